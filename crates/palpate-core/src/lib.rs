@@ -1,0 +1,3 @@
+//! The part of palpate that also runs on a microcontroller.
+#![no_std]
+#![forbid(unsafe_code)]
