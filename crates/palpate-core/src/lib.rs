@@ -1,3 +1,8 @@
-//! The part of palpate that also runs on a microcontroller.
+//! The part of palpate that also runs on a microcontroller: a reading goes in, an estimate comes out.
+//! No allocation, no standard library.
 #![no_std]
 #![forbid(unsafe_code)]
+
+mod activation;
+
+pub use activation::Activation;

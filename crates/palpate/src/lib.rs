@@ -1,1 +1,3 @@
-//! palpate.
+//! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
+
+pub mod network;
