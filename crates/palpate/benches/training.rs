@@ -1,0 +1,84 @@
+//! Presentations per second of the paper's 8–10–1 network: each instruction set against the scalar twin, one core, in
+//! CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
+
+use cpu_time::ThreadTime;
+use palpate::network::{
+    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, SeedQueue, Topology, TrainedNetwork,
+    TrainingTask, train_many, train_one,
+};
+
+const ROUNDS: usize = 9;
+const EPOCHS: u32 = 400;
+
+fn main() {
+    for count in [10, 20, 30] {
+        for precision in [Precision::F64, Precision::F32] {
+            compare(count, precision);
+        }
+    }
+}
+
+fn compare(count: usize, precision: Precision) {
+    let patterns = beam_patterns(count);
+    let topology = Topology::new(&NetworkConfig::default(), patterns.inputs, patterns.outputs);
+    let rule = BackPropagation { aggregate_error: 0.0, max_epochs: EPOCHS, ..BackPropagation::default() };
+    let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
+    let sets = InstructionSet::available();
+    let mut rates = vec![Vec::new(); sets.len() + 1];
+    for _ in 0..ROUNDS {
+        let start = ThreadTime::now();
+        for seed in 0..4 {
+            train_one(precision, &task, seed, &mut || true);
+        }
+        rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
+        for (set, rates) in sets.iter().zip(&mut rates[1..]) {
+            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let start = ThreadTime::now();
+            train_many(*set, precision, &task, &mut queue);
+            let presentations = f64::from(EPOCHS) * (count * 4 * set.lanes(precision)) as f64;
+            rates.push(presentations / start.elapsed().as_secs_f64());
+        }
+    }
+    let medians: Vec<f64> = rates.iter_mut().map(|r| median(r)).collect();
+    println!("{count} patterns, {precision:?}: scalar twin {:.2} M/s", medians[0] / 1e6);
+    for (set, rate) in sets.iter().zip(&medians[1..]) {
+        println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+struct Seeds {
+    left: u64,
+}
+
+impl SeedQueue for Seeds {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.left = self.left.checked_sub(1)?;
+        Some(self.left)
+    }
+    fn finished(&mut self, _: u64, network: TrainedNetwork) {
+        std::hint::black_box(network);
+    }
+    fn keep_going(&mut self) -> bool {
+        true
+    }
+}
+
+fn beam_patterns(count: usize) -> Patterns {
+    let mut patterns = Patterns { inputs: 8, outputs: 1, input_values: vec![], target_values: vec![] };
+    for p in 0..count {
+        let a = (p as f64 + 0.5) / count as f64;
+        for i in 1..=8 {
+            let x = i as f64 / 9.0;
+            let (x, a) = if x <= a { (x, a) } else { (1.0 - x, 1.0 - a) };
+            let b = 1.0 - a;
+            patterns.input_values.push(-8.0 * b * x * (1.0 - b * b - x * x));
+        }
+        patterns.target_values.push(a);
+    }
+    patterns
+}

@@ -1,0 +1,122 @@
+//! AVX2 with FMA: four f64 or eight f32 at a time.
+//!
+//! Safety of every block here: the types are private to the lanes, and [`super::dispatch`] enters the kernel with
+//! them only after `is_x86_feature_detected!` has found AVX2 and FMA, so the instructions exist.
+
+use super::Lanes;
+use std::arch::x86_64::*;
+
+/// Four f64.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct F64x4(__m256d);
+
+/// Eight f32.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct F32x8(__m256);
+
+/// A method that is one instruction.
+macro_rules! instruction {
+    ($name:ident($($operand:ident),*) $intrinsic:ident) => {
+        #[inline(always)]
+        fn $name(self, $($operand: Self),*) -> Self {
+            // SAFETY: see the head of this file.
+            Self(unsafe { $intrinsic(self.0, $($operand.0),*) })
+        }
+    };
+}
+
+impl Lanes<4> for F64x4 {
+    type Real = f64;
+    type Picks = [u32; 4];
+
+    #[inline(always)]
+    fn from_array(values: [f64; 4]) -> Self {
+        // SAFETY: see the head of this file; the load is unaligned and the array has four elements.
+        Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f64; 4] {
+        let mut values = [0.0; 4];
+        // SAFETY: see the head of this file; the store is unaligned and the array has four elements.
+        unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) };
+        values
+    }
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        // SAFETY: see the head of this file.
+        Self(unsafe { _mm256_set1_pd(value) })
+    }
+    instruction!(add(other) _mm256_add_pd);
+    instruction!(sub(other) _mm256_sub_pd);
+    instruction!(mul(other) _mm256_mul_pd);
+    instruction!(div(other) _mm256_div_pd);
+    instruction!(min(other) _mm256_min_pd);
+    instruction!(max(other) _mm256_max_pd);
+    instruction!(mul_add(factor, term) _mm256_fmadd_pd);
+    instruction!(mul_sub(factor, term) _mm256_fmsub_pd);
+    #[inline(always)]
+    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+        // SAFETY: see the head of this file.
+        Self(unsafe {
+            let exponent = _mm256_slli_epi64::<52>(_mm256_castpd_si256(shifted.0));
+            _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(self.0), exponent))
+        })
+    }
+    #[inline(always)]
+    fn picks(patterns: &[u32; 4]) -> [u32; 4] {
+        *patterns
+    }
+    #[inline(always)]
+    fn lookup(column: &[f64], picks: [u32; 4]) -> Self {
+        Self::from_array(picks.map(|pick| column[pick as usize]))
+    }
+}
+
+impl Lanes<8> for F32x8 {
+    type Real = f32;
+    type Picks = [u32; 8];
+
+    #[inline(always)]
+    fn from_array(values: [f32; 8]) -> Self {
+        // SAFETY: see the head of this file; the load is unaligned and the array has eight elements.
+        Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 8] {
+        let mut values = [0.0; 8];
+        // SAFETY: see the head of this file; the store is unaligned and the array has eight elements.
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: see the head of this file.
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+    instruction!(add(other) _mm256_add_ps);
+    instruction!(sub(other) _mm256_sub_ps);
+    instruction!(mul(other) _mm256_mul_ps);
+    instruction!(div(other) _mm256_div_ps);
+    instruction!(min(other) _mm256_min_ps);
+    instruction!(max(other) _mm256_max_ps);
+    instruction!(mul_add(factor, term) _mm256_fmadd_ps);
+    instruction!(mul_sub(factor, term) _mm256_fmsub_ps);
+    #[inline(always)]
+    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+        // SAFETY: see the head of this file.
+        Self(unsafe {
+            let exponent = _mm256_slli_epi32::<23>(_mm256_castps_si256(shifted.0));
+            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(self.0), exponent))
+        })
+    }
+    #[inline(always)]
+    fn picks(patterns: &[u32; 8]) -> [u32; 8] {
+        *patterns
+    }
+    #[inline(always)]
+    fn lookup(column: &[f32], picks: [u32; 8]) -> Self {
+        Self::from_array(picks.map(|pick| column[pick as usize]))
+    }
+}

@@ -1,0 +1,300 @@
+//! Back-propagation with momentum of N networks side by side, the same arithmetic as [`crate::network::scalar`].
+//!
+//! Symbols: w weights, Δ the last step of the weights, x inputs of a layer, z weighted sums, a outputs, t targets,
+//! δ = −∂E/∂z, η learning rate, α momentum.
+//!
+//! What bounds it: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
+//! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
+//! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
+//! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
+
+use super::order::{OrderDrawer, Streams};
+use super::{Lanes, Real, SHORTEST_COLUMN, logistic};
+use crate::network::{
+    Activation, BackPropagation, PresentationOrder, SeedQueue, TrainedNetwork, TrainingOutcome, TrainingTask,
+};
+use std::mem::swap;
+
+/// Trains every network of the queue. A lane whose network has finished takes the next seed.
+#[inline(always)]
+pub(super) fn train<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
+    let mut group = Group::<V, N>::new(task);
+    for lane in 0..N {
+        group.start_next(lane, queue);
+    }
+    group.sum_first_pattern();
+    while group.is_busy() && queue.keep_going() {
+        let errors = group.run_epoch();
+        if group.retire(errors.to_array(), queue) {
+            group.sum_first_pattern();
+        }
+    }
+}
+
+/// The network in one lane.
+#[derive(Clone, Copy)]
+struct Occupant {
+    seed: u64,
+    epochs: u32,
+}
+
+/// One layer of N networks.
+struct Layer<V> {
+    activation: Activation,
+    row_len: usize,
+    /// w, row by row.
+    weights: Vec<V>,
+    /// w of one update before.
+    before: Vec<V>,
+    /// z, then a; followed by the constant 1 that biases weigh.
+    outputs: Vec<V>,
+    /// δ, gathered over the layer above.
+    deltas: Vec<V>,
+}
+
+struct Group<'t, V: Lanes<N>, const N: usize> {
+    task: &'t TrainingTask<'t>,
+    /// Values of one input over all patterns, by input; then of one target, by output.
+    input_columns: Vec<Vec<V::Real>>,
+    target_columns: Vec<Vec<V::Real>>,
+    occupants: [Option<Occupant>; N],
+    streams: Streams<N>,
+    drawer: OrderDrawer,
+    /// This epoch's patterns, a row a presentation; and the next epoch's, whose first pattern ends this one.
+    order: Vec<[u32; N]>,
+    next_order: Vec<[u32; N]>,
+    /// x of this pattern and of the next, each followed by the constant 1 that biases weigh.
+    inputs: Vec<V>,
+    next_inputs: Vec<V>,
+    layers: Vec<Layer<V>>,
+}
+
+impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
+    fn new(task: &'t TrainingTask<'t>) -> Self {
+        let (topology, patterns) = (task.topology, task.patterns);
+        let one = V::splat(V::Real::from_f64(1.0));
+        let zero = V::splat(V::Real::from_f64(0.0));
+        let layer = |k: usize| Layer {
+            activation: topology.activation(k),
+            row_len: topology.row_len(k),
+            weights: vec![zero; topology.rows(k) * topology.row_len(k)],
+            before: vec![zero; topology.rows(k) * topology.row_len(k)],
+            outputs: vec![one; topology.rows(k) + usize::from(topology.biases)],
+            deltas: vec![zero; topology.rows(k) + usize::from(topology.biases)],
+        };
+        let identity: Vec<[u32; N]> = (0..patterns.count()).map(|pattern| [pattern as u32; N]).collect();
+        Self {
+            task,
+            input_columns: columns(&patterns.input_values, patterns.inputs),
+            target_columns: columns(&patterns.target_values, patterns.outputs),
+            occupants: [None; N],
+            streams: Streams::unseeded(),
+            drawer: OrderDrawer::new(patterns.count()),
+            next_order: identity.clone(),
+            order: identity,
+            inputs: vec![one; topology.row_len(0)],
+            next_inputs: vec![one; topology.row_len(0)],
+            layers: (0..topology.layers()).map(layer).collect(),
+        }
+    }
+
+    fn is_busy(&self) -> bool {
+        self.occupants.iter().any(Option::is_some)
+    }
+
+    /// Puts the queue's next network into a lane, or leaves the lane idle.
+    fn start_next(&mut self, lane: usize, queue: &mut dyn SeedQueue) {
+        let Some(seed) = queue.next_seed() else {
+            self.occupants[lane] = None;
+            return;
+        };
+        self.occupants[lane] = Some(Occupant { seed, epochs: 0 });
+        let mut stream = Streams::seeded(seed);
+        for layer in &mut self.layers {
+            for (weight, before) in layer.weights.iter_mut().zip(&mut layer.before) {
+                let value = V::Real::from_f64(stream.uniform(self.task.rule.initial_weights));
+                set_lane(weight, lane, value);
+                set_lane(before, lane, value);
+            }
+        }
+        if self.task.rule.order == PresentationOrder::Shuffled {
+            let mut picks = vec![0; self.drawer.patterns()];
+            self.drawer.draw_one(&mut stream, &mut picks);
+            for (row, pick) in self.order.iter_mut().zip(picks) {
+                row[lane] = pick;
+            }
+        }
+        self.streams.set(lane, &stream);
+    }
+
+    /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
+    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue) -> bool {
+        let mut replaced = false;
+        for (lane, error) in errors.into_iter().enumerate() {
+            let Some(occupant) = &mut self.occupants[lane] else { continue };
+            occupant.epochs += 1;
+            let Occupant { seed, epochs } = *occupant;
+            let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), self.task.rule) else {
+                continue;
+            };
+            let weights = self.layers.iter().flat_map(|layer| &layer.weights);
+            let weights = weights.map(|weight| weight.to_array()[lane].to_f64()).collect();
+            queue.finished(seed, TrainedNetwork { topology: self.task.topology.clone(), weights, outcome });
+            self.start_next(lane, queue);
+            replaced = true;
+        }
+        replaced
+    }
+
+    /// z of the first layer for the first pattern; afterwards the pass over the layer keeps one pattern ahead.
+    #[inline(always)]
+    fn sum_first_pattern(&mut self) {
+        look_up(&self.input_columns, &self.order[0], &mut self.inputs);
+        let layer = &mut self.layers[0];
+        for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
+            *output = weighted_sum(row, &self.inputs);
+        }
+    }
+
+    /// Presents every pattern once; the sums of squared errors.
+    #[inline(always)]
+    fn run_epoch(&mut self) -> V {
+        if self.task.rule.order == PresentationOrder::Shuffled {
+            self.drawer.draw(&mut self.streams, &mut self.next_order);
+        }
+        let mut error = V::splat(V::Real::from_f64(0.0));
+        for presentation in 0..self.order.len() {
+            let following = self.order.get(presentation + 1).unwrap_or(&self.next_order[0]);
+            look_up(&self.input_columns, following, &mut self.next_inputs);
+            self.forward();
+            let picks = V::picks(&self.order[presentation]);
+            error = self.compare_with_targets(picks, error);
+            self.backward();
+            self.update_first_layer();
+            swap(&mut self.inputs, &mut self.next_inputs);
+        }
+        swap(&mut self.order, &mut self.next_order);
+        error
+    }
+
+    /// From the first layer's sums to the outputs.
+    #[inline(always)]
+    fn forward(&mut self) {
+        for k in 0..self.layers.len() {
+            let (below, layer) = self.layers.split_at_mut(k);
+            let layer = &mut layer[0];
+            if let Some(below) = below.last() {
+                for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
+                    *output = weighted_sum(row, &below.outputs);
+                }
+            }
+            let rows = layer.weights.len() / layer.row_len;
+            logistic::activate(layer.activation, &mut layer.outputs[..rows]);
+        }
+    }
+
+    /// δ of the output layer; adds the squared errors to `error`.
+    #[inline(always)]
+    fn compare_with_targets(&mut self, picks: V::Picks, mut error: V) -> V {
+        if let Some(layer) = self.layers.last_mut() {
+            for ((column, output), delta) in
+                self.target_columns.iter().zip(&layer.outputs).zip(&mut layer.deltas)
+            {
+                let difference = V::lookup(column, picks).sub(*output);
+                error = difference.mul_add(difference, error);
+                *delta = difference.mul(logistic::derivative(layer.activation, *output));
+            }
+        }
+        error
+    }
+
+    /// From the output layer down to the second: sends δ to the layer below, then updates the weights.
+    #[inline(always)]
+    fn backward(&mut self) {
+        let (eta, alpha) = rates::<V, N>(self.task.rule);
+        let zero = V::splat(V::Real::from_f64(0.0));
+        for k in (1..self.layers.len()).rev() {
+            let (below, layer) = self.layers.split_at_mut(k);
+            let (below, layer) = (&mut below[k - 1], &mut layer[0]);
+            below.deltas.fill(zero);
+            let rows = layer.weights.chunks_exact(layer.row_len);
+            for ((row, before), delta) in
+                rows.zip(layer.before.chunks_exact_mut(layer.row_len)).zip(&layer.deltas)
+            {
+                let step = eta.mul(*delta);
+                for (((w, before), x), back) in
+                    row.iter().zip(before).zip(&below.outputs).zip(&mut below.deltas)
+                {
+                    *back = w.mul_add(*delta, *back);
+                    *before = step.mul_add(*x, alpha.mul_add(w.sub(*before), *w));
+                }
+            }
+            swap(&mut layer.weights, &mut layer.before);
+            for (delta, output) in below.deltas.iter_mut().zip(&below.outputs) {
+                *delta = delta.mul(logistic::derivative(below.activation, *output));
+            }
+        }
+    }
+
+    /// Updates the first layer with this pattern and sums it for the next, in one pass.
+    #[inline(always)]
+    fn update_first_layer(&mut self) {
+        let (eta, alpha) = rates::<V, N>(self.task.rule);
+        let layer = &mut self.layers[0];
+        let rows = layer.weights.chunks_exact(layer.row_len);
+        let rows = rows.zip(layer.before.chunks_exact_mut(layer.row_len));
+        for (((row, before), output), delta) in rows.zip(&mut layer.outputs).zip(&layer.deltas) {
+            let step = eta.mul(*delta);
+            let mut sum = V::splat(V::Real::from_f64(0.0));
+            for (((w, before), x), next_x) in row.iter().zip(before).zip(&self.inputs).zip(&self.next_inputs)
+            {
+                let new = step.mul_add(*x, alpha.mul_add(w.sub(*before), *w));
+                *before = new;
+                sum = new.mul_add(*next_x, sum);
+            }
+            *output = sum;
+        }
+        swap(&mut layer.weights, &mut layer.before);
+    }
+}
+
+#[inline(always)]
+fn rates<V: Lanes<N>, const N: usize>(rule: &BackPropagation) -> (V, V) {
+    (V::splat(V::Real::from_f64(rule.learning_rate)), V::splat(V::Real::from_f64(rule.momentum)))
+}
+
+#[inline(always)]
+fn weighted_sum<V: Lanes<N>, const N: usize>(row: &[V], inputs: &[V]) -> V {
+    let mut sum = V::splat(V::Real::from_f64(0.0));
+    for (w, x) in row.iter().zip(inputs) {
+        sum = w.mul_add(*x, sum);
+    }
+    sum
+}
+
+/// The values of each lane's pattern; the constant behind them stays.
+#[inline(always)]
+fn look_up<V: Lanes<N>, const N: usize>(columns: &[Vec<V::Real>], patterns: &[u32; N], values: &mut [V]) {
+    let picks = V::picks(patterns);
+    for (column, value) in columns.iter().zip(values) {
+        *value = V::lookup(column, picks);
+    }
+}
+
+fn set_lane<V: Lanes<N>, const N: usize>(vector: &mut V, lane: usize, value: V::Real) {
+    let mut values = vector.to_array();
+    values[lane] = value;
+    *vector = V::from_array(values);
+}
+
+/// Turns rows of `width` values into columns, padded so that any masked pattern number lies inside.
+fn columns<R: Real>(values: &[f64], width: usize) -> Vec<Vec<R>> {
+    let rows = values.len() / width.max(1);
+    let length = rows.next_power_of_two().max(SHORTEST_COLUMN);
+    let column = |c: usize| {
+        let mut column: Vec<R> = values.iter().skip(c).step_by(width).map(|&v| R::from_f64(v)).collect();
+        column.resize(length, R::from_f64(0.0));
+        column
+    };
+    (0..width).map(column).collect()
+}

@@ -1,0 +1,104 @@
+//! Many networks at once, one per SIMD lane.
+//!
+//! [`Lanes`] is the arithmetic that training needs, on N numbers at a time. One kernel ([`kernel`]) is written
+//! against it; the instruction sets ([`avx512`], [`avx2`]) and plain arrays ([`portable`]) implement it, and
+//! [`dispatch`] picks the widest that the machine has when the program runs. A multiply-add rounds once on every
+//! machine that can fuse it, so all of these give the same networks to the last bit.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod dispatch;
+mod kernel;
+mod logistic;
+mod order;
+mod portable;
+
+pub use dispatch::{InstructionSet, Precision};
+pub(super) use dispatch::{train_lanes, train_scalar};
+pub(super) use logistic::{activate, derivative};
+pub(super) use order::{OrderDrawer, Streams};
+
+/// The number in one lane.
+pub(crate) trait Real: Copy + PartialOrd + Send + Sync + 'static {
+    /// Adding then subtracting it rounds to a whole number, whose low bits then lie lowest in the sum: 1.5·2^mantissa.
+    const ROUNDER: Self;
+    /// Coefficients of the minimax polynomial of 2^r on |r| ≤ ½ (Remez, relative error), lowest first.
+    const EXP2: &'static [Self];
+    /// Beyond this |z| the logistic function is held, so that the product of two denominators stays finite.
+    const LOGISTIC_END: Self;
+    fn from_f64(x: f64) -> Self;
+    fn to_f64(self) -> f64;
+}
+
+impl Real for f64 {
+    const ROUNDER: Self = 6_755_399_441_055_744.0;
+    // Relative error 1.4e-14.
+    const EXP2: &'static [Self] = &[
+        1.000_000_000_000_012_7,
+        0.693_147_180_559_871,
+        0.240_226_506_956_496_53,
+        0.055_504_108_668_685_623,
+        0.009_618_129_192_067_193,
+        0.001_333_355_761_760_242_4,
+        0.000_154_034_349_481_035_28,
+        0.000_015_252_984_839_814_557,
+        1.325_940_560_357_369_6e-6,
+        1.015_033_649_514_861_8e-7,
+    ];
+    const LOGISTIC_END: Self = 350.0;
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f32 {
+    const ROUNDER: Self = 12_582_912.0;
+    // Relative error 7.5e-8.
+    const EXP2: &'static [Self] =
+        &[1.000_000_1, 0.693_146_94, 0.240_221_2, 0.055_507_13, 0.009_675_541, 0.001_327_647_2];
+    const LOGISTIC_END: Self = 43.0;
+    #[inline(always)]
+    fn from_f64(x: f64) -> Self {
+        x as f32
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+/// N numbers of one precision, side by side. Every operation is lane by lane and rounds as IEEE 754 says.
+pub(crate) trait Lanes<const N: usize>: Copy {
+    type Real: Real;
+    /// One pattern number a lane, in the form that [`Lanes::lookup`] wants.
+    type Picks: Copy;
+    fn from_array(values: [Self::Real; N]) -> Self;
+    fn to_array(self) -> [Self::Real; N];
+    fn splat(value: Self::Real) -> Self;
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    /// `self · factor + term`
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `self · factor − term`
+    fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// `self · 2^n`, where `shifted` = n + [`Real::ROUNDER`] and the result is a normal number.
+    fn scale_by_power_of_two(self, shifted: Self) -> Self;
+    fn picks(patterns: &[u32; N]) -> Self::Picks;
+    /// `column[pick]` in every lane. A column's length is a power of two, at least [`SHORTEST_COLUMN`], and greater
+    /// than every pick.
+    fn lookup(column: &[Self::Real], picks: Self::Picks) -> Self;
+}
+
+/// Columns are padded to at least this, two AVX-512 registers of f32.
+pub(crate) const SHORTEST_COLUMN: usize = 32;

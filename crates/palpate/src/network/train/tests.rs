@@ -1,0 +1,125 @@
+//! Every arithmetic gives the scalar twin's networks, to the last bit.
+
+use super::*;
+use crate::network::{Activation, NetworkConfig, PresentationOrder, TrainingStatus};
+
+/// A queue of the seeds 0…n.
+struct Seeds {
+    next: u64,
+    end: u64,
+    networks: Vec<(u64, TrainedNetwork)>,
+}
+
+impl SeedQueue for Seeds {
+    fn next_seed(&mut self) -> Option<u64> {
+        let seed = (self.next < self.end).then_some(self.next)?;
+        self.next += 1;
+        Some(seed)
+    }
+    fn finished(&mut self, seed: u64, network: TrainedNetwork) {
+        self.networks.push((seed, network));
+    }
+    fn keep_going(&mut self) -> bool {
+        true
+    }
+}
+
+/// y = sin x on a few points: enough to train on, and no symmetry to hide a mix-up of inputs.
+fn patterns(count: usize, inputs: usize, outputs: usize) -> Patterns {
+    let value = |k: usize| 0.5 + 0.4 * (1.0 + k as f64 * 0.7).sin();
+    Patterns {
+        inputs,
+        outputs,
+        input_values: (0..count * inputs).map(value).collect(),
+        target_values: (0..count * outputs).map(|k| value(k + 5)).collect(),
+    }
+}
+
+fn networks(
+    set: InstructionSet,
+    precision: Precision,
+    task: &TrainingTask,
+    seeds: u64,
+) -> Vec<TrainedNetwork> {
+    let mut queue = Seeds { next: 0, end: seeds, networks: Vec::new() };
+    train_many(set, precision, task, &mut queue);
+    queue.networks.sort_by_key(|(seed, _)| *seed);
+    assert_eq!(queue.networks.len() as u64, seeds);
+    queue.networks.into_iter().map(|(_, network)| network).collect()
+}
+
+fn compare_with_twin(config: &NetworkConfig, patterns: &Patterns, seeds: u64) {
+    let topology = Topology::new(config, patterns.inputs, patterns.outputs);
+    let task = TrainingTask { topology: &topology, patterns, rule: &config.training };
+    for precision in [Precision::F64, Precision::F32] {
+        let twin: Vec<_> =
+            (0..seeds).filter_map(|seed| train_one(precision, &task, seed, &mut || true)).collect();
+        for set in InstructionSet::available() {
+            assert_eq!(networks(set, precision, &task, seeds), twin, "{set}, {precision:?}, {config:?}");
+        }
+    }
+}
+
+fn config(max_epochs: u32) -> NetworkConfig {
+    let mut config = NetworkConfig::default();
+    config.training.max_epochs = max_epochs;
+    config
+}
+
+#[test]
+fn every_instruction_set_gives_the_twins_bits() {
+    for count in [1, 2, 7, 10, 17, 30, 33, 70] {
+        compare_with_twin(&config(60), &patterns(count, 8, 1), 21);
+    }
+}
+
+#[test]
+fn every_shape_gives_the_twins_bits() {
+    for hidden in [vec![], vec![3], vec![5, 4], vec![1, 2, 3]] {
+        for (hidden_activation, output_activation) in [
+            (Activation::Tanh, Activation::Linear),
+            (Activation::Logistic, Activation::Tanh),
+            (Activation::Linear, Activation::Logistic),
+        ] {
+            for biases in [true, false] {
+                let mut config = NetworkConfig {
+                    hidden: hidden.clone(),
+                    hidden_activation,
+                    output_activation,
+                    biases,
+                    ..config(25)
+                };
+                config.training.learning_rate = 0.1;
+                compare_with_twin(&config, &patterns(9, 3, 2), 5);
+            }
+        }
+    }
+}
+
+#[test]
+fn lanes_refill_as_networks_converge_at_their_own_time() {
+    let mut config = config(100_000);
+    config.training.aggregate_error = 0.05;
+    compare_with_twin(&config, &patterns(6, 4, 1), 40);
+}
+
+#[test]
+fn a_fixed_order_is_the_same_for_all() {
+    let mut config = config(40);
+    config.training.order = PresentationOrder::Fixed;
+    compare_with_twin(&config, &patterns(12, 8, 1), 10);
+}
+
+#[test]
+fn a_wild_step_diverges_and_says_so() {
+    let mut config = NetworkConfig { output_activation: Activation::Linear, ..config(10_000) };
+    config.training.learning_rate = 1e6;
+    config.hidden_activation = Activation::Linear;
+    let patterns = patterns(5, 3, 1);
+    let topology = Topology::new(&config, 3, 1);
+    let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &config.training };
+    for network in networks(InstructionSet::best(), Precision::F64, &task, 9) {
+        assert_eq!(network.outcome.status, TrainingStatus::Diverged);
+        assert!(network.outcome.epochs < 10_000);
+    }
+}
