@@ -18,7 +18,32 @@ use std::mem::swap;
 /// Trains every network of the queue. A lane whose network has finished takes the next seed.
 #[inline(always)]
 pub(super) fn train<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
-    let mut group = Group::<V, N>::new(task);
+    let topology = task.topology;
+    let one_hidden_layer = topology.layers() == 2;
+    if one_hidden_layer && topology.row_len(0) == 9 && topology.row_len(1) == 11 {
+        train_shape::<V, N, 9, 11>(task, queue);
+    } else {
+        train_shape::<V, N, ANY, ANY>(task, queue);
+    }
+}
+
+/// Stands for a row length that is known only when the program runs.
+const ANY: usize = 0;
+
+/// The row length `len`, as a constant where the shape is known: then loops over a row unroll, and the inputs of the
+/// paper's eight sensors stay in registers.
+#[inline(always)]
+fn row_len<const KNOWN: usize>(len: usize) -> usize {
+    if KNOWN == ANY { len } else { KNOWN }
+}
+
+/// [`train`] for rows of `FIRST` weights in the first layer and `UPPER` in every other.
+#[inline(always)]
+fn train_shape<V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn SeedQueue,
+) {
+    let mut group = Group::<V, N, FIRST, UPPER>::new(task);
     for lane in 0..N {
         group.start_next(lane, queue);
     }
@@ -52,7 +77,7 @@ struct Layer<V> {
     deltas: Vec<V>,
 }
 
-struct Group<'t, V: Lanes<N>, const N: usize> {
+struct Group<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> {
     task: &'t TrainingTask<'t>,
     /// Values of one input over all patterns, by input; then of one target, by output.
     input_columns: Vec<Vec<V::Real>>,
@@ -69,7 +94,7 @@ struct Group<'t, V: Lanes<N>, const N: usize> {
     layers: Vec<Layer<V>>,
 }
 
-impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
+impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Group<'t, V, N, FIRST, UPPER> {
     fn new(task: &'t TrainingTask<'t>) -> Self {
         let (topology, patterns) = (task.topology, task.patterns);
         let one = V::splat(V::Real::from_f64(1.0));
@@ -152,7 +177,7 @@ impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
         look_up(&self.input_columns, &self.order[0], &mut self.inputs);
         let layer = &mut self.layers[0];
         for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
-            *output = weighted_sum(row, &self.inputs);
+            *output = weighted_sum::<V, N, FIRST>(row, &self.inputs);
         }
     }
 
@@ -185,7 +210,7 @@ impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
             let layer = &mut layer[0];
             if let Some(below) = below.last() {
                 for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
-                    *output = weighted_sum(row, &below.outputs);
+                    *output = weighted_sum::<V, N, UPPER>(row, &below.outputs);
                 }
             }
             let rows = layer.weights.len() / layer.row_len;
@@ -218,16 +243,10 @@ impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
             let (below, layer) = (&mut below[k - 1], &mut layer[0]);
             below.deltas.fill(zero);
             let rows = layer.weights.chunks_exact(layer.row_len);
-            for ((row, before), delta) in
-                rows.zip(layer.before.chunks_exact_mut(layer.row_len)).zip(&layer.deltas)
-            {
-                let step = eta.mul(*delta);
-                for (((w, before), x), back) in
-                    row.iter().zip(before).zip(&below.outputs).zip(&mut below.deltas)
-                {
-                    *back = w.mul_add(*delta, *back);
-                    *before = step.mul_add(*x, alpha.mul_add(w.sub(*before), *w));
-                }
+            let rows = rows.zip(layer.before.chunks_exact_mut(layer.row_len));
+            for ((row, before), delta) in rows.zip(&layer.deltas) {
+                let step = Step { delta: *delta, eta_delta: eta.mul(*delta), alpha };
+                update_and_send_back::<V, N, UPPER>(row, before, &below.outputs, &mut below.deltas, step);
             }
             swap(&mut layer.weights, &mut layer.before);
             for (delta, output) in below.deltas.iter_mut().zip(&below.outputs) {
@@ -244,15 +263,8 @@ impl<'t, V: Lanes<N>, const N: usize> Group<'t, V, N> {
         let rows = layer.weights.chunks_exact(layer.row_len);
         let rows = rows.zip(layer.before.chunks_exact_mut(layer.row_len));
         for (((row, before), output), delta) in rows.zip(&mut layer.outputs).zip(&layer.deltas) {
-            let step = eta.mul(*delta);
-            let mut sum = V::splat(V::Real::from_f64(0.0));
-            for (((w, before), x), next_x) in row.iter().zip(before).zip(&self.inputs).zip(&self.next_inputs)
-            {
-                let new = step.mul_add(*x, alpha.mul_add(w.sub(*before), *w));
-                *before = new;
-                sum = new.mul_add(*next_x, sum);
-            }
-            *output = sum;
+            let step = Step { delta: *delta, eta_delta: eta.mul(*delta), alpha };
+            *output = update_and_sum::<V, N, FIRST>(row, before, &self.inputs, &self.next_inputs, step);
         }
         swap(&mut layer.weights, &mut layer.before);
     }
@@ -264,12 +276,69 @@ fn rates<V: Lanes<N>, const N: usize>(rule: &BackPropagation) -> (V, V) {
 }
 
 #[inline(always)]
-fn weighted_sum<V: Lanes<N>, const N: usize>(row: &[V], inputs: &[V]) -> V {
+fn weighted_sum<V: Lanes<N>, const N: usize, const KNOWN: usize>(row: &[V], inputs: &[V]) -> V {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, inputs) = (&row[..len], &inputs[..len]);
     let mut sum = V::splat(V::Real::from_f64(0.0));
-    for (w, x) in row.iter().zip(inputs) {
-        sum = w.mul_add(*x, sum);
+    for i in 0..len {
+        sum = row[i].mul_add(inputs[i], sum);
     }
     sum
+}
+
+/// What one node's weights move by: η δ x + α Δ.
+#[derive(Clone, Copy)]
+struct Step<V> {
+    delta: V,
+    eta_delta: V,
+    alpha: V,
+}
+
+impl<V> Step<V> {
+    #[inline(always)]
+    fn apply<const N: usize>(&self, w: V, before: V, x: V) -> V
+    where
+        V: Lanes<N>,
+    {
+        self.eta_delta.mul_add(x, self.alpha.mul_add(w.sub(before), w))
+    }
+}
+
+/// Updates a node's weights, and sums them over the next pattern's inputs.
+#[inline(always)]
+fn update_and_sum<V: Lanes<N>, const N: usize, const KNOWN: usize>(
+    row: &[V],
+    before: &mut [V],
+    x: &[V],
+    next_x: &[V],
+    step: Step<V>,
+) -> V {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, before, x, next_x) = (&row[..len], &mut before[..len], &x[..len], &next_x[..len]);
+    let mut sum = V::splat(V::Real::from_f64(0.0));
+    for i in 0..len {
+        let new = step.apply(row[i], before[i], x[i]);
+        before[i] = new;
+        sum = new.mul_add(next_x[i], sum);
+    }
+    sum
+}
+
+/// Adds a node's share to the δ of the layer below, and updates its weights.
+#[inline(always)]
+fn update_and_send_back<V: Lanes<N>, const N: usize, const KNOWN: usize>(
+    row: &[V],
+    before: &mut [V],
+    x: &[V],
+    back: &mut [V],
+    step: Step<V>,
+) {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, before, x, back) = (&row[..len], &mut before[..len], &x[..len], &mut back[..len]);
+    for i in 0..len {
+        back[i] = row[i].mul_add(step.delta, back[i]);
+        before[i] = step.apply(row[i], before[i], x[i]);
+    }
 }
 
 /// The values of each lane's pattern; the constant behind them stays.
