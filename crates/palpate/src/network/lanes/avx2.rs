@@ -3,7 +3,7 @@
 //! Safety of every block here: the types are private to the lanes, and [`super::dispatch`] enters the kernel with
 //! them only after `is_x86_feature_detected!` has found AVX2 and FMA, so the instructions exist.
 
-use super::Lanes;
+use super::{Lanes, Table};
 use std::arch::x86_64::*;
 
 /// Four f64.
@@ -29,7 +29,6 @@ macro_rules! instruction {
 
 impl Lanes<4> for F64x4 {
     type Real = f64;
-    type Picks = [u32; 4];
 
     #[inline(always)]
     fn from_array(values: [f64; 4]) -> Self {
@@ -65,18 +64,13 @@ impl Lanes<4> for F64x4 {
         })
     }
     #[inline(always)]
-    fn picks(patterns: &[u32; 4]) -> [u32; 4] {
-        *patterns
-    }
-    #[inline(always)]
-    fn lookup(column: &[f64], picks: [u32; 4]) -> Self {
-        Self::from_array(picks.map(|pick| column[pick as usize]))
+    fn look_up(table: &Table<f64>, picks: &[u32; 4], values: &mut [Self]) {
+        table.look_up_singly(picks, values);
     }
 }
 
 impl Lanes<8> for F32x8 {
     type Real = f32;
-    type Picks = [u32; 8];
 
     #[inline(always)]
     fn from_array(values: [f32; 8]) -> Self {
@@ -112,11 +106,7 @@ impl Lanes<8> for F32x8 {
         })
     }
     #[inline(always)]
-    fn picks(patterns: &[u32; 8]) -> [u32; 8] {
-        *patterns
-    }
-    #[inline(always)]
-    fn lookup(column: &[f32], picks: [u32; 8]) -> Self {
-        Self::from_array(picks.map(|pick| column[pick as usize]))
+    fn look_up(table: &Table<f32>, picks: &[u32; 8], values: &mut [Self]) {
+        table.look_up_singly(picks, values);
     }
 }

@@ -3,7 +3,7 @@
 //! Safety of every block here: the types are private to the lanes, and [`super::dispatch`] enters the kernel with
 //! them only after `is_x86_feature_detected!` has found AVX-512 F and DQ, so the instructions exist.
 
-use super::Lanes;
+use super::{Lanes, Table};
 use std::arch::x86_64::*;
 
 /// Eight f64.
@@ -29,7 +29,6 @@ macro_rules! instruction {
 
 impl Lanes<8> for F64x8 {
     type Real = f64;
-    type Picks = __m512i;
 
     #[inline(always)]
     fn from_array(values: [f64; 8]) -> Self {
@@ -65,34 +64,27 @@ impl Lanes<8> for F64x8 {
         })
     }
     #[inline(always)]
-    fn picks(patterns: &[u32; 8]) -> __m512i {
-        // SAFETY: see the head of this file; the load is unaligned and the array has eight elements.
-        unsafe { _mm512_cvtepu32_epi64(_mm256_loadu_si256(patterns.as_ptr().cast())) }
-    }
-    #[inline(always)]
-    fn lookup(column: &[f64], picks: __m512i) -> Self {
-        // Up to 32 values lie in four registers, which two permutes and a blend search faster than a gather.
-        let Some((table, _)) = column.split_first_chunk::<32>().filter(|(_, rest)| rest.is_empty()) else {
-            return Self::from_array(std::array::from_fn(|l| {
-                // SAFETY: a vector of eight 64-bit numbers has the layout of their array.
-                let picks: [u64; 8] = unsafe { std::mem::transmute(picks) };
-                column[picks[l] as usize]
-            }));
+    fn look_up(table: &Table<f64>, picks: &[u32; 8], values: &mut [Self]) {
+        let Some(columns) = table.short_columns() else {
+            return table.look_up_singly(picks, values);
         };
-        // SAFETY: see the head of this file; the loads are unaligned and lie within the 32 values.
-        Self(unsafe {
-            let part = |k: usize| _mm512_loadu_pd(table.as_ptr().add(8 * k));
-            let low = _mm512_permutex2var_pd(part(0), picks, part(1));
-            let high = _mm512_permutex2var_pd(part(2), picks, part(3));
+        // Thirty-two values lie in four registers, which two permutes and a blend search faster than a gather.
+        // SAFETY: see the head of this file; the loads are unaligned and lie within the eight picks and 32 values.
+        unsafe {
+            let picks = _mm512_cvtepu32_epi64(_mm256_loadu_si256(picks.as_ptr().cast()));
             let upper_half = _mm512_test_epi64_mask(picks, _mm512_set1_epi64(16));
-            _mm512_mask_blend_pd(upper_half, low, high)
-        })
+            for (column, value) in columns.iter().zip(values) {
+                let part = |k: usize| _mm512_loadu_pd(column.as_ptr().add(8 * k));
+                let low = _mm512_permutex2var_pd(part(0), picks, part(1));
+                let high = _mm512_permutex2var_pd(part(2), picks, part(3));
+                *value = Self(_mm512_mask_blend_pd(upper_half, low, high));
+            }
+        }
     }
 }
 
 impl Lanes<16> for F32x16 {
     type Real = f32;
-    type Picks = __m512i;
 
     #[inline(always)]
     fn from_array(values: [f32; 16]) -> Self {
@@ -128,24 +120,18 @@ impl Lanes<16> for F32x16 {
         })
     }
     #[inline(always)]
-    fn picks(patterns: &[u32; 16]) -> __m512i {
-        // SAFETY: see the head of this file; the load is unaligned and the array has sixteen elements.
-        unsafe { _mm512_loadu_si512(patterns.as_ptr().cast()) }
-    }
-    #[inline(always)]
-    fn lookup(column: &[f32], picks: __m512i) -> Self {
-        // Up to 32 values lie in two registers, which one permute searches faster than a gather.
-        let Some((table, _)) = column.split_first_chunk::<32>().filter(|(_, rest)| rest.is_empty()) else {
-            return Self::from_array(std::array::from_fn(|l| {
-                // SAFETY: a vector of sixteen 32-bit numbers has the layout of their array.
-                let picks: [u32; 16] = unsafe { std::mem::transmute(picks) };
-                column[picks[l] as usize]
-            }));
+    fn look_up(table: &Table<f32>, picks: &[u32; 16], values: &mut [Self]) {
+        let Some(columns) = table.short_columns() else {
+            return table.look_up_singly(picks, values);
         };
-        // SAFETY: see the head of this file; the loads are unaligned and lie within the 32 values.
-        Self(unsafe {
-            let part = |k: usize| _mm512_loadu_ps(table.as_ptr().add(16 * k));
-            _mm512_permutex2var_ps(part(0), picks, part(1))
-        })
+        // Thirty-two values lie in two registers, which one permute searches faster than a gather.
+        // SAFETY: see the head of this file; the loads are unaligned and lie within the sixteen picks and 32 values.
+        unsafe {
+            let picks = _mm512_loadu_si512(picks.as_ptr().cast());
+            for (column, value) in columns.iter().zip(values) {
+                let part = |k: usize| _mm512_loadu_ps(column.as_ptr().add(16 * k));
+                *value = Self(_mm512_permutex2var_ps(part(0), picks, part(1)));
+            }
+        }
     }
 }

@@ -9,7 +9,7 @@
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
 
 use super::order::{OrderDrawer, Streams};
-use super::{Lanes, Real, SHORTEST_COLUMN, logistic};
+use super::{Lanes, Real, Table, logistic};
 use crate::network::{
     Activation, BackPropagation, PresentationOrder, SeedQueue, TrainedNetwork, TrainingOutcome, TrainingTask,
 };
@@ -79,9 +79,9 @@ struct Layer<V> {
 
 struct Group<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> {
     task: &'t TrainingTask<'t>,
-    /// Values of one input over all patterns, by input; then of one target, by output.
-    input_columns: Vec<Vec<V::Real>>,
-    target_columns: Vec<Vec<V::Real>>,
+    /// The patterns, a column an input and a column an output.
+    input_table: Table<V::Real>,
+    target_table: Table<V::Real>,
     occupants: [Option<Occupant>; N],
     streams: Streams<N>,
     drawer: OrderDrawer,
@@ -91,6 +91,7 @@ struct Group<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: u
     /// x of this pattern and of the next, each followed by the constant 1 that biases weigh.
     inputs: Vec<V>,
     next_inputs: Vec<V>,
+    targets: Vec<V>,
     layers: Vec<Layer<V>>,
 }
 
@@ -110,8 +111,8 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
         let identity: Vec<[u32; N]> = (0..patterns.count()).map(|pattern| [pattern as u32; N]).collect();
         Self {
             task,
-            input_columns: columns(&patterns.input_values, patterns.inputs),
-            target_columns: columns(&patterns.target_values, patterns.outputs),
+            input_table: Table::from_rows(&patterns.input_values, patterns.inputs),
+            target_table: Table::from_rows(&patterns.target_values, patterns.outputs),
             occupants: [None; N],
             streams: Streams::unseeded(),
             drawer: OrderDrawer::new(patterns.count()),
@@ -119,6 +120,7 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
             order: identity,
             inputs: vec![one; topology.row_len(0)],
             next_inputs: vec![one; topology.row_len(0)],
+            targets: vec![zero; topology.outputs()],
             layers: (0..topology.layers()).map(layer).collect(),
         }
     }
@@ -174,7 +176,7 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
     /// z of the first layer for the first pattern; afterwards the pass over the layer keeps one pattern ahead.
     #[inline(always)]
     fn sum_first_pattern(&mut self) {
-        look_up(&self.input_columns, &self.order[0], &mut self.inputs);
+        V::look_up(&self.input_table, &self.order[0], &mut self.inputs);
         let layer = &mut self.layers[0];
         for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
             *output = weighted_sum::<V, N, FIRST>(row, &self.inputs);
@@ -190,10 +192,10 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
         let mut error = V::splat(V::Real::from_f64(0.0));
         for presentation in 0..self.order.len() {
             let following = self.order.get(presentation + 1).unwrap_or(&self.next_order[0]);
-            look_up(&self.input_columns, following, &mut self.next_inputs);
+            V::look_up(&self.input_table, following, &mut self.next_inputs);
             self.forward();
-            let picks = V::picks(&self.order[presentation]);
-            error = self.compare_with_targets(picks, error);
+            V::look_up(&self.target_table, &self.order[presentation], &mut self.targets);
+            error = self.compare_with_targets(error);
             self.backward();
             self.update_first_layer();
             swap(&mut self.inputs, &mut self.next_inputs);
@@ -220,12 +222,10 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
 
     /// δ of the output layer; adds the squared errors to `error`.
     #[inline(always)]
-    fn compare_with_targets(&mut self, picks: V::Picks, mut error: V) -> V {
+    fn compare_with_targets(&mut self, mut error: V) -> V {
         if let Some(layer) = self.layers.last_mut() {
-            for ((column, output), delta) in
-                self.target_columns.iter().zip(&layer.outputs).zip(&mut layer.deltas)
-            {
-                let difference = V::lookup(column, picks).sub(*output);
+            for ((target, output), delta) in self.targets.iter().zip(&layer.outputs).zip(&mut layer.deltas) {
+                let difference = target.sub(*output);
                 error = difference.mul_add(difference, error);
                 *delta = difference.mul(logistic::derivative(layer.activation, *output));
             }
@@ -341,29 +341,8 @@ fn update_and_send_back<V: Lanes<N>, const N: usize, const KNOWN: usize>(
     }
 }
 
-/// The values of each lane's pattern; the constant behind them stays.
-#[inline(always)]
-fn look_up<V: Lanes<N>, const N: usize>(columns: &[Vec<V::Real>], patterns: &[u32; N], values: &mut [V]) {
-    let picks = V::picks(patterns);
-    for (column, value) in columns.iter().zip(values) {
-        *value = V::lookup(column, picks);
-    }
-}
-
 fn set_lane<V: Lanes<N>, const N: usize>(vector: &mut V, lane: usize, value: V::Real) {
     let mut values = vector.to_array();
     values[lane] = value;
     *vector = V::from_array(values);
-}
-
-/// Turns rows of `width` values into columns, padded so that any masked pattern number lies inside.
-fn columns<R: Real>(values: &[f64], width: usize) -> Vec<Vec<R>> {
-    let rows = values.len() / width.max(1);
-    let length = rows.next_power_of_two().max(SHORTEST_COLUMN);
-    let column = |c: usize| {
-        let mut column: Vec<R> = values.iter().skip(c).step_by(width).map(|&v| R::from_f64(v)).collect();
-        column.resize(length, R::from_f64(0.0));
-        column
-    };
-    (0..width).map(column).collect()
 }

@@ -77,8 +77,6 @@ impl Real for f32 {
 /// N numbers of one precision, side by side. Every operation is lane by lane and rounds as IEEE 754 says.
 pub(crate) trait Lanes<const N: usize>: Copy {
     type Real: Real;
-    /// One pattern number a lane, in the form that [`Lanes::lookup`] wants.
-    type Picks: Copy;
     fn from_array(values: [Self::Real; N]) -> Self;
     fn to_array(self) -> [Self::Real; N];
     fn splat(value: Self::Real) -> Self;
@@ -94,11 +92,46 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn mul_sub(self, factor: Self, term: Self) -> Self;
     /// `self · 2^n`, where `shifted` = n + [`Real::ROUNDER`] and the result is a normal number.
     fn scale_by_power_of_two(self, shifted: Self) -> Self;
-    fn picks(patterns: &[u32; N]) -> Self::Picks;
-    /// `column[pick]` in every lane. A column's length is a power of two, at least [`SHORTEST_COLUMN`], and greater
-    /// than every pick.
-    fn lookup(column: &[Self::Real], picks: Self::Picks) -> Self;
+    /// For every column of the table, the value of each lane's pick.
+    fn look_up(table: &Table<Self::Real>, picks: &[u32; N], values: &mut [Self]);
+}
+
+/// Columns of numbers, one number a pattern.
+pub(crate) struct Table<R> {
+    /// Length of a column: a power of two, so that no pick, masked to it, lies outside.
+    column_len: usize,
+    values: Vec<R>,
+}
+
+impl<R: Real> Table<R> {
+    /// Turns rows of `width` values into columns.
+    pub(crate) fn from_rows(rows: &[f64], width: usize) -> Self {
+        let column_len = (rows.len() / width.max(1)).next_power_of_two().max(SHORTEST_COLUMN);
+        let mut values = vec![R::from_f64(0.0); column_len * width];
+        for (k, &value) in rows.iter().enumerate() {
+            values[k % width * column_len + k / width] = R::from_f64(value);
+        }
+        Self { column_len, values }
+    }
+
+    /// One value after the other, for machines and tables that know no better.
+    #[inline(always)]
+    fn look_up_singly<V: Lanes<N, Real = R>, const N: usize>(&self, picks: &[u32; N], values: &mut [V]) {
+        for (column, value) in self.values.chunks_exact(self.column_len).zip(values) {
+            let mut lanes = [column[0]; N];
+            for l in 0..N {
+                lanes[l] = column[picks[l] as usize];
+            }
+            *value = V::from_array(lanes);
+        }
+    }
+
+    /// The columns as arrays, where they have the shortest length.
+    #[inline(always)]
+    fn short_columns(&self) -> Option<&[[R; SHORTEST_COLUMN]]> {
+        (self.column_len == SHORTEST_COLUMN).then(|| self.values.as_chunks().0)
+    }
 }
 
 /// Columns are padded to at least this, two AVX-512 registers of f32.
-pub(crate) const SHORTEST_COLUMN: usize = 32;
+const SHORTEST_COLUMN: usize = 32;

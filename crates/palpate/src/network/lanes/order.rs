@@ -107,12 +107,15 @@ impl OrderDrawer {
     /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane.
     #[inline(always)]
     pub(crate) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
+        // A copy of its own lets the generator's state stay in registers.
+        let mut local = streams.clone();
         for (pattern, row) in order.iter_mut().enumerate() {
-            let random = streams.next();
+            let random = local.next();
             for l in 0..N {
                 row[l] = (random[l] & !self.mask) | pattern as u32;
             }
         }
+        *streams = local;
         for &(i, j) in &self.exchanges {
             let (low, high) = (order[i], order[j]);
             for l in 0..N {

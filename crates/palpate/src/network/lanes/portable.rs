@@ -1,6 +1,6 @@
 //! Lanes as plain arrays: for every machine, and with one lane the arithmetic of the scalar twin.
 
-use super::{Lanes, Real};
+use super::{Lanes, Table};
 
 /// N numbers in an array. With `FUSED` a multiply-add rounds once, which is fast only where the instruction exists.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,6 @@ macro_rules! array_lanes {
     ($real:ty, $bits:ty, $shift:expr) => {
         impl<const N: usize, const FUSED: bool> Lanes<N> for Array<$real, N, FUSED> {
             type Real = $real;
-            type Picks = [u32; N];
 
             #[inline(always)]
             fn from_array(values: [$real; N]) -> Self {
@@ -83,12 +82,8 @@ macro_rules! array_lanes {
                 ))
             }
             #[inline(always)]
-            fn picks(patterns: &[u32; N]) -> [u32; N] {
-                *patterns
-            }
-            #[inline(always)]
-            fn lookup(column: &[$real], picks: [u32; N]) -> Self {
-                each_lane!([<$real>::from_f64(0.0); N], l => column[picks[l] as usize])
+            fn look_up(table: &Table<$real>, picks: &[u32; N], values: &mut [Self]) {
+                table.look_up_singly(picks, values);
             }
         }
     };
