@@ -1,3 +1,5 @@
 //! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
 
+pub mod contact;
 pub mod network;
+pub mod units;
