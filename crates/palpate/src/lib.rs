@@ -1,5 +1,7 @@
 //! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
 
 pub mod contact;
+pub mod mechanics;
 pub mod network;
+pub mod sensing;
 pub mod units;
