@@ -1,5 +1,6 @@
 //! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
 
+pub mod arrangement;
 pub mod contact;
 pub mod mechanics;
 pub mod network;
