@@ -4,5 +4,6 @@ pub mod arrangement;
 pub mod contact;
 pub mod mechanics;
 pub mod network;
+pub mod recording;
 pub mod sensing;
 pub mod units;
