@@ -2,8 +2,11 @@
 
 pub mod arrangement;
 pub mod contact;
+pub mod estimator;
 pub mod mechanics;
 pub mod network;
 pub mod recording;
+pub mod rig;
 pub mod sensing;
+pub mod simulate;
 pub mod units;
