@@ -4,5 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod activation;
+mod contact;
 
 pub use activation::Activation;
+pub use contact::{Contact, Position};

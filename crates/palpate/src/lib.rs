@@ -1,3 +1,12 @@
 //! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
 
+pub mod arrangement;
+pub mod contact;
+pub mod estimator;
+pub mod mechanics;
 pub mod network;
+pub mod recording;
+pub mod rig;
+pub mod sensing;
+pub mod simulate;
+pub mod units;

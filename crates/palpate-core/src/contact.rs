@@ -1,0 +1,33 @@
+//! Where and how hard a surface is touched.
+
+/// A point on the surface, measured from its left support or lower left corner.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Position {
+    /// Distance along the length, in metres.
+    pub x_m: f64,
+    /// Distance across the width, in metres; 0 on a one-dimensional surface.
+    pub y_m: f64,
+}
+
+impl Position {
+    /// The point at `x_m` metres along a one-dimensional surface.
+    pub const fn along(x_m: f64) -> Self {
+        Self { x_m, y_m: 0.0 }
+    }
+
+    /// The straight distance to `other`, in metres.
+    pub fn distance_m(self, other: Self) -> f64 {
+        libm::hypot(self.x_m - other.x_m, self.y_m - other.y_m)
+    }
+}
+
+/// One touch: a force at a position.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Contact {
+    /// Where the force acts.
+    pub position: Position,
+    /// The force, in newtons, positive downward, into the surface.
+    pub force_n: f64,
+}

@@ -1,0 +1,76 @@
+use super::*;
+
+const LENGTH_M: f64 = 0.4;
+
+fn millimetres(arrangement: &Arrangement, count: usize) -> Vec<f64> {
+    let positions = arrangement.positions(count, LENGTH_M).unwrap();
+    positions.iter().map(|position| position.x_m * 1e3).collect()
+}
+
+#[track_caller]
+fn assert_close(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-9, "{found} instead of {expected}");
+    }
+}
+
+fn edge_dense(middle: usize) -> Arrangement {
+    Arrangement::EdgeDense { middle, portion: Arrangement::PAPER_PORTION }
+}
+
+#[test]
+fn sets_1_to_3_are_equally_spaced() {
+    let twenty: Vec<f64> = (0..20).map(|i| 10.0 + 20.0 * f64::from(i)).collect();
+    let thirty: Vec<f64> = (0..30).map(|i| 20.0 / 3.0 + 40.0 / 3.0 * f64::from(i)).collect();
+    let ten = [20.0, 60.0, 100.0, 140.0, 180.0, 220.0, 260.0, 300.0, 340.0, 380.0];
+    assert_close(&millimetres(&Arrangement::Even, 10), &ten);
+    assert_close(&millimetres(&Arrangement::Even, 20), &twenty);
+    assert_close(&millimetres(&Arrangement::Even, 30), &thirty);
+}
+
+/// Both edges at one pitch, and between them `middle` positions from 100 to 300 mm.
+fn table_3(edge: u32, pitch_mm: f64, middle: &[f64]) -> Vec<f64> {
+    let left = (1..=edge).map(|i| f64::from(i) * pitch_mm);
+    let right = (1..=edge).rev().map(|i| 400.0 - f64::from(i) * pitch_mm);
+    left.chain(middle.iter().copied()).chain(right).collect()
+}
+
+#[test]
+fn six_in_the_middle_are_e1_1_e2_1_and_e3_1() {
+    let middle = [100.0, 140.0, 180.0, 220.0, 260.0, 300.0];
+    assert_close(&millimetres(&edge_dense(6), 10), &table_3(2, 100.0 / 3.0, &middle));
+    assert_close(&millimetres(&edge_dense(6), 20), &table_3(7, 12.5, &middle));
+    assert_close(&millimetres(&edge_dense(6), 30), &table_3(12, 100.0 / 13.0, &middle));
+}
+
+#[test]
+fn four_in_the_middle_are_e1_2_e2_2_and_e3_2() {
+    let middle = [100.0, 500.0 / 3.0, 700.0 / 3.0, 300.0];
+    assert_close(&millimetres(&edge_dense(4), 10), &table_3(3, 25.0, &middle));
+    assert_close(&millimetres(&edge_dense(4), 20), &table_3(8, 100.0 / 9.0, &middle));
+    assert_close(&millimetres(&edge_dense(4), 30), &table_3(13, 100.0 / 14.0, &middle));
+}
+
+#[test]
+fn all_in_the_middle_leave_the_edges_empty() {
+    assert_close(&millimetres(&edge_dense(3), 3), &[100.0, 200.0, 300.0]);
+}
+
+#[test]
+fn what_cannot_be_laid_out_is_refused_with_value_and_bound() {
+    let explicit = |x_m| Arrangement::Explicit(vec![Position::along(0.1), Position::along(x_m)]);
+    let refusals = [
+        (Arrangement::Even, 0),
+        (edge_dense(1), 10),
+        (edge_dense(12), 10),
+        (edge_dense(5), 10),
+        (Arrangement::EdgeDense { middle: 4, portion: (0.5, 0.5) }, 10),
+        (Arrangement::EdgeDense { middle: 4, portion: (f64::NAN, 0.5) }, 10),
+        (explicit(0.2), 3),
+        (explicit(0.41), 2),
+        (explicit(f64::NAN), 2),
+    ];
+    let messages = refusals.map(|(rule, count)| rule.positions(count, LENGTH_M).unwrap_err().to_string());
+    insta::assert_snapshot!(messages.join("\n"));
+}

@@ -1,0 +1,28 @@
+//! What a rig's `[estimator]` section says.
+
+use crate::network::NetworkConfig;
+
+/// A configured method; fitting it to a recording gives a locator.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EstimatorConfig {
+    /// The founding paper's network (`kind = "network"`).
+    Network(NetworkConfig),
+}
+
+impl EstimatorConfig {
+    /// Every `kind` that a rig can name.
+    pub const KINDS: &'static [&'static str] = &["network"];
+
+    /// The `kind` under which a rig names this estimator.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Network(_) => "network",
+        }
+    }
+}
+
+impl Default for EstimatorConfig {
+    fn default() -> Self {
+        Self::Network(NetworkConfig::default())
+    }
+}

@@ -1,0 +1,159 @@
+//! The simply supported beam in closed form, after Euler and Bernoulli.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Surface};
+use crate::contact::Position;
+use crate::sensing::SensorKind;
+
+/// A straight beam of rectangular section on two simple supports, at x = 0 and x = l.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Beam {
+    /// Length l between the supports, in metres.
+    pub length_m: f64,
+    /// Width of the section, in metres.
+    pub width_m: f64,
+    /// Thickness t of the section, in metres.
+    pub thickness_m: f64,
+    /// Young's modulus E, in pascals.
+    pub youngs_modulus_pa: f64,
+}
+
+/// Why a beam cannot be computed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum BeamError {
+    /// A dimension is not a positive, finite number.
+    #[error("a beam's {name} is {value}; it must be greater than 0 and finite")]
+    NotPositive {
+        /// Which: "length", "width", "thickness" or "youngs_modulus".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// The compliance l³/(48·E·I) is not a positive, finite number.
+    #[error(
+        "a beam's compliance at mid-span is {compliance_m_per_n} m/N; it must be greater than 0 and finite"
+    )]
+    Compliance {
+        /// Mid-span deflection per newton at mid-span, in m/N.
+        compliance_m_per_n: f64,
+    },
+}
+
+impl Beam {
+    /// Checks that every dimension is positive and finite, and that the deflections are so too.
+    ///
+    /// # Errors
+    /// [`BeamError`], with the name and value of the first dimension that is not.
+    pub fn validate(&self) -> Result<(), BeamError> {
+        let dimensions = [
+            ("length", self.length_m),
+            ("width", self.width_m),
+            ("thickness", self.thickness_m),
+            ("youngs_modulus", self.youngs_modulus_pa),
+        ];
+        for (name, value) in dimensions {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(BeamError::NotPositive { name, value });
+            }
+        }
+        let compliance_m_per_n = self.full_scale(SensorKind::Deflection);
+        if compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite() {
+            Ok(())
+        } else {
+            Err(BeamError::Compliance { compliance_m_per_n })
+        }
+    }
+
+    /// Bending stiffness E·I in N·m², with I = width·t³/12.
+    pub fn bending_stiffness(&self) -> f64 {
+        self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
+    }
+
+    /// Deflection y(x) per newton at a, in m/N, positive upward: −b·x·(l² − b² − x²)/(6·E·I·l) for x ≤ a, and mirrored
+    /// beyond (the founding paper's eq. 1).
+    fn deflection(&self, span: Span) -> f64 {
+        let Span { l, b, x, .. } = span;
+        -b * x * (l * l - b * b - x * x) / (6.0 * self.bending_stiffness() * l)
+    }
+
+    /// Slope y'(x) per newton at a, in rad/N: −b·(l² − b² − 3·x²)/(6·E·I·l) for x ≤ a, mirrored with the sign changed
+    /// beyond.
+    fn slope(&self, span: Span) -> f64 {
+        let Span { l, b, x, direction } = span;
+        -direction * b * (l * l - b * b - 3.0 * x * x) / (6.0 * self.bending_stiffness() * l)
+    }
+
+    /// Strain on the lower face per newton at a, positive in tension: (t/2)·y''(x) = (t/2)·b·x/(E·I·l) for x ≤ a,
+    /// mirrored beyond. A downward force stretches the lower face, so it is never negative.
+    fn strain(&self, span: Span) -> f64 {
+        let Span { l, b, x, .. } = span;
+        0.5 * self.thickness_m * b * x / (self.bending_stiffness() * l)
+    }
+
+    /// Force of the support at `sensor` on the beam per newton at a, positive upward: b/l on the left, a/l on the
+    /// right; 0 where there is no support.
+    fn reaction(&self, sensor_m: f64, contact_m: f64) -> f64 {
+        let l = self.length_m;
+        let near = |support_m: f64| (sensor_m - support_m).abs() <= 1e-9 * l;
+        if near(0.0) {
+            (l - contact_m) / l
+        } else if near(l) {
+            contact_m / l
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Where the sensor is, seen from the support on its side of the force.
+///
+/// l: length; x: distance of the sensor from that support; b: distance of the force from the other one, all in metres;
+/// direction: 1 seen from the left, −1 seen from the right.
+#[derive(Clone, Copy)]
+struct Span {
+    l: f64,
+    b: f64,
+    x: f64,
+    direction: f64,
+}
+
+impl Span {
+    fn new(l: f64, sensor_m: f64, contact_m: f64) -> Self {
+        if sensor_m <= contact_m {
+            Self { l, b: l - contact_m, x: sensor_m, direction: 1.0 }
+        } else {
+            Self { l, b: contact_m, x: l - sensor_m, direction: -1.0 }
+        }
+    }
+}
+
+impl Surface for Beam {
+    fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
+        let span = Span::new(self.length_m, sensor.x_m, contact.x_m);
+        match kind {
+            SensorKind::Deflection => self.deflection(span),
+            SensorKind::Slope => self.slope(span),
+            SensorKind::Strain => self.strain(span),
+            SensorKind::Reaction => self.reaction(sensor.x_m, contact.x_m),
+            SensorKind::Raw => 0.0,
+        }
+    }
+
+    /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;
+    /// strain t·l/(8·E·I) at mid-span; reaction 1 under the force.
+    fn full_scale(&self, kind: SensorKind) -> f64 {
+        let (l, stiffness) = (self.length_m, self.bending_stiffness());
+        match kind {
+            SensorKind::Deflection => l.powi(3) / (48.0 * stiffness),
+            SensorKind::Slope => l * l / (9.0 * 3f64.sqrt() * stiffness),
+            SensorKind::Strain => self.thickness_m * l / (8.0 * stiffness),
+            SensorKind::Reaction => 1.0,
+            SensorKind::Raw => 0.0,
+        }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent { length_m: self.length_m, width_m: None }
+    }
+}

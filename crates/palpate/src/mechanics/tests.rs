@@ -1,0 +1,126 @@
+use proptest::prelude::*;
+
+use super::*;
+
+/// The founding paper's beam.
+const PAPER: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+
+fn at(kind: SensorKind, x_m: f64, a_m: f64) -> f64 {
+    PAPER.influence(kind, Position::along(x_m), Position::along(a_m))
+}
+
+#[test]
+fn three_newtons_at_mid_span_deflect_the_papers_beam_by_3_4722_mm() {
+    let deflection_mm = 3.0 * at(SensorKind::Deflection, 0.2, 0.2) * 1e3;
+    assert_eq!(format!("{deflection_mm:.4}"), "-3.4722");
+}
+
+#[test]
+fn a_force_on_the_beam_lowers_it_stretches_its_lower_face_and_tilts_it_inwards() {
+    assert!(at(SensorKind::Deflection, 0.1, 0.25) < 0.0);
+    assert!(at(SensorKind::Strain, 0.1, 0.25) > 0.0);
+    assert!(at(SensorKind::Slope, 0.0, 0.25) < 0.0);
+    assert!(at(SensorKind::Slope, 0.4, 0.25) > 0.0);
+}
+
+proptest! {
+    #[test]
+    fn deflection_is_reciprocal(x in 0.0..=0.4, a in 0.0..=0.4) {
+        let (here, there) = (at(SensorKind::Deflection, x, a), at(SensorKind::Deflection, a, x));
+        prop_assert!((here - there).abs() <= 1e-12 * PAPER.full_scale(SensorKind::Deflection));
+    }
+
+    #[test]
+    fn reactions_balance_force_and_moment(a in 0.0..=0.4) {
+        let (left, right) = (at(SensorKind::Reaction, 0.0, a), at(SensorKind::Reaction, 0.4, a));
+        prop_assert!((left + right - 1.0).abs() < 1e-12);
+        prop_assert!((right * 0.4 - a).abs() < 1e-12);
+        prop_assert_eq!(at(SensorKind::Reaction, 0.2, a), 0.0);
+    }
+
+    #[test]
+    fn slope_is_the_derivative_of_deflection(x in 0.001..0.399, a in 0.0..=0.4) {
+        let h = 1e-6;
+        let difference = (at(SensorKind::Deflection, x + h, a) - at(SensorKind::Deflection, x - h, a)) / (2.0 * h);
+        let slope = at(SensorKind::Slope, x, a);
+        prop_assert!((difference - slope).abs() < 1e-5 * PAPER.full_scale(SensorKind::Slope));
+    }
+
+    #[test]
+    fn strain_is_half_the_thickness_times_the_derivative_of_slope(x in 0.001..0.399, a in 0.0..=0.4) {
+        let h = 1e-6;
+        let difference = (at(SensorKind::Slope, x + h, a) - at(SensorKind::Slope, x - h, a)) / (2.0 * h);
+        let strain = at(SensorKind::Strain, x, a);
+        let kink = if (x - a).abs() < h { 1e-2 } else { 1e-5 };
+        prop_assert!((0.5 * PAPER.thickness_m * difference - strain).abs() < kink * PAPER.full_scale(SensorKind::Strain));
+    }
+
+    /// ∫ E·I·y''·φ'' dx = −φ(a) for every φ that vanishes with its second derivative on the supports: here sin(kπx/l).
+    #[test]
+    fn stiffness_times_the_fourth_derivative_is_the_load_weakly(k in 1..8u32, a in 0.01..0.39) {
+        let wave = f64::from(k) * std::f64::consts::PI / PAPER.length_m;
+        let curvature = |x| at(SensorKind::Strain, x, a) / (0.5 * PAPER.thickness_m);
+        let integrand = |x: f64| PAPER.bending_stiffness() * curvature(x) * -(wave * wave) * (wave * x).sin();
+        let virtual_work = simpson(integrand, 0.0, a) + simpson(integrand, a, PAPER.length_m);
+        prop_assert!((virtual_work + (wave * a).sin()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn full_scale_bounds_every_influence(x in 0.0..=0.4, a in 0.0..=0.4) {
+        for kind in SensorKind::ALL {
+            prop_assert!(at(kind, x, a).abs() <= PAPER.full_scale(kind) * (1.0 + 1e-12));
+        }
+    }
+}
+
+fn simpson(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
+    const INTERVALS: u32 = 400;
+    let h = (to - from) / f64::from(INTERVALS);
+    let sum: f64 = (0..=INTERVALS)
+        .map(|i| {
+            let weight = if i == 0 || i == INTERVALS { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
+            weight * f(from + f64::from(i) * h)
+        })
+        .sum();
+    sum * h / 3.0
+}
+
+#[test]
+fn full_scale_is_the_largest_influence_of_a_dense_grid() {
+    let grid: Vec<f64> = (0..=400).map(|i| f64::from(i) * 1e-3).collect();
+    for kind in SensorKind::ALL {
+        let pairs = grid.iter().flat_map(|x| grid.iter().map(|a| at(kind, *x, *a).abs()));
+        let largest = pairs.fold(0.0, f64::max);
+        let full_scale = PAPER.full_scale(kind);
+        assert!(
+            (largest - full_scale).abs() <= 1e-5 * full_scale,
+            "{kind}: {largest} instead of {full_scale}"
+        );
+    }
+}
+
+#[test]
+fn a_beam_without_size_is_refused_with_value_and_bound() {
+    let refused = [
+        Beam { length_m: 0.0, ..PAPER },
+        Beam { width_m: -0.04, ..PAPER },
+        Beam { thickness_m: f64::NAN, ..PAPER },
+        Beam { youngs_modulus_pa: f64::INFINITY, ..PAPER },
+        Beam { thickness_m: 1e-200, ..PAPER },
+    ];
+    let messages = refused.map(|beam| beam.validate().unwrap_err().to_string());
+    insta::assert_snapshot!(messages.join("\n"));
+    assert_eq!(PAPER.validate(), Ok(()));
+}
+
+#[test]
+fn the_extent_includes_its_boundary_and_nothing_beyond() {
+    let line = PAPER.extent();
+    assert!(line.contains(Position::along(0.0)) && line.contains(Position::along(0.4)));
+    assert!(!line.contains(Position::along(0.401)) && !line.contains(Position { x_m: 0.2, y_m: 0.001 }));
+    assert!(!line.contains(Position::along(f64::NAN)));
+    let plane = Extent { length_m: 0.4, width_m: Some(0.3) };
+    assert!(
+        plane.contains(Position { x_m: 0.4, y_m: 0.3 }) && !plane.contains(Position { x_m: 0.4, y_m: -0.1 })
+    );
+}

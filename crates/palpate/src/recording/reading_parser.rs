@@ -1,0 +1,106 @@
+//! Readings as they stream in, line by line.
+
+use super::cells::Cells;
+use super::columns::{Columns, Header};
+use super::csv_error::{CsvError, CsvProblem, Place};
+use crate::units::Unit;
+
+/// Turns lines of CSV into readings; only the channel columns need to be there.
+#[derive(Clone, Debug)]
+pub struct ReadingParser {
+    source: String,
+    columns: Columns,
+    found: Option<Found>,
+    line: usize,
+}
+
+/// What the first line told.
+#[derive(Clone, Debug)]
+struct Found {
+    channels: ChannelFields,
+    width: usize,
+}
+
+impl ReadingParser {
+    /// A parser for lines below `header_line`, the first line of `source`.
+    ///
+    /// # Errors
+    /// [`CsvError`] when the header lacks a channel of `columns`, names one twice, or is not UTF-8.
+    pub fn from_header(source: &str, header_line: &[u8], columns: &Columns) -> Result<Self, CsvError> {
+        let columns = Columns { header: Header::Present, ..columns.clone() };
+        let text = without_mark(utf8(source, 1, header_line)?);
+        let head = Cells::parse(source, 1, text)?;
+        let found = Found { channels: ChannelFields::find(&head, &columns)?, width: head.width() };
+        Ok(Self { source: source.to_owned(), columns, found: Some(found), line: 1 })
+    }
+
+    /// A parser for a stream without a header; `columns` must give its channels by number.
+    pub fn from_numbers(source: &str, columns: &Columns) -> Self {
+        let columns = Columns { header: Header::Absent, ..columns.clone() };
+        Self { source: source.to_owned(), columns, found: None, line: 0 }
+    }
+
+    /// Reads the next line: one value per channel, in SI units; `None` for a blank line.
+    ///
+    /// After an error the parser goes on with the next line.
+    ///
+    /// # Errors
+    /// [`CsvError`] with line and column: another number of fields than the header or the first row, a field that
+    /// is not a finite number, text that is not UTF-8.
+    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
+        self.line += 1;
+        let text = utf8(&self.source, self.line, line)?;
+        let text = if self.line == 1 { without_mark(text) } else { text };
+        if is_blank(text) {
+            return Ok(None);
+        }
+        let cells = Cells::parse(&self.source, self.line, text)?;
+        let found = match &mut self.found {
+            Some(found) => found,
+            none => {
+                let channels = ChannelFields::find(&cells, &self.columns)?;
+                none.insert(Found { channels, width: cells.width() })
+            }
+        };
+        cells.check_width(found.width)?;
+        found.channels.reading(&cells).map(Some)
+    }
+}
+
+/// Which fields of a row are the channels, in the layout's order.
+#[derive(Clone, Debug)]
+pub(super) struct ChannelFields(Vec<(usize, Unit)>);
+
+impl ChannelFields {
+    pub fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+        let find =
+            |channel: &super::ValueColumn| Ok((head.find(&channel.column, columns.header)?, channel.unit));
+        columns.channels.iter().map(find).collect::<Result<_, _>>().map(Self)
+    }
+
+    pub fn reading(&self, cells: &Cells) -> Result<Vec<f64>, CsvError> {
+        self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
+    }
+}
+
+/// Whether a line holds nothing, not even a comma.
+pub(super) fn is_blank(line: &str) -> bool {
+    line.trim().is_empty()
+}
+
+/// `text` without the byte-order mark that some spreadsheets put first.
+pub(super) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// `bytes` as text, without the line's end.
+fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvError> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Ok(text.trim_end_matches(['\r', '\n'])),
+        Err(_) => {
+            let text = String::from_utf8_lossy(bytes).trim_end_matches(['\r', '\n']).to_owned();
+            let span = 0..text.len();
+            Err(CsvProblem::NotUtf8.at(source, Place { line, column: None, text, span }))
+        }
+    }
+}

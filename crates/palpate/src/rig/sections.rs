@@ -1,0 +1,174 @@
+//! The rig file as it is written, before anything is checked: every key optional, every value with its place.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
+use toml::Spanned;
+
+use super::value::{RawColumn, RawQuantity};
+
+/// A value and its place, if the key is there.
+type Key<T> = Option<Spanned<T>>;
+
+/// The sections of a rig file. A study file has the same, and more beside them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RigSections {
+    pub surface: Key<SurfaceSection>,
+    pub sensors: Key<SensorsSections>,
+    pub contact: Key<ContactSection>,
+    pub training: Key<TrainingSection>,
+    pub estimator: Key<EstimatorSection>,
+    pub recording: Key<RecordingSection>,
+}
+
+/// `[surface]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SurfaceSection {
+    pub kind: Key<String>,
+    pub length: Key<RawQuantity>,
+    pub width: Key<RawQuantity>,
+    pub thickness: Key<RawQuantity>,
+    pub youngs_modulus: Key<RawQuantity>,
+    pub supports: Key<String>,
+}
+
+/// `[sensors]`, or several `[[sensors]]`
+#[derive(Clone, Debug)]
+pub(crate) enum SensorsSections {
+    One(Box<SensorsSection>),
+    Many(Vec<Spanned<SensorsSection>>),
+}
+
+/// One `[sensors]` or `[[sensors]]`: sensors of one kind
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SensorsSection {
+    pub measure: Key<String>,
+    pub count: Key<i64>,
+    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub noise: Key<RawQuantity>,
+    pub resolution: Key<RawQuantity>,
+    pub gain_error: Key<RawQuantity>,
+    pub offset_error: Key<RawQuantity>,
+    pub range: Key<Vec<Spanned<RawQuantity>>>,
+    pub dead: Key<Vec<Spanned<i64>>>,
+}
+
+/// `[contact]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ContactSection {
+    pub force: Key<RawQuantity>,
+}
+
+/// `[training]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TrainingSection {
+    pub arrangement: Key<String>,
+    pub count: Key<i64>,
+    pub middle: Key<i64>,
+    pub portion: Key<Vec<Spanned<RawQuantity>>>,
+    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub repeats: Key<i64>,
+}
+
+/// `[estimator]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EstimatorSection {
+    pub kind: Key<String>,
+    pub hidden: Key<Vec<Spanned<i64>>>,
+    pub hidden_activation: Key<String>,
+    pub output_activation: Key<String>,
+    pub biases: Option<bool>,
+    pub output: Key<String>,
+    pub input_scale: Key<RawQuantity>,
+    pub learning_rate: Key<f64>,
+    pub momentum: Key<f64>,
+    pub aggregate_error: Key<f64>,
+    pub max_epochs: Key<i64>,
+    pub order: Key<String>,
+    pub initial_weights: Key<f64>,
+}
+
+/// `[recording]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RecordingSection {
+    pub header: Option<bool>,
+    pub position: Key<RawColumn>,
+    pub x: Key<RawColumn>,
+    pub y: Key<RawColumn>,
+    pub position_unit: Key<String>,
+    pub channels: Key<Vec<Spanned<RawColumn>>>,
+    pub channel_unit: Key<UnitNames>,
+    pub force: Key<RawColumn>,
+    pub force_unit: Key<String>,
+}
+
+/// One unit for all channels, or one for each
+#[derive(Clone, Debug)]
+pub(crate) enum UnitNames {
+    One(String),
+    Each(Vec<Spanned<String>>),
+}
+
+impl<'de> Deserialize<'de> for SensorsSections {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrMany;
+
+        impl<'de> Visitor<'de> for OneOrMany {
+            type Value = SensorsSections;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table [sensors], or several [[sensors]]")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SensorsSections, A::Error> {
+                Box::deserialize(MapAccessDeserializer::new(map)).map(SensorsSections::One)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SensorsSections, A::Error> {
+                let mut sections = Vec::new();
+                while let Some(section) = seq.next_element()? {
+                    sections.push(section);
+                }
+                Ok(SensorsSections::Many(sections))
+            }
+        }
+
+        deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+impl<'de> Deserialize<'de> for UnitNames {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrEach;
+
+        impl<'de> Visitor<'de> for OneOrEach {
+            type Value = UnitNames;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a unit such as \"mm\", or an array of them")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, unit: &str) -> Result<UnitNames, E> {
+                Ok(UnitNames::One(unit.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<UnitNames, A::Error> {
+                let mut units = Vec::new();
+                while let Some(unit) = seq.next_element()? {
+                    units.push(unit);
+                }
+                Ok(UnitNames::Each(units))
+            }
+        }
+
+        deserializer.deserialize_any(OneOrEach)
+    }
+}

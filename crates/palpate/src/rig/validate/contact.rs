@@ -1,0 +1,110 @@
+//! `[contact]` and `[training]`
+
+use toml::Spanned;
+
+use crate::arrangement::Arrangement;
+use crate::contact::Position;
+use crate::mechanics::Extent;
+use crate::rig::Training;
+use crate::rig::error::{RigError, RigProblem};
+use crate::rig::sections::{ContactSection, TrainingSection};
+use crate::rig::value::{choice, count, positive, quantity};
+use crate::units::Dimension;
+
+/// More training positions, or presses of one position, than anyone makes.
+const MOST: usize = 100_000;
+const MOST_BOUND: &str = "at least 1 and at most 100000";
+
+pub(super) fn validate_force(section: Option<&Spanned<ContactSection>>) -> Result<Option<f64>, RigError> {
+    let force = section.and_then(|section| section.get_ref().force.as_ref());
+    force.map(|force| positive("force", force, Dimension::Force)).transpose()
+}
+
+#[derive(Clone, Copy)]
+enum Rule {
+    Even,
+    EdgeDense,
+    Explicit,
+}
+
+pub(super) fn validate_training(
+    section: Option<&Spanned<TrainingSection>>,
+    extent: Extent,
+) -> Result<Option<Training>, RigError> {
+    let Some(section) = section else { return Ok(None) };
+    let keys = section.get_ref();
+    let words = [("even", Rule::Even), ("edge-dense", Rule::EdgeDense), ("explicit", Rule::Explicit)];
+    let rule = match &keys.arrangement {
+        Some(arrangement) => choice("arrangement", arrangement, &words)?,
+        None if keys.positions.is_some() => Rule::Explicit,
+        None => Rule::Even,
+    };
+    refuse_unused(keys, rule)?;
+    let arrangement = match rule {
+        Rule::Even => Arrangement::Even,
+        Rule::EdgeDense => edge_dense(section)?,
+        Rule::Explicit => explicit(section)?,
+    };
+    let count = match (&keys.count, &arrangement) {
+        (Some(raw), _) => count("count", raw, 1..=MOST, MOST_BOUND)?,
+        (None, Arrangement::Explicit(positions)) => positions.len(),
+        (None, _) => return Err(missing("count", section)),
+    };
+    let repeats =
+        keys.repeats.as_ref().map_or(Ok(1), |raw| self::count("repeats", raw, 1..=MOST, MOST_BOUND))?;
+    let training = Training { arrangement, count, repeats };
+    let place = keys.positions.as_ref().map(Spanned::span).or(keys.count.as_ref().map(Spanned::span));
+    let span = place.unwrap_or_else(|| section.span());
+    training.positions(extent.length_m).map_err(|error| RigProblem::Arrangement(error).at(span))?;
+    Ok(Some(training))
+}
+
+fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
+    let with = match rule {
+        Rule::Even => "arrangement = \"even\"",
+        Rule::EdgeDense => "arrangement = \"edge-dense\"",
+        Rule::Explicit => "arrangement = \"explicit\"",
+    };
+    let unused = |key, span| Err(RigProblem::UnusedKey { key, with }.at(span));
+    match (rule, &keys.middle, &keys.portion, &keys.positions) {
+        (Rule::Even | Rule::Explicit, Some(middle), _, _) => unused("middle", middle.span()),
+        (Rule::Even | Rule::Explicit, _, Some(portion), _) => unused("portion", portion.span()),
+        (Rule::Even | Rule::EdgeDense, _, _, Some(positions)) => unused("positions", positions.span()),
+        _ => Ok(()),
+    }
+}
+
+fn edge_dense(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigError> {
+    let keys = section.get_ref();
+    let middle = keys.middle.as_ref().ok_or_else(|| missing("middle", section))?;
+    let middle = count("middle", middle, 2..=MOST, "at least 2 and at most 100000")?;
+    let portion = match &keys.portion {
+        None => Arrangement::PAPER_PORTION,
+        Some(portion) => match portion.get_ref().as_slice() {
+            [start, end] => {
+                (quantity("portion", start, Dimension::Ratio)?, quantity("portion", end, Dimension::Ratio)?)
+            }
+            listed => {
+                let (value, bound) = (format!("{} numbers", listed.len()), "2 numbers, a start and an end");
+                return Err(RigProblem::OutOfRange { key: "portion", value, bound }.at(portion.span()));
+            }
+        },
+    };
+    Ok(Arrangement::EdgeDense { middle, portion })
+}
+
+fn explicit(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigError> {
+    let positions = section.get_ref().positions.as_ref().ok_or_else(|| missing("positions", section))?;
+    if positions.get_ref().is_empty() {
+        let value = "0 positions".to_owned();
+        return Err(RigProblem::OutOfRange { key: "positions", value, bound: "at least 1 position" }
+            .at(positions.span()));
+    }
+    let along = positions.get_ref().iter().map(|raw| quantity("positions", raw, Dimension::Length));
+    let positions = along.map(|x_m| x_m.map(Position::along)).collect::<Result<_, _>>()?;
+    Ok(Arrangement::Explicit(positions))
+}
+
+fn missing(key: &'static str, section: &Spanned<TrainingSection>) -> RigError {
+    RigProblem::MissingKey { section: "training", key }.at(section.span())
+}

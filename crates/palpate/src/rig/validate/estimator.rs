@@ -1,0 +1,116 @@
+//! `[estimator]`
+
+use toml::Spanned;
+
+use crate::estimator::EstimatorConfig;
+use crate::network::{
+    Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
+};
+use crate::rig::error::{RigError, RigProblem};
+use crate::rig::sections::EstimatorSection;
+use crate::rig::value::{RawQuantity, choice, count, number, positive};
+use crate::sensing::Layout;
+
+const ACTIVATIONS: [(&str, Activation); 3] =
+    [("logistic", Activation::Logistic), ("tanh", Activation::Tanh), ("linear", Activation::Linear)];
+const MOST_LAYERS: usize = 16;
+const MOST_NODES: usize = 1000;
+
+pub(super) fn validate(
+    section: Option<&Spanned<EstimatorSection>>,
+    layout: &Layout,
+) -> Result<EstimatorConfig, RigError> {
+    let Some(section) = section else { return Ok(EstimatorConfig::default()) };
+    let keys = section.get_ref();
+    if let Some(kind) = &keys.kind {
+        let known: Vec<(&'static str, ())> = EstimatorConfig::KINDS.iter().map(|kind| (*kind, ())).collect();
+        choice("kind", kind, &known)?;
+    }
+    network(keys, layout).map(EstimatorConfig::Network)
+}
+
+fn network(keys: &EstimatorSection, layout: &Layout) -> Result<NetworkConfig, RigError> {
+    let default = NetworkConfig::default();
+    let activation = |key, raw: &Option<Spanned<String>>, default| {
+        raw.as_ref().map_or(Ok(default), |raw| choice(key, raw, &ACTIVATIONS))
+    };
+    let codings = [("position", OutputCoding::Position), ("normalized", OutputCoding::Normalized)];
+    Ok(NetworkConfig {
+        hidden: keys.hidden.as_ref().map_or(Ok(default.hidden), hidden)?,
+        hidden_activation: activation(
+            "hidden_activation",
+            &keys.hidden_activation,
+            default.hidden_activation,
+        )?,
+        output_activation: activation(
+            "output_activation",
+            &keys.output_activation,
+            default.output_activation,
+        )?,
+        biases: keys.biases.unwrap_or(default.biases),
+        output: keys.output.as_ref().map_or(Ok(default.output), |raw| choice("output", raw, &codings))?,
+        input_scale: keys
+            .input_scale
+            .as_ref()
+            .map_or(Ok(default.input_scale), |raw| input_scale(raw, layout))?,
+        training: back_propagation(keys)?,
+    })
+}
+
+fn hidden(raw: &Spanned<Vec<Spanned<i64>>>) -> Result<Vec<usize>, RigError> {
+    let layers = raw.get_ref();
+    if layers.len() > MOST_LAYERS {
+        let value = format!("{} layers", layers.len());
+        return Err(
+            RigProblem::OutOfRange { key: "hidden", value, bound: "at most 16 layers" }.at(raw.span())
+        );
+    }
+    layers.iter().map(|nodes| count("hidden", nodes, 1..=MOST_NODES, "at least 1 and at most 1000")).collect()
+}
+
+/// "full-scale", "standardized", or a reading in the sensors' own dimension.
+fn input_scale(raw: &Spanned<RawQuantity>, layout: &Layout) -> Result<InputScale, RigError> {
+    let RawQuantity::Text(text) = raw.get_ref() else { return divide_by(raw, layout) };
+    let starts_a_number = |c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.');
+    if text.trim_start().starts_with(starts_a_number) {
+        return divide_by(raw, layout);
+    }
+    let words = [("full-scale", InputScale::FullScale), ("standardized", InputScale::Standardized)];
+    choice("input_scale", &Spanned::new(raw.span(), text.clone()), &words)
+}
+
+fn divide_by(raw: &Spanned<RawQuantity>, layout: &Layout) -> Result<InputScale, RigError> {
+    let kinds = layout.kinds();
+    if let [first, rest @ ..] = kinds.as_slice() {
+        if let Some(second) = rest.iter().find(|kind| kind.dimension() != first.dimension()) {
+            return Err(RigProblem::MixedKinds { first: *first, second: *second }.at(raw.span()));
+        }
+        return positive("input_scale", raw, first.dimension()).map(InputScale::DivideBy);
+    }
+    Ok(InputScale::FullScale)
+}
+
+fn back_propagation(keys: &EstimatorSection) -> Result<BackPropagation, RigError> {
+    let default = BackPropagation::default();
+    let above_zero = |key, raw: &Option<Spanned<f64>>, default| {
+        raw.as_ref().map_or(Ok(default), |raw| number(key, raw, |value| value > 0.0, "greater than 0"))
+    };
+    let momentum = keys.momentum.as_ref().map_or(Ok(default.momentum), |raw| {
+        number("momentum", raw, |value| (0.0..1.0).contains(&value), "at least 0 and below 1")
+    })?;
+    let max_epochs = keys.max_epochs.as_ref().map_or(Ok(default.max_epochs), |raw| {
+        match u32::try_from(*raw.get_ref()) {
+            Ok(epochs) if epochs > 0 => Ok(epochs),
+            _ => Err(crate::rig::value::out_of_range("max_epochs", raw, "at least 1 and at most 4294967295")),
+        }
+    })?;
+    let orders = [("shuffled", PresentationOrder::Shuffled), ("fixed", PresentationOrder::Fixed)];
+    Ok(BackPropagation {
+        learning_rate: above_zero("learning_rate", &keys.learning_rate, default.learning_rate)?,
+        momentum,
+        aggregate_error: above_zero("aggregate_error", &keys.aggregate_error, default.aggregate_error)?,
+        max_epochs,
+        order: keys.order.as_ref().map_or(Ok(default.order), |raw| choice("order", raw, &orders))?,
+        initial_weights: above_zero("initial_weights", &keys.initial_weights, default.initial_weights)?,
+    })
+}

@@ -1,0 +1,29 @@
+//! From sections to a checked rig.
+
+mod columns;
+mod contact;
+mod estimator;
+mod sensors;
+mod surface;
+
+use super::Rig;
+use super::error::{RigError, RigProblem};
+use super::sections::RigSections;
+
+/// Checks the sections of a rig, or of a study that embeds them; spans are those of the document they came from.
+///
+/// # Errors
+/// [`RigError`] for the first thing that is wrong.
+pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
+    let surface = surface::validate(sections.surface.as_ref())?;
+    let layout = sensors::validate(sections.sensors.as_ref(), sections.recording.as_ref(), &surface)?;
+    let force_n = contact::validate_force(sections.contact.as_ref())?;
+    let training = contact::validate_training(sections.training.as_ref(), surface.extent())?;
+    let simulated = surface.model().is_some() && sections.recording.is_none();
+    if let (Some(training), None, true) = (&sections.training, force_n, simulated) {
+        return Err(RigProblem::NoForce.at(training.span()));
+    }
+    let estimator = estimator::validate(sections.estimator.as_ref(), &layout)?;
+    let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
+    Ok(Rig { surface, layout, force_n, training, estimator, columns })
+}

@@ -1,0 +1,209 @@
+//! `[sensors]` or `[[sensors]]`
+
+use toml::Spanned;
+
+use crate::contact::Position;
+use crate::rig::SurfaceSpec;
+use crate::rig::error::{RigError, RigProblem};
+use crate::rig::sections::{RecordingSection, SensorsSection, SensorsSections};
+use crate::rig::value::{RawColumn, RawQuantity, bounded, choice, count, not_negative, quantity};
+use crate::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
+use crate::units::Dimension;
+
+const SECTION: &str = "sensors";
+/// More sensors than anyone wires up.
+const MOST: usize = 10_000;
+const MOST_BOUND: &str = "at least 1 and at most 10000";
+
+pub(super) fn validate(
+    sections: Option<&Spanned<SensorsSections>>,
+    recording: Option<&Spanned<RecordingSection>>,
+    surface: &SurfaceSpec,
+) -> Result<Layout, RigError> {
+    let sections = sections.ok_or_else(|| RigProblem::MissingSection { section: SECTION }.nowhere())?;
+    let channels = recording.and_then(|recording| recording.get_ref().channels.as_ref());
+    let listed: Vec<(&SensorsSection, std::ops::Range<usize>)> = match sections.get_ref() {
+        SensorsSections::One(section) => vec![(section, sections.span())],
+        SensorsSections::Many(many) => {
+            many.iter().map(|section| (section.get_ref(), section.span())).collect()
+        }
+    };
+    let channel_count = channels.filter(|_| listed.len() == 1).map(|channels| channels.get_ref().len());
+    let mut sensors = Vec::new();
+    for (section, span) in listed {
+        let context = Context { section, span, surface, channel_count };
+        context.append(&mut sensors)?;
+    }
+    if sensors.is_empty() {
+        let value = "0 sensors".to_owned();
+        return Err(
+            RigProblem::OutOfRange { key: SECTION, value, bound: "at least 1 sensor" }.at(sections.span())
+        );
+    }
+    if let Some(channels) = channels {
+        name_after(channels.get_ref(), &mut sensors);
+    }
+    Ok(Layout { sensors })
+}
+
+/// Sensors are called what the recording calls its channels.
+fn name_after(channels: &[Spanned<RawColumn>], sensors: &mut [Sensor]) {
+    for (sensor, channel) in sensors.iter_mut().zip(channels) {
+        if let RawColumn::Name(name) = channel.get_ref() {
+            sensor.name.clone_from(name);
+        }
+    }
+}
+
+/// One section, and what its keys are judged by.
+struct Context<'a> {
+    section: &'a SensorsSection,
+    span: std::ops::Range<usize>,
+    surface: &'a SurfaceSpec,
+    /// How many channels the recording has, when they are all this section's.
+    channel_count: Option<usize>,
+}
+
+impl Context<'_> {
+    fn append(&self, sensors: &mut Vec<Sensor>) -> Result<(), RigError> {
+        let measure = self.section.measure.as_ref().ok_or_else(|| self.missing("measure"))?;
+        let kind = choice("measure", measure, &SensorKind::ALL.map(|kind| (kind.name(), kind)))?;
+        if kind == SensorKind::Raw && self.surface.model().is_some() {
+            return Err(RigProblem::RawOnModel.at(measure.span()));
+        }
+        let positions = self.positions(kind)?;
+        let channel = self.channel(kind)?;
+        let dead = self.dead(positions.len())?;
+        let before = sensors.iter().filter(|sensor| sensor.kind == kind).count();
+        sensors.extend(positions.into_iter().enumerate().map(|(i, position)| Sensor {
+            kind,
+            position,
+            name: format!("{kind}_{}", before + i + 1),
+            channel: ChannelModel { dead: dead.contains(&i), ..channel },
+        }));
+        Ok(())
+    }
+
+    fn positions(&self, kind: SensorKind) -> Result<Vec<Position>, RigError> {
+        let length_m = self.surface.extent().length_m;
+        match (&self.section.count, &self.section.positions) {
+            (Some(_), Some(positions)) => {
+                Err(RigProblem::UnusedKey { key: "positions", with: "`count`" }.at(positions.span()))
+            }
+            (None, Some(positions)) => self.explicit(kind, positions),
+            (Some(raw), None) => {
+                let count = count("count", raw, 1..=MOST, MOST_BOUND)?;
+                let positions: Vec<_> = even_positions(count, length_m).collect();
+                self.check_supported(kind, &positions, |_| raw.span())?;
+                Ok(positions)
+            }
+            (None, None) => match (self.channel_count, kind) {
+                (Some(count), SensorKind::Raw) => Ok(even_positions(count, length_m).collect()),
+                _ => Err(self.missing("count")),
+            },
+        }
+    }
+
+    fn explicit(
+        &self,
+        kind: SensorKind,
+        listed: &Spanned<Vec<Spanned<RawQuantity>>>,
+    ) -> Result<Vec<Position>, RigError> {
+        let extent = self.surface.extent();
+        let mut positions = Vec::new();
+        for raw in listed.get_ref() {
+            let position = Position::along(quantity("positions", raw, Dimension::Length)?);
+            if !extent.contains(position) {
+                let (number, x_m, length_m) = (positions.len() + 1, position.x_m, extent.length_m);
+                return Err(RigProblem::SensorOffSurface { number, x_m, length_m }.at(raw.span()));
+            }
+            positions.push(position);
+        }
+        if !(1..=MOST).contains(&positions.len()) {
+            let value = format!("{} positions", positions.len());
+            return Err(
+                RigProblem::OutOfRange { key: "positions", value, bound: MOST_BOUND }.at(listed.span())
+            );
+        }
+        self.check_supported(kind, &positions, |i| {
+            listed.get_ref().get(i).map_or(listed.span(), Spanned::span)
+        })?;
+        Ok(positions)
+    }
+
+    /// A reaction sensor of a modelled surface must sit at a support.
+    fn check_supported(
+        &self,
+        kind: SensorKind,
+        positions: &[Position],
+        span: impl Fn(usize) -> std::ops::Range<usize>,
+    ) -> Result<(), RigError> {
+        if kind != SensorKind::Reaction || self.surface.model().is_none() {
+            return Ok(());
+        }
+        let length_m = self.surface.extent().length_m;
+        let at_support =
+            |x_m: f64| [0.0, length_m].iter().any(|support| (x_m - support).abs() <= 1e-9 * length_m);
+        match positions.iter().position(|position| !at_support(position.x_m)) {
+            Some(i) => {
+                Err(RigProblem::NoSupport { number: i + 1, x_m: positions[i].x_m, length_m }.at(span(i)))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn channel(&self, kind: SensorKind) -> Result<ChannelModel, RigError> {
+        let dimension = kind.dimension();
+        let size = |key, raw: &Option<Spanned<RawQuantity>>| {
+            raw.as_ref().map_or(Ok(0.0), |raw| not_negative(key, raw, dimension))
+        };
+        let gain_error = self.section.gain_error.as_ref().map_or(Ok(0.0), |raw| {
+            let good = |gain: f64| (0.0..1.0).contains(&gain);
+            bounded("gain_error", raw, Dimension::Ratio, good, "at least 0 and below 1")
+        })?;
+        Ok(ChannelModel {
+            noise_sd: size("noise", &self.section.noise)?,
+            resolution: size("resolution", &self.section.resolution)?,
+            gain_error,
+            offset_error: size("offset_error", &self.section.offset_error)?,
+            range: self.range(dimension)?,
+            dead: false,
+        })
+    }
+
+    fn range(&self, dimension: Dimension) -> Result<Option<(f64, f64)>, RigError> {
+        let Some(range) = &self.section.range else { return Ok(None) };
+        let refuse = |value| {
+            let bound = "2 values, the lower one first";
+            Err(RigProblem::OutOfRange { key: "range", value, bound }.at(range.span()))
+        };
+        match range.get_ref().as_slice() {
+            [low, high] => {
+                let (lowest, highest) =
+                    (quantity("range", low, dimension)?, quantity("range", high, dimension)?);
+                if lowest < highest {
+                    Ok(Some((lowest, highest)))
+                } else {
+                    refuse(format!("{} to {}", low.get_ref(), high.get_ref()))
+                }
+            }
+            listed => refuse(format!("{} values", listed.len())),
+        }
+    }
+
+    /// The dead sensors' indices within the section.
+    fn dead(&self, count: usize) -> Result<Vec<usize>, RigError> {
+        let Some(dead) = &self.section.dead else { return Ok(Vec::new()) };
+        let index = |raw: &Spanned<i64>| {
+            let number = *raw.get_ref();
+            let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+            let index = index.filter(|index| *index < count);
+            index.ok_or_else(|| RigProblem::DeadNumber { number, count }.at(raw.span()))
+        };
+        dead.get_ref().iter().map(index).collect()
+    }
+
+    fn missing(&self, key: &'static str) -> RigError {
+        RigProblem::MissingKey { section: SECTION, key }.at(self.span.clone())
+    }
+}

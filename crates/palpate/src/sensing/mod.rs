@@ -1,0 +1,8 @@
+//! What is measured where, and how well: sensor kinds, the layout, and the faults of real channels.
+
+mod channel;
+mod layout;
+
+pub use channel::{ChannelErrors, ChannelModel, measure};
+pub(crate) use layout::even_positions;
+pub use layout::{Layout, Sensor, SensorKind};

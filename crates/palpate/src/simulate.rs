@@ -1,0 +1,94 @@
+//! Recordings made by a rig's model instead of its bench.
+
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::arrangement::ArrangementError;
+use crate::contact::{Contact, Position};
+use crate::mechanics::{Extent, Surface};
+use crate::recording::{Provenance, Recording, Row};
+use crate::rig::Rig;
+use crate::sensing::{ChannelErrors, Layout, measure};
+use crate::units::format_length_mm;
+
+/// Why a rig cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// The surface has no model.
+    #[error("a measured surface has no model to simulate; it needs a recording")]
+    NoModel,
+    /// The contact force is not given.
+    #[error("a simulation needs the contact force; the rig has no [contact] force")]
+    NoForce,
+    /// The rig does not say where to press.
+    #[error("a simulation needs training positions; the rig has no [training]")]
+    NoTraining,
+    /// The rig's training positions cannot be laid out.
+    #[error(transparent)]
+    Arrangement(#[from] ArrangementError),
+    /// A position does not lie on the surface.
+    #[error(
+        "position {number} is at {}, off the surface; it must be within 0 and {}",
+        format_length_mm(position.x_m),
+        format_length_mm(extent.length_m)
+    )]
+    OffSurface {
+        /// Which position, from 1.
+        number: usize,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+}
+
+/// What the sensors of `layout` would read without any fault when `contact` touches `surface`: force times influence,
+/// in the SI unit of each sensor.
+pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -> Vec<f64> {
+    let influence =
+        |sensor: &crate::sensing::Sensor| surface.influence(sensor.kind, sensor.position, contact.position);
+    layout.sensors.iter().map(|sensor| contact.force_n * influence(sensor)).collect()
+}
+
+/// Presses the rig's simulated surface at its training positions, as often as the rig says; see [`simulate_at`].
+///
+/// # Errors
+/// [`SimulateError`] when the rig lacks a model, a force or training positions.
+pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
+    let training = rig.training.as_ref().ok_or(SimulateError::NoTraining)?;
+    let positions = training.positions(rig.surface.extent().length_m)?;
+    simulate_at(rig, &positions, training.repeats, seed)
+}
+
+/// Presses the rig's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
+/// faulty channels report. Gains and offsets are drawn once for the recording, noise for each reading.
+///
+/// The same seed gives the same recording.
+///
+/// # Errors
+/// [`SimulateError`] when the rig lacks a model or a force, or a position lies off the surface.
+pub fn simulate_at(
+    rig: &Rig,
+    positions: &[Position],
+    repeats: usize,
+    seed: u64,
+) -> Result<Recording, SimulateError> {
+    let surface = rig.surface.model().ok_or(SimulateError::NoModel)?;
+    let force_n = rig.force_n.ok_or(SimulateError::NoForce)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let errors = ChannelErrors::draw(&rig.layout, &mut rng);
+    let mut rows = Vec::new();
+    for (i, position) in positions.iter().copied().enumerate() {
+        if !surface.contains(position) {
+            return Err(SimulateError::OffSurface { number: i + 1, position, extent: surface.extent() });
+        }
+        let clean = clean_reading(surface, &rig.layout, Contact { position, force_n });
+        for _ in 0..repeats {
+            let reading = measure(&rig.layout, &clean, &errors, &mut rng);
+            rows.push(Row { position, force_n: Some(force_n), reading });
+        }
+    }
+    let source = "simulation".to_owned();
+    let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
+    Ok(Recording { channels: rig.layout.names(), kinds: rig.layout.kinds(), rows, provenance })
+}
