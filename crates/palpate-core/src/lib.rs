@@ -5,6 +5,10 @@
 
 mod activation;
 mod contact;
+mod estimate;
+mod network;
 
 pub use activation::Activation;
 pub use contact::{Contact, Position};
+pub use estimate::{Estimate, Status};
+pub use network::{BufferMismatch, Network};

@@ -3,6 +3,7 @@
 pub mod arrangement;
 pub mod contact;
 pub mod estimator;
+pub mod evaluation;
 pub mod mechanics;
 pub mod network;
 pub mod recording;

@@ -1,5 +1,12 @@
 //! Where methods meet: whoever evaluates, studies, reports or listens treats every estimator alike.
 
 mod config;
+mod fitting;
+mod locator;
+mod locator_file;
 
 pub use config::EstimatorConfig;
+pub use fitting::{FitError, Fitting, LocatorQueue};
+pub use locator::{Locator, LocatorProvenance, Method, ReadingError};
+pub use locator_file::{FORMAT_VERSION, LocatorFileError};
+pub use palpate_core::{Estimate, Status};

@@ -2,9 +2,11 @@
 
 mod beam;
 mod extent;
+mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use surface_spec::SurfaceSpec;
 
 use crate::contact::Position;
 use crate::sensing::SensorKind;

@@ -1,7 +1,9 @@
 //! The founding paper's estimator: a feed-forward network trained by back-propagation.
 
 mod config;
+mod fitting;
 mod lanes;
+mod locator;
 mod outcome;
 mod patterns;
 mod scalar;
@@ -9,7 +11,9 @@ mod topology;
 mod train;
 
 pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
+pub use fitting::{NetworkFitError, NetworkFitting};
 pub use lanes::{InstructionSet, Precision};
+pub use locator::{ChannelScaling, NetworkLocator, NetworkLocatorError};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;
 pub use patterns::Patterns;

@@ -7,8 +7,6 @@ mod value;
 
 use std::io::Read;
 
-use serde::{Deserialize, Serialize};
-
 pub use error::{RigError, RigProblem};
 #[allow(unused_imports, reason = "a study file embeds these sections")]
 pub(crate) use sections::{
@@ -20,7 +18,7 @@ pub(crate) use validate::validate;
 use crate::arrangement::{Arrangement, ArrangementError};
 use crate::contact::Position;
 use crate::estimator::EstimatorConfig;
-use crate::mechanics::{Beam, Extent, Surface};
+use crate::mechanics::SurfaceSpec;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use crate::sensing::Layout;
 
@@ -41,16 +39,6 @@ pub struct Rig {
     pub columns: Option<Columns>,
 }
 
-/// The surface of a rig.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SurfaceSpec {
-    /// A simply supported beam.
-    Beam(Beam),
-    /// A surface without a model, known by recordings only.
-    Measured(Extent),
-}
-
 /// The training positions of a rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Training {
@@ -60,24 +48,6 @@ pub struct Training {
     pub count: usize,
     /// How often each is pressed; at least 1.
     pub repeats: usize,
-}
-
-impl SurfaceSpec {
-    /// The area that can be touched.
-    pub fn extent(&self) -> Extent {
-        match self {
-            Self::Beam(beam) => beam.extent(),
-            Self::Measured(extent) => *extent,
-        }
-    }
-
-    /// Its mechanics, where it has a model.
-    pub fn model(&self) -> Option<&dyn Surface> {
-        match self {
-            Self::Beam(beam) => Some(beam),
-            Self::Measured(_) => None,
-        }
-    }
 }
 
 impl Training {

@@ -3,7 +3,7 @@
 use toml::Spanned;
 
 use crate::contact::Position;
-use crate::rig::SurfaceSpec;
+use crate::mechanics::SurfaceSpec;
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{RecordingSection, SensorsSection, SensorsSections};
 use crate::rig::value::{RawColumn, RawQuantity, bounded, choice, count, not_negative, quantity};

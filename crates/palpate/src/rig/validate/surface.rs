@@ -2,8 +2,8 @@
 
 use toml::Spanned;
 
+use crate::mechanics::SurfaceSpec;
 use crate::mechanics::{Beam, Extent};
-use crate::rig::SurfaceSpec;
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::SurfaceSection;
 use crate::rig::value::{RawQuantity, choice, positive};

@@ -1,0 +1,98 @@
+//! The locator file: JSON with a format version.
+
+use super::{Locator, Method};
+use crate::network::NetworkLocatorError;
+
+/// The `format` of every locator file.
+const FORMAT: &str = "palpate-locator";
+
+/// The version of the format that this palpate writes and reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Why a locator file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LocatorFileError {
+    /// Not the JSON of a locator; the error names line and column.
+    #[error("this is not a locator file: {0}")]
+    Json(#[from] serde_json::Error),
+    /// JSON of another kind.
+    #[error("the file's format is `{found}`; a locator's is `{FORMAT}`")]
+    Format {
+        /// What the file says.
+        found: String,
+    },
+    /// A locator of another format version.
+    #[error(
+        "the locator has format version {found}; this palpate reads version {FORMAT_VERSION}: fit it again, or use the palpate that wrote it"
+    )]
+    Version {
+        /// What the file says.
+        found: u32,
+    },
+    /// Numbers that do not fit together.
+    #[error(transparent)]
+    Network(#[from] NetworkLocatorError),
+}
+
+impl LocatorFileError {
+    /// Line and column, from 1, where the JSON is at fault.
+    pub fn place(&self) -> Option<(usize, usize)> {
+        match self {
+            Self::Json(error) if error.line() > 0 => Some((error.line(), error.column().max(1))),
+            _ => None,
+        }
+    }
+}
+
+/// What every version of the file begins with.
+#[derive(serde::Deserialize)]
+struct Heading {
+    format: String,
+    format_version: u32,
+}
+
+#[derive(serde::Serialize)]
+struct Written<'a> {
+    format: &'static str,
+    format_version: u32,
+    locator: &'a Locator,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Read {
+    #[serde(rename = "format")]
+    _format: String,
+    #[serde(rename = "format_version")]
+    _format_version: u32,
+    locator: Locator,
+}
+
+impl Locator {
+    /// The locator as the text of its file.
+    ///
+    /// # Errors
+    /// [`LocatorFileError::Json`] when a number has no JSON, which no fitted locator has.
+    pub fn to_json(&self) -> Result<String, LocatorFileError> {
+        let written = Written { format: FORMAT, format_version: FORMAT_VERSION, locator: self };
+        Ok(serde_json::to_string_pretty(&written)? + "\n")
+    }
+
+    /// Reads the text of a locator file.
+    ///
+    /// # Errors
+    /// [`LocatorFileError`], with the place where there is one.
+    pub fn from_json(text: &str) -> Result<Self, LocatorFileError> {
+        let heading: Heading = serde_json::from_str(text)?;
+        if heading.format != FORMAT {
+            return Err(LocatorFileError::Format { found: heading.format });
+        }
+        if heading.format_version != FORMAT_VERSION {
+            return Err(LocatorFileError::Version { found: heading.format_version });
+        }
+        let Read { locator, .. } = serde_json::from_str(text)?;
+        let Method::Network(network) = &locator.method;
+        network.check(locator.layout.len())?;
+        Ok(locator)
+    }
+}

@@ -1,0 +1,33 @@
+//! A surface as data: what a rig describes and a locator file carries.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Beam, Extent, Surface};
+
+/// The surface that is touched.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceSpec {
+    /// A simply supported beam.
+    Beam(Beam),
+    /// A surface without a model, known by recordings only.
+    Measured(Extent),
+}
+
+impl SurfaceSpec {
+    /// The area that can be touched.
+    pub fn extent(&self) -> Extent {
+        match self {
+            Self::Beam(beam) => beam.extent(),
+            Self::Measured(extent) => *extent,
+        }
+    }
+
+    /// Its mechanics, where it has a model.
+    pub fn model(&self) -> Option<&dyn Surface> {
+        match self {
+            Self::Beam(beam) => Some(beam),
+            Self::Measured(_) => None,
+        }
+    }
+}
