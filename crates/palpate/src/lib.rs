@@ -1,1 +1,3 @@
 //! palpate.
+
+pub mod report;
