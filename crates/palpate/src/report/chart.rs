@@ -18,7 +18,7 @@ pub struct Chart {
     pub marks: Vec<Mark>,
     /// Width of the image in pixels at scale 1; drawn within 320 to 4,000.
     pub width_px: u32,
-    /// Height of the image in pixels at scale 1, legend included; drawn within 240 to 4,000.
+    /// Height of the image in pixels at scale 1, legend included; drawn within 280 to 4,000.
     pub height_px: u32,
 }
 

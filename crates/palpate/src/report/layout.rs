@@ -17,15 +17,19 @@ const TITLE_LINE: f64 = 22.0;
 const AXIS_LABEL_SIZE: f64 = 12.5;
 const AXIS_LABEL_LINE: f64 = 20.0;
 const TICK_SIZE: f64 = 11.5;
-const TICK_LINE: f64 = 22.0;
+const TICK_LINE: f64 = 24.0;
 const MARK_SIZE: f64 = 11.5;
 const MARK_LINE: f64 = 17.0;
 /// From the header to the plot or the names of marks, and from the axis label to the legend.
 const STRIP_GAP: f64 = 8.0;
 /// Most rows of names above the plot.
 const MARK_ROWS: usize = 3;
-/// From the plot to its tick labels.
+/// From the plot to the labels of the vertical axis.
 const TICK_GAP: f64 = 8.0;
+/// From the plot down to the middle of the labels of the horizontal axis.
+const TICK_DROP: f64 = 16.0;
+/// Share of the image's height that the legend leaves to the plot.
+const LEAST_PLOT_SHARE: f64 = 0.25;
 /// Least distances between neighbouring tick labels, and between their middles.
 const LABEL_GAP: f64 = 14.0;
 const LEAST_X_PITCH: f64 = 40.0;
@@ -53,7 +57,7 @@ pub(crate) struct Layout<'a> {
 impl<'a> Layout<'a> {
     /// Settles every place.
     pub fn new(chart: &'a Chart) -> Self {
-        let (width_px, height_px) = (chart.width_px.clamp(320, 4000), chart.height_px.clamp(240, 4000));
+        let (width_px, height_px) = (chart.width_px.clamp(320, 4000), chart.height_px.clamp(280, 4000));
         let (width, height) = (f64::from(width_px), f64::from(height_px));
         let (x_values, y_values) = scale::values(chart);
         let (x, y) = (AxisScale::new(&chart.x, &x_values), AxisScale::new(&chart.y, &y_values));
@@ -62,8 +66,8 @@ impl<'a> Layout<'a> {
         let most_mark_rows = if vertical_names(chart).next().is_some() { MARK_ROWS } else { 0 };
         let footer = TICK_LINE + line_if(&chart.x.label, AXIS_LABEL_LINE) + STRIP_GAP + MARGIN;
         let free = height - header_bottom - most_mark_rows as f64 * MARK_LINE - footer;
-        let least_plot = (0.3 * height).max(60.0);
-        let legend_rows = ((free - least_plot) / legend::ROW_HEIGHT).floor().max(0.0) as usize;
+        let least_plot = (LEAST_PLOT_SHARE * height).max(60.0);
+        let legend_rows = ((free - least_plot) / legend::ROW_HEIGHT).floor().max(1.0) as usize;
         let legend = Legend::new(chart, width - 2.0 * MARGIN, legend_rows);
 
         let least_height = free - legend.height;
@@ -213,7 +217,7 @@ fn tick_labels(
         colour: QUIET_INK,
     };
     let columns = x_ticks.iter().filter_map(|tick| {
-        let at = (plot.left + x.share(tick.value)? * plot.width(), plot.bottom + TICK_GAP + TICK_SIZE / 2.0);
+        let at = (plot.left + x.share(tick.value)? * plot.width(), plot.bottom + TICK_DROP);
         Some(label(tick, at, Anchor::Middle))
     });
     let rows = y_ticks.iter().filter_map(|tick| {

@@ -35,6 +35,9 @@ mod scale;
 mod text;
 mod ticks;
 
+#[cfg(test)]
+mod tests;
+
 pub use bench_drawing::{
     BenchDrawing, BenchDrawingError, BenchPart, BenchSupport, BenchSupportKind, bench_to_svg,
 };

@@ -1,7 +1,8 @@
 //! SVG to PNG with a font of our own, so that a figure is the same on every machine.
 
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg;
+use resvg::usvg::{self, fontdb};
+use std::sync::{Arc, LazyLock};
 
 /// Name of the font that stands for every generic family.
 const FONT_FAMILY: &str = "Noto Sans";
@@ -55,11 +56,19 @@ pub fn svg_to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
 
 /// The SVG document with its texts set in the built-in font.
 pub(crate) fn parse(svg: &str) -> Result<usvg::Tree, usvg::Error> {
-    let mut options = usvg::Options { font_family: FONT_FAMILY.to_owned(), ..usvg::Options::default() };
-    let fonts = options.fontdb_mut();
+    let options = usvg::Options {
+        font_family: FONT_FAMILY.to_owned(),
+        fontdb: Arc::clone(&FONTS),
+        ..usvg::Options::default()
+    };
+    usvg::Tree::from_str(svg, &options)
+}
+
+static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
+    let mut fonts = fontdb::Database::new();
     fonts.load_font_data(ttf_noto_sans::REGULAR.to_vec());
     fonts.set_sans_serif_family(FONT_FAMILY);
     fonts.set_serif_family(FONT_FAMILY);
     fonts.set_monospace_family(FONT_FAMILY);
-    usvg::Tree::from_str(svg, &options)
-}
+    Arc::new(fonts)
+});

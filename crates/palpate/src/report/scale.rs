@@ -32,7 +32,7 @@ impl AxisScale {
         }
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Log10 => (value / self.low).log10() / (self.high / self.low).log10(),
+            Scale::Log10 => (value.log10() - self.low.log10()) / (self.high.log10() - self.low.log10()),
         };
         Some(share.clamp(-1e6, 1e6))
     }

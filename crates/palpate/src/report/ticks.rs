@@ -76,7 +76,7 @@ fn logarithmic(axis: &AxisScale, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
         values.into_iter().map(|value| Tick { value, label: log_label(value) }).collect()
     };
     let acceptable = |ticks: &Vec<Tick>| ticks.len() <= MOST && fits(ticks);
-    let decades = (axis.high / axis.low).log10();
+    let decades = axis.high.log10() - axis.low.log10();
     if decades < 0.7 {
         return linear(axis, fits);
     }
