@@ -72,13 +72,11 @@ impl Painter<'_, '_> {
     fn grid(&self) {
         let Layout { x, y, x_ticks, y_ticks, plot, .. } = self.layout;
         let column = |value, colour| {
-            let Some(share) = x.share(value) else { return };
-            let across = self.layout.across(share);
+            let across = self.layout.across(x.tick_share(value));
             self.canvas.line(&[(across, plot.top), (across, plot.bottom)], 1.0, colour);
         };
         let row = |value, colour| {
-            let Some(share) = y.share(value) else { return };
-            let up = self.layout.up(share);
+            let up = self.layout.up(y.tick_share(value));
             self.canvas.line(&[(plot.left, up), (plot.right, up)], 1.0, colour);
         };
         ticks::minor(x, x_ticks).into_iter().for_each(|value| column(value, MINOR_GRID));

@@ -216,13 +216,13 @@ fn tick_labels(
         size: TICK_SIZE,
         colour: QUIET_INK,
     };
-    let columns = x_ticks.iter().filter_map(|tick| {
-        let at = (plot.left + x.share(tick.value)? * plot.width(), plot.bottom + TICK_DROP);
-        Some(label(tick, at, Anchor::Middle))
+    let columns = x_ticks.iter().map(|tick| {
+        let at = (plot.left + x.tick_share(tick.value) * plot.width(), plot.bottom + TICK_DROP);
+        label(tick, at, Anchor::Middle)
     });
-    let rows = y_ticks.iter().filter_map(|tick| {
-        let at = (plot.left - TICK_GAP, plot.bottom - y.share(tick.value)? * plot.height());
-        Some(label(tick, at, Anchor::End))
+    let rows = y_ticks.iter().map(|tick| {
+        let at = (plot.left - TICK_GAP, plot.bottom - y.tick_share(tick.value) * plot.height());
+        label(tick, at, Anchor::End)
     });
     columns.chain(rows).collect()
 }
@@ -247,16 +247,16 @@ fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
 /// Neighbouring ticks and how far apart they are as a share of the axis.
 fn pairs<'t>(axis: &AxisScale, ticks: &'t [Tick]) -> impl Iterator<Item = (f64, &'t Tick, &'t Tick)> {
     ticks.windows(2).map(|pair| {
-        let pitch = axis.share(pair[1].value).unwrap_or(0.0) - axis.share(pair[0].value).unwrap_or(0.0);
+        let pitch = axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value);
         (pitch, &pair[0], &pair[1])
     })
 }
 
 /// How far the label of the last tick reaches beyond the axis.
 fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
-    let reach = ticks.last().and_then(|tick| {
+    let reach = ticks.last().map_or(0.0, |tick| {
         let half = text::width(&tick.label, TICK_SIZE) / 2.0;
-        Some(half - (1.0 - axis.share(tick.value)?) * width)
+        half - (1.0 - axis.tick_share(tick.value)) * width
     });
-    reach.unwrap_or(0.0).clamp(4.0, OVERHANG)
+    reach.clamp(4.0, OVERHANG)
 }

@@ -24,17 +24,19 @@ impl AxisScale {
         AxisScale { low, high, scale: axis.scale }
     }
 
-    /// Where a value lies: 0 at the low end, 1 at the high end, outside them beyond (held within ±1e6).
-    /// `None` where the scale cannot show it.
+    /// Where a value of the data lies: 0 at the low end, 1 at the high end, outside them beyond (held within
+    /// ±1e6). `None` where the scale cannot show it.
     pub fn share(&self, value: f64) -> Option<f64> {
-        if !drawable(self.scale, value) {
-            return None;
-        }
+        drawable(self.scale, value).then(|| self.tick_share(value))
+    }
+
+    /// As [`AxisScale::share`] for a value on the axis itself, whose rounded ends may exceed what data may be.
+    pub fn tick_share(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Log10 => (value.log10() - self.low.log10()) / (self.high.log10() - self.low.log10()),
         };
-        Some(share.clamp(-1e6, 1e6))
+        share.clamp(-1e6, 1e6)
     }
 
     /// As [`AxisScale::share`], but a finite value that is not positive lies on the low end of a logarithmic axis.

@@ -103,7 +103,7 @@ fn multiples_of_decades(axis: &AxisScale, multiples: &[f64], stride: i32) -> Vec
 }
 
 fn within(axis: &AxisScale, value: f64) -> bool {
-    axis.share(value).is_some_and(|share| (-1e-6..=1.0 + 1e-6).contains(&share))
+    (-1e-6..=1.0 + 1e-6).contains(&axis.tick_share(value))
 }
 
 fn linear_label(value: f64, step: f64, largest: f64) -> String {

@@ -200,6 +200,15 @@ fn labels_are_shown_letter_by_letter() {
     }
 }
 
+#[test]
+fn both_axes_of_every_chart_can_be_read() {
+    for (case, chart) in awkward() {
+        let layout = Layout::new(&chart);
+        assert!(layout.x_ticks.len() >= 2, "{case}: {:?} along {:?}", layout.x_ticks, layout.x);
+        assert!(layout.y_ticks.len() >= 2, "{case}: {:?} along {:?}", layout.y_ticks, layout.y);
+    }
+}
+
 /// Strokes in the colour of the first series, without its sample in the legend.
 fn pieces(chart: &Chart) -> usize {
     see(&chart_to_svg(chart)).strokes(BLUE).count() - 1
