@@ -7,6 +7,7 @@ pub mod evaluation;
 pub mod mechanics;
 pub mod network;
 pub mod recording;
+pub mod report;
 pub mod rig;
 pub mod sensing;
 pub mod simulate;

@@ -1,0 +1,230 @@
+//! The chart as data: axes, series and marks, with no drawing in it.
+
+/// A chart of one plot area, its title, axes, series and legend.
+///
+/// Any data can be drawn: values that are not finite (or beyond ±1e300) break a line and are otherwise left
+/// out, as are values that are not positive on a logarithmic axis. A chart without data shows empty axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// Heading; wrapped onto at most two lines. Empty for none.
+    pub title: String,
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis. Its label stands above the plot, unrotated.
+    pub y: Axis,
+    /// What is drawn, later series over earlier ones within each kind: bands lie under lines, lines under points.
+    pub series: Vec<Series>,
+    /// Reference lines and shaded ranges behind the data.
+    pub marks: Vec<Mark>,
+    /// Width of the image in pixels at scale 1; drawn within 320 to 4,000.
+    pub width_px: u32,
+    /// Height of the image in pixels at scale 1, legend included; drawn within 280 to 4,000.
+    pub height_px: u32,
+}
+
+impl Default for Chart {
+    fn default() -> Self {
+        Chart {
+            title: String::new(),
+            x: Axis::default(),
+            y: Axis::default(),
+            series: Vec::new(),
+            marks: Vec::new(),
+            width_px: 720,
+            height_px: 440,
+        }
+    }
+}
+
+/// One axis of a chart.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Axis {
+    /// What is measured, with its unit: "load position, mm".
+    pub label: String,
+    /// First and last value shown.
+    pub range: AxisRange,
+    /// How values map to lengths.
+    pub scale: Scale,
+    /// Where the labelled ticks are.
+    pub ticks: Ticks,
+}
+
+impl Axis {
+    /// A linear axis with automatic range and ticks.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Axis { label: label.into(), ..Axis::default() }
+    }
+
+    /// A logarithmic axis with automatic range and ticks.
+    pub fn log10(label: impl Into<String>) -> Self {
+        Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
+    }
+
+    /// The same axis from `low` to `high`.
+    pub fn from_to(self, low: f64, high: f64) -> Self {
+        Axis { range: AxisRange::Fixed { low, high }, ..self }
+    }
+
+    /// The same axis with ticks at `values` only.
+    pub fn ticks_at(self, values: impl Into<Vec<f64>>) -> Self {
+        Axis { ticks: Ticks::At(values.into()), ..self }
+    }
+}
+
+/// First and last value that an axis shows.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum AxisRange {
+    /// From the data and marks, with padding; a linear axis ends on round numbers and is not padded across zero.
+    #[default]
+    Automatic,
+    /// From `low` to `high`; in either order. Treated as automatic where it spans nothing or the scale cannot
+    /// show it (not finite, or not positive on a logarithmic axis).
+    Fixed {
+        /// One end.
+        low: f64,
+        /// The other end.
+        high: f64,
+    },
+}
+
+/// How values map to lengths along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// Equal differences have equal lengths.
+    #[default]
+    Linear,
+    /// Equal ratios have equal lengths.
+    Log10,
+}
+
+/// Where an axis carries labelled ticks.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Ticks {
+    /// Round numbers, as many as are readable.
+    #[default]
+    Automatic,
+    /// These values where they lie in the range; one whose label would touch its neighbour's is left out.
+    At(Vec<f64>),
+}
+
+/// One thing that is drawn, with one entry in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; empty keeps the series out of it.
+    pub label: String,
+    /// Index into seven colours that colour-blind readers can tell apart (Okabe and Ito): blue, vermilion,
+    /// green, purple, sky blue, orange, black; larger indices start over.
+    pub colour: usize,
+    /// Shape and data.
+    pub kind: SeriesKind,
+}
+
+/// Shape and data of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SeriesKind {
+    /// A line through the points in their order.
+    Line {
+        /// (x, y) in the units of the axes.
+        points: Vec<(f64, f64)>,
+        /// Solid or dashed.
+        stroke: Stroke,
+    },
+    /// A translucent area between two curves.
+    Band {
+        /// Its lower and upper edge at each x. On a logarithmic axis an edge that is not positive lies on the
+        /// end of the axis.
+        points: Vec<BandPoint>,
+    },
+    /// Unconnected markers.
+    Points {
+        /// (x, y) in the units of the axes.
+        points: Vec<(f64, f64)>,
+        /// Shape of each marker.
+        marker: Marker,
+    },
+    /// Unconnected markers with a vertical bar.
+    ErrorBars {
+        /// Each marker and the two ends of its bar.
+        points: Vec<ErrorPoint>,
+        /// Shape of each marker.
+        marker: Marker,
+    },
+}
+
+/// How a line is stroked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Stroke {
+    /// Unbroken.
+    #[default]
+    Solid,
+    /// Broken.
+    Dashed,
+}
+
+/// Shape of a marker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marker {
+    /// A filled disc.
+    Circle,
+    /// A filled square.
+    Square,
+    /// A filled triangle, apex up.
+    Triangle,
+    /// A diagonal cross.
+    Cross,
+}
+
+/// The edges of a band at one x.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BandPoint {
+    /// Horizontal position.
+    pub x: f64,
+    /// Lower edge.
+    pub low: f64,
+    /// Upper edge.
+    pub high: f64,
+}
+
+/// A value with the ends of its error bar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorPoint {
+    /// Horizontal position.
+    pub x: f64,
+    /// The value itself.
+    pub y: f64,
+    /// Lower end of the bar. On a logarithmic axis an end that is not positive lies on the end of the axis.
+    pub low: f64,
+    /// Upper end of the bar.
+    pub high: f64,
+}
+
+/// A reference behind the data.
+///
+/// Labels of vertical marks stand above the plot, in at most three rows; one that finds no room is left out
+/// while its mark stays. A horizontal mark is named in the legend.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mark {
+    /// A dashed vertical line, such as a support.
+    VerticalLine {
+        /// Where it stands.
+        x: f64,
+        /// Its name; empty for none.
+        label: String,
+    },
+    /// A dashed horizontal line, such as a tolerance.
+    HorizontalLine {
+        /// Where it lies.
+        y: f64,
+        /// Its name in the legend; empty for none.
+        label: String,
+    },
+    /// A shaded range of x, such as a portion of a beam.
+    Span {
+        /// One end.
+        low: f64,
+        /// The other end.
+        high: f64,
+        /// Its name; empty for none.
+        label: String,
+    },
+}

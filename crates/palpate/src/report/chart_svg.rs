@@ -1,0 +1,292 @@
+//! A chart as SVG text.
+
+use super::canvas::{self, Canvas, GRID, MINOR_GRID, QUIET_INK, REFERENCE, WHITE};
+use super::chart::{BandPoint, Chart, ErrorPoint, Mark, Marker, Series, SeriesKind, Stroke};
+use super::geometry::{Point, Rect};
+use super::layout::Layout;
+use super::legend::Named;
+use super::ticks;
+use plotters::style::{Color, RGBColor};
+
+const LINE_WIDTH: f64 = 1.8;
+const REFERENCE_WIDTH: f64 = 1.2;
+const ERROR_BAR_WIDTH: f64 = 1.5;
+const CAP_HALF_WIDTH: f64 = 4.0;
+const MARKER_RADIUS: f64 = 4.2;
+/// White rim that keeps a marker apart from what lies under it.
+const MARKER_RIM: f64 = 1.2;
+const CROSS_WIDTH: f64 = 2.0;
+const BAND_OPACITY: f64 = 0.2;
+const SPAN_OPACITY: f64 = 0.05;
+
+/// Draws the chart as one self-contained SVG document, `width_px` × `height_px` in size.
+///
+/// The legend stands beneath the plot; where even that leaves no room for all names, its last entry says how many
+/// are missing. Texts are set in the reader's sans-serif font.
+pub fn chart_to_svg(chart: &Chart) -> String {
+    let layout = Layout::new(chart);
+    canvas::svg(layout.width_px, layout.height_px, |canvas| {
+        let painter = Painter { canvas, layout: &layout };
+        painter.spans(&chart.marks);
+        painter.grid();
+        for series in &chart.series {
+            painter.band(series);
+        }
+        painter.reference_lines(&chart.marks);
+        painter.base_line();
+        for series in &chart.series {
+            painter.line(series);
+        }
+        for series in &chart.series {
+            painter.markers(series);
+        }
+        painter.legend();
+        for label in &layout.labels {
+            canvas.text(label);
+        }
+    })
+}
+
+struct Painter<'a, 'svg> {
+    canvas: &'a Canvas<'svg>,
+    layout: &'a Layout<'a>,
+}
+
+impl Painter<'_, '_> {
+    fn spans(&self, marks: &[Mark]) {
+        let plot = self.layout.plot;
+        for mark in marks {
+            let Mark::Span { low, high, .. } = mark else { continue };
+            let (Some(start), Some(end)) =
+                (self.layout.x.share(low.min(*high)), self.layout.x.share(low.max(*high)))
+            else {
+                continue;
+            };
+            let (left, right) = (self.layout.across(start.max(0.0)), self.layout.across(end.min(1.0)));
+            if left < right {
+                self.canvas.rectangle(Rect { left, right, ..plot }, canvas::palette(6).mix(SPAN_OPACITY));
+            }
+        }
+    }
+
+    fn grid(&self) {
+        let Layout { x, y, x_ticks, y_ticks, plot, .. } = self.layout;
+        let column = |value, colour| {
+            let across = self.layout.across(x.tick_share(value));
+            self.canvas.line(&[(across, plot.top), (across, plot.bottom)], 1.0, colour);
+        };
+        let row = |value, colour| {
+            let up = self.layout.up(y.tick_share(value));
+            self.canvas.line(&[(plot.left, up), (plot.right, up)], 1.0, colour);
+        };
+        ticks::minor(x, x_ticks).into_iter().for_each(|value| column(value, MINOR_GRID));
+        ticks::minor(y, y_ticks).into_iter().for_each(|value| row(value, MINOR_GRID));
+        x_ticks.iter().for_each(|tick| column(tick.value, GRID));
+        y_ticks.iter().for_each(|tick| row(tick.value, GRID));
+    }
+
+    fn base_line(&self) {
+        let plot = self.layout.plot;
+        self.canvas.line(&[(plot.left, plot.bottom), (plot.right, plot.bottom)], 1.0, QUIET_INK);
+    }
+
+    fn reference_lines(&self, marks: &[Mark]) {
+        let plot = self.layout.plot;
+        for mark in marks {
+            let ends = match *mark {
+                Mark::VerticalLine { x, .. } => self
+                    .layout
+                    .x
+                    .share(x)
+                    .map(|share| self.layout.across(share))
+                    .map(|x| [(x, plot.top), (x, plot.bottom)]),
+                Mark::HorizontalLine { y, .. } => self
+                    .layout
+                    .y
+                    .share(y)
+                    .map(|share| self.layout.up(share))
+                    .map(|y| [(plot.left, y), (plot.right, y)]),
+                Mark::Span { .. } => None,
+            };
+            for piece in ends.into_iter().flat_map(|ends| plot.clip_line(&ends)) {
+                self.canvas.dashed_line(&piece, REFERENCE_WIDTH, REFERENCE);
+            }
+        }
+    }
+
+    fn band(&self, series: &Series) {
+        let SeriesKind::Band { points } = &series.kind else { return };
+        let place = |point: &BandPoint| {
+            Some((self.layout.place_edge(point.x, point.low)?, self.layout.place_edge(point.x, point.high)?))
+        };
+        for run in runs(points.iter().map(place)) {
+            let low = run.iter().map(|(low, _)| *low);
+            let high = run.iter().rev().map(|(_, high)| *high);
+            let outline: Vec<Point> = low.chain(high).collect();
+            let colour = canvas::palette(series.colour).mix(BAND_OPACITY);
+            self.canvas.polygon(&self.layout.plot.clip_polygon(&outline), colour);
+        }
+    }
+
+    fn line(&self, series: &Series) {
+        let SeriesKind::Line { points, stroke } = &series.kind else { return };
+        let colour = canvas::palette(series.colour);
+        for run in runs(points.iter().map(|&(x, y)| self.layout.place(x, y))) {
+            if let [lone] = run[..]
+                && self.layout.plot.contains(lone)
+            {
+                self.canvas.disc(lone, LINE_WIDTH, colour);
+            }
+            for piece in self.layout.plot.clip_line(&run) {
+                self.stroke(&piece, *stroke, colour);
+            }
+        }
+    }
+
+    fn stroke(&self, points: &[Point], stroke: Stroke, colour: RGBColor) {
+        match stroke {
+            Stroke::Solid => self.canvas.line(points, LINE_WIDTH, colour),
+            Stroke::Dashed => self.canvas.dashed_line(points, LINE_WIDTH, colour),
+        }
+    }
+
+    fn markers(&self, series: &Series) {
+        let colour = canvas::palette(series.colour);
+        match &series.kind {
+            SeriesKind::Points { points, marker } => {
+                for at in points.iter().filter_map(|&(x, y)| self.place_inside(x, y)) {
+                    draw_rim(self.canvas, at, *marker);
+                    draw_marker(self.canvas, at, *marker, colour);
+                }
+            }
+            SeriesKind::ErrorBars { points, marker } => {
+                points.iter().for_each(|point| self.error_bar(point, *marker, colour));
+            }
+            SeriesKind::Line { .. } | SeriesKind::Band { .. } => {}
+        }
+    }
+
+    fn error_bar(&self, point: &ErrorPoint, marker: Marker, colour: RGBColor) {
+        let plot = self.layout.plot;
+        let at = self.place_inside(point.x, point.y);
+        if let Some(at) = at {
+            draw_rim(self.canvas, at, marker);
+        }
+        let ends = [self.layout.place_edge(point.x, point.low), self.layout.place_edge(point.x, point.high)];
+        if let [Some(low), Some(high)] = ends {
+            for piece in plot.clip_line(&[low, high]) {
+                self.canvas.line(&piece, ERROR_BAR_WIDTH, colour);
+            }
+            for (x, y) in [low, high].into_iter().filter(|&end| plot.contains(end)) {
+                self.canvas.line(
+                    &[(x - CAP_HALF_WIDTH, y), (x + CAP_HALF_WIDTH, y)],
+                    ERROR_BAR_WIDTH,
+                    colour,
+                );
+            }
+        }
+        if let Some(at) = at {
+            draw_marker(self.canvas, at, marker, colour);
+        }
+    }
+
+    /// Where a point of the data lies; `None` outside the plot.
+    fn place_inside(&self, x: f64, y: f64) -> Option<Point> {
+        self.layout.place(x, y).filter(|&at| self.layout.plot.contains(at))
+    }
+
+    fn legend(&self) {
+        for entry in &self.layout.legend.entries {
+            let Rect { left, right, top, bottom } = entry.swatch;
+            let middle = top.midpoint(bottom);
+            match entry.named {
+                Named::Series(series) => self.swatch(series, entry.swatch),
+                Named::Reference => {
+                    self.canvas.dashed_line(&[(left, middle), (right, middle)], REFERENCE_WIDTH, REFERENCE);
+                }
+            }
+            self.canvas.text(&entry.label);
+        }
+        if let Some(remainder) = &self.layout.legend.remainder {
+            self.canvas.text(remainder);
+        }
+    }
+
+    /// A sample of how the series is drawn.
+    fn swatch(&self, series: &Series, area: Rect) {
+        let colour = canvas::palette(series.colour);
+        let Rect { left, right, top, bottom } = area;
+        let middle = (left.midpoint(right), top.midpoint(bottom));
+        match &series.kind {
+            SeriesKind::Line { stroke, .. } => {
+                self.stroke(&[(left, middle.1), (right, middle.1)], *stroke, colour);
+            }
+            SeriesKind::Band { .. } => self.canvas.rectangle(area, colour.mix(BAND_OPACITY)),
+            SeriesKind::Points { marker, .. } => draw_marker(self.canvas, middle, *marker, colour),
+            SeriesKind::ErrorBars { marker, .. } => {
+                self.canvas.line(&[(middle.0, top - 2.0), (middle.0, bottom + 2.0)], ERROR_BAR_WIDTH, colour);
+                draw_marker(self.canvas, middle, *marker, colour);
+            }
+        }
+    }
+}
+
+/// The longest stretches without a gap.
+fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
+    let mut runs = vec![Vec::new()];
+    for item in items {
+        match (item, runs.last_mut()) {
+            (Some(item), Some(run)) => run.push(item),
+            _ => runs.push(Vec::new()),
+        }
+    }
+    runs.retain(|run| !run.is_empty());
+    runs
+}
+
+/// A white ground a little larger than the marker, which keeps it apart from lines of other series.
+fn draw_rim(canvas: &Canvas<'_>, at: Point, marker: Marker) {
+    draw_shape(canvas, at, marker, MARKER_RADIUS + MARKER_RIM, CROSS_WIDTH + MARKER_RIM, WHITE);
+}
+
+fn draw_marker(canvas: &Canvas<'_>, at: Point, marker: Marker, colour: RGBColor) {
+    draw_shape(canvas, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
+}
+
+/// Shapes that look equally large at the same `radius`.
+fn draw_shape(
+    canvas: &Canvas<'_>,
+    at: Point,
+    marker: Marker,
+    radius: f64,
+    cross_width: f64,
+    colour: RGBColor,
+) {
+    match marker {
+        Marker::Circle => canvas.disc(at, radius, colour),
+        Marker::Square => canvas.rectangle(square(at, 0.9 * radius), colour.to_rgba()),
+        Marker::Triangle => canvas.polygon(&triangle(at, 1.35 * radius), colour.to_rgba()),
+        Marker::Cross => {
+            canvas.line(
+                &[(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)],
+                cross_width,
+                colour,
+            );
+            canvas.line(
+                &[(at.0 - radius, at.1 + radius), (at.0 + radius, at.1 - radius)],
+                cross_width,
+                colour,
+            );
+        }
+    }
+}
+
+fn square((x, y): Point, half: f64) -> Rect {
+    Rect { left: x - half, right: x + half, top: y - half, bottom: y + half }
+}
+
+/// An equilateral triangle, apex up, with its centre at the point and its corners at `radius` from it.
+fn triangle((x, y): Point, radius: f64) -> [Point; 3] {
+    let half_side = radius * 0.75_f64.sqrt();
+    [(x, y - radius), (x + half_side, y + radius / 2.0), (x - half_side, y + radius / 2.0)]
+}

@@ -1,0 +1,48 @@
+//! Figures: charts and drawings of a bench, as SVG text and as PNG bytes.
+//!
+//! Nothing here knows what is drawn: a [`Chart`] is plain data that the caller fills in. No function touches a
+//! file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
+//!
+//! ```
+//! use palpate::report::{Axis, Chart, Series, SeriesKind, Stroke, chart_to_svg, svg_to_png};
+//!
+//! let chart = Chart {
+//!     title: "Location error".into(),
+//!     x: Axis::linear("load position, mm"),
+//!     y: Axis::log10("error, mm"),
+//!     series: vec![Series {
+//!         label: "10 training positions".into(),
+//!         colour: 0,
+//!         kind: SeriesKind::Line { points: vec![(1.0, 12.0), (200.0, 0.4), (399.0, 9.0)], stroke: Stroke::Solid },
+//!     }],
+//!     ..Chart::default()
+//! };
+//! let svg = chart_to_svg(&chart);
+//! let png = svg_to_png(&svg, 2.0)?;
+//! assert!(png.starts_with(b"\x89PNG"));
+//! # Ok::<(), palpate::report::PngError>(())
+//! ```
+
+mod bench_drawing;
+mod canvas;
+mod chart;
+mod chart_svg;
+mod geometry;
+mod layout;
+mod legend;
+mod png;
+mod scale;
+mod text;
+mod ticks;
+
+#[cfg(test)]
+mod tests;
+
+pub use bench_drawing::{
+    BenchDrawing, BenchDrawingError, BenchPart, BenchSupport, BenchSupportKind, bench_to_svg,
+};
+pub use chart::{
+    Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
+};
+pub use chart_svg::chart_to_svg;
+pub use png::{PngError, svg_to_png};

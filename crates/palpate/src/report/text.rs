@@ -1,0 +1,56 @@
+//! How much room a text takes, without looking at a font.
+//!
+//! An SVG is shown with whatever sans-serif font its reader has. The widths here follow the wider of the common
+//! ones (DejaVu Sans, Verdana), so that a layout made with them holds for the narrower ones (Arial, Noto Sans).
+
+/// Estimated width in pixels of `text` at a font size of `size` pixels; rather too wide than too narrow.
+pub(crate) fn width(text: &str, size: f64) -> f64 {
+    text.chars().map(em).sum::<f64>() * size
+}
+
+/// Advance of one character in units of the font size.
+fn em(character: char) -> f64 {
+    match character {
+        'i' | 'j' | 'l' | '\'' | '.' | ',' | ':' | ';' | '|' | ' ' => 0.34,
+        'f' | 't' | 'r' | '(' | ')' | '[' | ']' | '!' | '/' | '-' => 0.42,
+        'm' | 'w' | 'M' | 'W' | '%' | '@' | '…' => 1.0,
+        '+' | '<' | '>' | '=' | '−' | '×' | '±' | '≤' | '≥' | '&' | '~' | '#' => 0.84,
+        'A'..='Z' => 0.76,
+        '\u{2e80}'.. => 1.05,
+        '\u{0250}'.. => 0.8,
+        _ => 0.64,
+    }
+}
+
+/// `text` itself where it is no wider than `room` pixels, else as much of its beginning as fits, with an ellipsis.
+pub(crate) fn fit(text: &str, size: f64, room: f64) -> String {
+    if width(text, size) <= room {
+        return text.to_owned();
+    }
+    let mut left = room - width("…", size);
+    let kept: String = text
+        .chars()
+        .take_while(|&character| {
+            left -= em(character) * size;
+            left >= 0.0
+        })
+        .collect();
+    format!("{}…", kept.trim_end())
+}
+
+/// `text` broken at spaces onto at most `lines` lines of at most `room` pixels; what is left over is cut off
+/// with an ellipsis. No line for an empty text.
+pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String> {
+    let mut wrapped: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        let at_last = wrapped.len() == lines;
+        match wrapped.last_mut() {
+            Some(line) if at_last || width(line, size) + width(" ", size) + width(word, size) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => wrapped.push(word.to_owned()),
+        }
+    }
+    wrapped.iter().map(|line| fit(line, size, room)).collect()
+}
