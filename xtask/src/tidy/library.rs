@@ -24,7 +24,9 @@ const CRATES: [&str; 2] = ["crates/palpate/src/", "crates/palpate-core/src/"];
 
 /// A use of the outside in `palpate` or `palpate-core`, but for tests.
 pub fn findings(project: &Project) -> Vec<Finding> {
-    let library = project.rust().filter(|file| CRATES.iter().any(|folder| file.path.starts_with(folder)));
+    let library = project
+        .rust()
+        .filter(|file| !file.is_test() && CRATES.iter().any(|folder| file.path.starts_with(folder)));
     library.flat_map(of_file).collect()
 }
 
@@ -71,6 +73,7 @@ mod tests {
     fn durations_readers_tests_and_the_command_are_clean() {
         let text = "use std::time::Duration;\nuse std::io::{self, Read};\n/// println!(\"\")\n#[cfg(test)]\nmod tests { use std::fs; }";
         assert!(lines("crates/palpate/src/rig.rs", text).is_empty());
+        assert!(lines("crates/palpate/src/report/tests.rs", "use std::fs;").is_empty());
         assert!(lines("crates/palpate-cli/src/main.rs", "use std::fs;").is_empty());
     }
 }

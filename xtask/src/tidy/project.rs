@@ -82,6 +82,11 @@ impl File {
         String::from_utf8_lossy(&self.bytes)
     }
 
+    /// Whether it holds tests alone.
+    pub fn is_test(&self) -> bool {
+        self.path.contains("/tests/") || self.path.ends_with("/tests.rs")
+    }
+
     /// Whether it is one of the rules' own files, which must name what they forbid.
     pub fn is_a_rule(&self) -> bool {
         self.path.starts_with("xtask/src/tidy/")
