@@ -17,7 +17,10 @@ pub struct Counts {
 impl Counts {
     /// Adds up every closing line among `lines`; `None` when there is none, as after a failed build.
     pub fn read(lines: &[String]) -> Option<Self> {
-        lines.iter().filter_map(|line| nextest(line).or_else(|| cargo_test(line))).reduce(Self::add)
+        let sum =
+            |read: fn(&str) -> Option<Self>| lines.iter().filter_map(|line| read(line)).reduce(Self::add);
+        // nextest repeats what a failed test printed, and that ends like a run of cargo test.
+        sum(nextest).or_else(|| sum(cargo_test))
     }
 
     /// Counts tests that found a prerequisite missing, which their runner takes as passed, as skipped.
@@ -63,7 +66,7 @@ fn nextest(line: &str) -> Option<Counts> {
 
 /// `test result: ok. 3 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s`
 fn cargo_test(line: &str) -> Option<Counts> {
-    let (_, results) = line.trim_start().strip_prefix("test result: ")?.split_once(". ")?;
+    let (_, results) = line.strip_prefix("test result: ")?.split_once(". ")?;
     Some(tally(results, ';'))
 }
 
@@ -106,6 +109,14 @@ mod tests {
         assert_eq!(counts, Some(Counts { passed: 7, failed: 3, skipped: 2 }));
         let counts = read("  Summary [   0.001s] 1 test run: 1 passed, 4 skipped");
         assert_eq!(counts, Some(Counts { passed: 1, failed: 0, skipped: 4 }));
+    }
+
+    #[test]
+    fn a_failure_that_nextest_repeats_is_counted_once() {
+        let counts = read(
+            "test result: FAILED. 0 passed; 1 failed; 0 ignored\n Summary [ 1s] 2 tests run: 1 passed, 1 failed, 0 skipped",
+        );
+        assert_eq!(counts, Some(Counts { passed: 1, failed: 1, skipped: 0 }));
     }
 
     #[test]

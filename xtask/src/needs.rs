@@ -1,6 +1,7 @@
 //! What the tests need beyond Rust: how it is found, how it is installed, and which tests do without it.
 
 use std::env;
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +14,10 @@ use crate::run;
 pub struct Need {
     /// What a person calls it.
     pub name: &'static str,
-    found: fn(&Path) -> bool,
+    /// An environment variable that says where it is, and so that it need not be installed.
+    variable: Option<&'static str>,
+    /// Whether it is where it usually is, or where the variable says.
+    found: fn(&Path, Option<&Path>) -> bool,
     install: Option<Install>,
     /// What becomes of the tests without it.
     pub without: Without,
@@ -49,7 +53,8 @@ enum Install {
 /// Runs the tests in parallel, a process each.
 pub const NEXTEST: Need = Need {
     name: "cargo-nextest",
-    found: |_| run::answers("cargo", &["nextest", "--version"]),
+    variable: None,
+    found: |_, _| run::answers("cargo", &["nextest", "--version"]),
     install: None,
     without: Without::FallsBack("cargo test runs the tests instead"),
 };
@@ -58,10 +63,8 @@ const NEEDS: [Need; 3] = [
     NEXTEST,
     Need {
         name: "the folder of real recordings",
-        found: |root| match env::var_os("PALPATE_DATA") {
-            Some(folder) => Path::new(&folder).is_dir(),
-            None => root.join("../shared/data").is_dir(),
-        },
+        variable: Some("PALPATE_DATA"),
+        found: |root, named| named.map_or_else(|| root.join("../shared/data").is_dir(), Path::is_dir),
         install: None,
         without: Without::Skips {
             tests: &["crates/palpate-cli/tests/recordings.rs", "every test that reads a real recording"],
@@ -70,10 +73,8 @@ const NEEDS: [Need; 3] = [
     },
     Need {
         name: "Chromium",
-        found: |_| match env::var_os("PALPATE_CHROMIUM") {
-            Some(program) => Path::new(&program).is_file(),
-            None => Path::new("/usr/bin/chromium").is_file(),
-        },
+        variable: Some("PALPATE_CHROMIUM"),
+        found: |_, named| named.unwrap_or(Path::new("/usr/bin/chromium")).is_file(),
         install: Some(Install::Apt(&["chromium", "fonts-dejavu-core"])),
         without: Without::Skips {
             tests: &["crates/palpate-cli/tests/browser.rs"],
@@ -97,7 +98,11 @@ pub fn missing(root: &Path) -> Result<Vec<Need>> {
 impl Need {
     /// Whether it is on this machine.
     pub fn is_there(&self, root: &Path) -> bool {
-        (self.found)(root)
+        (self.found)(root, self.named().as_deref().map(Path::new))
+    }
+
+    fn named(&self) -> Option<OsString> {
+        self.variable.and_then(env::var_os)
     }
 
     /// What is missing, what follows and what can be done, for people.
@@ -111,7 +116,8 @@ impl Need {
     }
 
     fn installed(&self, root: &Path) -> Result<bool> {
-        let Some(install) = self.install.filter(|install| install.may_run()) else { return Ok(false) };
+        let install = self.install.filter(|install| self.named().is_none() && install.may_run());
+        let Some(install) = install else { return Ok(false) };
         println!("installing {}", self.name);
         for mut command in install.commands(root) {
             if !run::shown(&mut command)? {
