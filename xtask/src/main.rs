@@ -35,9 +35,12 @@ enum Chore {
     Tidy,
     /// Run the benchmarks of the whole workspace
     Bench {
-        /// Handed on to `cargo bench`
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-        rest: Vec<String>,
+        /// Handed on to `cargo bench`, such as --bench NAME
+        #[arg(allow_hyphen_values = true)]
+        for_cargo: Vec<String>,
+        /// Handed on to the benchmarks
+        #[arg(last = true)]
+        for_benches: Vec<String>,
     },
     /// Fuzz one target, or list the targets when none is named
     Fuzz {
@@ -56,8 +59,10 @@ fn main() -> ExitCode {
             test::run(&root, if strict { test::Skips::Fail } else { test::Skips::Pass })
         }
         Chore::Tidy => tidy::run(&root),
-        Chore::Bench { rest } => {
-            run::shown(Command::new("cargo").args(["bench", "--workspace"]).args(rest).current_dir(&root))
+        Chore::Bench { for_cargo, for_benches } => {
+            let mut bench = Command::new("cargo");
+            bench.args(["bench", "--workspace"]).args(for_cargo).arg("--").args(for_benches);
+            run::shown(bench.current_dir(&root))
         }
         Chore::Fuzz { target: None, .. } => fuzz::list(&root),
         Chore::Fuzz { target: Some(target), seconds } => fuzz::run(&root, &target, seconds),
