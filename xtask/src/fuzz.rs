@@ -86,10 +86,7 @@ fn host() -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn root() -> std::path::PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-    }
+    use crate::root;
 
     #[test]
     fn every_target_file_is_a_binary_of_the_manifest() {

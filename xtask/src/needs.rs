@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn every_test_file_that_the_table_names_exists() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let root = crate::root();
         for need in &NEEDS {
             if let Without::Skips { tests, .. } = need.without {
                 let files = tests.iter().filter(|test| test.contains('/'));

@@ -13,7 +13,9 @@ use super::skip::skip;
 /// let Some(path) = data::recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
 /// ```
 pub fn recording(name: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    // As cargo says when the test runs: what it said at build time is stale once a clone has moved.
+    let package = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+    let beside = || Path::new(&package).join("../../../shared/data");
     let folder = env::var_os("PALPATE_DATA").map_or_else(beside, PathBuf::from);
     if !folder.is_dir() {
         skip(
