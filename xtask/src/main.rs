@@ -1,2 +1,85 @@
-//! Project chores.
-fn main() {}
+//! The project's chores: `cargo xtask test | tidy | bench | fuzz`.
+#![forbid(unsafe_code)]
+
+mod counts;
+mod fuzz;
+mod needs;
+mod run;
+mod skipped;
+mod test;
+mod tidy;
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use clap::{Parser, Subcommand};
+
+/// The project's chores.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    chore: Chore,
+}
+
+#[derive(Subcommand)]
+enum Chore {
+    /// Run every check: formatting, clippy, tests, doc tests, docs, tidy
+    Test {
+        /// A test that is skipped for want of a prerequisite fails
+        #[arg(long)]
+        strict: bool,
+    },
+    /// Check the rules that a program can check: dependencies, invariants, links, file lengths
+    Tidy,
+    /// Run the benchmarks of the whole workspace
+    Bench {
+        /// Handed on to `cargo bench`, such as --bench NAME
+        #[arg(allow_hyphen_values = true)]
+        for_cargo: Vec<String>,
+        /// Handed on to the benchmarks
+        #[arg(last = true)]
+        for_benches: Vec<String>,
+    },
+    /// Fuzz one target, or list the targets when none is named
+    Fuzz {
+        /// A file of fuzz/fuzz_targets, without .rs
+        target: Option<String>,
+        /// Stop after this many seconds
+        #[arg(long, value_name = "N", default_value_t = 60)]
+        seconds: u32,
+    },
+}
+
+fn main() -> ExitCode {
+    let root = root();
+    let done = match Arguments::parse().chore {
+        Chore::Test { strict } => {
+            test::run(&root, if strict { test::Skips::Fail } else { test::Skips::Pass })
+        }
+        Chore::Tidy => tidy::run(&root),
+        Chore::Bench { for_cargo, for_benches } => {
+            let mut bench = Command::new("cargo");
+            bench.args(["bench", "--workspace"]).args(for_cargo).arg("--").args(for_benches);
+            run::shown(bench.current_dir(&root))
+        }
+        Chore::Fuzz { target: None, .. } => fuzz::list(&root),
+        Chore::Fuzz { target: Some(target), seconds } => fuzz::run(&root, &target, seconds),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The workspace's folder. Cargo names xtask's own when it runs it; a binary run by hand falls back on where it was built.
+fn root() -> PathBuf {
+    let own =
+        env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
+    own.parent().map_or_else(|| own.clone(), Path::to_path_buf)
+}

@@ -1,2 +1,4 @@
 //! The `palpate` command.
+#![forbid(unsafe_code)]
+
 fn main() {}

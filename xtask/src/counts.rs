@@ -1,0 +1,143 @@
+//! How many tests ran, read off the closing lines of the test runners.
+
+use std::fmt;
+use std::ops::Add;
+
+/// Tests by result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Ran and passed.
+    pub passed: usize,
+    /// Ran and failed, timed out, or could not be started.
+    pub failed: usize,
+    /// Did not run, or found a prerequisite missing.
+    pub skipped: usize,
+}
+
+impl Counts {
+    /// Adds up every closing line among `lines`; `None` when there is none, as after a failed build.
+    pub fn read(lines: &[String]) -> Option<Self> {
+        let sum =
+            |read: fn(&str) -> Option<Self>| lines.iter().filter_map(|line| read(line)).reduce(Self::add);
+        // nextest repeats what a failed test printed, and that ends like a run of cargo test.
+        sum(nextest).or_else(|| sum(cargo_test))
+    }
+
+    /// Counts tests that found a prerequisite missing, which their runner takes as passed, as skipped.
+    pub fn with_skips(self, skips: usize) -> Self {
+        let moved = skips.min(self.passed);
+        Self { passed: self.passed - moved, skipped: self.skipped + moved, ..self }
+    }
+
+    fn count(mut self, number: usize, what: &str) -> Self {
+        match what {
+            "passed" => self.passed += number,
+            "failed" | "timed out" | "exec failed" => self.failed += number,
+            "skipped" | "ignored" => self.skipped += number,
+            _ => {}
+        }
+        self
+    }
+}
+
+impl Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            passed: self.passed + other.passed,
+            failed: self.failed + other.failed,
+            skipped: self.skipped + other.skipped,
+        }
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} passed, {} failed, {} skipped", self.passed, self.failed, self.skipped)
+    }
+}
+
+/// `Summary [   0.01s] 3/4 tests run: 2 passed (1 slow, 1 flaky), 1 failed, 1 skipped`
+fn nextest(line: &str) -> Option<Counts> {
+    let (_, results) = line.trim_start().strip_prefix("Summary [")?.split_once(" run: ")?;
+    Some(tally(&without_asides(results), ','))
+}
+
+/// `test result: ok. 3 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s`
+fn cargo_test(line: &str) -> Option<Counts> {
+    let (_, results) = line.strip_prefix("test result: ")?.split_once(". ")?;
+    Some(tally(results, ';'))
+}
+
+fn tally(results: &str, between: char) -> Counts {
+    results.split(between).fold(Counts::default(), |counts, part| match part.trim().split_once(' ') {
+        Some((number, what)) => number.parse().map_or(counts, |number| counts.count(number, what.trim())),
+        None => counts,
+    })
+}
+
+fn without_asides(text: &str) -> String {
+    let mut depth = 0usize;
+    let kept = text.chars().filter(|&character| {
+        let outside = depth == 0 && character != '(';
+        match character {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        outside
+    });
+    kept.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Option<Counts> {
+        Counts::read(&text.lines().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn nextest_summaries_are_read() {
+        let counts = read("     Summary [   0.005s] 3 tests run: 3 passed, 0 skipped");
+        assert_eq!(counts, Some(Counts { passed: 3, failed: 0, skipped: 0 }));
+        let counts = read(
+            "  Summary [  5.678s] 10/20 tests run: 7 passed (1 slow, 1 flaky), 1 failed, 1 timed out, 1 exec failed, 2 skipped",
+        );
+        assert_eq!(counts, Some(Counts { passed: 7, failed: 3, skipped: 2 }));
+        let counts = read("  Summary [   0.001s] 1 test run: 1 passed, 4 skipped");
+        assert_eq!(counts, Some(Counts { passed: 1, failed: 0, skipped: 4 }));
+    }
+
+    #[test]
+    fn a_failure_that_nextest_repeats_is_counted_once() {
+        let counts = read(
+            "test result: FAILED. 0 passed; 1 failed; 0 ignored\n Summary [ 1s] 2 tests run: 1 passed, 1 failed, 0 skipped",
+        );
+        assert_eq!(counts, Some(Counts { passed: 1, failed: 1, skipped: 0 }));
+    }
+
+    #[test]
+    fn cargo_test_results_are_added_up() {
+        let counts = read(
+            "test result: ok. 3 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s\n\
+             test result: FAILED. 1 passed; 2 failed; 0 ignored; 0 measured; 5 filtered out; finished in 0.10s",
+        );
+        assert_eq!(counts, Some(Counts { passed: 4, failed: 2, skipped: 1 }));
+    }
+
+    #[test]
+    fn a_failed_build_has_no_counts() {
+        assert_eq!(read("error: could not compile `palpate`\nSummary of nothing"), None);
+    }
+
+    #[test]
+    fn skips_are_taken_from_the_passed() {
+        let counts = Counts { passed: 4, failed: 1, skipped: 1 }.with_skips(3);
+        assert_eq!(counts, Counts { passed: 1, failed: 1, skipped: 4 });
+        assert_eq!(counts.to_string(), "1 passed, 1 failed, 4 skipped");
+        assert_eq!(Counts { passed: 1, failed: 0, skipped: 0 }.with_skips(9).skipped, 1);
+    }
+}

@@ -1,0 +1,40 @@
+//! The tests that found a prerequisite missing. A test runner counts them as passed and hides what they print, so each
+//! adds a line to a file that the environment names, and this reads it.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+/// Names the file to which a test that skips adds a line.
+pub const VARIABLE: &str = "PALPATE_SKIPPED";
+
+/// The file of one run.
+pub struct Skipped {
+    /// Where it is.
+    pub file: PathBuf,
+}
+
+impl Skipped {
+    /// Empties the file of the run before.
+    pub fn begin(root: &Path) -> Result<Self> {
+        let file = root.join("target/xtask/skipped.txt");
+        fs::create_dir_all(root.join("target/xtask")).context("cannot make the folder target/xtask")?;
+        fs::write(&file, "").with_context(|| format!("cannot empty {}", file.display()))?;
+        Ok(Self { file })
+    }
+
+    /// What the tests wrote, a line each, in order of name.
+    pub fn lines(&self) -> Result<Vec<String>> {
+        let text = match fs::read_to_string(&self.file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(error).with_context(|| format!("cannot read {}", self.file.display())),
+        };
+        let mut lines: Vec<String> =
+            text.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect();
+        lines.sort();
+        Ok(lines)
+    }
+}

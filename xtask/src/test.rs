@@ -1,0 +1,162 @@
+//! `cargo xtask test`: every check, in order, going on after one that fails.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+
+use crate::counts::Counts;
+use crate::needs::{self, NEXTEST, Without};
+use crate::run;
+use crate::skipped::{self, Skipped};
+use crate::tidy;
+
+/// Tells a test that it must fail where it would skip.
+const STRICT: &str = "PALPATE_STRICT";
+
+/// What a test that is skipped for want of a prerequisite counts as.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Skips {
+    /// It is named and counted.
+    Pass,
+    /// It fails.
+    Fail,
+}
+
+/// What one step did.
+struct Step {
+    name: &'static str,
+    succeeded: bool,
+    took: Duration,
+    counts: Option<Counts>,
+}
+
+/// Runs every check; true when all of them succeed.
+pub fn run(root: &Path, skips: Skips) -> Result<bool> {
+    let skipped = Skipped::begin(root)?;
+    let mut missing = Vec::new();
+    let steps = [
+        step("prerequisites", || prerequisites(root, skips, &mut missing))?,
+        step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
+        step("clippy", || shown(root, &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?,
+        step("tests", || tests(root, skips, &skipped))?,
+        step("doc tests", || watched(cargo(root, &["test", "--workspace", "--doc"])))?,
+        step("docs", || {
+            let mut docs = cargo(root, &["doc", "--workspace", "--no-deps"]);
+            Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
+        })?,
+        step("tidy", || Ok((tidy::run(root)?, None)))?,
+    ];
+    let lines = skipped.lines()?;
+    print!("\n{}", closing(&steps, &missing, &lines));
+    Ok(steps.iter().all(|step| step.succeeded))
+}
+
+/// Whether a step succeeded, and the tests it counted.
+type Outcome = Result<(bool, Option<Counts>)>;
+
+fn step(name: &'static str, act: impl FnOnce() -> Outcome) -> Result<Step> {
+    println!("\n=== {name}");
+    let start = Instant::now();
+    let (succeeded, counts) = act()?;
+    Ok(Step { name, succeeded, took: start.elapsed(), counts })
+}
+
+fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcome {
+    let mut succeeded = true;
+    for need in needs::missing(root)? {
+        println!("{}", need.describe());
+        missing.push(need.describe());
+        succeeded &= skips == Skips::Pass || matches!(need.without, Without::FallsBack(_));
+    }
+    if missing.is_empty() {
+        println!("all there");
+    }
+    Ok((succeeded, None))
+}
+
+fn tests(root: &Path, skips: Skips, skipped: &Skipped) -> Outcome {
+    let mut command = if NEXTEST.is_there(root) {
+        cargo(root, &["nextest", "run", "--workspace", "--no-fail-fast"])
+    } else {
+        cargo(root, &["test", "--workspace", "--lib", "--bins", "--tests", "--no-fail-fast"])
+    };
+    command.env(skipped::VARIABLE, &skipped.file);
+    match skips {
+        Skips::Fail => command.env(STRICT, "1"),
+        Skips::Pass => command.env_remove(STRICT),
+    };
+    let (succeeded, counts) = watched(command)?;
+    Ok((succeeded, counts.map(|counts| counts.with_skips(skipped.lines().map_or(0, |lines| lines.len())))))
+}
+
+fn cargo(root: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new("cargo");
+    command.args(arguments).current_dir(root);
+    command
+}
+
+fn shown(root: &Path, arguments: &[&str]) -> Outcome {
+    Ok((run::shown(&mut cargo(root, arguments))?, None))
+}
+
+fn watched(mut command: Command) -> Outcome {
+    let watched = run::watched(&mut command)?;
+    Ok((watched.succeeded, Counts::read(&watched.lines)))
+}
+
+/// The table of steps, what was skipped and why, the failed steps, and the counts on a line of their own.
+fn closing(steps: &[Step], missing: &[String], skipped: &[String]) -> String {
+    let mut text = format!("{:<14} {:<6} {:>8}\n", "step", "result", "seconds");
+    for step in steps {
+        let result = if step.succeeded { "ok" } else { "FAILED" };
+        text += &format!("{:<14} {result:<6} {:>8.1}\n", step.name, step.took.as_secs_f64());
+    }
+    for line in missing.iter().chain(skipped) {
+        text += &format!("{line}\n");
+    }
+    let failed: Vec<_> = steps.iter().filter(|step| !step.succeeded).map(|step| step.name).collect();
+    if !failed.is_empty() {
+        text += &format!("failed: {}\n", failed.join(", "));
+    }
+    if let Some(counts) = steps.iter().filter_map(|step| step.counts).reduce(|sum, counts| sum + counts) {
+        text += &format!("{counts}\n");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn done(name: &'static str, succeeded: bool, counts: Option<Counts>) -> Step {
+        Step { name, succeeded, took: Duration::from_millis(1500), counts }
+    }
+
+    #[test]
+    fn the_closing_names_failed_steps_and_ends_with_the_counts_of_all_tests() {
+        let steps = [
+            done("formatting", false, None),
+            done("tests", true, Some(Counts { passed: 3, failed: 0, skipped: 1 })),
+            done("doc tests", true, Some(Counts { passed: 2, failed: 0, skipped: 0 })),
+        ];
+        let text = closing(&steps, &["Chromium is missing".into()], &["skipped: a test: no Chromium".into()]);
+        let expected = "\
+step           result  seconds
+formatting     FAILED      1.5
+tests          ok          1.5
+doc tests      ok          1.5
+Chromium is missing
+skipped: a test: no Chromium
+failed: formatting
+5 passed, 0 failed, 1 skipped
+";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn without_counts_there_is_no_line_of_counts() {
+        assert!(closing(&[done("tests", false, None)], &[], &[]).ends_with("failed: tests\n"));
+    }
+}

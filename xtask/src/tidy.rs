@@ -1,0 +1,83 @@
+//! `cargo xtask tidy`: the rules of the project that a program can check.
+//!
+//! Each rule is a function from the project, as read, to findings; none touches the disk.
+
+mod binary;
+mod changelog;
+mod crates;
+mod length;
+mod library;
+mod links;
+mod modules;
+mod places;
+mod project;
+mod rust_text;
+mod unfinished;
+mod unsafe_code;
+mod used_paths;
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use project::Project;
+
+/// Something that breaks a rule, or comes near to it.
+#[derive(Debug, PartialEq, Eq)]
+struct Finding {
+    path: String,
+    /// Counted from 1.
+    line: usize,
+    message: String,
+    weight: Weight,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Weight {
+    Warning,
+    Failure,
+}
+
+impl Finding {
+    fn failure(path: &str, line: usize, message: impl Into<String>) -> Self {
+        Self { path: path.into(), line, message: message.into(), weight: Weight::Failure }
+    }
+
+    fn warning(path: &str, line: usize, message: impl Into<String>) -> Self {
+        Self { weight: Weight::Warning, ..Self::failure(path, line, message) }
+    }
+}
+
+type Rule = fn(&Project) -> Vec<Finding>;
+
+const RULES: [(&str, Rule); 10] = [
+    ("crates depend one way", crates::findings),
+    ("modules of palpate use those above them", modules::findings),
+    ("the library has no clock, files or terminal", library::findings),
+    ("unsafe only in lanes", unsafe_code::findings),
+    ("file length", length::findings),
+    ("documents name what exists", links::findings),
+    ("no machine's paths or hosts", places::findings),
+    ("nothing unfinished", unfinished::findings),
+    ("text files only", binary::findings),
+    ("the changelog knows the version", changelog::findings),
+];
+
+/// Checks every rule and prints what breaks one; true when none is broken.
+pub fn run(root: &Path) -> Result<bool> {
+    let project = Project::read(root)?;
+    let mut failures = 0;
+    for (name, rule) in RULES {
+        for Finding { path, line, message, weight } in rule(&project) {
+            match weight {
+                Weight::Warning => println!("{path}:{line}: note ({name}): {message}"),
+                Weight::Failure => {
+                    failures += 1;
+                    println!("{path}:{line}: error ({name}): {message}");
+                }
+            }
+        }
+    }
+    println!("tidy: {} rules, {} files, {failures} broken", RULES.len(), project.files.len());
+    Ok(failures == 0)
+}

@@ -1,0 +1,85 @@
+//! What is left undone says why: markers and ignored tests carry a reason, and macros that stand for missing code stay out.
+
+use super::Finding;
+use super::project::{File, Project};
+use super::rust_text::RustText;
+use super::used_paths::used_macros;
+
+const MACROS: [&str; 3] = ["todo", "unimplemented", "dbg"];
+const MARKERS: [&str; 2] = ["TODO", "FIXME"];
+
+/// Files whose text, comments and all, may hold markers.
+const TEXT: [&str; 7] = [".ts", ".py", ".css", ".sh", ".toml", ".c", ".md"];
+
+/// Unfinished code, markers without a reason, and tests ignored without one.
+pub fn findings(project: &Project) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for file in project.files.iter().filter(|file| !file.is_a_rule()) {
+        if file.path.ends_with(".rs") {
+            found.extend(of_rust(file));
+        } else if TEXT.iter().any(|end| file.path.ends_with(end)) {
+            found.extend(markers(file, &file.text()));
+        }
+    }
+    found
+}
+
+fn of_rust(file: &File) -> Vec<Finding> {
+    let text = RustText::of(&file.text());
+    let left = used_macros(&text.code).into_iter().filter(|(_, name)| MACROS.contains(&name.as_str()));
+    let left = left.map(|(line, name)| {
+        Finding::failure(&file.path, line, format!("{name}! is for work in hand: finish it"))
+    });
+    let ignored = text.code.lines().enumerate().filter(|(_, line)| line.contains("#[ignore]"));
+    let ignored = ignored.map(|(number, _)| {
+        Finding::failure(&file.path, number + 1, "an ignored test says why: #[ignore = \"reason\"]")
+    });
+    left.chain(ignored).chain(markers(file, &text.comments)).collect()
+}
+
+fn markers(file: &File, text: &str) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        for marker in MARKERS.into_iter().filter(|marker| lacks_reason(line, marker)) {
+            found.push(Finding::failure(
+                &file.path,
+                number + 1,
+                format!("{marker} without a reason: write {marker} (why)"),
+            ));
+        }
+    }
+    found
+}
+
+fn lacks_reason(line: &str, marker: &str) -> bool {
+    let is_word = |character: Option<char>| character.is_some_and(|it| it.is_alphanumeric() || it == '_');
+    line.match_indices(marker).any(|(at, _)| {
+        let (before, after) = (&line[..at], &line[at + marker.len()..]);
+        let reason = after.trim_start().strip_prefix('(').and_then(|rest| rest.split(')').next());
+        let stands_alone = !is_word(before.chars().next_back()) && !is_word(after.chars().next());
+        stands_alone && reason.is_none_or(|reason| reason.trim().is_empty())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(path: &str, text: &str) -> Vec<usize> {
+        findings(&Project::of(&[(path, text)])).into_iter().map(|finding| finding.line).collect()
+    }
+
+    #[test]
+    fn what_is_unfinished_is_found() {
+        let text = "todo!();\nunimplemented!()\ndbg!(x);\n#[ignore]\n// TODO later\n/* FIXME() */";
+        assert_eq!(lines("crates/palpate/src/rig.rs", text), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(lines("web/src/main.ts", "let a; // FIXME: b"), [1]);
+    }
+
+    #[test]
+    fn reasons_words_and_strings_are_clean() {
+        let text = "// TODO (the paper gives no value): find one\n#[ignore = \"takes an hour\"]\nlet a = \"TODO dbg!(x)\";\n// MASTODON TODOS";
+        assert!(lines("crates/palpate/src/rig.rs", text).is_empty());
+        assert!(lines("xtask/src/tidy/unfinished.rs", "// TODO").is_empty());
+    }
+}
