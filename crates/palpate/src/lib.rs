@@ -11,4 +11,5 @@ pub mod report;
 pub mod rig;
 pub mod sensing;
 pub mod simulate;
+pub mod study;
 pub mod units;

@@ -8,12 +8,11 @@ mod value;
 use std::io::Read;
 
 pub use error::{RigError, RigProblem};
-#[allow(unused_imports, reason = "a study file embeds these sections")]
 pub(crate) use sections::{
-    ContactSection, EstimatorSection, RecordingSection, RigSections, SensorsSections, SurfaceSection,
-    TrainingSection,
+    ContactSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection, TrainingSection,
 };
 pub(crate) use validate::validate;
+pub(crate) use value::{RawQuantity, positive};
 
 use crate::arrangement::{Arrangement, ArrangementError};
 use crate::contact::Position;

@@ -95,6 +95,28 @@ pub(crate) struct EstimatorSection {
     pub initial_weights: Key<f64>,
 }
 
+impl EstimatorSection {
+    /// These keys, and those of `base` where this section is silent.
+    pub fn over(self, base: &Self) -> Self {
+        let base = base.clone();
+        Self {
+            kind: self.kind.or(base.kind),
+            hidden: self.hidden.or(base.hidden),
+            hidden_activation: self.hidden_activation.or(base.hidden_activation),
+            output_activation: self.output_activation.or(base.output_activation),
+            biases: self.biases.or(base.biases),
+            output: self.output.or(base.output),
+            input_scale: self.input_scale.or(base.input_scale),
+            learning_rate: self.learning_rate.or(base.learning_rate),
+            momentum: self.momentum.or(base.momentum),
+            aggregate_error: self.aggregate_error.or(base.aggregate_error),
+            max_epochs: self.max_epochs.or(base.max_epochs),
+            order: self.order.or(base.order),
+            initial_weights: self.initial_weights.or(base.initial_weights),
+        }
+    }
+}
+
 /// `[recording]`
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -67,7 +67,7 @@ pub(super) fn bounded(
 }
 
 /// A quantity that must be greater than 0.
-pub(super) fn positive(
+pub(crate) fn positive(
     key: &'static str,
     raw: &Spanned<RawQuantity>,
     wanted: Dimension,
