@@ -8,7 +8,7 @@ mod run;
 
 pub use file::{StudyError, StudyProblem};
 pub use networks_csv::{Checkpoint, CheckpointError, NetworksCsv};
-pub use results::{ArmResults, PortionResults, StudyResults};
+pub use results::{ArmResults, PortionResults, RunFacts, StudyResults};
 pub use run::{ArmOutcome, Observer, PrepareError, PreparedStudy, RunOptions, Trained, TrainedSeed};
 
 use crate::contact::Position;

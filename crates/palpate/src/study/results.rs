@@ -4,13 +4,38 @@ use serde::Serialize;
 
 use super::{ArmOutcome, Judging, TrainedSeed};
 use crate::evaluation::{ErrorSummary, Evaluation, Portion, Spread, percentage_error};
-use crate::network::TrainingStatus;
+use crate::network::{Precision, TrainingStatus};
 
 /// What a study found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyResults {
     /// Every arm that has at least one fit.
     pub arms: Vec<ArmResults>,
+}
+
+/// How a study was run, as every file that it writes says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunFacts {
+    /// Version of palpate.
+    pub palpate: &'static str,
+    /// The study's name.
+    pub study: String,
+    /// SHA-256 of the study file, in hexadecimal.
+    pub study_sha256: String,
+    /// Seeds 0 to this less 1, of every arm.
+    pub seeds: u64,
+    /// Threads that fitted.
+    pub threads: usize,
+    /// Width of the numbers in training.
+    pub precision: Precision,
+    /// The arithmetic of the lanes, in words.
+    pub arithmetic: String,
+    /// Patterns presented to networks in this run; what an earlier run left is not counted.
+    pub presentations: u64,
+    /// Wall-clock time of the fits, in seconds.
+    pub seconds: f64,
+    /// Their ratio.
+    pub presentations_per_second: f64,
 }
 
 /// An arm's figures over its seeds.
