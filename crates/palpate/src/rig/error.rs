@@ -128,6 +128,14 @@ pub enum RigProblem {
     /// The rig is to be simulated, but its force is unknown.
     #[error("the surface is to be simulated at these training positions, but [contact] has no `force`")]
     NoForce,
+    /// The training positions, their repeats and the sensors make a recording too large to hold.
+    #[error("training positions × repeats × sensors make {values} values; at most {most} can be held")]
+    TooManyValues {
+        /// The product.
+        values: usize,
+        /// The most it can be.
+        most: usize,
+    },
     /// The columns that hold channels are not as many as the sensors.
     #[error("`{key}` lists {listed}, but there are {sensors} sensors; they must be as many")]
     ChannelCount {

@@ -8,15 +8,15 @@ fn paper() -> Rig {
 }
 
 fn noisy() -> Rig {
-    let noise = "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"2 um\"";
-    Rig::from_toml(&PAPER.replace("noise = \"0 um\"", noise).replace("repeats = 1", "repeats = 3")).unwrap()
+    let faults = "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"2 um\"";
+    Rig::from_toml(&PAPER.replace("noise = \"5 um\"", faults).replace("repeats = 1", "repeats = 3")).unwrap()
 }
 
 #[test]
 fn a_clean_simulation_is_force_times_influence() {
-    let recording = simulate(&paper(), 1).unwrap();
+    let rig = Rig::from_toml(&PAPER.replace("5 um", "0 um")).unwrap();
+    let recording = simulate(&rig, 1).unwrap();
     assert_eq!(recording.rows.len(), 10);
-    let rig = paper();
     let surface = rig.surface.model().unwrap();
     for (i, row) in recording.rows.iter().enumerate() {
         assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
