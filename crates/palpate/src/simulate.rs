@@ -92,3 +92,6 @@ pub fn simulate_at(
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
     Ok(Recording { channels: rig.layout.names(), kinds: rig.layout.kinds(), rows, provenance })
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,6 +10,9 @@ use super::Rig;
 use super::error::{RigError, RigProblem};
 use super::sections::RigSections;
 
+/// More values than a recording of the training positions should hold in memory.
+const MOST_VALUES: usize = 100_000_000;
+
 /// Checks the sections of a rig, or of a study that embeds them; spans are those of the document they came from.
 ///
 /// # Errors
@@ -22,6 +25,12 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let simulated = surface.model().is_some() && sections.recording.is_none();
     if let (Some(training), None, true) = (&sections.training, force_n, simulated) {
         return Err(RigProblem::NoForce.at(training.span()));
+    }
+    if let (Some(section), Some(training)) = (&sections.training, &training) {
+        let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());
+        if values > MOST_VALUES {
+            return Err(RigProblem::TooManyValues { values, most: MOST_VALUES }.at(section.span()));
+        }
     }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
