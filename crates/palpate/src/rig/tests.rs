@@ -1,6 +1,8 @@
 use std::path::PathBuf;
 
 use super::*;
+use crate::mechanics::{Beam, Extent, SurfaceSpec};
+use crate::sensing::Layout;
 use crate::network::{InputScale, NetworkConfig, OutputCoding};
 use crate::recording::{Column, PositionColumns};
 use crate::sensing::SensorKind;
@@ -12,24 +14,24 @@ const FSI_WATER: &str = include_str!("../../../../examples/fsi-water.toml");
 fn the_papers_bench_is_what_the_paper_says() {
     let rig = Rig::from_toml(PAPER).unwrap();
     let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
-    assert_eq!(rig.surface, SurfaceSpec::Beam(beam));
+    assert_eq!(rig.bench.surface, SurfaceSpec::Beam(beam));
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6);
-    assert_eq!(rig.layout, layout);
-    assert_eq!(rig.force_n, Some(3.0));
+    assert_eq!(rig.bench.layout, layout);
+    assert_eq!(rig.bench.force_n, Some(3.0));
     assert_eq!(rig.training, Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1 }));
     assert_eq!(rig.estimator, EstimatorConfig::Network(NetworkConfig::default()));
-    assert_eq!(rig.columns, None);
+    assert_eq!(rig.bench.columns, None);
 }
 
 #[test]
 fn the_water_strip_maps_foreign_columns() {
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    assert_eq!(rig.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
-    assert_eq!(rig.layout.names(), ["Pl", "Pr"]);
+    assert_eq!(rig.bench.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
+    assert_eq!(rig.bench.layout.names(), ["Pl", "Pr"]);
     let EstimatorConfig::Network(network) = &rig.estimator;
     assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));
-    let columns = rig.columns.unwrap();
+    let columns = rig.bench.columns.unwrap();
     assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
     assert_eq!(columns.position_unit.symbol(), "mm");
 }
@@ -51,7 +53,7 @@ fn data(file: &str) -> Option<PathBuf> {
 fn the_water_strips_recording_is_read() {
     let Some(path) = data("tactile-fsi/1d-water-1.5mm.csv") else { return };
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    let recording = rig.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
+    let recording = rig.bench.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
     assert_eq!(recording.rows.len(), 779);
     assert_eq!(recording.distinct_positions().len(), 41);
     assert_eq!(recording.rows[0].reading, [2.04354199724436, 1.42585650614297]);

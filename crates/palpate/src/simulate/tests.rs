@@ -17,10 +17,10 @@ fn a_clean_simulation_is_force_times_influence() {
     let rig = Rig::from_toml(&PAPER.replace("5 um", "0 um")).unwrap();
     let recording = simulate(&rig, 1).unwrap();
     assert_eq!(recording.rows.len(), 10);
-    let surface = rig.surface.model().unwrap();
+    let surface = rig.bench.surface.model().unwrap();
     for (i, row) in recording.rows.iter().enumerate() {
         assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
-        for (sensor, value) in rig.layout.sensors.iter().zip(&row.reading) {
+        for (sensor, value) in rig.bench.layout.sensors.iter().zip(&row.reading) {
             let influence = surface.influence(SensorKind::Deflection, sensor.position, row.position);
             assert_eq!(*value, 3.0 * influence);
         }
@@ -42,22 +42,23 @@ fn a_simulation_survives_its_file_bit_for_bit() {
     let rig = noisy();
     let recording = simulate(&rig, 7).unwrap();
     let mut bytes = Vec::new();
-    crate::recording::write(&recording, rig.surface.extent(), &mut bytes).unwrap();
+    crate::recording::write(&recording, rig.bench.surface.extent(), &mut bytes).unwrap();
     assert!(bytes.starts_with(b"position_mm,force_n,deflection_1_mm,deflection_2_mm,"));
-    assert_eq!(rig.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
+    assert_eq!(rig.bench.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
 }
 
 #[test]
 fn what_cannot_be_simulated_is_refused_with_the_reason() {
     let measured = Rig::from_toml(include_str!("../../../../examples/fsi-water.toml")).unwrap();
-    let no_force = Rig { force_n: None, ..paper() };
+    let mut no_force = paper();
+    no_force.bench.force_n = None;
     let no_training = Rig { training: None, ..paper() };
     let here = [Position::along(0.1)];
     let messages = [
-        simulate_at(&measured, &here, 1, 1).unwrap_err().to_string(),
+        simulate_at(&measured.bench, &here, 1, 1).unwrap_err().to_string(),
         simulate(&no_force, 1).unwrap_err().to_string(),
         simulate(&no_training, 1).unwrap_err().to_string(),
-        simulate_at(&paper(), &[Position::along(0.1), Position::along(0.401)], 1, 1).unwrap_err().to_string(),
+        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1).unwrap_err().to_string(),
     ];
     insta::assert_snapshot!(messages.join("\n"));
 }

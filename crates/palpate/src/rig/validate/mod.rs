@@ -6,6 +6,8 @@ mod estimator;
 mod sensors;
 mod surface;
 
+use crate::bench::Bench;
+
 use super::Rig;
 use super::error::{RigError, RigProblem};
 use super::sections::RigSections;
@@ -34,5 +36,6 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
-    Ok(Rig { surface, layout, force_n, training, estimator, columns })
+    let bench = Bench { surface, layout, force_n, columns };
+    Ok(Rig { bench, training, estimator })
 }
