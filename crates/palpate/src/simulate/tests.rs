@@ -42,7 +42,7 @@ fn a_simulation_survives_its_file_bit_for_bit() {
     let rig = noisy();
     let recording = simulate(&rig, 7).unwrap();
     let mut bytes = Vec::new();
-    crate::recording::write(&recording, rig.bench.surface.extent(), &mut bytes).unwrap();
+    crate::recording::write(&recording, rig.bench.surface.extent(), "a simulation", &mut bytes).unwrap();
     assert!(bytes.starts_with(b"position_mm,force_n,deflection_1_mm,deflection_2_mm,"));
     assert_eq!(rig.bench.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
 }
@@ -58,7 +58,9 @@ fn what_cannot_be_simulated_is_refused_with_the_reason() {
         simulate_at(&measured.bench, &here, 1, 1).unwrap_err().to_string(),
         simulate(&no_force, 1).unwrap_err().to_string(),
         simulate(&no_training, 1).unwrap_err().to_string(),
-        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1).unwrap_err().to_string(),
+        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1)
+            .unwrap_err()
+            .to_string(),
     ];
     insta::assert_snapshot!(messages.join("\n"));
 }
