@@ -1,4 +1,50 @@
-//! The `palpate` command.
+//! The `palpate` command: arguments, files, progress, messages. What it says is computed by the library.
 #![forbid(unsafe_code)]
 
-fn main() {}
+mod commands;
+mod failure;
+mod input;
+mod interrupt;
+mod output;
+mod progress;
+mod table;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Turns an elastic surface with a few sensors into a calibrated contact locator.
+///
+/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted.
+#[derive(Parser)]
+#[command(name = "palpate", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Study(commands::study::Arguments),
+    Simulate(commands::simulate::Arguments),
+    Fit(commands::fit::Arguments),
+    Evaluate(commands::evaluate::Arguments),
+    Locate(commands::locate::Arguments),
+    Inspect(commands::inspect::Arguments),
+}
+
+fn main() -> ExitCode {
+    failure::install_handler();
+    interrupt::install_handler();
+    let result = match Arguments::parse().command {
+        Command::Study(arguments) => commands::study::run(&arguments),
+        Command::Simulate(arguments) => commands::simulate::run(&arguments),
+        Command::Fit(arguments) => commands::fit::run(&arguments),
+        Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
+        Command::Locate(arguments) => commands::locate::run(&arguments),
+        Command::Inspect(arguments) => commands::inspect::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,6 +1,7 @@
 //! The library behind the `palpate` command: everything that a notebook needs, without clock, files or terminal.
 
 pub mod arrangement;
+pub mod bench;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;

@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::ArrangementError;
+use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::mechanics::{Extent, Surface};
 use crate::recording::{Provenance, Recording, Row};
@@ -18,7 +19,7 @@ pub enum SimulateError {
     #[error("a measured surface has no model to simulate; it needs a recording")]
     NoModel,
     /// The contact force is not given.
-    #[error("a simulation needs the contact force; the rig has no [contact] force")]
+    #[error("a simulation needs the contact force; there is no [contact] force")]
     NoForce,
     /// The rig does not say where to press.
     #[error("a simulation needs training positions; the rig has no [training]")]
@@ -56,39 +57,42 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
 /// [`SimulateError`] when the rig lacks a model, a force or training positions.
 pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
     let training = rig.training.as_ref().ok_or(SimulateError::NoTraining)?;
-    let positions = training.positions(rig.surface.extent().length_m)?;
-    simulate_at(rig, &positions, training.repeats, seed)
+    let positions = training.positions(rig.bench.surface.extent().length_m)?;
+    simulate_at(&rig.bench, &positions, training.repeats, seed)
 }
 
-/// Presses the rig's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
+/// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
 /// faulty channels report. Gains and offsets are drawn once for the recording, noise for each reading.
 ///
 /// The same seed gives the same recording.
 ///
 /// # Errors
-/// [`SimulateError`] when the rig lacks a model or a force, or a position lies off the surface.
+/// [`SimulateError`] when the bench lacks a model or a force, or a position lies off the surface.
 pub fn simulate_at(
-    rig: &Rig,
+    bench: &Bench,
     positions: &[Position],
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
-    let surface = rig.surface.model().ok_or(SimulateError::NoModel)?;
-    let force_n = rig.force_n.ok_or(SimulateError::NoForce)?;
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let errors = ChannelErrors::draw(&rig.layout, &mut rng);
+    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
         if !surface.contains(position) {
             return Err(SimulateError::OffSurface { number: i + 1, position, extent: surface.extent() });
         }
-        let clean = clean_reading(surface, &rig.layout, Contact { position, force_n });
+        let clean = clean_reading(surface, &bench.layout, Contact { position, force_n });
         for _ in 0..repeats {
-            let reading = measure(&rig.layout, &clean, &errors, &mut rng);
+            let reading = measure(&bench.layout, &clean, &errors, &mut rng);
             rows.push(Row { position, force_n: Some(force_n), reading });
         }
     }
     let source = "simulation".to_owned();
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
-    Ok(Recording { channels: rig.layout.names(), kinds: rig.layout.kinds(), rows, provenance })
+    Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
 }
+
+#[cfg(test)]
+mod tests;

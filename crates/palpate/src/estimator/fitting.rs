@@ -1,20 +1,20 @@
-//! From a rig and a recording to locators.
+//! From a bench, an estimator and a recording to locators.
 
 use super::{EstimatorConfig, Locator, LocatorProvenance, Method};
+use crate::bench::Bench;
 use crate::network::{
     InstructionSet, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork, TrainingOutcome,
     train_many, train_one,
 };
 use crate::recording::Recording;
-use crate::rig::Rig;
 
 /// Why an estimator cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// The recording's channels are not the rig's.
-    #[error("the recording has {found} channels; the rig has {needed} sensors")]
+    /// The recording's channels are not the bench's.
+    #[error("the recording has {found} channels; the bench has {needed} sensors")]
     Channels {
-        /// Sensors of the rig.
+        /// Sensors of the bench.
         needed: usize,
         /// Channels of the recording.
         found: usize,
@@ -37,7 +37,7 @@ pub trait LocatorQueue {
 /// An estimator that has seen its recording and is ready to be fitted from any seed.
 #[derive(Clone, Debug)]
 pub struct Fitting {
-    rig: Rig,
+    bench: Bench,
     recording: crate::recording::Provenance,
     method: MethodFitting,
 }
@@ -48,19 +48,23 @@ enum MethodFitting {
 }
 
 impl Fitting {
-    /// Prepares the rig's estimator for a recording of the rig's bench.
+    /// Prepares an estimator for a recording of a bench.
     ///
     /// # Errors
-    /// [`FitError`] when the recording does not suit the rig or the estimator.
-    pub fn prepare(rig: &Rig, recording: &Recording) -> Result<Self, FitError> {
-        if recording.channels.len() != rig.layout.len() {
-            return Err(FitError::Channels { needed: rig.layout.len(), found: recording.channels.len() });
+    /// [`FitError`] when the recording does not suit the bench or the estimator.
+    pub fn prepare(
+        bench: &Bench,
+        estimator: &EstimatorConfig,
+        recording: &Recording,
+    ) -> Result<Self, FitError> {
+        if recording.channels.len() != bench.layout.len() {
+            return Err(FitError::Channels { needed: bench.layout.len(), found: recording.channels.len() });
         }
-        let EstimatorConfig::Network(config) = &rig.estimator;
-        let (extent, model) = (rig.surface.extent(), rig.surface.model());
-        let method = NetworkFitting::prepare(config, extent, model, rig.force_n, recording)?;
+        let EstimatorConfig::Network(config) = estimator;
+        let (extent, model) = (bench.surface.extent(), bench.surface.model());
+        let method = NetworkFitting::prepare(config, extent, model, bench.force_n, recording)?;
         Ok(Self {
-            rig: rig.clone(),
+            bench: bench.clone(),
             recording: recording.provenance.clone(),
             method: MethodFitting::Network(method),
         })
@@ -101,10 +105,7 @@ impl Fitting {
     fn locator(&self, seed: u64, trained: TrainedNetwork) -> Locator {
         let MethodFitting::Network(network) = &self.method;
         Locator {
-            surface: self.rig.surface,
-            layout: self.rig.layout.clone(),
-            force_n: self.rig.force_n,
-            columns: self.rig.columns.clone(),
+            bench: self.bench.clone(),
             provenance: LocatorProvenance {
                 palpate: env!("CARGO_PKG_VERSION").to_owned(),
                 seed,

@@ -1,23 +1,16 @@
 //! What fitting gives: all that a reading needs to become an estimate.
 
-use crate::mechanics::SurfaceSpec;
+use crate::bench::Bench;
 use crate::network::{NetworkLocator, TrainingOutcome};
-use crate::recording::{Columns, Provenance};
-use crate::sensing::Layout;
+use crate::recording::Provenance;
 use palpate_core::{Estimate, Status};
 
 /// A fitted estimator. It carries its surface, layout, scaling and provenance, so that nothing it needs is outside it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Locator {
-    /// The surface that is touched.
-    pub surface: SurfaceSpec,
-    /// Its sensors, one a channel of a reading.
-    pub layout: Layout,
-    /// The contact force in newtons, where it was known.
-    pub force_n: Option<f64>,
-    /// Which column of a recording is what, where the rig said so.
-    pub columns: Option<Columns>,
+    /// The surface that is touched, and its sensors.
+    pub bench: Bench,
     /// Where it comes from.
     pub provenance: LocatorProvenance,
     /// The method and what it learned.
@@ -71,8 +64,8 @@ impl Locator {
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        let mismatch = ReadingError::Channels { needed: self.layout.len(), found: reading.len() };
-        if reading.len() != self.layout.len() {
+        let mismatch = ReadingError::Channels { needed: self.bench.layout.len(), found: reading.len() };
+        if reading.len() != self.bench.layout.len() {
             return Err(mismatch);
         }
         if let Some(i) = reading.iter().position(|value| !value.is_finite()) {
@@ -80,7 +73,7 @@ impl Locator {
         }
         let Method::Network(network) = &self.method;
         let position = network.position(reading).ok_or(mismatch)?;
-        let on_surface = self.surface.extent().contains(position);
+        let on_surface = self.bench.surface.extent().contains(position);
         let status = if on_surface { Status::Located } else { Status::OutsideSurface };
         Ok(Estimate { position, force_n: None, status })
     }

@@ -92,7 +92,7 @@ impl Locator {
         }
         let Read { locator, .. } = serde_json::from_str(text)?;
         let Method::Network(network) = &locator.method;
-        network.check(locator.layout.len())?;
+        network.check(locator.bench.layout.len())?;
         Ok(locator)
     }
 }

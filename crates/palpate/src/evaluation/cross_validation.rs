@@ -31,9 +31,9 @@ pub fn cross_validate(
     seed: u64,
     keep_going: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Evaluation>, CrossValidationError> {
-    let mut pooled = Evaluation { length_m: rig.surface.extent().length_m, located: Vec::new() };
+    let mut pooled = Evaluation { length_m: rig.bench.surface.extent().length_m, located: Vec::new() };
     for fold in recording.folds(folds)? {
-        let fitting = Fitting::prepare(rig, &recording.subset(&fold.training))?;
+        let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording.subset(&fold.training))?;
         let Some(locator) = fitting.fit(seed, keep_going) else { return Ok(None) };
         let part = Evaluation::of(&locator, &recording.subset(&fold.held_out))?;
         pooled.located.extend(part.located);

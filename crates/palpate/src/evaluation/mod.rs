@@ -84,7 +84,7 @@ impl Evaluation {
             Ok(Located { truth: row.position, estimate })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { length_m: locator.surface.extent().length_m, located })
+        Ok(Self { length_m: locator.bench.surface.extent().length_m, located })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.

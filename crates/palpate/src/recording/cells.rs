@@ -94,6 +94,7 @@ impl<'a> Cells<'a> {
         match unit.parse_si(&field.value) {
             Some(value) if value.is_finite() => Ok(value),
             Some(_) => Err(self.error(index, CsvProblem::NotFinite { text: field.value.to_string() })),
+            None if field.value.is_empty() => Err(self.error(index, CsvProblem::EmptyField)),
             None => Err(self.error(index, CsvProblem::NotANumber { text: field.value.to_string() })),
         }
     }

@@ -95,6 +95,9 @@ pub enum CsvProblem {
         /// How many it must have.
         expected: usize,
     },
+    /// A field that must be a number is empty.
+    #[error("the field is empty; it must be a number")]
+    EmptyField,
     /// A field is not a number.
     #[error("`{text}` is not a number")]
     NotANumber {

@@ -128,6 +128,14 @@ pub enum RigProblem {
     /// The rig is to be simulated, but its force is unknown.
     #[error("the surface is to be simulated at these training positions, but [contact] has no `force`")]
     NoForce,
+    /// The training positions, their repeats and the sensors make a recording too large to hold.
+    #[error("training positions × repeats × sensors make {values} values; at most {most} can be held")]
+    TooManyValues {
+        /// The product.
+        values: usize,
+        /// The most it can be.
+        most: usize,
+    },
     /// The columns that hold channels are not as many as the sensors.
     #[error("`{key}` lists {listed}, but there are {sensors} sensors; they must be as many")]
     ChannelCount {
@@ -168,8 +176,11 @@ impl RigError {
     /// What would help, where more can be said than the message does.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
-            RigProblem::UnknownKey { known, .. } => Some(format!("known keys: {}", known.join(", "))),
-            RigProblem::UnknownWord { known, .. } => Some(format!("it can be: {}", known.join(", "))),
+            RigProblem::UnknownKey { key, known } => closest(key, known.iter().map(String::as_str))
+                .map(|_| format!("known keys: {}", known.join(", "))),
+            RigProblem::UnknownWord { word, known, .. } => {
+                closest(word, known.iter().copied()).map(|_| format!("it can be: {}", known.join(", ")))
+            }
             RigProblem::MissingSection { section } => Some(format!("add a section [{section}]")),
             RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
             RigProblem::NoForce => {
@@ -212,14 +223,15 @@ fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
 }
 
 /// ", did you mean `x`?" for the known word closest to `word`, or what is known where none is close.
-fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let known: Vec<&str> = known.collect();
-    let closest = known.iter().map(|other| (strsim::damerau_levenshtein(word, other), *other)).min();
-    match closest {
-        Some((distance, other)) if distance <= 1 + word.chars().count() / 4 => {
-            format!(", did you mean `{other}`?")
-        }
-        _ if known.is_empty() => String::new(),
-        _ => format!("; known are {}", known.join(", ")),
+fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match closest(word, known.clone()) {
+        Some(other) => format!(", did you mean `{other}`?"),
+        None => format!("; known are {}", known.collect::<Vec<_>>().join(", ")),
     }
+}
+
+/// The known word that is a slip of the pen away: one edit, and one more for every four letters.
+fn closest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let (distance, other) = known.map(|other| (strsim::damerau_levenshtein(word, other), other)).min()?;
+    (distance <= 1 + word.chars().count() / 4).then_some(other)
 }

@@ -6,3 +6,6 @@ mod layout;
 pub use channel::{ChannelErrors, ChannelModel, measure};
 pub(crate) use layout::even_positions;
 pub use layout::{Layout, Sensor, SensorKind};
+
+#[cfg(test)]
+mod tests;

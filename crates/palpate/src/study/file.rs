@@ -153,7 +153,7 @@ impl Study {
                 return Err(StudyProblem::SameName { name: arm.name.clone() }.at(file.arm[i].name.span()));
             }
         }
-        let length_m = first.rig.surface.extent().length_m;
+        let length_m = first.rig.bench.surface.extent().length_m;
         Ok(Self {
             name: checked_name(&file.name)?,
             seeds: file.seeds()?,
@@ -194,7 +194,7 @@ impl StudyFile {
             estimator: self.estimator_of(arm),
             recording: None,
         })?;
-        if rig.surface.model().is_none() || rig.force_n.is_none() || rig.training.is_none() {
+        if rig.bench.surface.model().is_none() || rig.bench.force_n.is_none() || rig.training.is_none() {
             return Err(StudyProblem::NotSimulated { arm: name }.at(arm.name.span()));
         }
         Ok(Arm { name, rig })

@@ -102,13 +102,13 @@ impl PreparedStudy {
     pub fn new(study: Study) -> Result<Self, PrepareError> {
         let arms = study.arms.iter().map(|arm| {
             let simulated = |error| PrepareError::Simulate { arm: arm.name.clone(), error };
-            let mut clean = arm.rig.clone();
+            let mut clean = arm.rig.bench.clone();
             for sensor in &mut clean.layout.sensors {
                 sensor.channel = crate::sensing::ChannelModel::default();
             }
             let judged = simulate_at(&clean, &study.judging.positions, 1, 0).map_err(simulated)?;
             let recording = simulate(&arm.rig, 0).map_err(simulated)?;
-            let fitting = Fitting::prepare(&arm.rig, &recording)
+            let fitting = Fitting::prepare(&arm.rig.bench, &arm.rig.estimator, &recording)
                 .map_err(|error| PrepareError::Fit { arm: arm.name.clone(), error })?;
             Ok(PreparedArm { fitting, judged })
         });

@@ -196,14 +196,18 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// The unit that shows `quantity` best; centimetres and degrees are read but not chosen.
+/// The largest unit that keeps the number at 1 or above. Some units are read but never chosen, and lengths below 10 m
+/// stay in millimetres.
 fn readable_unit(quantity: Quantity) -> Option<Unit> {
     let magnitude = quantity.value.abs() * (1.0 + 1e-9);
     if magnitude == 0.0 {
         return quantity.dimension.units().find(|unit| unit.factor() == 1.0);
     }
-    let hidden: &[&str] =
-        if magnitude < 10.0 { &["cm", "deg", "g/cm3", "mm/m", "m"] } else { &["cm", "deg"] };
+    let hidden: &[&str] = if magnitude < 10.0 {
+        &["m", "cm", "deg", "um/m", "mm/m", "g/cm3"]
+    } else {
+        &["cm", "deg", "um/m", "mm/m", "g/cm3"]
+    };
     let mut best = None;
     for unit in quantity.dimension.units().filter(|unit| !hidden.contains(&unit.symbol())) {
         if best.is_none() || magnitude >= unit.factor() {

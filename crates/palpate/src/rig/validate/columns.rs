@@ -31,7 +31,7 @@ pub(super) fn validate(
         channels: channels(keys, layout, own.channels)?,
         force: force(keys, own.force)?,
     };
-    check_numbered(&columns, section.span())?;
+    check_numbered(&columns, section)?;
     Ok(Some(columns))
 }
 
@@ -135,9 +135,7 @@ fn channel_units(keys: &RecordingSection, kinds: &[SensorKind]) -> Result<Vec<Un
 fn force(keys: &RecordingSection, own: Option<ForceColumn>) -> Result<Option<ForceColumn>, RigError> {
     let Some(raw) = &keys.force else {
         return match &keys.force_unit {
-            Some(unit) => {
-                Err(RigProblem::UnusedKey { key: "force_unit", with: "no `force`" }.at(unit.span()))
-            }
+            Some(unit) => Err(RigProblem::MissingKey { section: "recording", key: "force" }.at(unit.span())),
             None => Ok(own),
         };
     };
@@ -151,7 +149,7 @@ fn force(keys: &RecordingSection, own: Option<ForceColumn>) -> Result<Option<For
 }
 
 /// Without a header, columns must be numbers; an optional one that has a name is simply not there.
-fn check_numbered(columns: &Columns, span: Range<usize>) -> Result<(), RigError> {
+fn check_numbered(columns: &Columns, section: &Spanned<RecordingSection>) -> Result<(), RigError> {
     if columns.header == Header::Present {
         return Ok(());
     }
@@ -164,8 +162,18 @@ fn check_numbered(columns: &Columns, span: Range<usize>) -> Result<(), RigError>
     let channels = columns.channels.iter().map(|channel| &channel.column);
     for column in position.into_iter().chain(force).chain(channels) {
         if let Column::Name(name) = column {
+            let span = place_of(name, section);
             return Err(RigProblem::NameWithoutHeader { name: name.clone() }.at(span));
         }
     }
     Ok(())
+}
+
+/// Where the section names the column `name`; the whole section when it does not.
+fn place_of(name: &str, section: &Spanned<RecordingSection>) -> Range<usize> {
+    let keys = section.get_ref();
+    let single = [&keys.position, &keys.x, &keys.y, &keys.force].into_iter().flatten();
+    let listed = keys.channels.iter().flat_map(|channels| channels.get_ref());
+    let named = |raw: &&Spanned<RawColumn>| matches!(raw.get_ref(), RawColumn::Name(written) if written.trim() == name);
+    single.chain(listed).find(named).map_or_else(|| section.span(), Spanned::span)
 }

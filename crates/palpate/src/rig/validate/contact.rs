@@ -1,8 +1,10 @@
 //! `[contact]` and `[training]`
 
+use std::ops::Range;
+
 use toml::Spanned;
 
-use crate::arrangement::Arrangement;
+use crate::arrangement::{Arrangement, ArrangementError};
 use crate::contact::Position;
 use crate::mechanics::Extent;
 use crate::rig::Training;
@@ -53,10 +55,27 @@ pub(super) fn validate_training(
     let repeats =
         keys.repeats.as_ref().map_or(Ok(1), |raw| self::count("repeats", raw, 1..=MOST, MOST_BOUND))?;
     let training = Training { arrangement, count, repeats };
-    let place = keys.positions.as_ref().map(Spanned::span).or(keys.count.as_ref().map(Spanned::span));
-    let span = place.unwrap_or_else(|| section.span());
-    training.positions(extent.length_m).map_err(|error| RigProblem::Arrangement(error).at(span))?;
+    let laid_out = training.positions(extent.length_m);
+    laid_out.map_err(|error| {
+        let span = culprit(section, &error);
+        RigProblem::Arrangement(error).at(span)
+    })?;
     Ok(Some(training))
+}
+
+/// The key, or the listed position, that `error` is about.
+fn culprit(section: &Spanned<TrainingSection>, error: &ArrangementError) -> Range<usize> {
+    let keys = section.get_ref();
+    let listed = keys.positions.as_ref();
+    let key = match error {
+        ArrangementError::OffSurface { number, .. } => {
+            listed.and_then(|listed| listed.get_ref().get(number.saturating_sub(1))).map(Spanned::span)
+        }
+        ArrangementError::MiddleTooSmall { .. } => keys.middle.as_ref().map(Spanned::span),
+        ArrangementError::Portion { .. } => keys.portion.as_ref().map(Spanned::span),
+        _ => keys.count.as_ref().map(Spanned::span),
+    };
+    key.unwrap_or_else(|| section.span())
 }
 
 fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
@@ -85,7 +104,7 @@ fn edge_dense(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigErro
                 (quantity("portion", start, Dimension::Ratio)?, quantity("portion", end, Dimension::Ratio)?)
             }
             listed => {
-                let (value, bound) = (format!("{} numbers", listed.len()), "2 numbers, a start and an end");
+                let (value, bound) = (format!("a list of {}", listed.len()), "a list of 2, start and end");
                 return Err(RigProblem::OutOfRange { key: "portion", value, bound }.at(portion.span()));
             }
         },
@@ -96,8 +115,8 @@ fn edge_dense(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigErro
 fn explicit(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigError> {
     let positions = section.get_ref().positions.as_ref().ok_or_else(|| missing("positions", section))?;
     if positions.get_ref().is_empty() {
-        let value = "0 positions".to_owned();
-        return Err(RigProblem::OutOfRange { key: "positions", value, bound: "at least 1 position" }
+        let value = "a list of 0".to_owned();
+        return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of at least 1" }
             .at(positions.span()));
     }
     let along = positions.get_ref().iter().map(|raw| quantity("positions", raw, Dimension::Length));

@@ -8,7 +8,7 @@ use crate::network::{
 };
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::EstimatorSection;
-use crate::rig::value::{RawQuantity, choice, count, number, positive};
+use crate::rig::value::{RawQuantity, choice, count, number, out_of_range, positive};
 use crate::sensing::Layout;
 
 const ACTIVATIONS: [(&str, Activation); 3] =
@@ -60,9 +60,9 @@ fn network(keys: &EstimatorSection, layout: &Layout) -> Result<NetworkConfig, Ri
 fn hidden(raw: &Spanned<Vec<Spanned<i64>>>) -> Result<Vec<usize>, RigError> {
     let layers = raw.get_ref();
     if layers.len() > MOST_LAYERS {
-        let value = format!("{} layers", layers.len());
+        let value = format!("a list of {}", layers.len());
         return Err(
-            RigProblem::OutOfRange { key: "hidden", value, bound: "at most 16 layers" }.at(raw.span())
+            RigProblem::OutOfRange { key: "hidden", value, bound: "a list of at most 16" }.at(raw.span())
         );
     }
     layers.iter().map(|nodes| count("hidden", nodes, 1..=MOST_NODES, "at least 1 and at most 1000")).collect()
@@ -101,7 +101,7 @@ fn back_propagation(keys: &EstimatorSection) -> Result<BackPropagation, RigError
     let max_epochs = keys.max_epochs.as_ref().map_or(Ok(default.max_epochs), |raw| {
         match u32::try_from(*raw.get_ref()) {
             Ok(epochs) if epochs > 0 => Ok(epochs),
-            _ => Err(crate::rig::value::out_of_range("max_epochs", raw, "at least 1 and at most 4294967295")),
+            _ => Err(out_of_range("max_epochs", raw, "at least 1 and at most 4294967295")),
         }
     })?;
     let orders = [("shuffled", PresentationOrder::Shuffled), ("fixed", PresentationOrder::Fixed)];

@@ -6,9 +6,14 @@ mod estimator;
 mod sensors;
 mod surface;
 
+use crate::bench::Bench;
+
 use super::Rig;
 use super::error::{RigError, RigProblem};
 use super::sections::RigSections;
+
+/// More values than a recording of the training positions should hold in memory.
+const MOST_VALUES: usize = 100_000_000;
 
 /// Checks the sections of a rig, or of a study that embeds them; spans are those of the document they came from.
 ///
@@ -23,7 +28,14 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     if let (Some(training), None, true) = (&sections.training, force_n, simulated) {
         return Err(RigProblem::NoForce.at(training.span()));
     }
+    if let (Some(section), Some(training)) = (&sections.training, &training) {
+        let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());
+        if values > MOST_VALUES {
+            return Err(RigProblem::TooManyValues { values, most: MOST_VALUES }.at(section.span()));
+        }
+    }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
-    Ok(Rig { surface, layout, force_n, training, estimator, columns })
+    let bench = Bench { surface, layout, force_n, columns };
+    Ok(Rig { bench, training, estimator })
 }

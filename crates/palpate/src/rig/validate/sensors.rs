@@ -35,9 +35,9 @@ pub(super) fn validate(
         context.append(&mut sensors)?;
     }
     if sensors.is_empty() {
-        let value = "0 sensors".to_owned();
+        let value = "a list of 0".to_owned();
         return Err(
-            RigProblem::OutOfRange { key: SECTION, value, bound: "at least 1 sensor" }.at(sections.span())
+            RigProblem::OutOfRange { key: SECTION, value, bound: "a list of at least 1" }.at(sections.span())
         );
     }
     if let Some(channels) = channels {
@@ -120,10 +120,9 @@ impl Context<'_> {
             positions.push(position);
         }
         if !(1..=MOST).contains(&positions.len()) {
-            let value = format!("{} positions", positions.len());
-            return Err(
-                RigProblem::OutOfRange { key: "positions", value, bound: MOST_BOUND }.at(listed.span())
-            );
+            let value = format!("a list of {}", positions.len());
+            return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of 1 to 10000" }
+                .at(listed.span()));
         }
         self.check_supported(kind, &positions, |i| {
             listed.get_ref().get(i).map_or(listed.span(), Spanned::span)
@@ -174,7 +173,7 @@ impl Context<'_> {
     fn range(&self, dimension: Dimension) -> Result<Option<(f64, f64)>, RigError> {
         let Some(range) = &self.section.range else { return Ok(None) };
         let refuse = |value| {
-            let bound = "2 values, the lower one first";
+            let bound = "a list of 2, the lower value first";
             Err(RigProblem::OutOfRange { key: "range", value, bound }.at(range.span()))
         };
         match range.get_ref().as_slice() {
@@ -187,7 +186,7 @@ impl Context<'_> {
                     refuse(format!("{} to {}", low.get_ref(), high.get_ref()))
                 }
             }
-            listed => refuse(format!("{} values", listed.len())),
+            listed => refuse(format!("a list of {}", listed.len())),
         }
     }
 

@@ -1,0 +1,8 @@
+//! One module a verb.
+
+pub mod evaluate;
+pub mod fit;
+pub mod inspect;
+pub mod locate;
+pub mod simulate;
+pub mod study;

@@ -1,0 +1,156 @@
+//! How a command ends when it does not end well: a message with its place, and an exit code.
+
+use miette::{Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use std::fmt;
+use std::io::IsTerminal;
+use std::ops::Range;
+use std::process::ExitCode;
+
+/// Why a command did not simply succeed.
+#[derive(Debug)]
+pub enum Failure {
+    /// Exit code 1: it ran, but a stated goal was missed.
+    GoalMissed(String),
+    /// Exit code 2: bad input; nothing was written.
+    BadInput(Box<Complaint>),
+    /// Exit code 3: it finished, but data was lost; the places were reported as they came.
+    DataLost(String),
+    /// Exit code 130: somebody pressed Ctrl-C.
+    Interrupted(String),
+    /// Whoever read our output stopped reading, which is their right.
+    NobodyReads,
+}
+
+impl Failure {
+    /// Says what happened on stderr.
+    pub fn report(self) -> ExitCode {
+        let (message, code) = match self {
+            Self::BadInput(complaint) => {
+                eprintln!("{:?}", miette::Report::new(*complaint));
+                return ExitCode::from(2);
+            }
+            Self::NobodyReads => return ExitCode::SUCCESS,
+            Self::GoalMissed(message) => (message, 1),
+            Self::DataLost(message) => (message, 3),
+            Self::Interrupted(message) => (message, 130),
+        };
+        eprintln!("palpate: {message}");
+        ExitCode::from(code)
+    }
+}
+
+/// What is wrong, where, and what would help.
+#[derive(Debug)]
+pub struct Complaint {
+    message: String,
+    help: Option<String>,
+    excerpt: Option<Excerpt>,
+}
+
+/// A line of a file with the part that is meant.
+#[derive(Debug)]
+struct Excerpt {
+    file: String,
+    /// From 0.
+    line: usize,
+    text: String,
+    span: Range<usize>,
+}
+
+impl Complaint {
+    /// A complaint without a place.
+    pub fn new(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), help: None, excerpt: None }
+    }
+
+    /// Adds what would help.
+    pub fn help(mut self, help: impl fmt::Display) -> Self {
+        self.help = Some(help.to_string());
+        self
+    }
+
+    /// Adds the place: bytes `span` of a whole text.
+    pub fn at_span(self, file: &str, text: &str, span: Range<usize>) -> Self {
+        let start = floor_char(text, span.start);
+        let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
+        let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
+        let line = text[..line_start].matches('\n').count();
+        let end = floor_char(text, span.end.max(start)).min(line_end);
+        let span = start - line_start..end.max(start) - line_start;
+        self.at_line(file, line + 1, &text[line_start..line_end], span)
+    }
+
+    /// Adds the place: bytes `span` of line number `line` (from 1), which reads `text`.
+    pub fn at_line(mut self, file: &str, line: usize, text: &str, span: Range<usize>) -> Self {
+        // A very long line, as networks.csv has them, would drown the message.
+        const MOST: usize = 400;
+        let begin = floor_char(text, span.start.saturating_sub(MOST / 2));
+        let text = &text[begin..floor_char(text, begin + MOST)];
+        let within = |at: usize| floor_char(text, at.saturating_sub(begin));
+        let span = within(span.start)..within(span.end);
+        self.excerpt = Some(Excerpt { file: file.to_owned(), line: line.max(1) - 1, text: text.to_owned(), span });
+        self
+    }
+}
+
+impl From<Complaint> for Failure {
+    fn from(complaint: Complaint) -> Self {
+        Self::BadInput(Box::new(complaint))
+    }
+}
+
+/// The nearest place at or before `at` where a character begins.
+fn floor_char(text: &str, at: usize) -> usize {
+    text.floor_char_boundary(at.min(text.len()))
+}
+
+impl fmt::Display for Complaint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Complaint {}
+
+impl Diagnostic for Complaint {
+    fn help(&self) -> Option<Box<dyn fmt::Display + '_>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.excerpt.as_ref().map(|excerpt| excerpt as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.excerpt.as_ref()?.span.clone();
+        Some(Box::new(std::iter::once(LabeledSpan::new_with_span(Some("here".to_owned()), span))))
+    }
+}
+
+impl SourceCode for Excerpt {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        _lines_before: usize,
+        _lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        // The heading names the line and the column of the span; the line is drawn from its first character.
+        let column = self.text[..span.offset().min(self.text.len())].chars().count();
+        let whole = SourceSpan::from(0..self.text.len());
+        let (file, line) = (self.file.clone(), self.line);
+        let data = self.text.as_bytes();
+        let column = if span.is_empty() || *span == SourceSpan::from(self.span.clone()) { column } else { 0 };
+        Ok(Box::new(MietteSpanContents::new_named(file, data, whole, line, column, 1)))
+    }
+}
+
+/// Draws complaints in colour on a terminal and in plain characters elsewhere.
+pub fn install_handler() {
+    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let installed = miette::set_hook(Box::new(move |_| {
+        Box::new(miette::MietteHandlerOpts::new().color(colour).terminal_links(false).width(100).build())
+    }));
+    if installed.is_err() {
+        eprintln!("palpate: messages will look plainer than usual");
+    }
+}

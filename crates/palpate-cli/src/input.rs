@@ -1,0 +1,109 @@
+//! Reading palpate's files, with complaints that point at the place.
+
+use crate::failure::{Complaint, Failure};
+use palpate::estimator::{Locator, LocatorFileError};
+use palpate::recording::{CsvError, Recording};
+use palpate::rig::{Rig, RigError};
+use palpate::study::{Study, StudyError, StudyProblem};
+use palpate::units::{Dimension, Quantity};
+use std::path::Path;
+
+/// The text of a file.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    let bytes = read_bytes(path)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        Complaint::new(format!("{} is not UTF-8 text: byte {} is no character", path.display(), at + 1)).into()
+    })
+}
+
+/// The bytes of a file.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| {
+        let complaint = Complaint::new(format!("cannot read {}: {error}", path.display()));
+        match error.kind() {
+            std::io::ErrorKind::NotFound => complaint.help("check the name; it is taken from the current folder").into(),
+            _ => complaint.into(),
+        }
+    })
+}
+
+/// A rig, from its file.
+pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
+    let text = read_text(path)?;
+    Rig::from_toml(&text).map_err(|error| rig_complaint(error, path, &text))
+}
+
+/// A study, from its file's text.
+pub fn parse_study(name: &str, text: &str) -> Result<Study, Failure> {
+    Study::from_toml(text).map_err(|StudyError { problem, span }| match problem {
+        StudyProblem::Rig(error) => rig_complaint(error, Path::new(name), text),
+        problem => complaint_at(Complaint::new(problem), name, text, span).into(),
+    })
+}
+
+/// A locator, from its file.
+pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
+    parse_locator(path, &read_text(path)?)
+}
+
+/// A locator, from its file's text.
+pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
+    Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
+}
+
+/// A recording of a rig's bench, with its warnings said on stderr.
+pub fn read_recording(rig: &Rig, path: &Path) -> Result<Recording, Failure> {
+    let bytes = read_bytes(path)?;
+    let name = path.display().to_string();
+    let recording = rig.read_recording(&name, bytes.as_slice()).map_err(csv_complaint)?;
+    for warning in recording.warnings() {
+        eprintln!("warning: {name}: {warning}");
+    }
+    Ok(recording)
+}
+
+/// A length in metres, from a command line argument.
+pub fn length(text: &str) -> Result<f64, String> {
+    match Quantity::parse_as(text, Dimension::Length) {
+        Ok(length_m) if length_m > 0.0 => Ok(length_m),
+        Ok(_) => Err(format!("`{text}` must be greater than 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
+    let complaint = Complaint::new(&error);
+    let complaint = match error.problem.help() {
+        Some(help) => complaint.help(help),
+        None => complaint,
+    };
+    complaint_at(complaint, &path.display().to_string(), text, error.span).into()
+}
+
+fn complaint_at(
+    complaint: Complaint,
+    name: &str,
+    text: &str,
+    span: Option<std::ops::Range<usize>>,
+) -> Complaint {
+    // What is not there at all is said of the first line.
+    complaint.at_span(name, text, span.unwrap_or(0..0))
+}
+
+fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Complaint {
+    let complaint = Complaint::new(format!("{}: {error}", path.display()));
+    let Some((line, column)) = error.place() else { return complaint };
+    let line_text = text.lines().nth(line - 1).unwrap_or_default();
+    let start = (column - 1).min(line_text.len());
+    complaint.at_line(&path.display().to_string(), line, line_text, start..line_text.len().min(start + 1))
+}
+
+/// The complaint about a recording.
+pub fn csv_complaint(error: CsvError) -> Failure {
+    let complaint = Complaint::new(&error);
+    match &error.place {
+        Some(place) => complaint.at_line(&error.source_name, place.line, &place.text, place.span.clone()).into(),
+        None => complaint.into(),
+    }
+}

@@ -1,0 +1,64 @@
+//! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
+
+use crate::failure::{Complaint, Failure};
+use std::fmt::Display;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+/// Writes a file under a temporary name and renames it, so that nobody ever sees half of it.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let write = || -> std::io::Result<()> {
+        let mut file = tempfile::Builder::new().prefix(".palpate-").tempfile_in(folder)?;
+        file.write_all(bytes)?;
+        make_readable(file.as_file())?;
+        file.persist(path)?;
+        Ok(())
+    };
+    write().map_err(|error| cannot("write", path, &error))
+}
+
+/// Temporary files begin private to their owner; results are for whoever may read the folder.
+fn make_readable(file: &std::fs::File) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.set_permissions(std::fs::Permissions::from_mode(0o644))?;
+    }
+    #[cfg(not(unix))]
+    let _ = file;
+    Ok(())
+}
+
+/// Makes a folder, with those above it.
+pub fn make_folder(path: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|error| cannot("make the folder", path, &error))
+}
+
+/// The complaint that a path cannot be used.
+pub fn cannot(what: &str, path: &Path, error: &std::io::Error) -> Failure {
+    Complaint::new(format!("cannot {what} {}: {error}", path.display())).into()
+}
+
+/// Prints a line on stdout.
+pub fn say(line: impl Display) -> Result<(), Failure> {
+    print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())
+}
+
+/// Prints a value as JSON on stdout.
+pub fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    say(to_json(value)?)
+}
+
+/// A value as JSON text.
+pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map_err(|error| Complaint::new(error).into())
+}
+
+/// Writes to stdout or whatever stands for it; a reader that has gone is no error of ours.
+pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
+    out.write_all(bytes).map_err(|error| match error.kind() {
+        ErrorKind::BrokenPipe => Failure::NobodyReads,
+        _ => Complaint::new(format!("cannot write to the output: {error}")).into(),
+    })
+}

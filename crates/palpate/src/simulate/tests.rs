@@ -1,0 +1,64 @@
+use super::*;
+use crate::sensing::SensorKind;
+
+const PAPER: &str = include_str!("../../../../examples/paper.toml");
+
+fn paper() -> Rig {
+    Rig::from_toml(PAPER).unwrap()
+}
+
+fn noisy() -> Rig {
+    let faults = "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"2 um\"";
+    Rig::from_toml(&PAPER.replace("noise = \"5 um\"", faults).replace("repeats = 1", "repeats = 3")).unwrap()
+}
+
+#[test]
+fn a_clean_simulation_is_force_times_influence() {
+    let rig = Rig::from_toml(&PAPER.replace("5 um", "0 um")).unwrap();
+    let recording = simulate(&rig, 1).unwrap();
+    assert_eq!(recording.rows.len(), 10);
+    let surface = rig.bench.surface.model().unwrap();
+    for (i, row) in recording.rows.iter().enumerate() {
+        assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
+        for (sensor, value) in rig.bench.layout.sensors.iter().zip(&row.reading) {
+            let influence = surface.influence(SensorKind::Deflection, sensor.position, row.position);
+            assert_eq!(*value, 3.0 * influence);
+        }
+    }
+}
+
+#[test]
+fn one_seed_gives_one_recording_and_another_seed_another() {
+    let rig = noisy();
+    let recording = simulate(&rig, 7).unwrap();
+    assert_eq!(recording.rows.len(), 30);
+    assert_eq!(simulate(&rig, 7).unwrap(), recording);
+    assert_ne!(simulate(&rig, 8).unwrap().rows, recording.rows);
+    assert_eq!(recording.provenance.seed, Some(7));
+}
+
+#[test]
+fn a_simulation_survives_its_file_bit_for_bit() {
+    let rig = noisy();
+    let recording = simulate(&rig, 7).unwrap();
+    let mut bytes = Vec::new();
+    crate::recording::write(&recording, rig.bench.surface.extent(), &mut bytes).unwrap();
+    assert!(bytes.starts_with(b"position_mm,force_n,deflection_1_mm,deflection_2_mm,"));
+    assert_eq!(rig.bench.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_the_reason() {
+    let measured = Rig::from_toml(include_str!("../../../../examples/fsi-water.toml")).unwrap();
+    let mut no_force = paper();
+    no_force.bench.force_n = None;
+    let no_training = Rig { training: None, ..paper() };
+    let here = [Position::along(0.1)];
+    let messages = [
+        simulate_at(&measured.bench, &here, 1, 1).unwrap_err().to_string(),
+        simulate(&no_force, 1).unwrap_err().to_string(),
+        simulate(&no_training, 1).unwrap_err().to_string(),
+        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1).unwrap_err().to_string(),
+    ];
+    insta::assert_snapshot!(messages.join("\n"));
+}
