@@ -4,9 +4,11 @@ mod config;
 mod fitting;
 mod locator;
 mod locator_file;
+mod settings;
 
 pub use config::EstimatorConfig;
 pub use fitting::{FitError, Fitting, LocatorQueue};
 pub use locator::{Locator, LocatorProvenance, Method, ReadingError};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{Estimate, Status};
+pub use settings::Setting;

@@ -7,6 +7,7 @@ mod locator;
 mod outcome;
 mod patterns;
 mod scalar;
+mod settings;
 mod topology;
 mod train;
 

@@ -14,6 +14,16 @@ pub enum TrainingStatus {
     Diverged,
 }
 
+impl std::fmt::Display for TrainingStatus {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Self::Converged => "converged",
+            Self::Capped => "capped",
+            Self::Diverged => "diverged",
+        })
+    }
+}
+
 /// How a training ended and what it took. Not converging is a status, never an error.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrainingOutcome {

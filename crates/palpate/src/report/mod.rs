@@ -1,7 +1,8 @@
-//! Figures: charts and drawings of a bench, as SVG text and as PNG bytes.
+//! Reports: self-contained HTML pages with their figures as SVG and PNG, handed back as [`ReportFile`]s.
 //!
-//! Nothing here knows what is drawn: a [`Chart`] is plain data that the caller fills in. No function touches a
-//! file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
+//! Beneath them lie charts and drawings of a bench, which know nothing of what is drawn: a [`Chart`] is plain data that
+//! the caller fills in. No function touches a file, the clock or the fonts of the machine, so the same data give the
+//! same bytes everywhere.
 //!
 //! ```
 //! use palpate::report::{Axis, Chart, Series, SeriesKind, Stroke, chart_to_svg, svg_to_png};
@@ -27,11 +28,18 @@ mod bench_drawing;
 mod canvas;
 mod chart;
 mod chart_svg;
+mod evaluation_report;
 mod geometry;
 mod layout;
 mod legend;
+mod numbers;
+mod page;
+mod paper_report;
 mod png;
+mod report_file;
 mod scale;
+mod study_parts;
+mod study_report;
 mod text;
 mod ticks;
 
@@ -45,4 +53,8 @@ pub use chart::{
     Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
 };
 pub use chart_svg::chart_to_svg;
+pub use evaluation_report::{Answers, EvaluationReport, evaluation_report};
+pub use paper_report::paper_report;
 pub use png::{PngError, svg_to_png};
+pub use report_file::{ReportError, ReportFile};
+pub use study_report::{StudyReport, study_report};

@@ -1,0 +1,67 @@
+//! A network's configuration in words.
+
+use super::{Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
+use crate::estimator::Setting;
+
+impl NetworkConfig {
+    /// Every setting, in words.
+    pub fn settings(&self) -> Vec<Setting> {
+        let setting = |key, name, value| Setting { key, name, value };
+        let BackPropagation { learning_rate, momentum, aggregate_error, max_epochs, order, initial_weights } =
+            self.training;
+        let hidden: Vec<String> = self.hidden.iter().map(usize::to_string).collect();
+        vec![
+            setting("hidden", "nodes in the hidden layers", hidden.join(", ")),
+            setting("hidden_activation", "activation, hidden", activation(self.hidden_activation).to_owned()),
+            setting("output_activation", "activation, output", activation(self.output_activation).to_owned()),
+            setting("biases", "biases", if self.biases { "every node has one" } else { "none" }.to_owned()),
+            setting("output", "output", output(self.output).to_owned()),
+            setting("input_scale", "input scale", input_scale(self.input_scale)),
+            setting("learning_rate", "learning rate", learning_rate.to_string()),
+            setting("momentum", "momentum", momentum.to_string()),
+            setting("weight_update", "weight update", "after every pattern".to_owned()),
+            setting("order", "presentation order", presentation_order(order).to_owned()),
+            setting("initial_weights", "initial weights", format!("uniform within ±{initial_weights}")),
+            setting("aggregate_error", "training stops", stop(aggregate_error)),
+            setting("max_epochs", "most iterations", format!("{max_epochs} epochs")),
+        ]
+    }
+}
+
+fn activation(activation: Activation) -> &'static str {
+    match activation {
+        Activation::Logistic => "logistic sigmoid",
+        Activation::Tanh => "hyperbolic tangent",
+        Activation::Linear => "linear",
+    }
+}
+
+fn output(coding: OutputCoding) -> &'static str {
+    match coding {
+        OutputCoding::Position => "the position in metres",
+        OutputCoding::Normalized => "the position divided by the length",
+    }
+}
+
+fn input_scale(scale: InputScale) -> String {
+    match scale {
+        InputScale::FullScale => {
+            "divided by the largest reading that the contact force can cause (full scale)".to_owned()
+        }
+        InputScale::Standardized => {
+            "each channel shifted to mean 0 and divided by its standard deviation".to_owned()
+        }
+        InputScale::DivideBy(divisor) => format!("divided by {divisor} in the sensors' SI unit"),
+    }
+}
+
+fn presentation_order(order: PresentationOrder) -> &'static str {
+    match order {
+        PresentationOrder::Shuffled => "a fresh random order every epoch",
+        PresentationOrder::Fixed => "the same order every epoch",
+    }
+}
+
+fn stop(aggregate_error: f64) -> String {
+    format!("when the squared output errors of one epoch sum to at most {aggregate_error:e}")
+}
