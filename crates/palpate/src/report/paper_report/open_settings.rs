@@ -111,7 +111,7 @@ fn modulus_row(beam: Beam) -> Vec<Markup> {
 }
 
 fn noise_row(rig: &Rig) -> Vec<Markup> {
-    let noisy = rig.layout.sensors.iter().any(|sensor| sensor.channel != Default::default());
+    let noisy = rig.bench.layout.sensors.iter().any(|sensor| sensor.channel != Default::default());
     let study = if noisy {
         "the sensors have faults, as the study's file states"
     } else {
