@@ -150,7 +150,7 @@ impl EvaluationReport<'_> {
             series("estimated = true", 6, SeriesKind::Line { points: identity, stroke: Stroke::Dashed }),
             series("along the surface", 0, SeriesKind::Points { points: along, marker: Marker::Circle }),
         ];
-        if self.locator.surface.extent().width_m.is_some() {
+        if self.locator.bench.surface.extent().width_m.is_some() {
             let points = to_mm(|located| (located.truth.y_m, located.estimate.y_m));
             drawn.push(series(
                 "across the surface",
@@ -220,7 +220,8 @@ impl EvaluationReport<'_> {
         let locator = self.locator;
         let outcome = locator.training_outcome();
         let ended = format!("{} after {} epochs", outcome.status, whole(f64::from(outcome.epochs)));
-        let force = locator.force_n.map_or("unknown".to_owned(), |force_n| format!("{} N", number(force_n)));
+        let force =
+            locator.bench.force_n.map_or("unknown".to_owned(), |force_n| format!("{} N", number(force_n)));
         let fitted_to = &locator.provenance.recording;
         let facts = [
             ("estimator", text(locator.kind())),
@@ -245,8 +246,8 @@ impl EvaluationReport<'_> {
     }
 
     fn surface_in_words(&self) -> String {
-        let extent = self.locator.surface.extent();
-        let kind = match self.locator.surface {
+        let extent = self.locator.bench.surface.extent();
+        let kind = match self.locator.bench.surface {
             SurfaceSpec::Beam(_) => "beam",
             SurfaceSpec::Measured(_) => "measured, without a model",
         };
@@ -255,8 +256,9 @@ impl EvaluationReport<'_> {
     }
 
     fn sensors_in_words(&self) -> String {
-        let names = self.locator.layout.names();
-        let mut kinds: Vec<&str> = self.locator.layout.kinds().into_iter().map(|kind| kind.name()).collect();
+        let names = self.locator.bench.layout.names();
+        let mut kinds: Vec<&str> =
+            self.locator.bench.layout.kinds().into_iter().map(|kind| kind.name()).collect();
         kinds.dedup();
         format!("{}, {}: {}", names.len(), listed(&kinds), names.join(", "))
     }

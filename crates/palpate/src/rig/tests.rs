@@ -2,9 +2,9 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::mechanics::{Beam, Extent, SurfaceSpec};
-use crate::sensing::Layout;
 use crate::network::{InputScale, NetworkConfig, OutputCoding};
 use crate::recording::{Column, PositionColumns};
+use crate::sensing::Layout;
 use crate::sensing::SensorKind;
 
 const PAPER: &str = include_str!("../../../../examples/paper.toml");

@@ -58,7 +58,9 @@ fn what_cannot_be_simulated_is_refused_with_the_reason() {
         simulate_at(&measured.bench, &here, 1, 1).unwrap_err().to_string(),
         simulate(&no_force, 1).unwrap_err().to_string(),
         simulate(&no_training, 1).unwrap_err().to_string(),
-        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1).unwrap_err().to_string(),
+        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1)
+            .unwrap_err()
+            .to_string(),
     ];
     insta::assert_snapshot!(messages.join("\n"));
 }

@@ -20,14 +20,14 @@ impl Paper<'_> {
     /// What is on the bench, where the surface is a beam. All arms of the paper share it.
     pub(super) fn bench(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
-        let SurfaceSpec::Beam(beam) = rig.surface else { return None };
-        Some((rig, beam, rig.force_n?))
+        let SurfaceSpec::Beam(beam) = rig.bench.surface else { return None };
+        Some((rig, beam, rig.bench.force_n?))
     }
 
     /// Distance of neighbouring sensors in mm, where it is the same for all.
     pub(super) fn sensor_pitch_mm(&self) -> Option<String> {
         let (rig, ..) = self.bench()?;
-        let positions: Vec<f64> = rig.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+        let positions: Vec<f64> = rig.bench.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
         let pitches: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let first = *pitches.first()?;
         pitches.iter().all(|pitch| (pitch - first).abs() < 1e-6).then(|| number(first * 1e3))
@@ -46,14 +46,14 @@ impl Paper<'_> {
         let svg = bench_to_svg(&BenchDrawing {
             length_mm,
             supports: vec![wedge(0.0), wedge(length_mm)],
-            sensors_mm: rig.layout.sensors.iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
+            sensors_mm: rig.bench.layout.sensors.iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
             load_mm: load.x_m * 1e3,
             load_label: format!("{} N", stated(force_n)),
             deflection_mm: deflection_mm.collect(),
             width_px: 760,
         })?;
         let caption = html! {
-            "The bench: a beam on two wedges, " (counted(rig.layout.len(), "sensor", "sensors")) " beneath it and a load of "
+            "The bench: a beam on two wedges, " (counted(rig.bench.layout.len(), "sensor", "sensors")) " beneath it and a load of "
             (stated(force_n)) " N, here at " (mm(load.x_m)) " mm. Blue: the bent beam, in closed form."
         };
         Ok(Some(Figure {
@@ -90,7 +90,22 @@ impl Paper<'_> {
             p {
                 "The paper asks three things. What should the output stand for: the plain position in metres, or the \
                  position divided by the beam's length, which uses the whole range of the output? How many training \
-                 positions are enough? And does it help to crowd them towards the supports, where errors are largest?"
+                 positions are enough? And does it help to crowd them towards the supports?"
+            }
+            p {
+                "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
+                 training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
+                 and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
+                code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
+            }
+        }
+    }
+
+    pub(super) fn starting_point(&self) -> Markup {
+        html! {
+            p {
+                "The paper begins with the position output and ten equally spaced training positions. "
+                @if self.report.outcome("position-10").is_none() { "That arm was not run." }
             }
         }
     }
@@ -113,7 +128,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
             "The surface here is a beam, " (mm(beam.length_m)) " mm long, " (mm(beam.width_m)) " mm wide and "
             (mm(beam.thickness_m)) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa / 1e9))
             " GPa, on two wedges at its ends. "
-            (counted(rig.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
+            (counted(rig.bench.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
             (stated(force_n)) " N, whose force is known, stands on it. With the load in the middle the beam sags by "
             (number(sag_mm)) " mm there."
         }
@@ -122,7 +137,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
 
 /// "deflection", or more where the sensors differ.
 fn kinds(rig: &Rig) -> String {
-    let mut names: Vec<&str> = rig.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
+    let mut names: Vec<&str> = rig.bench.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();
     names.join(", ")
 }
