@@ -1,6 +1,8 @@
 //! How a command ends when it does not end well: a message with its place, and an exit code.
 
-use miette::{Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use miette::{
+    Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
+};
 use std::fmt;
 use std::io::IsTerminal;
 use std::ops::Range;
@@ -88,7 +90,8 @@ impl Complaint {
         let text = &text[begin..floor_char(text, begin + MOST)];
         let within = |at: usize| floor_char(text, at.saturating_sub(begin));
         let span = within(span.start)..within(span.end);
-        self.excerpt = Some(Excerpt { file: file.to_owned(), line: line.max(1) - 1, text: text.to_owned(), span });
+        self.excerpt =
+            Some(Excerpt { file: file.to_owned(), line: line.max(1) - 1, text: text.to_owned(), span });
         self
     }
 }

@@ -1,6 +1,7 @@
 //! Reading palpate's files, with complaints that point at the place.
 
 use crate::failure::{Complaint, Failure};
+use palpate::bench::Bench;
 use palpate::estimator::{Locator, LocatorFileError};
 use palpate::recording::{CsvError, Recording};
 use palpate::rig::{Rig, RigError};
@@ -13,7 +14,8 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     let bytes = read_bytes(path)?;
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        Complaint::new(format!("{} is not UTF-8 text: byte {} is no character", path.display(), at + 1)).into()
+        Complaint::new(format!("{} is not UTF-8 text: byte {} is no character", path.display(), at + 1))
+            .into()
     })
 }
 
@@ -22,7 +24,9 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     std::fs::read(path).map_err(|error| {
         let complaint = Complaint::new(format!("cannot read {}: {error}", path.display()));
         match error.kind() {
-            std::io::ErrorKind::NotFound => complaint.help("check the name; it is taken from the current folder").into(),
+            std::io::ErrorKind::NotFound => {
+                complaint.help("check the name; it is taken from the current folder").into()
+            }
             _ => complaint.into(),
         }
     })
@@ -52,11 +56,11 @@ pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
 }
 
-/// A recording of a rig's bench, with its warnings said on stderr.
-pub fn read_recording(rig: &Rig, path: &Path) -> Result<Recording, Failure> {
+/// A recording of a bench, with its warnings said on stderr.
+pub fn read_recording(bench: &Bench, path: &Path) -> Result<Recording, Failure> {
     let bytes = read_bytes(path)?;
     let name = path.display().to_string();
-    let recording = rig.read_recording(&name, bytes.as_slice()).map_err(csv_complaint)?;
+    let recording = bench.read_recording(&name, bytes.as_slice()).map_err(|error| csv_complaint(&error))?;
     for warning in recording.warnings() {
         eprintln!("warning: {name}: {warning}");
     }
@@ -74,7 +78,7 @@ pub fn length(text: &str) -> Result<f64, String> {
 
 fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
     let complaint = Complaint::new(&error);
-    let complaint = match error.problem.help() {
+    let complaint = match error.help() {
         Some(help) => complaint.help(help),
         None => complaint,
     };
@@ -100,10 +104,12 @@ fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Compl
 }
 
 /// The complaint about a recording.
-pub fn csv_complaint(error: CsvError) -> Failure {
-    let complaint = Complaint::new(&error);
+pub fn csv_complaint(error: &CsvError) -> Failure {
+    let complaint = Complaint::new(error);
     match &error.place {
-        Some(place) => complaint.at_line(&error.source_name, place.line, &place.text, place.span.clone()).into(),
+        Some(place) => {
+            complaint.at_line(&error.source_name, place.line, &place.text, place.span.clone()).into()
+        }
         None => complaint.into(),
     }
 }

@@ -21,11 +21,8 @@ pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> S
 pub fn thousands(number: f64) -> String {
     let digits = format!("{number:.0}");
     let (sign, digits) = digits.strip_prefix('-').map_or(("", digits.as_str()), |rest| ("-", rest));
-    let groups: Vec<&str> = (0..digits.len())
-        .rev()
-        .step_by(3)
-        .map(|end| &digits[end.saturating_sub(2)..=end])
-        .collect();
+    let groups: Vec<&str> =
+        (0..digits.len()).rev().step_by(3).map(|end| &digits[end.saturating_sub(2)..=end]).collect();
     sign.to_owned() + &groups.into_iter().rev().collect::<Vec<_>>().join(",")
 }
 
@@ -41,7 +38,8 @@ mod tests {
 
     #[test]
     fn columns_line_up() {
-        let text = table(&["arm", "epochs"], [vec!["a".into(), "1".into()], vec!["long".into(), "100".into()]]);
+        let text =
+            table(&["arm", "epochs"], [vec!["a".into(), "1".into()], vec!["long".into(), "100".into()]]);
         insta::assert_snapshot!(text, @r"
         arm   epochs
         a          1

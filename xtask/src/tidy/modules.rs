@@ -8,21 +8,23 @@ use super::used_paths::used_paths;
 const SOURCE: &str = "crates/palpate/src/";
 
 /// Top to bottom: a module may use those above it.
-const ORDER: [&str; 19] = [
+const ORDER: [&str; 21] = [
     "units",
     "contact",
     "sensing",
     "mechanics",
     "recording",
+    "bench",
     "arrangement",
-    "rig",
-    "estimator",
     "network",
     "influence",
     "gaussian_process",
-    "limit",
     "tracking",
     "distribution",
+    "estimator",
+    "rig",
+    "simulate",
+    "limit",
     "design",
     "evaluation",
     "study",
@@ -30,7 +32,7 @@ const ORDER: [&str; 19] = [
     "export",
 ];
 
-/// The ways to interpret readings. They know estimator's traits and estimator knows them; they do not know each other.
+/// The ways to interpret readings. The estimator knows them; they do not know each other.
 const METHODS: [&str; 5] = ["network", "influence", "gaussian_process", "tracking", "distribution"];
 
 /// Modules that treat every locator alike, so they see methods through `estimator` only.

@@ -13,6 +13,13 @@ impl EstimatorConfig {
     /// Every `kind` that a rig can name.
     pub const KINDS: &'static [&'static str] = &["network"];
 
+    /// Distinct contact positions that a recording must have for fitting.
+    pub fn positions_needed(&self) -> usize {
+        match self {
+            Self::Network(_) => 2,
+        }
+    }
+
     /// The `kind` under which a rig names this estimator.
     pub fn kind(&self) -> &'static str {
         match self {

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use super::cells::Cells;
 use super::columns::{Columns, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem, Place};
-use super::reading_parser::{ChannelFields, is_blank, without_mark};
+use super::reading_parser::{ChannelFields, is_passed_over, without_mark};
 use super::{Provenance, Recording, Row};
 use crate::contact::Position;
 use crate::mechanics::Extent;
@@ -120,8 +120,9 @@ impl<'s> File<'s> {
         row: impl Fn(&Cells, &C) -> Result<T, CsvError>,
     ) -> Result<Vec<T>, CsvError> {
         let lines = without_mark(&self.text).lines().enumerate();
-        let mut lines =
-            lines.filter(|(_, text)| !is_blank(text)).map(|(i, text)| Cells::parse(self.source, i + 1, text));
+        let mut lines = lines
+            .filter(|(_, text)| !is_passed_over(text))
+            .map(|(i, text)| Cells::parse(self.source, i + 1, text));
         let head = lines.next().ok_or_else(|| CsvProblem::Empty.of_file(self.source))??;
         let columns = find(&head)?;
         let first = match header {

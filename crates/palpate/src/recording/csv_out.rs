@@ -7,14 +7,16 @@ use super::{Recording, Row};
 use crate::mechanics::Extent;
 
 /// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the force
-/// column is written where every row has a force. `extent` says whether positions have one coordinate or two.
+/// column is written where every row has a force. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes from, in a
+/// first line that begins with `#`.
 ///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write(recording: &Recording, extent: Extent, out: impl Write) -> io::Result<()> {
+pub fn write(recording: &Recording, extent: Extent, comment: &str, mut out: impl Write) -> io::Result<()> {
     let columns = Columns::own(&recording.channels, &recording.kinds, extent);
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
+    writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
     let mut csv = csv::Writer::from_writer(out);
     csv.write_record(header(&columns))?;
     for row in &recording.rows {

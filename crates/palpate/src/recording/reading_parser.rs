@@ -22,36 +22,28 @@ struct Found {
 }
 
 impl ReadingParser {
-    /// A parser for lines below `header_line`, the first line of `source`.
-    ///
-    /// # Errors
-    /// [`CsvError`] when the header lacks a channel of `columns`, names one twice, or is not UTF-8.
-    pub fn from_header(source: &str, header_line: &[u8], columns: &Columns) -> Result<Self, CsvError> {
-        let columns = Columns { header: Header::Present, ..columns.clone() };
-        let text = without_mark(utf8(source, 1, header_line)?);
-        let head = Cells::parse(source, 1, text)?;
-        let found = Found { channels: ChannelFields::find(&head, &columns)?, width: head.width() };
-        Ok(Self { source: source.to_owned(), columns, found: Some(found), line: 1 })
+    /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
+    pub fn new(source: &str, columns: &Columns) -> Self {
+        Self { source: source.to_owned(), columns: columns.clone(), found: None, line: 0 }
     }
 
-    /// A parser for a stream without a header; `columns` must give its channels by number.
-    pub fn from_numbers(source: &str, columns: &Columns) -> Self {
-        let columns = Columns { header: Header::Absent, ..columns.clone() };
-        Self { source: source.to_owned(), columns, found: None, line: 0 }
+    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
+    pub fn awaits_columns(&self) -> bool {
+        self.found.is_none()
     }
 
-    /// Reads the next line: one value per channel, in SI units; `None` for a blank line.
+    /// Reads the next line: one value per channel, in SI units; `None` for the header, a blank line or a comment (`#`).
     ///
     /// After an error the parser goes on with the next line.
     ///
     /// # Errors
-    /// [`CsvError`] with line and column: another number of fields than the header or the first row, a field that
-    /// is not a finite number, text that is not UTF-8.
+    /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
+    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8.
     pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
         self.line += 1;
         let text = utf8(&self.source, self.line, line)?;
         let text = if self.line == 1 { without_mark(text) } else { text };
-        if is_blank(text) {
+        if is_passed_over(text) {
             return Ok(None);
         }
         let cells = Cells::parse(&self.source, self.line, text)?;
@@ -59,7 +51,11 @@ impl ReadingParser {
             Some(found) => found,
             none => {
                 let channels = ChannelFields::find(&cells, &self.columns)?;
-                none.insert(Found { channels, width: cells.width() })
+                let found = none.insert(Found { channels, width: cells.width() });
+                if self.columns.header == Header::Present {
+                    return Ok(None);
+                }
+                found
             }
         };
         cells.check_width(found.width)?;
@@ -83,9 +79,9 @@ impl ChannelFields {
     }
 }
 
-/// Whether a line holds nothing, not even a comma.
-pub(super) fn is_blank(line: &str) -> bool {
-    line.trim().is_empty()
+/// Whether a line holds nothing, not even a comma, or is a comment.
+pub(super) fn is_passed_over(line: &str) -> bool {
+    line.trim().is_empty() || line.starts_with('#')
 }
 
 /// `text` without the byte-order mark that some spreadsheets put first.

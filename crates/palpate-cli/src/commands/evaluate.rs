@@ -1,0 +1,211 @@
+//! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
+
+use crate::failure::{Complaint, Failure};
+use crate::table::table;
+use crate::{input, interrupt, output};
+use palpate::contact::Position;
+use palpate::estimator::Locator;
+use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
+use palpate::recording::Recording;
+use palpate::simulate::{simulate, simulate_at};
+use std::path::{Path, PathBuf};
+
+/// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// A locator; or a rig, whose estimator is then cross-validated on the recording
+    subject: PathBuf,
+    /// The recording to judge by [default: the simulation at 399 positions]
+    #[arg(long, value_name = "FILE.csv")]
+    data: Option<PathBuf>,
+    /// Folds of the cross-validation
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    folds: u16,
+    /// An error up to this is good enough for the effective length
+    #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
+    tolerance: f64,
+    /// A portion that is also judged by itself, as in `--portion "60 mm..300 mm"`; may be repeated
+    #[arg(long, value_name = "FROM..TO", value_parser = portion)]
+    portion: Vec<Portion>,
+    /// Seed of simulation and fits
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Folder for a report
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the errors as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is printed, or written as JSON.
+#[derive(serde::Serialize)]
+struct Findings {
+    palpate: &'static str,
+    subject: String,
+    data: String,
+    folds: Option<u16>,
+    seed: u64,
+    length_mm: f64,
+    tolerance_mm: f64,
+    effective_percent: f64,
+    errors: Vec<Errors>,
+}
+
+#[derive(serde::Serialize)]
+struct Errors {
+    portion: String,
+    count: usize,
+    error_mm: Figures,
+    error_percent: Figures,
+}
+
+#[derive(serde::Serialize)]
+struct Figures {
+    mean: f64,
+    median: f64,
+    p95: f64,
+    rmse: f64,
+    max: f64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let (evaluation, judged, data) =
+        if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
+    let findings = findings(arguments, &evaluation, &judged, data)?;
+    // REPORT
+    if arguments.json { output::say_json(&findings) } else { print(&findings, arguments) }
+}
+
+fn is_toml(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
+fn cross_validated(arguments: &Arguments) -> Result<(Evaluation, Judged, String), Failure> {
+    let rig = input::read_rig(&arguments.subject)?;
+    let (recording, data) = match &arguments.data {
+        Some(path) => (input::read_recording(&rig.bench, path)?, path.display().to_string()),
+        None => (simulate(&rig, arguments.seed).map_err(Complaint::new)?, "the simulation".to_owned()),
+    };
+    let folds = usize::from(arguments.folds);
+    let evaluation = cross_validate(&rig, &recording, folds, arguments.seed, &mut || !interrupt::asked());
+    let evaluation = evaluation.map_err(Complaint::new)?;
+    let evaluation =
+        evaluation.ok_or_else(|| Failure::Interrupted("stopped; nothing was written".to_owned()))?;
+    Ok((evaluation, Judged::CrossValidated { rig: Box::new(rig), folds }, data))
+}
+
+/// A locator, judged by a recording or by its own bench's simulation.
+fn located(arguments: &Arguments) -> Result<(Evaluation, Judged, String), Failure> {
+    let locator = input::read_locator(&arguments.subject)?;
+    let (recording, data) = match &arguments.data {
+        Some(path) => {
+            let recording = input::read_recording(&locator.bench, path)?;
+            warn_of_training_data(&locator, &recording);
+            (recording, path.display().to_string())
+        }
+        None => (simulated(&locator, arguments.seed)?, "the simulation".to_owned()),
+    };
+    let evaluation = Evaluation::of(&locator, &recording).map_err(Complaint::new)?;
+    Ok((evaluation, Judged::Locator(Box::new(locator)), data))
+}
+
+/// The bench pressed at 399 positions, 1/400 of the length apart: for the paper's beam, every millimetre.
+fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
+    let length_m = locator.bench.surface.extent().length_m;
+    let positions: Vec<Position> =
+        (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
+    simulate_at(&locator.bench, &positions, 1, seed)
+        .map_err(|error| Complaint::new(error).help("--data names a recording to judge by").into())
+}
+
+fn warn_of_training_data(locator: &Locator, recording: &Recording) {
+    if locator.provenance.recording.digests == recording.provenance.digests {
+        eprintln!(
+            "warning: the locator was fitted to this very recording; at positions that it has not seen it is worse: `palpate evaluate RIG --data …` cross-validates"
+        );
+    }
+}
+
+fn portion(text: &str) -> Result<Portion, String> {
+    let (from, to) =
+        text.split_once("..").ok_or_else(|| format!("`{text}` has no `..` between two lengths"))?;
+    let portion = Portion { from_m: input::length(from.trim())?, to_m: input::length(to.trim())? };
+    if portion.from_m < portion.to_m { Ok(portion) } else { Err(format!("`{text}` does not rise")) }
+}
+
+fn findings(
+    arguments: &Arguments,
+    evaluation: &Evaluation,
+    judged: &Judged,
+    data: String,
+) -> Result<Findings, Failure> {
+    let named = |portion: &Portion| format!("{}–{} mm", portion.from_m * 1e3, portion.to_m * 1e3);
+    let portions = std::iter::once((None, "whole surface".to_owned()))
+        .chain(arguments.portion.iter().map(|portion| (Some(*portion), named(portion))));
+    let errors = portions.map(|(portion, name)| {
+        let summary = evaluation.summary(portion).ok_or_else(|| {
+            Complaint::new(format!("{name} has no contact in {data}")).help("name a portion that was pressed")
+        })?;
+        Ok(errors(name, &summary, evaluation.length_m))
+    });
+    let folds = matches!(judged, Judged::CrossValidated { .. }).then_some(arguments.folds);
+    Ok(Findings {
+        palpate: env!("CARGO_PKG_VERSION"),
+        subject: arguments.subject.display().to_string(),
+        folds,
+        seed: arguments.seed,
+        length_mm: evaluation.length_m * 1e3,
+        tolerance_mm: arguments.tolerance * 1e3,
+        effective_percent: evaluation.effective_percent(arguments.tolerance),
+        errors: errors.collect::<Result<_, Failure>>()?,
+        data,
+    })
+}
+
+fn errors(portion: String, summary: &ErrorSummary, length_m: f64) -> Errors {
+    let figures = |unit: &dyn Fn(f64) -> f64| Figures {
+        mean: unit(summary.average_m),
+        median: unit(summary.median_m),
+        p95: unit(summary.p95_m),
+        rmse: unit(summary.rmse_m),
+        max: unit(summary.largest_m),
+    };
+    let error_percent = figures(&|error_m| percentage_error(error_m, length_m));
+    Errors { portion, count: summary.count, error_mm: figures(&|error_m| error_m * 1e3), error_percent }
+}
+
+fn print(findings: &Findings, arguments: &Arguments) -> Result<(), Failure> {
+    let how = match findings.folds {
+        Some(folds) => format!("cross-validated in {folds} folds by position"),
+        None => "located".to_owned(),
+    };
+    let count = findings.errors.first().map_or(0, |errors| errors.count);
+    output::say(format!("{}: {count} readings of {}, {how}\n", findings.subject, findings.data))?;
+    let cell = |mm: f64, percent: f64| format!("{mm:.3} ({percent:.2})");
+    let rows = findings.errors.iter().map(|errors| {
+        let (mm, percent) = (&errors.error_mm, &errors.error_percent);
+        vec![
+            errors.portion.clone(),
+            errors.count.to_string(),
+            cell(mm.mean, percent.mean),
+            cell(mm.median, percent.median),
+            cell(mm.p95, percent.p95),
+            cell(mm.max, percent.max),
+        ]
+    });
+    let heading = ["error, mm (% of length)", "contacts", "average", "median", "95th percentile", "largest"];
+    output::say(table(&heading, rows))?;
+    let (share, tolerance) = (findings.effective_percent, findings.tolerance_mm);
+    output::say(format!("\neffective: {share:.1} % of the contacts within {tolerance} mm"))?;
+    match &arguments.out {
+        Some(out) => output::say(format!("Report: {}", out.join("report.html").display())),
+        None => Ok(()),
+    }
+}
+
+enum Judged {
+    Locator(Box<Locator>),
+    CrossValidated { rig: Box<palpate::rig::Rig>, folds: usize },
+}

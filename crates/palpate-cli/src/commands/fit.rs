@@ -1,0 +1,85 @@
+//! `palpate fit`: calibrate an estimator.
+
+use crate::failure::{Complaint, Failure};
+use crate::table::thousands;
+use crate::{input, interrupt, output};
+use palpate::estimator::Fitting;
+use palpate::network::TrainingStatus;
+use palpate::simulate::simulate;
+use std::path::PathBuf;
+
+/// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The rig file
+    rig: PathBuf,
+    /// The recording to fit
+    #[arg(long, value_name = "FILE.csv")]
+    data: Option<PathBuf>,
+    /// The locator to write
+    #[arg(short, long, value_name = "LOCATOR")]
+    out: PathBuf,
+    /// Seed of the fit, and of the simulation
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Print the outcome as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(serde::Serialize)]
+struct Outcome<'a> {
+    palpate: &'static str,
+    locator: String,
+    estimator: &'a str,
+    seed: u64,
+    rows: usize,
+    training: palpate::network::TrainingOutcome,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let rig = input::read_rig(&arguments.rig)?;
+    let recording = match &arguments.data {
+        Some(path) => input::read_recording(&rig.bench, path)?,
+        None => simulate(&rig, arguments.seed).map_err(|error| {
+            Complaint::new(format!("{}: {error}", arguments.rig.display()))
+                .help("--data names a recording to fit")
+        })?,
+    };
+    let needed = rig.estimator.positions_needed();
+    recording.check_distinct_positions(needed).map_err(Complaint::new)?;
+    let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
+    let Some(locator) = fitting.fit(arguments.seed, &mut || !interrupt::asked()) else {
+        return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
+    };
+    let training = locator.training_outcome();
+    let epochs = thousands(f64::from(training.epochs));
+    if training.status == TrainingStatus::Diverged {
+        return Err(Failure::GoalMissed(format!(
+            "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
+        )));
+    }
+    let json = locator.to_json().map_err(Complaint::new)?;
+    output::write_file(&arguments.out, json.as_bytes())?;
+    if arguments.json {
+        return output::say_json(&Outcome {
+            palpate: env!("CARGO_PKG_VERSION"),
+            locator: arguments.out.display().to_string(),
+            estimator: locator.kind(),
+            seed: arguments.seed,
+            rows: recording.rows.len(),
+            training,
+        });
+    }
+    let status = match training.status {
+        TrainingStatus::Converged => "converged",
+        _ => "stopped at the cap",
+    };
+    let error = training.aggregate_error;
+    output::say(format!(
+        "{} fitted to {} rows; training {status} after {epochs} epochs, aggregate error {error:.2e}: {}",
+        locator.kind(),
+        recording.rows.len(),
+        arguments.out.display()
+    ))
+}

@@ -1,0 +1,190 @@
+//! `palpate inspect`: what any of palpate's files holds, in words.
+
+use crate::failure::Failure;
+use crate::table::thousands;
+use crate::{input, output};
+use palpate::bench::Bench;
+use palpate::estimator::EstimatorConfig;
+use palpate::mechanics::SurfaceSpec;
+use palpate::network::{NetworkConfig, Topology};
+use palpate::rig::{Rig, Training};
+use palpate::sensing::Layout;
+use palpate::units::{Quantity, format_length_mm};
+use std::path::{Path, PathBuf};
+
+/// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The file
+    file: PathBuf,
+    /// The rig whose recording it is, to read a CSV by
+    #[arg(long, value_name = "RIG")]
+    rig: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let path = &arguments.file;
+    let text = input::read_text(path)?;
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let lines = match extension.to_ascii_lowercase().as_str() {
+        "toml" if text.lines().any(|line| line.trim_start().starts_with("[[arm]]")) => study(path, &text)?,
+        "toml" => rig(&input::read_rig(path)?),
+        "csv" => csv(path, &text, arguments.rig.as_deref())?,
+        _ => locator(path, &text)?,
+    };
+    output::say(lines.join("\n"))
+}
+
+fn rig(rig: &Rig) -> Vec<String> {
+    let mut lines = vec!["a rig".to_owned()];
+    lines.extend(bench(&rig.bench));
+    if let Some(training) = &rig.training {
+        lines.push(format!("training positions: {}", training_words(training)));
+    }
+    let EstimatorConfig::Network(network) = &rig.estimator;
+    lines.push(format!("estimator: {}", network_words(network, rig.bench.layout.len())));
+    lines
+}
+
+fn bench(bench: &Bench) -> Vec<String> {
+    let extent = bench.surface.extent();
+    let surface = match &bench.surface {
+        SurfaceSpec::Beam(beam) => format!(
+            "simply supported beam, {} × {} × {}, Young's modulus {}",
+            format_length_mm(beam.length_m),
+            format_length_mm(beam.width_m),
+            format_length_mm(beam.thickness_m),
+            Quantity { value: beam.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
+        ),
+        SurfaceSpec::Measured(_) => match extent.width_m {
+            Some(width_m) => {
+                format!("measured, {} × {}", format_length_mm(extent.length_m), format_length_mm(width_m))
+            }
+            None => format!("measured, {} long", format_length_mm(extent.length_m)),
+        },
+    };
+    let force = bench.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
+    vec![
+        format!("surface: {surface}"),
+        format!("sensors: {}", layout(&bench.layout)),
+        format!("contact force: {force}"),
+    ]
+}
+
+fn layout(layout: &Layout) -> String {
+    let names: Vec<String> = layout
+        .sensors
+        .iter()
+        .map(|sensor| match sensor.kind {
+            palpate::sensing::SensorKind::Raw => sensor.name.clone(),
+            kind => format!("{kind} at {}", format_length_mm(sensor.position.x_m)),
+        })
+        .collect();
+    format!("{}: {}", layout.len(), names.join(", "))
+}
+
+fn training_words(training: &Training) -> String {
+    use palpate::arrangement::Arrangement;
+    let rule = match &training.arrangement {
+        Arrangement::Even => "evenly".to_owned(),
+        Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
+        Arrangement::Explicit(_) => "as listed".to_owned(),
+    };
+    format!("{}, {rule}, {} × each", training.count, training.repeats)
+}
+
+fn network_words(network: &NetworkConfig, inputs: usize) -> String {
+    let hidden: Vec<String> = network.hidden.iter().map(usize::to_string).collect();
+    let rule = &network.training;
+    format!(
+        "network, {inputs} inputs, hidden layers {}; learning rate {}, momentum {}, to an aggregate error of {:e} or {} epochs",
+        if hidden.is_empty() { "none".to_owned() } else { hidden.join("–") },
+        rule.learning_rate,
+        rule.momentum,
+        rule.aggregate_error,
+        thousands(f64::from(rule.max_epochs))
+    )
+}
+
+fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
+    let study = input::parse_study(&path.display().to_string(), text)?;
+    let mut lines = vec![format!(
+        "the study {}: {} arms × {} seeds, judged at {} positions",
+        study.name,
+        study.arms.len(),
+        study.seeds,
+        study.judging.positions.len()
+    )];
+    if let Some(arm) = study.arms.first() {
+        lines.extend(bench(&arm.rig.bench));
+    }
+    for arm in &study.arms {
+        let training = arm.rig.training.as_ref().map_or_else(String::new, training_words);
+        lines.push(format!("arm {}: {training}", arm.name));
+    }
+    Ok(lines)
+}
+
+fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
+    let locator = input::parse_locator(path, text)?;
+    let (provenance, outcome) = (&locator.provenance, locator.training_outcome());
+    let mut lines = vec![format!(
+        "a locator, {}, fitted by palpate {}, seed {}",
+        locator.kind(),
+        provenance.palpate,
+        provenance.seed
+    )];
+    lines.extend(bench(&locator.bench));
+    let palpate::estimator::Method::Network(network) = &locator.method;
+    lines.push(format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()));
+    let status = format!("{:?}", outcome.status).to_lowercase();
+    lines.push(format!(
+        "training: {status} after {} epochs, aggregate error {:.2e}",
+        thousands(f64::from(outcome.epochs)),
+        outcome.aggregate_error
+    ));
+    let recording = &provenance.recording;
+    lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
+    for digest in &recording.digests {
+        lines.push(format!("    sha256 {digest}"));
+    }
+    Ok(lines)
+}
+
+fn shape(topology: &Topology) -> String {
+    topology.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join("–")
+}
+
+/// With a rig the CSV is read as its recording; otherwise it is described as a table.
+fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
+    let Some(rig) = rig else { return Ok(table(text)) };
+    let bench = input::read_rig(rig)?.bench;
+    let recording = input::read_recording(&bench, path)?;
+    let positions = recording.distinct_positions();
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (low, high) = range(&mut positions.iter().map(|position| position.x_m));
+    let mut lines = vec![
+        format!("a recording: {} rows at {} positions", recording.rows.len(), positions.len()),
+        format!("positions: {} to {}", format_length_mm(low), format_length_mm(high)),
+    ];
+    for (i, (name, kind)) in recording.channels.iter().zip(&recording.kinds).enumerate() {
+        let (low, high) = range(&mut recording.rows.iter().map(|row| row.reading[i]));
+        let shown = |value| Quantity { value, dimension: kind.dimension() };
+        lines.push(format!("channel {name} ({kind}): {} to {}", shown(low), shown(high)));
+    }
+    Ok(lines)
+}
+
+fn table(text: &str) -> Vec<String> {
+    let comments = text.lines().take_while(|line| line.starts_with('#'));
+    let mut lines: Vec<String> =
+        comments.map(|line| line.trim_start_matches(['#', ' ']).to_owned()).collect();
+    let mut rows = text.lines().filter(|line| !line.starts_with('#') && !line.trim().is_empty());
+    let columns = rows.next().unwrap_or_default();
+    lines.push(format!("a table of {} rows", rows.count()));
+    lines.push(format!("columns: {}", columns.replace(',', ", ")));
+    lines.push("--rig RIG reads it as a recording of that rig".to_owned());
+    lines
+}

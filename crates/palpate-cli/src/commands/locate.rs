@@ -1,0 +1,155 @@
+//! `palpate locate`: readings in, estimates out, line by line.
+
+use crate::failure::{Complaint, Failure};
+use crate::{input, interrupt, output};
+use palpate::estimator::{Estimate, Locator};
+use palpate::recording::{Column, Columns, Header, ReadingParser};
+use std::fs::File;
+use std::io::{BufRead, BufReader, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// Locate readings: CSV in (a file, or stdin), estimates out as they come.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The locator
+    locator: PathBuf,
+    /// The readings; `-` or nothing for stdin
+    readings: Option<PathBuf>,
+    /// The readings have no header: a row is one value a channel, in the locator's order
+    #[arg(long)]
+    no_header: bool,
+    /// Print one JSON object a line instead of CSV
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let locator = input::read_locator(&arguments.locator)?;
+    let stdin = Path::new("-");
+    let path = arguments.readings.as_deref().unwrap_or(stdin);
+    let (name, source): (String, Box<dyn BufRead>) = if path == stdin {
+        if std::io::stdin().is_terminal() {
+            eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
+        }
+        ("stdin".to_owned(), Box::new(std::io::stdin().lock()))
+    } else {
+        let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
+        (path.display().to_string(), Box::new(BufReader::new(file)))
+    };
+    let mut stream = Stream { locator: &locator, name, json: arguments.json, lost: 0, line: 0 };
+    stream.run(source, &columns(&locator, arguments.no_header))
+}
+
+fn columns(locator: &Locator, no_header: bool) -> Columns {
+    let mut columns = locator.bench.recording_columns();
+    if no_header {
+        columns.header = Header::Absent;
+        for (i, channel) in columns.channels.iter_mut().enumerate() {
+            channel.column = Column::Number(i + 1);
+        }
+    }
+    columns
+}
+
+struct Stream<'a> {
+    locator: &'a Locator,
+    name: String,
+    json: bool,
+    /// Rows that gave no estimate.
+    lost: u64,
+    line: u64,
+}
+
+/// An estimate as a line of JSON.
+#[derive(serde::Serialize)]
+struct JsonEstimate {
+    line: u64,
+    x_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force_n: Option<f64>,
+    status: &'static str,
+}
+
+impl Stream<'_> {
+    fn run(&mut self, mut source: Box<dyn BufRead>, columns: &Columns) -> Result<(), Failure> {
+        let mut out = std::io::stdout().lock();
+        let mut line = Vec::new();
+        let mut parser = ReadingParser::new(&self.name, columns);
+        if !self.json {
+            let heading = if self.is_plane() { "x_mm,y_mm,status\n" } else { "position_mm,status\n" };
+            output::print(&mut out, heading.as_bytes())?;
+        }
+        while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
+            match parser.parse_line(&line) {
+                Ok(None) => {}
+                Ok(Some(reading)) => self.locate(&reading, &mut out)?,
+                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
+                Err(error) => self.lose(&error),
+            }
+        }
+        if parser.awaits_columns() {
+            let complaint = Complaint::new(format!("{} holds no reading", self.name));
+            return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
+        }
+        match self.lost {
+            0 => Ok(()),
+            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", self.line))),
+        }
+    }
+
+    /// Reads the next line; false at the end.
+    fn read_line(&mut self, source: &mut Box<dyn BufRead>, line: &mut Vec<u8>) -> Result<bool, Failure> {
+        line.clear();
+        self.line += 1;
+        let read = source.read_until(b'\n', line);
+        let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
+        Ok(read > 0)
+    }
+
+    fn locate(&mut self, reading: &[f64], out: &mut impl Write) -> Result<(), Failure> {
+        match self.locator.locate(reading) {
+            Ok(estimate) => {
+                let line = if self.json { self.json_line(&estimate)? } else { self.csv_line(&estimate) };
+                output::print(out, line.as_bytes())?;
+                // A reader at the other end of a pipe wants each estimate now.
+                out.flush().map_err(|_| Failure::NobodyReads)
+            }
+            Err(error) => {
+                self.lose(&error);
+                Ok(())
+            }
+        }
+    }
+
+    fn lose(&mut self, error: &dyn std::fmt::Display) {
+        self.lost += 1;
+        eprintln!("palpate: skipped: {error}");
+    }
+
+    fn is_plane(&self) -> bool {
+        self.locator.bench.surface.extent().width_m.is_some()
+    }
+
+    fn csv_line(&self, estimate: &Estimate) -> String {
+        let (x_mm, y_mm) = (estimate.position.x_m * 1e3, estimate.position.y_m * 1e3);
+        let status = estimate.status.name();
+        if self.is_plane() {
+            format!("{x_mm:.4},{y_mm:.4},{status}\n")
+        } else {
+            format!("{x_mm:.4},{status}\n")
+        }
+    }
+
+    fn json_line(&self, estimate: &Estimate) -> Result<String, Failure> {
+        let object = JsonEstimate {
+            line: self.line,
+            x_mm: estimate.position.x_m * 1e3,
+            y_mm: self.is_plane().then_some(estimate.position.y_m * 1e3),
+            force_n: estimate.force_n,
+            status: estimate.status.name(),
+        };
+        serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+    }
+}

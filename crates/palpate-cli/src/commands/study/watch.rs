@@ -1,0 +1,124 @@
+//! Watches a study as it trains: a row and a step of the bar for every network.
+
+use super::checkpoint::CheckpointFile;
+use crate::failure::{Complaint, Failure};
+use crate::progress;
+use indicatif::ProgressBar;
+use palpate::study::{NetworksCsv, PreparedStudy, RunOptions, Trained, TrainedSeed};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Patterns that were presented to a network.
+pub fn presentations(prepared: &PreparedStudy, arm: usize, fit: &TrainedSeed) -> u64 {
+    u64::from(fit.locator.training_outcome().epochs) * prepared.patterns(arm) as u64
+}
+
+/// Called by every training thread.
+pub struct Watch<'a> {
+    prepared: &'a PreparedStudy,
+    table: &'a NetworksCsv<'a>,
+    bar: ProgressBar,
+    start: Instant,
+    state: Mutex<State>,
+}
+
+struct State {
+    file: CheckpointFile,
+    error: Option<std::io::Error>,
+    arms: Vec<ArmTally>,
+    /// Presentations of this run.
+    presented: u64,
+}
+
+/// What is known of an arm's cost.
+#[derive(Clone, Copy, Default)]
+struct ArmTally {
+    patterns: f64,
+    left: f64,
+    finished: f64,
+    presentations: f64,
+}
+
+impl<'a> Watch<'a> {
+    /// Watches a run that has `done` behind it.
+    pub fn new(
+        prepared: &'a PreparedStudy,
+        options: RunOptions,
+        table: &'a NetworksCsv<'a>,
+        file: CheckpointFile,
+        done: &[Trained],
+    ) -> Self {
+        let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len())
+            .map(|arm| ArmTally {
+                patterns: prepared.patterns(arm) as f64,
+                left: options.seeds as f64,
+                ..ArmTally::default()
+            })
+            .collect();
+        for trained in done.iter().filter(|trained| trained.fit.seed < options.seeds) {
+            arms[trained.arm].count(presentations(prepared, trained.arm, &trained.fit) as f64);
+        }
+        let bar = progress::bar(arms.len() as u64 * options.seeds, "training");
+        bar.set_position(arms.iter().map(|arm| arm.finished as u64).sum());
+        let state = Mutex::new(State { file, error: None, arms, presented: 0 });
+        Self { prepared, table, bar, start: Instant::now(), state }
+    }
+
+    /// A network is finished: its row goes to the file, and the bar goes on.
+    pub fn note(&self, trained: &Trained) {
+        let row = self.table.row(trained);
+        let presented = presentations(self.prepared, trained.arm, &trained.fit);
+        let mut state = self.state();
+        if let Err(error) = state.file.add(&row) {
+            state.error.get_or_insert(error);
+        }
+        state.presented += presented;
+        state.arms[trained.arm].count(presented as f64);
+        let rate = state.presented as f64 / self.start.elapsed().as_secs_f64();
+        let left = progress::duration(state.presentations_left() / rate);
+        drop(state);
+        self.bar.set_prefix(format!("{:.1} M presentations/s, {left} left", rate / 1e6));
+        self.bar.inc(1);
+    }
+
+    /// Whether the file could not be written.
+    pub fn failed(&self) -> bool {
+        self.state().error.is_some()
+    }
+
+    /// Takes the bar away.
+    pub fn finish(self) -> Result<(), Failure> {
+        self.bar.finish_and_clear();
+        match self.state.into_inner().unwrap_or_else(PoisonError::into_inner).error {
+            Some(error) => Err(Complaint::new(format!("cannot write networks.csv: {error}")).into()),
+            None => Ok(()),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl ArmTally {
+    fn count(&mut self, presentations: f64) {
+        self.left -= 1.0;
+        self.finished += 1.0;
+        self.presentations += presentations;
+    }
+}
+
+impl State {
+    /// An arm's networks cost what its finished ones did. Where none is finished, they cost what the others did, in
+    /// proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
+    fn presentations_left(&self) -> f64 {
+        let known: Vec<&ArmTally> = self.arms.iter().filter(|arm| arm.finished > 0.0).collect();
+        let per_square = known.iter().map(|arm| arm.presentations / arm.finished / arm.patterns.powi(2));
+        let per_square = per_square.sum::<f64>() / known.len().max(1) as f64;
+        let cost = |arm: &ArmTally| match arm.finished {
+            0.0 => per_square * arm.patterns.powi(2),
+            finished => arm.presentations / finished,
+        };
+        self.arms.iter().map(|arm| arm.left * cost(arm)).sum()
+    }
+}
