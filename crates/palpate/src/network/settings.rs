@@ -2,6 +2,7 @@
 
 use super::{Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
 use crate::estimator::Setting;
+use crate::units::format_count;
 
 impl NetworkConfig {
     /// Every setting, in words.
@@ -23,7 +24,7 @@ impl NetworkConfig {
             setting("order", "presentation order", presentation_order(order).to_owned()),
             setting("initial_weights", "initial weights", format!("uniform within ±{initial_weights}")),
             setting("aggregate_error", "training stops", stop(aggregate_error)),
-            setting("max_epochs", "most iterations", format!("{max_epochs} epochs")),
+            setting("max_epochs", "most iterations", format!("{} epochs", format_count(max_epochs.into()))),
         ]
     }
 }

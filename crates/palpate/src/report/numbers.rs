@@ -1,6 +1,7 @@
 //! Numbers as people read them.
 
 use crate::evaluation::Spread;
+use crate::units::format_count;
 
 /// What stands where there is no number.
 pub(crate) const NOTHING: &str = "–";
@@ -29,15 +30,8 @@ pub(crate) fn whole(value: f64) -> String {
     if !value.is_finite() {
         return NOTHING.to_owned();
     }
-    let digits = format!("{:.0}", value.abs());
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    if value < 0.0 && digits != "0" { format!("−{text}") } else { text }
+    let text = format_count(value.abs().round() as u64);
+    if value < 0.0 && text != "0" { format!("−{text}") } else { text }
 }
 
 /// As it was written, with separators of thousands from 1,000 on: "3.6", "26,850".

@@ -5,7 +5,7 @@
 mod quantity;
 mod unit;
 
-pub use quantity::{Quantity, UnitError, format_length_mm};
+pub use quantity::{Quantity, UnitError, format_count, format_length_mm};
 pub use unit::{Dimension, Unit};
 
 #[cfg(test)]

@@ -168,6 +168,19 @@ fn split(text: &str) -> (&str, &str) {
     (number, rest.trim_start())
 }
 
+/// A count with separators of thousands: "26,850".
+pub fn format_count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 /// A length in metres as people read it: millimetres with at most four decimals, "44.4444 mm".
 pub fn format_length_mm(length_m: f64) -> String {
     format!("{} mm", rounded(length_m * 1e3, 4))

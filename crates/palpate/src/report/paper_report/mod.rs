@@ -59,8 +59,8 @@ impl Paper<'_> {
             ),
             section(
                 "position-output",
-                "Ten training positions and the plain position",
-                html! { (figures.show(2)) (self.portions_table(2)) },
+                "The starting point: ten positions",
+                html! { (self.starting_point()) (figures.show(2)) (self.portions_table(2)) },
             ),
             section(
                 "output-coding",

@@ -16,11 +16,11 @@ const PRINTED_MODULUS_PA: f64 = 200e6;
 
 /// What the paper says of an estimator's setting, by its key; the keys in the order of the table.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
-    ("input_scale", "nothing"),
-    ("biases", "nothing"),
-    ("initial_weights", "nothing"),
-    ("order", "nothing"),
-    ("weight_update", "nothing"),
+    ("input_scale", "not stated"),
+    ("biases", "not stated"),
+    ("initial_weights", "not stated"),
+    ("order", "not stated"),
+    ("weight_update", "not stated"),
     ("aggregate_error", "stops at an aggregate error of 0.001 %, without saying of what it is the sum"),
     ("max_epochs", "at most a million iterations, without saying what one iteration is"),
     ("hidden", "10"),

@@ -90,7 +90,22 @@ impl Paper<'_> {
             p {
                 "The paper asks three things. What should the output stand for: the plain position in metres, or the \
                  position divided by the beam's length, which uses the whole range of the output? How many training \
-                 positions are enough? And does it help to crowd them towards the supports, where errors are largest?"
+                 positions are enough? And does it help to crowd them towards the supports?"
+            }
+            p {
+                "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
+                 training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
+                 and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
+                code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
+            }
+        }
+    }
+
+    pub(super) fn starting_point(&self) -> Markup {
+        html! {
+            p {
+                "The paper begins with the position output and ten equally spaced training positions. "
+                @if self.report.outcome("position-10").is_none() { "That arm was not run." }
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::arrangement::Arrangement;
 use crate::contact::Position;
 use crate::evaluation::{Portion, Spread};
 use crate::report::numbers::{NOTHING, listed, mm, number, spread};
-use crate::report::page::{Table, numeric, short, text, words};
+use crate::report::page::{Table, numeric, short, text, wide, words};
 use crate::report::study_parts::portion_in_words;
 use crate::rig::Training;
 
@@ -70,7 +70,9 @@ impl Paper<'_> {
         shown(&Table {
             number: table,
             caption: html! {
-                "Sets with fewer training positions in the middle portion than near the supports, computed from their rule."
+                "Sets with few training positions in the middle portion and the others near the supports, computed from their \
+                 rule. The middle portion" (middle_in_words(&sets, self.report.length_m())) " begins and ends with a training position; dots \
+                 part it from the edges."
             },
             columns: vec![
                 short("set"),
@@ -80,8 +82,8 @@ impl Paper<'_> {
                 numeric("start, mm"),
                 numeric("pitch in the edges, mm"),
                 numeric("pitch in the middle, mm"),
-                short("positions, mm"),
-                words("arm"),
+                wide("positions, mm"),
+                short("arm"),
             ],
             rows: sets.iter().filter_map(|set| edge_dense_row(set, self.report.length_m())).collect(),
         })
@@ -184,14 +186,28 @@ fn edge_dense_row(set: &Set, length_m: f64) -> Option<Vec<Markup>> {
     Some(vec![
         text(paper_name(count, *middle)),
         text(count.to_string()),
-        html! { (middle) " in " (mm(portion.0 * length_m)) "–" (mm(portion.1 * length_m)) " mm" },
+        text(middle.to_string()),
         text(edge.to_string()),
         text(end(set.positions.first())),
         text(mm(edge_pitch)),
         text(even_pitch(parts[1])),
-        html! { @for part in &compact { (part) br; } },
+        text(compact.join(" · ")),
         text(listed(&set.arms)),
     ])
+}
+
+/// " (100–300 mm)" where every set has the same middle portion.
+fn middle_in_words(sets: &[Set], length_m: f64) -> String {
+    let mut portions: Vec<String> = sets
+        .iter()
+        .filter_map(|set| {
+            let Arrangement::EdgeDense { portion, .. } = &set.training.arrangement else { return None };
+            let (from_m, to_m) = (portion.0 * length_m, portion.1 * length_m);
+            Some(portion_in_words(Portion { from_m, to_m }))
+        })
+        .collect();
+    portions.dedup();
+    if let [only] = portions.as_slice() { format!(" ({only})") } else { String::new() }
 }
 
 /// Equally spaced positions in short: "33.33, 66.67", "7.14, 14.29 … 92.86".

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::{Paper, ours};
 use crate::report::numbers::{as_written, number, spread, whole};
-use crate::report::page::{Table, numeric, short, text, verdict, wide, words};
+use crate::report::page::{Table, numeric, short, text, verdict, wide};
 use crate::study::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
 
 /// A share of seeds below this is worth a remark where the medians hold.
@@ -33,10 +33,10 @@ impl Paper<'_> {
             },
             columns: vec![
                 short("arm"),
-                words("figure"),
+                short("figure"),
                 numeric("published"),
                 numeric("found"),
-                words("agrees when"),
+                short("agrees when"),
                 short("verdict"),
             ],
             rows: rows.collect(),
@@ -69,14 +69,15 @@ impl Paper<'_> {
             number: table,
             caption: html! {
                 "The paper's claims in our words, each parted into what a program can check. A claim holds when every part of \
-                 it holds in the medians. The share of seeds is that for which every part holds, each seed of one arm beside \
-                 the same seed of another."
+                 it holds in the medians. ✓ and ✗ say whether a part does; beside them is the share of the seeds for which it \
+                 holds, each seed of one arm beside the same seed of another, and in the last column the share of those for \
+                 which every part holds."
             },
             columns: vec![
                 short("claim"),
                 wide("in words, and its parts"),
                 short("verdict"),
-                numeric("seeds"),
+                numeric("share of seeds"),
             ],
             rows: rows.collect(),
         };
@@ -138,9 +139,13 @@ fn difference(figure: &PublishedFigure) -> Markup {
     html! {
         b { (figure.arm) } ", " (figure.what) ": the paper prints " (printed(figure)) ", the median found here is "
         (shown(figure)(figure.median)) ", not " (yardstick(figure)) ". "
-        @if figure.yardstick != Yardstick::Below {
-            @if inside { "The published figure is within the range of the seeds." }
-            @else { "The published figure is outside the range of the seeds." }
+        @if figure.yardstick == Yardstick::Below {
+            @if figure.p05 < figure.published { "Some seeds do stay below it." }
+            @else { "Hardly any seed stays below it." }
+        } @else if inside {
+            "The published figure is within the range of the seeds."
+        } @else {
+            "The published figure is outside the range of the seeds."
         }
     }
 }
@@ -161,9 +166,10 @@ fn fails(count: usize) -> &'static str {
 
 fn part_in_words(part: &ClaimPart) -> Markup {
     html! {
-        (part.what) ": "
-        @if part.holds { span.yes { "yes" } } @else { span.no { "no" } }
-        span.quiet { ", " (share(part.share_of_seeds)) " of the seeds" }
+        span.share.yes[part.holds].no[!part.holds] {
+            @if part.holds { "✓ " } @else { "✗ " } (share(part.share_of_seeds))
+        }
+        (part.what)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod bench;
 mod charts;
+mod pages;
 mod parts;
 
 use super::geometry::Rect;

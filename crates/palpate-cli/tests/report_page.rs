@@ -1,0 +1,64 @@
+//! The paper's report in a browser, on a phone and on a screen.
+#![forbid(unsafe_code)]
+
+mod support {
+    pub mod browser;
+    pub mod skip;
+}
+
+use std::fs;
+
+use palpate::network::{InstructionSet, Precision};
+use palpate::report::{ReportFile, StudyReport, paper_report, study_report};
+use palpate::study::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};
+use support::browser::measure;
+use tempfile::TempDir;
+
+struct Unwatched;
+
+impl Observer for Unwatched {
+    fn trained(&self, _: &Trained) {}
+    fn keep_going(&self) -> bool {
+        true
+    }
+}
+
+/// The pages of the paper's study, cut down to a few epochs: as the paper's, and as any study's.
+fn pages() -> [Vec<ReportFile>; 2] {
+    let toml = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 50");
+    let study = PreparedStudy::new(Study::from_toml(&toml).unwrap()).unwrap();
+    let seeds = 2;
+    let options = RunOptions { seeds, threads: 1, set: InstructionSet::best() };
+    let outcomes = study.run(options, Vec::new(), &Unwatched);
+    let results = StudyResults::of(&outcomes, study.judging());
+    let run = RunFacts {
+        palpate: env!("CARGO_PKG_VERSION"),
+        study: study.study.name.clone(),
+        study_sha256: study.study.digest.clone(),
+        seeds,
+        threads: 1,
+        precision: Precision::F64,
+        arithmetic: "eight lanes".to_owned(),
+        presentations: 1_000_000,
+        seconds: 0.1,
+        presentations_per_second: 1e7,
+    };
+    let report = StudyReport { study: &study, outcomes: &outcomes, results: &results, run: &run };
+    [paper_report(&report).unwrap(), study_report(&report).unwrap()]
+}
+
+#[test]
+fn a_browser_finds_no_fault_with_the_pages_of_a_study() {
+    let folder = TempDir::new().unwrap();
+    for files in pages() {
+        let page = folder.path().join("report.html");
+        let report = files.iter().find(|file| file.name == "report.html").unwrap();
+        fs::write(&page, &report.bytes).unwrap();
+        for width in [400, 1200] {
+            let Some(seen) = measure(&page, width) else { return };
+            assert!(seen.content_width <= width, "{} px at {width} px", seen.content_width);
+            assert!(seen.errors.is_empty() && seen.dead_anchors.is_empty(), "{seen:?}");
+            assert!(seen.outside_loads.is_empty() && seen.empty_pictures.is_empty(), "{seen:?}");
+        }
+    }
+}
