@@ -1,8 +1,9 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
 use crate::failure::{Complaint, Failure};
+use crate::progress::FitWatch;
 use crate::table::table;
-use crate::{input, interrupt, output};
+use crate::{input, output};
 use palpate::contact::Position;
 use palpate::estimator::{Fitting, Locator};
 use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
@@ -112,11 +113,13 @@ fn cross_validated(arguments: &Arguments) -> Result<Judged, Failure> {
         None => simulate(&rig, arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
-    let mut keep_going = || !interrupt::asked();
+    let mut watch = FitWatch::new((folds as u64 + 1) * rig.estimator.most_rounds());
+    let mut keep_going = || watch.keep_going();
     let evaluation =
         cross_validate(&rig, &recording, folds, seed, &mut keep_going).map_err(Complaint::new)?;
     let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
     let whole = fitting.fit(seed, &mut keep_going);
+    drop(watch);
     let (Some(evaluation), Some(locator)) = (evaluation, whole) else {
         return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
     };
