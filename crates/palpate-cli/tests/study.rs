@@ -1,0 +1,141 @@
+//! `palpate study` from outside: the paper's, small and whole; stopping and going on.
+#![forbid(unsafe_code)]
+
+mod support {
+    pub mod command;
+}
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use support::command::{complained, palpate, run, said};
+
+fn results(folder: &Path, out: &str) -> Value {
+    serde_json::from_str(&fs::read_to_string(folder.join(out).join("results.json")).unwrap()).unwrap()
+}
+
+/// The paper's study with its arms of ten training positions only: seconds instead of minutes.
+fn arms_of_ten() -> String {
+    let paper = include_str!("../../../studies/paper.toml");
+    let (base, arms) = paper.split_at(paper.find("[[arm]]").unwrap());
+    let tens = arms.split("[[arm]]").filter(|arm| arm.contains("-10\""));
+    base.replacen("\"paper\"", "\"tens\"", 1) + &tens.map(|arm| format!("[[arm]]{arm}")).collect::<String>()
+}
+
+#[test]
+fn the_small_table_stays_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tens.toml"), arms_of_ten()).unwrap();
+    let table = said(&run(folder.path(), &["study", "tens.toml", "--seeds", "5", "--threads", "1"]));
+    let table = &table[..table
+        .find("\n\n")
+        .and_then(|head| table[head + 2..].find("\n\n").map(|at| head + 2 + at))
+        .unwrap()];
+    insta::assert_snapshot!(table);
+}
+
+#[test]
+fn threads_do_not_change_a_single_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tens.toml"), arms_of_ten()).unwrap();
+    let networks = |threads: &str, out: &str| {
+        said(&run(
+            folder.path(),
+            &["study", "tens.toml", "--seeds", "12", "--threads", threads, "--out", out],
+        ));
+        fs::read_to_string(folder.path().join(out).join("networks.csv")).unwrap()
+    };
+    assert_eq!(networks("1", "one"), networks("3", "three"));
+}
+
+#[test]
+fn the_papers_study_replicates_what_it_is_known_to() {
+    let folder = tempfile::tempdir().unwrap();
+    said(&run(folder.path(), &["study", "paper", "--seeds", "5", "--out", "out"]));
+    let results = results(folder.path(), "out");
+    let arms = results["arms"].as_array().unwrap();
+    assert_eq!(arms.len(), 12);
+    assert!(arms.iter().all(|arm| arm["converged"] == 5), "{arms:?}");
+    let published = results["published"].as_array().unwrap();
+    let errors = published.iter().filter(|figure| {
+        let id = figure["id"].as_str().unwrap();
+        id.contains(".error_percent") || id.contains("effective") || id.contains("epochs")
+    });
+    for figure in errors {
+        assert_eq!(figure["agrees"], true, "{figure}");
+    }
+    let holds = |id: &str| {
+        let claims = results["claims"].as_array().unwrap();
+        claims.iter().find(|claim| claim["id"] == id).unwrap()["holds"] == true
+    };
+    assert!(["C1", "C2", "C3", "C4", "C8"].into_iter().all(holds), "{}", results["claims"]);
+    for name in ["report.html", "networks.csv", "figure-2.svg", "figure-2.png", "figure-6.svg"] {
+        assert!(fs::metadata(folder.path().join("out").join(name)).unwrap().len() > 1000, "{name}");
+    }
+}
+
+#[test]
+fn single_precision_trains_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = arms_of_ten().replacen("\"f64\"", "\"f32\"", 1);
+    fs::write(folder.path().join("tens.toml"), study).unwrap();
+    said(&run(folder.path(), &["study", "tens.toml", "--seeds", "5"]));
+    let results = results(folder.path(), "palpate-out/tens");
+    assert_eq!(results["precision"], "f32");
+    let error = results["arms"][0]["error_percent"]["median"].as_f64().unwrap();
+    assert!((3.0..4.2).contains(&error), "{error}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_stopped_study_goes_on_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = arms_of_ten().replacen("\"tens\"", "\"long\"", 1);
+    fs::write(folder.path().join("long.toml"), study).unwrap();
+    let arguments = ["study", "long.toml", "--seeds", "400", "--threads", "1", "--out"];
+    said(&run(folder.path(), &[&arguments[..], &["whole"]].concat()));
+    let whole = fs::read_to_string(folder.path().join("whole/networks.csv")).unwrap();
+
+    let networks = folder.path().join("parts/networks.csv");
+    let mut child = palpate(folder.path())
+        .args(arguments)
+        .arg("parts")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while fs::read_to_string(&networks).map_or(0, |text| text.lines().count()) < 20 {
+        assert!(start.elapsed() < Duration::from_secs(60), "no networks after a minute");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let kept = fs::read_to_string(&networks).unwrap().lines().count() - 2;
+    assert!((18..1600).contains(&kept), "{kept} networks");
+
+    let again = run(folder.path(), &[&arguments[..], &["parts"]].concat());
+    assert!(complained(&again, 2).contains("--resume"));
+    // As a crash leaves it: the last line cut off.
+    let text = fs::read_to_string(&networks).unwrap();
+    fs::write(&networks, &text[..text.len() - 30]).unwrap();
+    let resumed = run(folder.path(), &[&arguments[..], &["parts", "--resume"]].concat());
+    said(&resumed);
+    assert!(String::from_utf8_lossy(&resumed.stderr).contains("cut off"));
+    assert_eq!(fs::read_to_string(&networks).unwrap(), whole);
+}
+
+#[test]
+fn a_checkpoint_of_another_study_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.toml"), arms_of_ten()).unwrap();
+    fs::write(folder.path().join("b.toml"), arms_of_ten().replacen("0.7", "0.6", 1)).unwrap();
+    said(&run(folder.path(), &["study", "a.toml", "--seeds", "1", "--out", "out"]));
+    let before = fs::read(folder.path().join("out/networks.csv")).unwrap();
+    let refused = run(folder.path(), &["study", "b.toml", "--seeds", "1", "--out", "out", "--resume"]);
+    let complaint = complained(&refused, 2);
+    assert!(complaint.contains("belongs to another run"), "{complaint}");
+    assert_eq!(fs::read(folder.path().join("out/networks.csv")).unwrap(), before);
+}
