@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::numbers::{counted, mm, number, spread, whole};
+use super::numbers::{counted, mm, number, whole};
 use super::page::{Table, numeric, short, text, words};
 use super::{Axis, BandPoint, Chart, Mark, Series, SeriesKind, Stroke, StudyReport};
 use crate::evaluation::{Located, Portion, Spread};
@@ -117,7 +117,7 @@ const LEAST_ERROR_MM: f64 = 0.05;
 /// Every arm with its figures.
 pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     let portions = &report.study.judging().portions;
-    let mut columns = vec![short("arm"), numeric("seeds"), numeric("converged"), numeric("iterations")];
+    let mut columns = vec![short("arm"), numeric("seeds converged"), numeric("iterations")];
     let whole_surface = report.judged_portion().map_or(String::new(), portion_in_words);
     columns.push(numeric(format!("average error, {whole_surface}, %")));
     columns.extend(portions.iter().map(|p| numeric(format!("average error, {}, %", portion_in_words(*p)))));
@@ -126,8 +126,8 @@ pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     Table {
         number: table,
         caption: html! {
-            "Every arm: median over the seeds, and in brackets the range from the 5th to the 95th percentile. Errors are \
-             in % of the surface's length."
+            "Every arm: median over the seeds, and beneath it the range from the 5th to the 95th percentile. Errors are in % \
+             of the surface's length."
         },
         columns,
         rows: report.results.arms.iter().map(arm_row).collect(),
@@ -137,16 +137,21 @@ pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
 
 fn arm_row(arm: &ArmResults) -> Vec<Markup> {
     let mut cells = vec![
-        arm.name.clone(),
-        whole(arm.seeds as f64),
-        whole(arm.converged as f64),
-        spread(arm.epochs, whole),
-        spread(arm.error_percent, number),
+        text(&arm.name),
+        text(format!("{} of {}", whole(arm.converged as f64), whole(arm.seeds as f64))),
+        stacked(arm.epochs, whole),
+        stacked(arm.error_percent, number),
     ];
-    cells.extend(arm.portions.iter().map(|portion| spread(portion.error_percent, number)));
-    cells.push(spread(arm.max_error_percent, number));
-    cells.push(spread(arm.effective_length_percent, number));
-    cells.iter().map(text).collect()
+    cells.extend(arm.portions.iter().map(|portion| stacked(portion.error_percent, number)));
+    cells.push(stacked(arm.max_error_percent, number));
+    cells.push(stacked(arm.effective_length_percent, number));
+    cells
+}
+
+/// The median, and beneath it the range where there is one.
+fn stacked(spread: Spread, shown: fn(f64) -> String) -> Markup {
+    let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
+    html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }
 
 /// How the study was run.
