@@ -118,9 +118,10 @@ const LEAST_ERROR_MM: f64 = 0.05;
 pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     let portions = &report.study.judging().portions;
     let mut columns = vec![short("arm"), numeric("seeds converged"), numeric("iterations")];
-    let whole_surface = report.judged_portion().map_or(String::new(), portion_in_words);
-    columns.push(numeric(format!("average error, {whole_surface}, %")));
-    columns.extend(portions.iter().map(|p| numeric(format!("average error, {}, %", portion_in_words(*p)))));
+    let judged = report.judged_portion().into_iter().chain(portions.iter().copied());
+    columns.extend(
+        judged.map(|portion| numeric(format!("average error, {}, %", unbroken(&portion_in_words(portion))))),
+    );
     columns.push(numeric("largest error, %"));
     columns.push(numeric(format!("effective length, {} mm, %", mm(report.study.judging().tolerance_m))));
     Table {
@@ -152,6 +153,11 @@ fn arm_row(arm: &ArmResults) -> Vec<Markup> {
 fn stacked(spread: Spread, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
+}
+
+/// The same text without a place to break a line.
+fn unbroken(text: &str) -> String {
+    text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
 
 /// How the study was run.
@@ -211,7 +217,7 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
             dt { "Seed" }
             dd {
                 "The number from which a network's random start follows. Networks that differ in nothing else come out \
-                 differently, so each figure here is the median over many seeds, with the range in which all but the \
+                 differently, so each figure here is the median over the seeds of its arm, with the range in which all but the \
                  lowest and the highest twentieth of them lie (5–95 %)."
             }
         }
