@@ -1,7 +1,8 @@
 //! Progress of long work: on a terminal a bar with rate and time left, in a pipe nothing.
 
+use crate::interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A bar of `length` steps on stderr.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
@@ -13,6 +14,40 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
     bar.set_message(what.to_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
+}
+
+/// Watches fits of at most `rounds` rounds in all: a bar, and Ctrl-C.
+pub struct FitWatch {
+    bar: ProgressBar,
+    rounds: u64,
+    start: Instant,
+}
+
+impl FitWatch {
+    /// Begins to watch.
+    pub fn new(rounds: u64) -> Self {
+        Self { bar: bar(rounds, "fitting"), rounds: 0, start: Instant::now() }
+    }
+
+    /// Counts a round; false once somebody pressed Ctrl-C.
+    pub fn keep_going(&mut self) -> bool {
+        // Often enough for the eye, seldom enough to cost nothing.
+        const EVERY: u64 = 64;
+        self.rounds += 1;
+        if self.rounds.is_multiple_of(EVERY) {
+            self.bar.set_position(self.rounds);
+            let rate = self.rounds as f64 / self.start.elapsed().as_secs_f64();
+            let most = duration(self.bar.length().unwrap_or(0).saturating_sub(self.rounds) as f64 / rate);
+            self.bar.set_prefix(format!("{rate:.0} epochs/s, at most {most} left"));
+        }
+        !interrupt::asked()
+    }
+}
+
+impl Drop for FitWatch {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
 }
 
 /// "1 min 20 s"

@@ -1,13 +1,15 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
 use crate::failure::{Complaint, Failure};
+use crate::progress::FitWatch;
 use crate::table::table;
-use crate::{input, interrupt, output};
+use crate::{input, output};
 use palpate::contact::Position;
-use palpate::estimator::Locator;
+use palpate::estimator::{Fitting, Locator};
 use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
-use palpate::recording::Recording;
-use palpate::simulate::{simulate, simulate_at};
+use palpate::recording::{Provenance, Recording};
+use palpate::report::{Answers, EvaluationReport, evaluation_report};
+use palpate::simulate::{SimulateError, simulate, simulate_at};
 use std::path::{Path, PathBuf};
 
 /// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
@@ -69,11 +71,33 @@ struct Figures {
     max: f64,
 }
 
+/// A judged locator.
+struct Judged {
+    evaluation: Evaluation,
+    /// Where folds were held out, the one fitted to all of them.
+    locator: Locator,
+    recording: Provenance,
+    answers: Answers,
+}
+
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let (evaluation, judged, data) =
-        if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
-    let findings = findings(arguments, &evaluation, &judged, data)?;
-    // REPORT
+    let judged = if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
+    let findings = findings(arguments, &judged)?;
+    if let Some(out) = &arguments.out {
+        output::make_folder(out)?;
+        let report = EvaluationReport {
+            title: &format!("Location errors of {}", findings.subject),
+            locator: &judged.locator,
+            evaluation: &judged.evaluation,
+            recording: &judged.recording,
+            answers: judged.answers,
+            portions: &arguments.portion,
+            tolerance_m: arguments.tolerance,
+        };
+        for file in evaluation_report(&report).map_err(Complaint::new)? {
+            output::write_file(&out.join(&file.name), &file.bytes)?;
+        }
+    }
     if arguments.json { output::say_json(&findings) } else { print(&findings, arguments) }
 }
 
@@ -82,33 +106,43 @@ fn is_toml(path: &Path) -> bool {
 }
 
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
-fn cross_validated(arguments: &Arguments) -> Result<(Evaluation, Judged, String), Failure> {
+fn cross_validated(arguments: &Arguments) -> Result<Judged, Failure> {
     let rig = input::read_rig(&arguments.subject)?;
-    let (recording, data) = match &arguments.data {
-        Some(path) => (input::read_recording(&rig.bench, path)?, path.display().to_string()),
-        None => (simulate(&rig, arguments.seed).map_err(Complaint::new)?, "the simulation".to_owned()),
+    let recording = match &arguments.data {
+        Some(path) => input::read_recording(&rig.bench, path)?,
+        None => simulate(&rig, arguments.seed).map_err(simulation_complaint)?,
     };
-    let folds = usize::from(arguments.folds);
-    let evaluation = cross_validate(&rig, &recording, folds, arguments.seed, &mut || !interrupt::asked());
-    let evaluation = evaluation.map_err(Complaint::new)?;
+    let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
+    let mut watch = FitWatch::new((folds as u64 + 1) * rig.estimator.most_rounds());
+    let mut keep_going = || watch.keep_going();
     let evaluation =
-        evaluation.ok_or_else(|| Failure::Interrupted("stopped; nothing was written".to_owned()))?;
-    Ok((evaluation, Judged::CrossValidated { rig: Box::new(rig), folds }, data))
+        cross_validate(&rig, &recording, folds, seed, &mut keep_going).map_err(Complaint::new)?;
+    let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
+    let whole = fitting.fit(seed, &mut keep_going);
+    drop(watch);
+    let (Some(evaluation), Some(locator)) = (evaluation, whole) else {
+        return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
+    };
+    Ok(Judged { evaluation, locator, recording: recording.provenance, answers: Answers::HeldOut { folds } })
 }
 
 /// A locator, judged by a recording or by its own bench's simulation.
-fn located(arguments: &Arguments) -> Result<(Evaluation, Judged, String), Failure> {
+fn located(arguments: &Arguments) -> Result<Judged, Failure> {
     let locator = input::read_locator(&arguments.subject)?;
-    let (recording, data) = match &arguments.data {
+    let recording = match &arguments.data {
         Some(path) => {
             let recording = input::read_recording(&locator.bench, path)?;
             warn_of_training_data(&locator, &recording);
-            (recording, path.display().to_string())
+            recording
         }
-        None => (simulated(&locator, arguments.seed)?, "the simulation".to_owned()),
+        None => simulated(&locator, arguments.seed)?,
     };
     let evaluation = Evaluation::of(&locator, &recording).map_err(Complaint::new)?;
-    Ok((evaluation, Judged::Locator(Box::new(locator)), data))
+    Ok(Judged { evaluation, locator, recording: recording.provenance, answers: Answers::OfTheLocator })
+}
+
+fn simulation_complaint(error: SimulateError) -> Complaint {
+    Complaint::new(error).help("--data names a recording to judge by")
 }
 
 /// The bench pressed at 399 positions, 1/400 of the length apart: for the paper's beam, every millimetre.
@@ -116,8 +150,7 @@ fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
     let length_m = locator.bench.surface.extent().length_m;
     let positions: Vec<Position> =
         (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
-    simulate_at(&locator.bench, &positions, 1, seed)
-        .map_err(|error| Complaint::new(error).help("--data names a recording to judge by").into())
+    Ok(simulate_at(&locator.bench, &positions, 1, seed).map_err(simulation_complaint)?)
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {
@@ -135,12 +168,8 @@ fn portion(text: &str) -> Result<Portion, String> {
     if portion.from_m < portion.to_m { Ok(portion) } else { Err(format!("`{text}` does not rise")) }
 }
 
-fn findings(
-    arguments: &Arguments,
-    evaluation: &Evaluation,
-    judged: &Judged,
-    data: String,
-) -> Result<Findings, Failure> {
+fn findings(arguments: &Arguments, judged: &Judged) -> Result<Findings, Failure> {
+    let (evaluation, data) = (&judged.evaluation, judged.recording.source.clone());
     let named = |portion: &Portion| format!("{}–{} mm", portion.from_m * 1e3, portion.to_m * 1e3);
     let portions = std::iter::once((None, "whole surface".to_owned()))
         .chain(arguments.portion.iter().map(|portion| (Some(*portion), named(portion))));
@@ -150,7 +179,7 @@ fn findings(
         })?;
         Ok(errors(name, &summary, evaluation.length_m))
     });
-    let folds = matches!(judged, Judged::CrossValidated { .. }).then_some(arguments.folds);
+    let folds = matches!(judged.answers, Answers::HeldOut { .. }).then_some(arguments.folds);
     Ok(Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         subject: arguments.subject.display().to_string(),
@@ -203,9 +232,4 @@ fn print(findings: &Findings, arguments: &Arguments) -> Result<(), Failure> {
         Some(out) => output::say(format!("Report: {}", out.join("report.html").display())),
         None => Ok(()),
     }
-}
-
-enum Judged {
-    Locator(Box<Locator>),
-    CrossValidated { rig: Box<palpate::rig::Rig>, folds: usize },
 }

@@ -1,8 +1,9 @@
 //! `palpate fit`: calibrate an estimator.
 
 use crate::failure::{Complaint, Failure};
+use crate::progress::FitWatch;
 use crate::table::thousands;
-use crate::{input, interrupt, output};
+use crate::{input, output};
 use palpate::estimator::Fitting;
 use palpate::network::TrainingStatus;
 use palpate::simulate::simulate;
@@ -49,7 +50,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
     let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
-    let Some(locator) = fitting.fit(arguments.seed, &mut || !interrupt::asked()) else {
+    let mut watch = FitWatch::new(rig.estimator.most_rounds());
+    let locator = fitting.fit(arguments.seed, &mut || watch.keep_going());
+    drop(watch);
+    let Some(locator) = locator else {
         return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
     };
     let training = locator.training_outcome();

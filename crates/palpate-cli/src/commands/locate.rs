@@ -102,9 +102,9 @@ impl Stream<'_> {
     /// Reads the next line; false at the end.
     fn read_line(&mut self, source: &mut Box<dyn BufRead>, line: &mut Vec<u8>) -> Result<bool, Failure> {
         line.clear();
-        self.line += 1;
         let read = source.read_until(b'\n', line);
         let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
+        self.line += u64::from(read > 0);
         Ok(read > 0)
     }
 

@@ -5,9 +5,10 @@ use crate::table::{table, thousands};
 use crate::{input, interrupt, output, progress};
 use palpate::evaluation::Spread;
 use palpate::network::InstructionSet;
+use palpate::report::{StudyReport, paper_report, study_report};
 use palpate::study::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate::study::{
-    ArmOutcome, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained,
+    ArmOutcome, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults, Trained,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -80,7 +81,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         published: is_paper.then(|| published_figures(&results)),
         claims: is_paper.then(|| claims(&outcomes, prepared.judging())),
     };
-    // REPORT
+    let report = StudyReport { study: &prepared, outcomes: &outcomes, results: &results, run: &facts };
+    let files =
+        if is_paper { paper_report(&report) } else { study_report(&report) }.map_err(Complaint::new)?;
+    for report_file in files {
+        output::write_file(&out.join(&report_file.name), &report_file.bytes)?;
+    }
     output::write_file(&out.join("results.json"), (output::to_json(&file)? + "\n").as_bytes())?;
     if arguments.json {
         return output::say_json(&file);

@@ -20,6 +20,13 @@ impl EstimatorConfig {
         }
     }
 
+    /// The most often that one fit asks whether to go on.
+    pub fn most_rounds(&self) -> u64 {
+        match self {
+            Self::Network(config) => u64::from(config.training.max_epochs),
+        }
+    }
+
     /// The `kind` under which a rig names this estimator.
     pub fn kind(&self) -> &'static str {
         match self {
