@@ -56,7 +56,9 @@ fn a_browser_finds_no_fault_with_the_pages_of_a_study() {
         fs::write(&page, &report.bytes).unwrap();
         for width in [400, 1200] {
             let Some(seen) = measure(&page, width) else { return };
+            assert_eq!(seen.width, width);
             assert!(seen.content_width <= width, "{} px at {width} px", seen.content_width);
+            assert!(seen.outside_links.iter().all(|link| link.starts_with("https://doi.org/")), "{seen:?}");
             assert!(seen.errors.is_empty() && seen.dead_anchors.is_empty(), "{seen:?}");
             assert!(seen.outside_loads.is_empty() && seen.empty_pictures.is_empty(), "{seen:?}");
         }

@@ -7,7 +7,6 @@ mod locator;
 mod outcome;
 mod patterns;
 mod scalar;
-mod settings;
 mod topology;
 mod train;
 

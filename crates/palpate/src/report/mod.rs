@@ -53,7 +53,7 @@ pub use chart::{
     Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
 };
 pub use chart_svg::chart_to_svg;
-pub use evaluation_report::{Answers, EvaluationReport, evaluation_report};
+pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
 pub use paper_report::paper_report;
 pub use png::{PngError, svg_to_png};
 pub use report_file::{ReportError, ReportFile};

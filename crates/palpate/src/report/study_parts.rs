@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::numbers::{counted, mm, number, spread, whole};
+use super::numbers::{counted, mm, number, whole};
 use super::page::{Table, numeric, short, text, words};
 use super::{Axis, BandPoint, Chart, Mark, Series, SeriesKind, Stroke, StudyReport};
 use crate::evaluation::{Located, Portion, Spread};
@@ -117,17 +117,18 @@ const LEAST_ERROR_MM: f64 = 0.05;
 /// Every arm with its figures.
 pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     let portions = &report.study.judging().portions;
-    let mut columns = vec![short("arm"), numeric("seeds"), numeric("converged"), numeric("iterations")];
-    let whole_surface = report.judged_portion().map_or(String::new(), portion_in_words);
-    columns.push(numeric(format!("average error, {whole_surface}, %")));
-    columns.extend(portions.iter().map(|p| numeric(format!("average error, {}, %", portion_in_words(*p)))));
+    let mut columns = vec![short("arm"), numeric("seeds converged"), numeric("iterations")];
+    let judged = report.judged_portion().into_iter().chain(portions.iter().copied());
+    columns.extend(
+        judged.map(|portion| numeric(format!("average error, {}, %", unbroken(&portion_in_words(portion))))),
+    );
     columns.push(numeric("largest error, %"));
     columns.push(numeric(format!("effective length, {} mm, %", mm(report.study.judging().tolerance_m))));
     Table {
         number: table,
         caption: html! {
-            "Every arm: median over the seeds, and in brackets the range from the 5th to the 95th percentile. Errors are \
-             in % of the surface's length."
+            "Every arm: median over the seeds, and beneath it the range from the 5th to the 95th percentile. Errors are in % \
+             of the surface's length."
         },
         columns,
         rows: report.results.arms.iter().map(arm_row).collect(),
@@ -137,16 +138,26 @@ pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
 
 fn arm_row(arm: &ArmResults) -> Vec<Markup> {
     let mut cells = vec![
-        arm.name.clone(),
-        whole(arm.seeds as f64),
-        whole(arm.converged as f64),
-        spread(arm.epochs, whole),
-        spread(arm.error_percent, number),
+        text(&arm.name),
+        text(format!("{} of {}", whole(arm.converged as f64), whole(arm.seeds as f64))),
+        stacked(arm.epochs, whole),
+        stacked(arm.error_percent, number),
     ];
-    cells.extend(arm.portions.iter().map(|portion| spread(portion.error_percent, number)));
-    cells.push(spread(arm.max_error_percent, number));
-    cells.push(spread(arm.effective_length_percent, number));
-    cells.iter().map(text).collect()
+    cells.extend(arm.portions.iter().map(|portion| stacked(portion.error_percent, number)));
+    cells.push(stacked(arm.max_error_percent, number));
+    cells.push(stacked(arm.effective_length_percent, number));
+    cells
+}
+
+/// The median, and beneath it the range where there is one.
+fn stacked(spread: Spread, shown: fn(f64) -> String) -> Markup {
+    let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
+    html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
+}
+
+/// The same text without a place to break a line.
+fn unbroken(text: &str) -> String {
+    text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
 
 /// How the study was run.
@@ -206,7 +217,7 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
             dt { "Seed" }
             dd {
                 "The number from which a network's random start follows. Networks that differ in nothing else come out \
-                 differently, so each figure here is the median over many seeds, with the range in which all but the \
+                 differently, so each figure here is the median over the seeds of its arm, with the range in which all but the \
                  lowest and the highest twentieth of them lie (5–95 %)."
             }
         }

@@ -7,7 +7,7 @@ use crate::arrangement::Arrangement;
 use crate::contact::Position;
 use crate::evaluation::{Portion, Spread};
 use crate::report::numbers::{NOTHING, listed, mm, number, spread};
-use crate::report::page::{Table, numeric, short, text, wide, words};
+use crate::report::page::{Table, numeric, short, text, wide};
 use crate::report::study_parts::portion_in_words;
 use crate::rig::Training;
 
@@ -59,7 +59,7 @@ impl Paper<'_> {
                 numeric("first, mm"),
                 numeric("pitch, mm"),
                 numeric("last, mm"),
-                words("arms"),
+                short("arms"),
             ],
             rows: rows.collect(),
         })

@@ -36,7 +36,7 @@ impl Paper<'_> {
                 short("figure"),
                 numeric("published"),
                 numeric("found"),
-                short("agrees when"),
+                short("agrees if within"),
                 short("verdict"),
             ],
             rows: rows.collect(),
@@ -128,8 +128,8 @@ fn shown(figure: &PublishedFigure) -> fn(f64) -> String {
 
 fn yardstick(figure: &PublishedFigure) -> String {
     match figure.yardstick {
-        Yardstick::Within(difference) => format!("within ±{difference} points"),
-        Yardstick::Factor(factor) => format!("within a factor of {factor}"),
+        Yardstick::Within(difference) => format!("±{difference} points"),
+        Yardstick::Factor(factor) => format!("a factor of {factor}"),
         Yardstick::Below => format!("below {}", as_written(figure.published)),
     }
 }
@@ -138,7 +138,7 @@ fn difference(figure: &PublishedFigure) -> Markup {
     let inside = (figure.p05..=figure.p95).contains(&figure.published);
     html! {
         b { (figure.arm) } ", " (figure.what) ": the paper prints " (printed(figure)) ", the median found here is "
-        (shown(figure)(figure.median)) ", not " (yardstick(figure)) ". "
+        (shown(figure)(figure.median)) ", not " @if figure.yardstick != Yardstick::Below { "within " } (yardstick(figure)) ". "
         @if figure.yardstick == Yardstick::Below {
             @if figure.p05 < figure.published { "Some seeds do stay below it." }
             @else { "Hardly any seed stays below it." }

@@ -6,7 +6,7 @@ use crate::estimator::Fitting;
 use crate::evaluation::{Evaluation, Portion};
 use crate::network::{InstructionSet, Precision};
 use crate::report::{
-    Answers, EvaluationReport, ReportFile, StudyReport, evaluation_report, paper_report, study_report,
+    EvaluationReport, Judged, ReportFile, StudyReport, evaluation_report, paper_report, study_report,
 };
 use crate::rig::Rig;
 use crate::simulate::{simulate, simulate_at};
@@ -213,17 +213,20 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let positions: Vec<_> = recording.distinct_positions();
     let other = simulate_at(&rig.bench, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
-    for (recording, answers, said) in [
-        (&recording, Answers::OfTheLocator, "this very recording"),
-        (&other, Answers::OfTheLocator, "another recording"),
-        (&other, Answers::HeldOut { folds: 5 }, "Cross-validated by position in 5 folds"),
+    for (recording, judged, said) in [
+        (&recording, Judged::Locator(&locator), "this very recording"),
+        (&other, Judged::Locator(&locator), "another recording"),
+        (
+            &other,
+            Judged::CrossValidated { rig: &rig, folds: 5, seed: 3 },
+            "Cross-validated by position in 5 folds",
+        ),
     ] {
         let files = evaluation_report(&EvaluationReport {
             title: "Evaluation of <paper>",
-            locator: &locator,
             evaluation: &Evaluation::of(&locator, recording).unwrap(),
             recording: &recording.provenance,
-            answers,
+            judged,
             portions: &portions,
             tolerance_m: 2e-3,
         })
@@ -232,7 +235,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
         let html = page(&files);
         assert!(html.contains("Evaluation of &lt;paper&gt;"));
         let text = shown_text(html);
-        for fact in [said, "capped after 50 epochs", "20–380 mm", "network", "beam, 400 mm"] {
+        for fact in [said, "50 epochs", "20–380 mm", "network", "beam, 400 mm"] {
             assert!(text.contains(fact), "{fact} is missing: {text}");
         }
     }
@@ -247,10 +250,9 @@ fn an_evaluation_of_nothing_has_a_report() {
         Fitting::prepare(&rig.bench, &rig.estimator, &recording).unwrap().fit(0, &mut || true).unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
-        locator: &locator,
         evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
         recording: &recording.provenance,
-        answers: Answers::OfTheLocator,
+        judged: Judged::Locator(&locator),
         portions: &[],
         tolerance_m: 2e-3,
     });
