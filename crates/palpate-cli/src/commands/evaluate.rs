@@ -5,10 +5,11 @@ use crate::progress::FitWatch;
 use crate::table::table;
 use crate::{input, output};
 use palpate::contact::Position;
-use palpate::estimator::{Fitting, Locator};
+use palpate::estimator::Locator;
 use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
 use palpate::recording::{Provenance, Recording};
-use palpate::report::{Answers, EvaluationReport, evaluation_report};
+use palpate::report::{EvaluationReport, Judged, evaluation_report};
+use palpate::rig::Rig;
 use palpate::simulate::{SimulateError, simulate, simulate_at};
 use std::path::{Path, PathBuf};
 
@@ -71,26 +72,32 @@ struct Figures {
     max: f64,
 }
 
-/// A judged locator.
-struct Judged {
+/// Answers, and what gave them.
+struct Answers {
     evaluation: Evaluation,
-    /// Where folds were held out, the one fitted to all of them.
-    locator: Locator,
     recording: Provenance,
-    answers: Answers,
+    subject: Subject,
+}
+
+enum Subject {
+    Locator(Box<Locator>),
+    Rig(Box<Rig>),
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let judged = if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
-    let findings = findings(arguments, &judged)?;
+    let answers = if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
+    let findings = findings(arguments, &answers)?;
     if let Some(out) = &arguments.out {
         output::make_folder(out)?;
+        let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
             title: &format!("Location errors of {}", findings.subject),
-            locator: &judged.locator,
-            evaluation: &judged.evaluation,
-            recording: &judged.recording,
-            answers: judged.answers,
+            judged: match &answers.subject {
+                Subject::Locator(locator) => Judged::Locator(locator),
+                Subject::Rig(rig) => Judged::CrossValidated { rig, folds, seed },
+            },
+            evaluation: &answers.evaluation,
+            recording: &answers.recording,
             portions: &arguments.portion,
             tolerance_m: arguments.tolerance,
         };
@@ -106,28 +113,23 @@ fn is_toml(path: &Path) -> bool {
 }
 
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
-fn cross_validated(arguments: &Arguments) -> Result<Judged, Failure> {
+fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     let rig = input::read_rig(&arguments.subject)?;
     let recording = match &arguments.data {
         Some(path) => input::read_recording(&rig.bench, path)?,
         None => simulate(&rig, arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
-    let mut watch = FitWatch::new((folds as u64 + 1) * rig.estimator.most_rounds());
-    let mut keep_going = || watch.keep_going();
-    let evaluation =
-        cross_validate(&rig, &recording, folds, seed, &mut keep_going).map_err(Complaint::new)?;
-    let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
-    let whole = fitting.fit(seed, &mut keep_going);
+    let mut watch = FitWatch::new(folds as u64 * rig.estimator.most_rounds());
+    let evaluation = cross_validate(&rig, &recording, folds, seed, &mut || watch.keep_going());
     drop(watch);
-    let (Some(evaluation), Some(locator)) = (evaluation, whole) else {
-        return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
-    };
-    Ok(Judged { evaluation, locator, recording: recording.provenance, answers: Answers::HeldOut { folds } })
+    let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
+    let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(stopped)?;
+    Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
 }
 
 /// A locator, judged by a recording or by its own bench's simulation.
-fn located(arguments: &Arguments) -> Result<Judged, Failure> {
+fn located(arguments: &Arguments) -> Result<Answers, Failure> {
     let locator = input::read_locator(&arguments.subject)?;
     let recording = match &arguments.data {
         Some(path) => {
@@ -138,7 +140,8 @@ fn located(arguments: &Arguments) -> Result<Judged, Failure> {
         None => simulated(&locator, arguments.seed)?,
     };
     let evaluation = Evaluation::of(&locator, &recording).map_err(Complaint::new)?;
-    Ok(Judged { evaluation, locator, recording: recording.provenance, answers: Answers::OfTheLocator })
+    let subject = Subject::Locator(Box::new(locator));
+    Ok(Answers { evaluation, recording: recording.provenance, subject })
 }
 
 fn simulation_complaint(error: SimulateError) -> Complaint {
@@ -168,8 +171,8 @@ fn portion(text: &str) -> Result<Portion, String> {
     if portion.from_m < portion.to_m { Ok(portion) } else { Err(format!("`{text}` does not rise")) }
 }
 
-fn findings(arguments: &Arguments, judged: &Judged) -> Result<Findings, Failure> {
-    let (evaluation, data) = (&judged.evaluation, judged.recording.source.clone());
+fn findings(arguments: &Arguments, answers: &Answers) -> Result<Findings, Failure> {
+    let (evaluation, data) = (&answers.evaluation, answers.recording.source.clone());
     let named = |portion: &Portion| format!("{}–{} mm", portion.from_m * 1e3, portion.to_m * 1e3);
     let portions = std::iter::once((None, "whole surface".to_owned()))
         .chain(arguments.portion.iter().map(|portion| (Some(*portion), named(portion))));
@@ -179,7 +182,7 @@ fn findings(arguments: &Arguments, judged: &Judged) -> Result<Findings, Failure>
         })?;
         Ok(errors(name, &summary, evaluation.length_m))
     });
-    let folds = matches!(judged.answers, Answers::HeldOut { .. }).then_some(arguments.folds);
+    let folds = matches!(answers.subject, Subject::Rig(_)).then_some(arguments.folds);
     Ok(Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         subject: arguments.subject.display().to_string(),
