@@ -1,0 +1,11 @@
+//! Any text, read as a locator; what is accepted can locate.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use palpate::estimator::Locator;
+
+fuzz_target!(|text: &str| {
+    if let Ok(locator) = Locator::from_json(text) {
+        let _ = locator.locate(&vec![0.5; locator.bench.layout.len()]);
+    }
+});

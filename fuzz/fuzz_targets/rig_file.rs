@@ -1,0 +1,8 @@
+//! Any text, read as a rig.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|text: &str| {
+    let _ = palpate::rig::Rig::from_toml(text);
+});

@@ -1,0 +1,8 @@
+//! Any text, read as a study.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|text: &str| {
+    let _ = palpate::study::Study::from_toml(text);
+});
