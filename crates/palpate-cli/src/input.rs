@@ -105,11 +105,11 @@ fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Compl
 
 /// The complaint about a recording.
 pub fn csv_complaint(error: &CsvError) -> Failure {
-    let complaint = Complaint::new(error);
     match &error.place {
-        Some(place) => {
-            complaint.at_line(&error.source_name, place.line, &place.text, place.span.clone()).into()
-        }
-        None => complaint.into(),
+        // The caret's heading says the place.
+        Some(place) => Complaint::new(&error.problem)
+            .at_line(&error.source_name, place.line, &place.text, place.span.clone())
+            .into(),
+        None => Complaint::new(error).into(),
     }
 }

@@ -5,17 +5,34 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+/// Complains at once, before any work, when a file could not be written later.
+pub fn check_writable(path: &Path) -> Result<(), Failure> {
+    let folder = folder_of(path);
+    if path.is_dir() {
+        return Err(Complaint::new(format!("cannot write {}: it is a folder", path.display())).into());
+    }
+    if !folder.is_dir() {
+        let complaint = format!("cannot write {}: there is no folder {}", path.display(), folder.display());
+        return Err(Complaint::new(complaint).into());
+    }
+    Ok(())
+}
+
 /// Writes a file under a temporary name and renames it, so that nobody ever sees half of it.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    check_writable(path)?;
     let write = || -> std::io::Result<()> {
-        let mut file = tempfile::Builder::new().prefix(".palpate-").tempfile_in(folder)?;
+        let mut file = tempfile::Builder::new().prefix(".palpate-").tempfile_in(folder_of(path))?;
         file.write_all(bytes)?;
         make_readable(file.as_file())?;
         file.persist(path)?;
         Ok(())
     };
     write().map_err(|error| cannot("write", path, &error))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Temporary files begin private to their owner; results are for whoever may read the folder.

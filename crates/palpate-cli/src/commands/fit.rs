@@ -39,6 +39,7 @@ struct Outcome<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    output::check_writable(&arguments.out)?;
     let rig = input::read_rig(&arguments.rig)?;
     let recording = match &arguments.data {
         Some(path) => input::read_recording(&rig.bench, path)?,

@@ -43,7 +43,7 @@ fn a_simulation_survives_its_file_bit_for_bit() {
     let recording = simulate(&rig, 7).unwrap();
     let mut bytes = Vec::new();
     crate::recording::write(&recording, rig.bench.surface.extent(), "a simulation", &mut bytes).unwrap();
-    assert!(bytes.starts_with(b"position_mm,force_n,deflection_1_mm,deflection_2_mm,"));
+    assert!(bytes.starts_with(b"# a simulation\nposition_mm,force_n,deflection_1_mm,deflection_2_mm,"));
     assert_eq!(rig.bench.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
 }
 

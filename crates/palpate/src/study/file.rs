@@ -14,7 +14,7 @@ use crate::rig::{
     ContactSection, EstimatorSection, RawQuantity, RigError, RigSections, SensorsSections, SurfaceSection,
     TrainingSection, positive, validate,
 };
-use crate::units::Dimension;
+use crate::units::{Dimension, format_length_mm};
 
 /// A study file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -61,13 +61,26 @@ pub enum StudyProblem {
         /// What the file says.
         word: String,
     },
-    /// Contact positions that are not on the surface, or none, or far too many.
+    /// Contact positions that end before they begin, or beside the surface.
     #[error(
-        "`{key}` does not fit: the contact positions must go from `from` to `to` on the surface, in at most {most} steps"
+        "`to` is {}; it must be at least `from`, {}, and at most the surface's length, {}",
+        format_length_mm(*to_m),
+        format_length_mm(*from_m),
+        format_length_mm(*length_m)
     )]
-    Positions {
-        /// The key at fault.
-        key: &'static str,
+    End {
+        /// Where they end, in metres.
+        to_m: f64,
+        /// Where they begin, in metres.
+        from_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// Far too many contact positions.
+    #[error("`step` is {}, which makes more than {most} contact positions", format_length_mm(*step_m))]
+    Step {
+        /// The distance between two, in metres.
+        step_m: f64,
         /// How many there may be.
         most: usize,
     },
@@ -242,14 +255,13 @@ fn positions(section: &EvaluationSection, length_m: f64) -> Result<Vec<Position>
     let from_m = positive_length("from", &section.from)?;
     let to_m = positive_length("to", &section.to)?;
     let step_m = positive_length("step", &section.step)?;
-    let wrong = |key, span| Err(StudyProblem::Positions { key, most: MOST_POSITIONS }.at(span));
     if to_m < from_m || to_m > length_m {
-        return wrong("to", section.to.span());
+        return Err(StudyProblem::End { to_m, from_m, length_m }.at(section.to.span()));
     }
     // A rounding error of a millionth of a step does not lose the last position.
     let steps = ((to_m - from_m) / step_m + 1e-6).floor();
     if steps >= MOST_POSITIONS as f64 {
-        return wrong("step", section.step.span());
+        return Err(StudyProblem::Step { step_m, most: MOST_POSITIONS }.at(section.step.span()));
     }
     Ok((0..=steps as usize).map(|i| Position::along(from_m + i as f64 * step_m)).collect())
 }
