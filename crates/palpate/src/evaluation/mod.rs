@@ -127,3 +127,6 @@ impl Evaluation {
         summaries.collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -94,3 +94,64 @@ pub(crate) fn derivative<V: Lanes<N>, const N: usize>(activation: Activation, ou
         Activation::Linear => one,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::lanes::portable::Array;
+
+    /// σ by the library's exponential.
+    fn exact(z: f64) -> f64 {
+        1.0 / (1.0 + (-z).exp())
+    }
+
+    fn values_f64(z: &[f64], activation: Activation) -> Vec<f64> {
+        let mut values: Vec<Array<f64, 1, true>> = z.iter().map(|&z| Array::splat(z)).collect();
+        activate(activation, &mut values);
+        values.into_iter().map(|value| value.to_array()[0]).collect()
+    }
+
+    fn sweep() -> Vec<f64> {
+        (-4003..=4003).map(|i| f64::from(i) * 0.0101).collect()
+    }
+
+    #[test]
+    fn the_logistic_function_is_right_to_fourteen_digits() {
+        for (z, a) in sweep().into_iter().zip(values_f64(&sweep(), Activation::Logistic)) {
+            assert!((a / exact(z) - 1.0).abs() < 3e-14, "σ({z}) = {a}");
+        }
+    }
+
+    #[test]
+    fn single_precision_is_right_to_its_own_digits() {
+        let mut values: Vec<Array<f32, 1, true>> =
+            sweep().into_iter().map(|z| Array::splat(z as f32)).collect();
+        activate(Activation::Logistic, &mut values);
+        for (z, a) in sweep().into_iter().zip(values) {
+            let a = f64::from(a.to_array()[0]);
+            assert!((a - exact(f64::from(z as f32))).abs() < 3e-7, "σ({z}) = {a}");
+        }
+    }
+
+    #[test]
+    fn far_out_it_stays_between_nought_and_one() {
+        for z in [1e3, 1e30, f64::MAX] {
+            let [low, high] = values_f64(&[-z, z], Activation::Logistic)[..] else { unreachable!() };
+            assert!((0.0..1e-100).contains(&low) && high == 1.0, "{low}, {high}");
+        }
+    }
+
+    #[test]
+    fn derivatives_follow_their_functions() {
+        let step = 1e-5;
+        for activation in [Activation::Logistic, Activation::Tanh, Activation::Linear] {
+            for z in [-3.0, -0.4, 0.0, 1.7] {
+                let [below, at, above] = values_f64(&[z - step, z, z + step], activation)[..] else {
+                    unreachable!()
+                };
+                let [slope] = derivative(activation, Array::<f64, 1, true>::splat(at)).to_array();
+                assert!((slope - (above - below) / (2.0 * step)).abs() < 1e-8, "{activation:?} at {z}");
+            }
+        }
+    }
+}

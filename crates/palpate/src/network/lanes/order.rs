@@ -145,3 +145,72 @@ impl OrderDrawer {
         self.patterns
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro128PlusPlus;
+
+    #[test]
+    fn the_streams_are_xoshiro128_plus_plus() {
+        let mut state = [0; 16];
+        let ours = Streams::<1>::seeded(42);
+        for (bytes, word) in state.chunks_exact_mut(4).zip(ours.0) {
+            bytes.copy_from_slice(&word[0].to_le_bytes());
+        }
+        let mut reference = Xoshiro128PlusPlus::from_seed(state);
+        let mut side_by_side = Streams::<3>::unseeded();
+        side_by_side.set(1, &ours);
+        for _ in 0..1000 {
+            assert_eq!(side_by_side.next()[1], reference.next_u32());
+        }
+    }
+
+    #[test]
+    fn the_network_sorts_what_an_ordinary_sort_sorts() {
+        for patterns in (1..=40).chain([100, 257]) {
+            let drawer = OrderDrawer::new(patterns);
+            let mut lanes = Streams::<4>::unseeded();
+            let mut singles: Vec<_> = (0..4).map(Streams::seeded).collect();
+            for (lane, single) in singles.iter().enumerate() {
+                lanes.set(lane, single);
+            }
+            let mut order = vec![[0; 4]; patterns];
+            for _ in 0..3 {
+                drawer.draw(&mut lanes, &mut order);
+                for (lane, single) in singles.iter_mut().enumerate() {
+                    let mut expected = vec![0; patterns];
+                    drawer.draw_one(single, &mut expected);
+                    assert_eq!(order.iter().map(|row| row[lane]).collect::<Vec<_>>(), expected);
+                    expected.sort_unstable();
+                    assert!(expected.into_iter().eq(0..patterns as u32), "{patterns} patterns");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_pattern_comes_first_equally_often() {
+        let drawer = OrderDrawer::new(10);
+        let mut stream = Streams::seeded(1);
+        let mut order = [0; 10];
+        let mut first = [0; 10];
+        for _ in 0..20_000 {
+            drawer.draw_one(&mut stream, &mut order);
+            first[order[0] as usize] += 1;
+        }
+        // χ² with 9 degrees of freedom exceeds 27.9 once in a thousand times.
+        let chi_squared: f64 = first.iter().map(|count| f64::from(count - 2000).powi(2) / 2000.0).sum();
+        assert!(chi_squared < 27.9, "{first:?}");
+    }
+
+    #[test]
+    fn weights_start_within_their_width() {
+        let mut stream = Streams::seeded(9);
+        let values: Vec<f64> = (0..10_000).map(|_| stream.uniform(0.5)).collect();
+        assert!(values.iter().all(|value| value.abs() <= 0.5));
+        let mean = values.iter().sum::<f64>() / 10_000.0;
+        assert!(mean.abs() < 0.015, "{mean}");
+    }
+}

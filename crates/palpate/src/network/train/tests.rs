@@ -123,3 +123,56 @@ fn a_wild_step_diverges_and_says_so() {
         assert!(network.outcome.epochs < 10_000);
     }
 }
+
+/// E = ½ Σ (t − a)², by the forward pass of the core.
+fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &Patterns, pattern: usize) -> f64 {
+    let network = palpate_core::Network {
+        sizes: &topology.sizes,
+        biases: topology.biases,
+        hidden_activation: topology.hidden_activation,
+        output_activation: topology.output_activation,
+        weights,
+    };
+    let mut outputs = vec![0.0; topology.outputs()];
+    let mut scratch = vec![0.0; network.scratch_len()];
+    network.forward_into(patterns.input(pattern), &mut outputs, &mut scratch).unwrap();
+    outputs.iter().zip(patterns.target(pattern)).map(|(a, t)| (t - a).powi(2) / 2.0).sum()
+}
+
+#[test]
+fn one_update_goes_down_the_gradient_of_finite_differences() {
+    for activation in [Activation::Logistic, Activation::Tanh] {
+        let mut config =
+            NetworkConfig { hidden: vec![4, 3], hidden_activation: activation, ..NetworkConfig::default() };
+        let rule = &mut config.training;
+        (rule.learning_rate, rule.aggregate_error, rule.order) = (1e-3, 1e-300, PresentationOrder::Fixed);
+        let patterns = patterns(1, 3, 2);
+        let topology = Topology::new(&config, 3, 2);
+        let after = |epochs: u32| {
+            let rule = BackPropagation { max_epochs: epochs, ..config.training };
+            let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
+            train_one(Precision::F64, &task, 3, &mut || true).unwrap().weights
+        };
+        let (first, second) = (after(1), after(2));
+        // The first update has no momentum yet, the second repeats a share of it: Δw₂ = α Δw₁ − η ∂E/∂w.
+        let before: Vec<f64> = {
+            let mut stream = crate::network::lanes::Streams::seeded(3);
+            (0..topology.weight_count()).map(|_| stream.uniform(config.training.initial_weights)).collect()
+        };
+        let gradient = |weights: &[f64], k: usize| {
+            let shifted = |step: f64| {
+                let mut weights = weights.to_vec();
+                weights[k] += step;
+                half_squared_error(&topology, &weights, &patterns, 0)
+            };
+            (shifted(1e-6) - shifted(-1e-6)) / 2e-6
+        };
+        let BackPropagation { learning_rate: eta, momentum: alpha, .. } = config.training;
+        for k in 0..topology.weight_count() {
+            let step = first[k] - before[k];
+            assert!((step + eta * gradient(&before, k)).abs() < 1e-12, "{activation:?}, weight {k}: {step}");
+            let next = alpha * step - eta * gradient(&first, k);
+            assert!((second[k] - first[k] - next).abs() < 1e-12, "{activation:?}, weight {k}");
+        }
+    }
+}
