@@ -184,7 +184,7 @@ mod tests {
 
     fn shown(install: Install) -> Vec<String> {
         install
-            .commands(Path::new("/w"))
+            .commands(Path::new("/usr/w"))
             .iter()
             .map(|command| format!("{command:?}").replace('"', ""))
             .collect()
@@ -198,7 +198,7 @@ mod tests {
         assert!(apt.iter().all(|command| command.contains("DEBIAN_FRONTEND=noninteractive")), "{apt:?}");
         assert!(shown(Install::Npm("web"))[0].ends_with("npm ci --no-audit --no-fund"));
         let pip = shown(Install::Pip(&["onnx"]));
-        assert!(pip[1].starts_with("/w/target/xtask/venv/bin/python -m pip install"), "{pip:?}");
+        assert!(pip[1].starts_with("/usr/w/target/xtask/venv/bin/python -m pip install"), "{pip:?}");
     }
 
     #[test]

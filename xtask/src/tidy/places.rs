@@ -1,51 +1,62 @@
-//! Nothing in the project names a place on somebody's machine, or a package registry's host.
+//! Nothing in the project names a place on somebody's machine, or a host that the project does not mean to name.
 
 use super::Finding;
 use super::project::{File, Project};
 
-/// Beginnings of paths that only one machine has.
-const PATHS: [&str; 4] = ["/work/", "/root/", "/home/", "/farm/"];
+/// The first folders of paths that every Unix machine has. Any other absolute path is somebody's own.
+const EVERYWHERE: [&str; 4] = ["dev", "etc", "proc", "usr"];
 
-const HOSTS: [&str; 7] = [
-    "static.crates.io",
-    "index.crates.io",
-    "registry.npmjs.org",
-    "pypi.org",
-    "files.pythonhosted.org",
-    "deb.debian.org",
-    "proxy.golang.org",
-];
+/// Hosts that readers are sent to, or that name a format. Packages are named, not the registries that hold them.
+const HOSTS: [&str; 4] = ["doi.org", "example.org", "www.apache.org", "www.w3.org"];
 
 /// Files that package managers write, which name the registries they use.
 const LOCKS: [&str; 3] = ["Cargo.lock", "package-lock.json", "uv.lock"];
 
-/// A machine's path in any file, and a registry's host outside lock files.
+/// A machine's path in any file, and an unknown host outside lock files.
 pub fn findings(project: &Project) -> Vec<Finding> {
     project.files.iter().filter(|file| !file.is_a_rule()).flat_map(of_file).collect()
 }
 
 fn of_file(file: &File) -> Vec<Finding> {
-    let is_lock = LOCKS.iter().any(|name| file.path.rsplit('/').next() == Some(name));
+    let name = file.path.rsplit('/').next().unwrap_or_default();
+    let (is_lock, holds_patterns) = (LOCKS.contains(&name), name == ".gitignore");
     let mut found = Vec::new();
     for (number, line) in file.text().lines().enumerate() {
         let mut add = |message: String| found.push(Finding::failure(&file.path, number + 1, message));
-        for path in PATHS.into_iter().filter(|path| names_path(line, path)) {
-            add(format!("{path}… is a path of one machine: make it relative, or an argument"));
+        for path in own_paths(line).filter(|_| !holds_patterns) {
+            add(format!("/{path}/… is a path of one machine: make it relative, or an argument"));
         }
-        for host in HOSTS.into_iter().filter(|host| !is_lock && line.contains(host)) {
-            add(format!("{host} is a registry's host: name the package instead"));
+        for host in hosts(line).filter(|host| !is_lock && !HOSTS.contains(host)) {
+            add(format!("{host} is no host that the project names: name the package or the DOI instead"));
         }
     }
     found
 }
 
-/// The path stands at the head of a word, as against inside a longer path or an address, and goes on after its slash.
-fn names_path(line: &str, path: &str) -> bool {
-    line.match_indices(path).any(|(at, _)| {
+/// The first folder of every absolute path that begins a word and is not on every machine.
+fn own_paths(line: &str) -> impl Iterator<Item = &str> {
+    line.match_indices('/').filter_map(|(at, _)| {
         let before = line[..at].chars().next_back();
-        let after = line[at + path.len()..].chars().next();
-        !before.is_some_and(|it| it.is_alphanumeric() || "._-/}*".contains(it))
-            && (path != "/home/" || after.is_some_and(char::is_alphanumeric))
+        let begins_a_word = before.is_none_or(|it| it.is_whitespace() || "\"'`(=:".contains(it));
+        let (folder, rest) = line[at + 1..].split_once('/')?;
+        let names_a_folder = !folder.is_empty()
+            && folder.chars().all(|it| it.is_ascii_alphanumeric() || it == '_')
+            && rest.starts_with(|it: char| it.is_ascii_alphanumeric());
+        (begins_a_word && names_a_folder && !EVERYWHERE.contains(&folder)).then_some(folder)
+    })
+}
+
+/// The host of every address of the web.
+fn hosts(line: &str) -> impl Iterator<Item = &str> {
+    let after = line
+        .match_indices("://")
+        .filter(|(at, _)| line[..*at].ends_with("http") || line[..*at].ends_with("https"));
+    after.filter_map(|(at, mark)| {
+        let host = line[at + mark.len()..]
+            .split(|it: char| !(it.is_ascii_alphanumeric() || ".-".contains(it)))
+            .next()?;
+        let host = host.trim_end_matches('.');
+        host.contains('.').then_some(host)
     })
 }
 
@@ -59,17 +70,17 @@ mod tests {
 
     #[test]
     fn machine_paths_and_hosts_are_found() {
-        let text = "see /work/main\ncd \"/root/x\"\n(/home/jane/x)\nfine\n/farm/a\nhttps://pypi.org/simple";
+        let text =
+            "see /srv/main\ncd \"/mine/x\"\n(/home/jane/x)\nfine\n/farm/a\nhttps://packages.example/simple";
         assert_eq!(lines("docs/a.md", text), [1, 2, 3, 5, 6]);
     }
 
     #[test]
     fn relative_paths_addresses_locks_and_the_rules_are_clean() {
-        assert!(
-            lines("docs/a.md", "docs/work/a ../root/b example.org/home/jane /home/$USER /workshop/")
-                .is_empty()
-        );
-        assert!(lines("fuzz/Cargo.lock", "https://index.crates.io").is_empty());
-        assert!(lines("xtask/src/tidy/places.rs", "/work/").is_empty());
+        let text = "docs/work/a ../root/b example.org/home/jane /home/$USER /workshop/ /usr/bin/env https://doi.org/10.1/2";
+        assert!(lines("docs/a.md", text).is_empty());
+        assert!(lines("fuzz/Cargo.lock", "https://packages.example").is_empty());
+        assert!(lines(".gitignore", "/fuzz/target").is_empty());
+        assert!(lines("xtask/src/tidy/places.rs", "/srv/a").is_empty());
     }
 }

@@ -148,12 +148,12 @@ mod tests {
     #[test]
     fn metadata_gives_names_roots_and_dependencies() {
         let metadata = serde_json::json!({
-            "workspace_root": "/w",
+            "workspace_root": "/usr/w",
             "packages": [{
-                "name": "palpate-cli", "version": "0.1.0", "manifest_path": "/w/crates/palpate-cli/Cargo.toml",
+                "name": "palpate-cli", "version": "0.1.0", "manifest_path": "/usr/w/crates/palpate-cli/Cargo.toml",
                 "targets": [
-                    {"kind": ["bin"], "src_path": "/w/crates/palpate-cli/src/main.rs"},
-                    {"kind": ["test"], "src_path": "/w/crates/palpate-cli/tests/browser.rs"},
+                    {"kind": ["bin"], "src_path": "/usr/w/crates/palpate-cli/src/main.rs"},
+                    {"kind": ["test"], "src_path": "/usr/w/crates/palpate-cli/tests/browser.rs"},
                 ],
                 "dependencies": [{"name": "palpate"}],
             }],
