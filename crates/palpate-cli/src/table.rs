@@ -1,4 +1,4 @@
-//! Tables and numbers for people.
+//! Tables for people.
 
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -17,24 +17,9 @@ pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> S
     lines.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
-/// "12,345"
-pub fn thousands(number: f64) -> String {
-    let digits = format!("{number:.0}");
-    let (sign, digits) = digits.strip_prefix('-').map_or(("", digits.as_str()), |rest| ("-", rest));
-    let groups: Vec<&str> =
-        (0..digits.len()).rev().step_by(3).map(|end| &digits[end.saturating_sub(2)..=end]).collect();
-    sign.to_owned() + &groups.into_iter().rev().collect::<Vec<_>>().join(",")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thousands_are_parted() {
-        let numbers = [0.0, 12.0, 999.4, 1000.0, 1_234_567.0, -26_850.0];
-        assert_eq!(numbers.map(thousands), ["0", "12", "999", "1,000", "1,234,567", "-26,850"]);
-    }
 
     #[test]
     fn columns_line_up() {

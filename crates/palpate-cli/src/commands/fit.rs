@@ -2,11 +2,11 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
-use crate::table::thousands;
 use crate::{input, output};
 use palpate::estimator::Fitting;
 use palpate::network::TrainingStatus;
 use palpate::simulate::simulate;
+use palpate::units::format_count;
 use std::path::PathBuf;
 
 /// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
     };
     let training = locator.training_outcome();
-    let epochs = thousands(f64::from(training.epochs));
+    let epochs = format_count(u64::from(training.epochs));
     if training.status == TrainingStatus::Diverged {
         return Err(Failure::GoalMissed(format!(
             "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"

@@ -1,15 +1,13 @@
 //! `palpate inspect`: what any of palpate's files holds, in words.
 
 use crate::failure::Failure;
-use crate::table::thousands;
 use crate::{input, output};
 use palpate::bench::Bench;
-use palpate::estimator::EstimatorConfig;
 use palpate::mechanics::SurfaceSpec;
-use palpate::network::{NetworkConfig, Topology};
+use palpate::network::Topology;
 use palpate::rig::{Rig, Training};
 use palpate::sensing::Layout;
-use palpate::units::{Quantity, format_length_mm};
+use palpate::units::{Quantity, format_count, format_length_mm};
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -41,8 +39,10 @@ fn rig(rig: &Rig) -> Vec<String> {
     if let Some(training) = &rig.training {
         lines.push(format!("training positions: {}", training_words(training)));
     }
-    let EstimatorConfig::Network(network) = &rig.estimator;
-    lines.push(format!("estimator: {}", network_words(network, rig.bench.layout.len())));
+    lines.push(format!("estimator: {}", rig.estimator.kind()));
+    lines.extend(
+        rig.estimator.settings().iter().map(|setting| format!("    {}: {}", setting.name, setting.value)),
+    );
     lines
 }
 
@@ -93,19 +93,6 @@ fn training_words(training: &Training) -> String {
     format!("{}, {rule}, {} × each", training.count, training.repeats)
 }
 
-fn network_words(network: &NetworkConfig, inputs: usize) -> String {
-    let hidden: Vec<String> = network.hidden.iter().map(usize::to_string).collect();
-    let rule = &network.training;
-    format!(
-        "network, {inputs} inputs, hidden layers {}; learning rate {}, momentum {}, to an aggregate error of {:e} or {} epochs",
-        if hidden.is_empty() { "none".to_owned() } else { hidden.join("–") },
-        rule.learning_rate,
-        rule.momentum,
-        rule.aggregate_error,
-        thousands(f64::from(rule.max_epochs))
-    )
-}
-
 fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     let study = input::parse_study(&path.display().to_string(), text)?;
     let mut lines = vec![format!(
@@ -137,10 +124,10 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     lines.extend(bench(&locator.bench));
     let palpate::estimator::Method::Network(network) = &locator.method;
     lines.push(format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()));
-    let status = format!("{:?}", outcome.status).to_lowercase();
     lines.push(format!(
-        "training: {status} after {} epochs, aggregate error {:.2e}",
-        thousands(f64::from(outcome.epochs)),
+        "training: {} after {} epochs, aggregate error {:.2e}",
+        outcome.status,
+        format_count(u64::from(outcome.epochs)),
         outcome.aggregate_error
     ));
     let recording = &provenance.recording;

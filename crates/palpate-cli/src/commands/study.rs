@@ -1,7 +1,7 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
 use crate::failure::{Complaint, Failure};
-use crate::table::{table, thousands};
+use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate::evaluation::Spread;
 use palpate::network::InstructionSet;
@@ -10,6 +10,7 @@ use palpate::study::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claim
 use palpate::study::{
     ArmOutcome, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults, Trained,
 };
+use palpate::units::format_count;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -159,9 +160,8 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     let spread =
         |s: &Spread, digits: usize| format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95);
     let arms = file.results.arms.iter().map(|arm| {
-        let epochs = &arm.epochs;
-        let epochs =
-            format!("{} ({}–{})", thousands(epochs.median), thousands(epochs.p05), thousands(epochs.p95));
+        let epochs = [arm.epochs.median, arm.epochs.p05, arm.epochs.p95].map(whole);
+        let epochs = format!("{} ({}–{})", epochs[0], epochs[1], epochs[2]);
         let converged = format!("{}/{}", arm.converged, arm.seeds);
         let effective = spread(&arm.effective_length_percent, 1);
         vec![arm.name.clone(), converged, epochs, spread(&arm.error_percent, 2), effective]
@@ -171,7 +171,7 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     if let Some(figures) = &file.published {
         let rows = figures.iter().map(|figure| {
             let digits = if figure.median >= 1000.0 { 0 } else { 2 };
-            let show = |value: f64| if digits == 0 { thousands(value) } else { format!("{value:.2}") };
+            let show = |value: f64| if digits == 0 { whole(value) } else { format!("{value:.2}") };
             let ours = format!("{} ({}–{})", show(figure.median), show(figure.p05), show(figure.p95));
             let name = format!("{}: {}", figure.arm, figure.what);
             vec![name, show(figure.published), ours, if figure.agrees { "yes" } else { "NO" }.to_owned()]
@@ -196,6 +196,11 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
         run.threads, run.arithmetic
     ))?;
     output::say(format!("Report: {}", out.join("report.html").display()))
+}
+
+/// A count, or a spread of counts, rounded.
+fn whole(count: f64) -> String {
+    format_count(count.round() as u64)
 }
 
 /// A claim as long as a table's line can be.

@@ -67,7 +67,7 @@ impl<'a> NetworksCsv<'a> {
             self.study.study.arms[trained.arm].name.clone(),
             trained.fit.seed.to_string(),
             outcome.epochs.to_string(),
-            status_name(outcome.status).to_owned(),
+            outcome.status.to_string(),
             outcome.aggregate_error.to_string(),
         ];
         cells.extend(self.metrics(Some(trained)).into_iter().map(|(_, value)| format!("{value:.6}")));
@@ -139,16 +139,7 @@ impl<'a> NetworksCsv<'a> {
     }
 }
 
-const STATUSES: [(&str, TrainingStatus); 3] = [
-    ("converged", TrainingStatus::Converged),
-    ("capped", TrainingStatus::Capped),
-    ("diverged", TrainingStatus::Diverged),
-];
-
-fn status_name(status: TrainingStatus) -> &'static str {
-    STATUSES.iter().find(|(_, other)| *other == status).map_or("", |(name, _)| name)
-}
-
 fn status_from(name: &str) -> Option<TrainingStatus> {
-    STATUSES.iter().find(|(other, _)| *other == name).map(|(_, status)| *status)
+    let all = [TrainingStatus::Converged, TrainingStatus::Capped, TrainingStatus::Diverged];
+    all.into_iter().find(|status| status.to_string() == name)
 }
