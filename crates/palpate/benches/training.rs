@@ -3,19 +3,45 @@
 
 use cpu_time::ThreadTime;
 use palpate::network::{
-    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, SeedQueue, Topology, TrainedNetwork,
-    TrainingTask, train_many, train_one,
+    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, SeedQueue,
+    Topology, TrainedNetwork, TrainingTask, train_many, train_one,
 };
 
 const ROUNDS: usize = 9;
 const EPOCHS: u32 = 400;
 
 fn main() {
-    for count in [10, 20, 30] {
-        for precision in [Precision::F64, Precision::F32] {
+    for precision in [Precision::F64, Precision::F32] {
+        for count in [10, 20, 30] {
             compare(count, precision);
         }
+        price_of_shuffling(precision);
     }
+}
+
+/// What drawing a fresh order every epoch costs, against presenting the patterns as they are.
+fn price_of_shuffling(precision: Precision) {
+    let patterns = beam_patterns(30);
+    let topology = Topology::new(&NetworkConfig::default(), patterns.inputs, patterns.outputs);
+    let set = InstructionSet::best();
+    let mut shares = Vec::new();
+    for _ in 0..ROUNDS {
+        let seconds = [PresentationOrder::Shuffled, PresentationOrder::Fixed].map(|order| {
+            let rule = BackPropagation {
+                aggregate_error: 0.0,
+                max_epochs: EPOCHS,
+                order,
+                ..BackPropagation::default()
+            };
+            let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
+            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let start = ThreadTime::now();
+            train_many(set, precision, &task, &mut queue);
+            start.elapsed().as_secs_f64()
+        });
+        shares.push(100.0 * (seconds[0] - seconds[1]) / seconds[0]);
+    }
+    println!("30 patterns, {precision:?}, {set}: shuffling takes {:.1} % of the time", median(&mut shares));
 }
 
 fn compare(count: usize, precision: Precision) {
