@@ -92,7 +92,7 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn mul_sub(self, factor: Self, term: Self) -> Self;
     /// `self · 2^n`, where `shifted` = n + [`Real::ROUNDER`] and the result is a normal number.
     fn scale_by_power_of_two(self, shifted: Self) -> Self;
-    /// For every column of the table, the value of each lane's pick.
+    /// For every column of the table, the value of each lane's pick, of which only the low bits count.
     fn look_up(table: &Table<Self::Real>, picks: &[u32; N], values: &mut [Self]);
 }
 
@@ -106,7 +106,7 @@ pub(crate) struct Table<R> {
 impl<R: Real> Table<R> {
     /// Turns rows of `width` values into columns.
     pub(crate) fn from_rows(rows: &[f64], width: usize) -> Self {
-        let column_len = (rows.len() / width.max(1)).next_power_of_two().max(SHORTEST_COLUMN);
+        let column_len = column_len(rows.len() / width.max(1));
         let mut values = vec![R::from_f64(0.0); column_len * width];
         for (k, &value) in rows.iter().enumerate() {
             values[k % width * column_len + k / width] = R::from_f64(value);
@@ -120,7 +120,7 @@ impl<R: Real> Table<R> {
         for (column, value) in self.values.chunks_exact(self.column_len).zip(values) {
             let mut lanes = [column[0]; N];
             for l in 0..N {
-                lanes[l] = column[picks[l] as usize];
+                lanes[l] = column[picks[l] as usize & (column.len() - 1)];
             }
             *value = V::from_array(lanes);
         }
@@ -131,6 +131,11 @@ impl<R: Real> Table<R> {
     fn short_columns(&self) -> Option<&[[R; SHORTEST_COLUMN]]> {
         (self.column_len == SHORTEST_COLUMN).then(|| self.values.as_chunks().0)
     }
+}
+
+/// The length of a column that holds `patterns` numbers.
+fn column_len(patterns: usize) -> usize {
+    patterns.next_power_of_two().max(SHORTEST_COLUMN)
 }
 
 /// Columns are padded to at least this, two AVX-512 registers of f32.

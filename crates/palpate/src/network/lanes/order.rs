@@ -5,6 +5,8 @@
 //! Fisher and Yates' exchanges would need a scattered store a lane and presentation. With n = 30 the 27 random bits of
 //! two keys coincide once in 300,000 epochs; then the lower number goes first, a bias far below what matters.
 
+use super::column_len;
+
 /// The generator xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams side by side.
 #[derive(Clone, Debug)]
 pub(crate) struct Streams<const N: usize>([[u32; N]; 4]);
@@ -67,7 +69,7 @@ impl Streams<1> {
 }
 
 /// The exchanges of Batcher's odd–even merge sort for n keys (Knuth, TAOCP vol. 3, 5.2.2, algorithm M).
-fn exchanges(n: usize) -> Vec<(usize, usize)> {
+fn exchanges(n: usize) -> Vec<(u32, u32)> {
     let mut list = Vec::new();
     if n < 2 {
         return list;
@@ -77,7 +79,7 @@ fn exchanges(n: usize) -> Vec<(usize, usize)> {
     while p > 0 {
         let (mut q, mut r, mut d) = (top, 0, p);
         loop {
-            list.extend((0..n - d).filter(|i| i & p == r).map(|i| (i, i + d)));
+            list.extend((0..n - d).filter(|i| i & p == r).map(|i| (i as u32, (i + d) as u32)));
             if q == p {
                 break;
             }
@@ -95,16 +97,17 @@ pub(crate) struct OrderDrawer {
     patterns: usize,
     /// Covers the pattern number in a key.
     mask: u32,
-    exchanges: Vec<(usize, usize)>,
+    exchanges: Vec<(u32, u32)>,
 }
 
 impl OrderDrawer {
     pub(crate) fn new(patterns: usize) -> Self {
-        let mask = patterns.next_power_of_two() as u32 - 1;
+        let mask = column_len(patterns) as u32 - 1;
         Self { patterns, mask, exchanges: exchanges(patterns) }
     }
 
-    /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane.
+    /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The pattern's number
+    /// is a pick's low bits, which is what [`Table`](super::Table)s look at; the bits above it are left as they were drawn.
     #[inline(always)]
     pub(crate) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
         // A copy of its own lets the generator's state stay in registers.
@@ -117,15 +120,11 @@ impl OrderDrawer {
         }
         *streams = local;
         for &(i, j) in &self.exchanges {
+            let (i, j) = (i as usize, j as usize);
             let (low, high) = (order[i], order[j]);
             for l in 0..N {
                 order[i][l] = low[l].min(high[l]);
                 order[j][l] = low[l].max(high[l]);
-            }
-        }
-        for row in order.iter_mut() {
-            for pick in row {
-                *pick &= self.mask;
             }
         }
     }
@@ -182,7 +181,8 @@ mod tests {
                 for (lane, single) in singles.iter_mut().enumerate() {
                     let mut expected = vec![0; patterns];
                     drawer.draw_one(single, &mut expected);
-                    assert_eq!(order.iter().map(|row| row[lane]).collect::<Vec<_>>(), expected);
+                    let drawn: Vec<_> = order.iter().map(|row| row[lane] & drawer.mask).collect();
+                    assert_eq!(drawn, expected);
                     expected.sort_unstable();
                     assert!(expected.into_iter().eq(0..patterns as u32), "{patterns} patterns");
                 }
