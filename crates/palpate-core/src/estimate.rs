@@ -4,24 +4,76 @@ use crate::Position;
 
 /// Where a locator believes that the surface is touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimate {
-    /// The contact's position.
-    pub position: Position,
-    /// The contact's force in newtons, positive downward, where the locator estimates it.
-    pub force_n: Option<f64>,
+    /// The contact: the only one, or the strongest.
+    pub contact: ContactEstimate,
     /// How far the estimate is to be believed.
     pub status: Status,
+    /// Other places that explain the same single contact, most probable first, when the status is
+    /// [`Status::Ambiguous`].
+    pub modes: Few<Mode, 3>,
+    /// Contacts beside the first that touch at the same time, strongest first.
+    pub further: Few<ContactEstimate, 2>,
+}
+
+/// One estimated contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactEstimate {
+    /// Where it is.
+    pub position: Position,
+    /// Its force in newtons, positive downward, where it is known or estimated.
+    pub force_n: Option<f64>,
+    /// How sure the locator is, where its method can tell.
+    pub uncertainty: Option<Uncertainty>,
+}
+
+/// The uncertainty of one estimated contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Uncertainty {
+    /// Covariance of (x, y, force), in m², m·N and N², upper triangle: xx, xy, xf, yy, yf, ff. What is not estimated
+    /// has zeros.
+    pub covariance: [f64; 6],
+    /// Lower and upper end of the 95 % interval along x, in metres.
+    pub x_95_m: (f64, f64),
+    /// Lower and upper end of the 95 % interval across, in metres; both 0 on a one-dimensional surface.
+    pub y_95_m: (f64, f64),
+}
+
+/// One place that explains a reading, and how probable it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mode {
+    /// The contact there.
+    pub contact: ContactEstimate,
+    /// Its share of the posterior probability, 0 to 1.
+    pub probability: f64,
 }
 
 /// How far an estimate is to be believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Status {
     /// A position on the surface.
     Located,
+    /// Nothing touches: the reading is noise. The position means nothing.
+    NoContact,
+    /// Several places explain the reading; the estimate is the most probable one, and its modes are the others.
+    Ambiguous,
+    /// No contact explains the reading within the noise: more contacts than assumed, a damaged sensor, drift.
+    OutsideModel,
     /// A position beyond the surface's edge, which no contact can have.
     OutsideSurface,
+}
+
+impl Estimate {
+    /// An estimate that is a position and nothing more.
+    pub const fn of_position(position: Position, status: Status) -> Self {
+        let contact = ContactEstimate { position, force_n: None, uncertainty: None };
+        Self { contact, status, modes: Few::none(NO_MODE), further: Few::none(NO_CONTACT) }
+    }
+
+    /// An estimate of one contact.
+    pub const fn of_contact(contact: ContactEstimate, status: Status) -> Self {
+        Self { contact, status, modes: Few::none(NO_MODE), further: Few::none(NO_CONTACT) }
+    }
 }
 
 impl Status {
@@ -29,7 +81,55 @@ impl Status {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Located => "located",
+            Self::NoContact => "no_contact",
+            Self::Ambiguous => "ambiguous",
+            Self::OutsideModel => "outside_model",
             Self::OutsideSurface => "outside_surface",
         }
+    }
+}
+
+const NO_CONTACT: ContactEstimate =
+    ContactEstimate { position: Position::along(0.0), force_n: None, uncertainty: None };
+const NO_MODE: Mode = Mode { contact: NO_CONTACT, probability: 0.0 };
+
+/// A list of at most N, without allocation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Few<T, const N: usize> {
+    items: [T; N],
+    len: usize,
+}
+
+impl<T: Copy, const N: usize> Few<T, N> {
+    /// An empty list; `filler` stands where nothing is.
+    pub const fn none(filler: T) -> Self {
+        Self { items: [filler; N], len: 0 }
+    }
+
+    /// Adds an item, and says whether there was room.
+    pub fn push(&mut self, item: T) -> bool {
+        let Some(slot) = self.items.get_mut(self.len) else { return false };
+        *slot = item;
+        self.len += 1;
+        true
+    }
+
+    /// The items.
+    pub fn as_slice(&self) -> &[T] {
+        &self.items[..self.len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_list_takes_no_more() {
+        let mut few = Few::<u8, 2>::none(0);
+        assert!(few.as_slice().is_empty());
+        assert!(few.push(1) && few.push(2));
+        assert!(!few.push(3));
+        assert_eq!(few.as_slice(), [1, 2]);
     }
 }

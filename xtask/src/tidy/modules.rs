@@ -8,17 +8,23 @@ use super::used_paths::used_paths;
 const SOURCE: &str = "crates/palpate/src/";
 
 /// Top to bottom: a module may use those above it.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 27] = [
     "units",
+    "numerics",
+    "regression",
     "contact",
     "sensing",
     "mechanics",
     "recording",
     "bench",
     "arrangement",
+    "method",
     "network",
     "influence",
     "gaussian_process",
+    "closed_form",
+    "neighbours",
+    "centroid",
     "tracking",
     "distribution",
     "estimator",
@@ -33,7 +39,16 @@ const ORDER: [&str; 21] = [
 ];
 
 /// The ways to interpret readings. The estimator knows them; they do not know each other.
-const METHODS: [&str; 5] = ["network", "influence", "gaussian_process", "tracking", "distribution"];
+const METHODS: [&str; 8] = [
+    "network",
+    "influence",
+    "gaussian_process",
+    "closed_form",
+    "neighbours",
+    "centroid",
+    "tracking",
+    "distribution",
+];
 
 /// Modules that treat every locator alike, so they see methods through `estimator` only.
 const BLIND_TO_METHODS: [&str; 2] = ["evaluation", "report"];

@@ -133,7 +133,7 @@ impl Stream<'_> {
     }
 
     fn csv_line(&self, estimate: &Estimate) -> String {
-        let (x_mm, y_mm) = (estimate.position.x_m * 1e3, estimate.position.y_m * 1e3);
+        let (x_mm, y_mm) = (estimate.contact.position.x_m * 1e3, estimate.contact.position.y_m * 1e3);
         let status = estimate.status.name();
         if self.is_plane() {
             format!("{x_mm:.4},{y_mm:.4},{status}\n")
@@ -145,9 +145,9 @@ impl Stream<'_> {
     fn json_line(&self, estimate: &Estimate) -> Result<String, Failure> {
         let object = JsonEstimate {
             line: self.line,
-            x_mm: estimate.position.x_m * 1e3,
-            y_mm: self.is_plane().then_some(estimate.position.y_m * 1e3),
-            force_n: estimate.force_n,
+            x_mm: estimate.contact.position.x_m * 1e3,
+            y_mm: self.is_plane().then_some(estimate.contact.position.y_m * 1e3),
+            force_n: estimate.contact.force_n,
             status: estimate.status.name(),
         };
         serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())

@@ -75,7 +75,7 @@ impl Locator {
         let position = network.position(reading).ok_or(mismatch)?;
         let on_surface = self.bench.surface.extent().contains(position);
         let status = if on_surface { Status::Located } else { Status::OutsideSurface };
-        Ok(Estimate { position, force_n: None, status })
+        Ok(Estimate::of_position(position, status))
     }
 
     /// The `kind` under which a rig names its estimator.

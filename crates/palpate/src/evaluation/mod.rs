@@ -80,7 +80,7 @@ impl Evaluation {
     /// [`ReadingError`] when the recording's channels are not the locator's.
     pub fn of(locator: &Locator, recording: &Recording) -> Result<Self, ReadingError> {
         let locate = |row: &crate::recording::Row| {
-            let estimate = locator.locate(&row.reading)?.position;
+            let estimate = locator.locate(&row.reading)?.contact.position;
             Ok(Located { truth: row.position, estimate })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
