@@ -4,7 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
 use crate::{input, output};
 use palpate::estimator::Fitting;
-use palpate::network::TrainingStatus;
+use palpate::network::{TrainingOutcome, TrainingStatus};
 use palpate::simulate::simulate;
 use palpate::units::format_count;
 use std::path::PathBuf;
@@ -35,7 +35,8 @@ struct Outcome<'a> {
     estimator: &'a str,
     seed: u64,
     rows: usize,
-    training: palpate::network::TrainingOutcome,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    training: Option<palpate::network::TrainingOutcome>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -54,12 +55,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut watch = FitWatch::new(rig.estimator.most_rounds());
     let locator = fitting.fit(arguments.seed, &mut || watch.keep_going());
     drop(watch);
+    let locator = locator.map_err(Complaint::new)?;
     let Some(locator) = locator else {
         return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
     };
     let training = locator.training_outcome();
-    let epochs = format_count(u64::from(training.epochs));
-    if training.status == TrainingStatus::Diverged {
+    if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
+        let epochs = format_count(u64::from(epochs));
         return Err(Failure::GoalMissed(format!(
             "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
         )));
@@ -76,15 +78,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             training,
         });
     }
-    let status = match training.status {
-        TrainingStatus::Converged => "converged",
-        _ => "stopped at the cap",
-    };
-    let error = training.aggregate_error;
+    let ended = training.map_or_else(String::new, |outcome| format!("; {}", in_words(outcome)));
     output::say(format!(
-        "{} fitted to {} rows; training {status} after {epochs} epochs, aggregate error {error:.2e}: {}",
+        "{} fitted to {} rows{ended}: {}",
         locator.kind(),
         recording.rows.len(),
         arguments.out.display()
     ))
+}
+
+fn in_words(outcome: TrainingOutcome) -> String {
+    let status = match outcome.status {
+        TrainingStatus::Converged => "converged",
+        _ => "stopped at the cap",
+    };
+    let epochs = format_count(u64::from(outcome.epochs));
+    format!("training {status} after {epochs} epochs, aggregate error {:.2e}", outcome.aggregate_error)
 }

@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::{input, output};
 use palpate::bench::Bench;
+use palpate::estimator::Method;
 use palpate::mechanics::SurfaceSpec;
 use palpate::network::Topology;
 use palpate::rig::{Rig, Training};
@@ -114,7 +115,7 @@ fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
 
 fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     let locator = input::parse_locator(path, text)?;
-    let (provenance, outcome) = (&locator.provenance, locator.training_outcome());
+    let provenance = &locator.provenance;
     let mut lines = vec![format!(
         "a locator, {}, fitted by palpate {}, seed {}",
         locator.kind(),
@@ -122,20 +123,36 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         provenance.seed
     )];
     lines.extend(bench(&locator.bench));
-    let palpate::estimator::Method::Network(network) = &locator.method;
-    lines.push(format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()));
-    lines.push(format!(
-        "training: {} after {} epochs, aggregate error {:.2e}",
-        outcome.status,
-        format_count(u64::from(outcome.epochs)),
-        outcome.aggregate_error
-    ));
+    lines.extend(method(&locator.method));
     let recording = &provenance.recording;
     lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
     for digest in &recording.digests {
         lines.push(format!("    sha256 {digest}"));
     }
     Ok(lines)
+}
+
+fn method(method: &Method) -> Vec<String> {
+    match method {
+        Method::Network(network) => {
+            let outcome = network.outcome;
+            vec![
+                format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()),
+                format!(
+                    "training: {} after {} epochs, aggregate error {:.2e}",
+                    outcome.status,
+                    format_count(u64::from(outcome.epochs)),
+                    outcome.aggregate_error
+                ),
+            ]
+        }
+        Method::Influence(influence) => vec![format!(
+            "influence functions of {} sensors at {} nodes; at most {} contacts at once",
+            influence.table().sensors,
+            influence.table().nodes(),
+            influence.contacts()
+        )],
+    }
 }
 
 fn shape(topology: &Topology) -> String {

@@ -1,8 +1,9 @@
 //! `palpate locate`: readings in, estimates out, line by line.
 
+use super::estimate_line;
 use crate::failure::{Complaint, Failure};
 use crate::{input, interrupt, output};
-use palpate::estimator::{Estimate, Locator};
+use palpate::estimator::Locator;
 use palpate::recording::{Column, Columns, Header, ReadingParser};
 use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal, Write};
@@ -18,13 +19,21 @@ pub struct Arguments {
     /// The readings have no header: a row is one value a channel, in the locator's order
     #[arg(long)]
     no_header: bool,
+    /// Leave a dead channel out, by its number from 1; may be repeated
+    #[arg(long, value_name = "CHANNEL")]
+    dead: Vec<usize>,
     /// Print one JSON object a line instead of CSV
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let locator = input::read_locator(&arguments.locator)?;
+    let mut locator = input::read_locator(&arguments.locator)?;
+    for channel in &arguments.dead {
+        // Channel 0 is none, like those beyond the last.
+        let left_out = locator.leave_out(channel.wrapping_sub(1));
+        left_out.map_err(|error| Complaint::new(format!("--dead {channel}: {error}")))?;
+    }
     let stdin = Path::new("-");
     let path = arguments.readings.as_deref().unwrap_or(stdin);
     let (name, source): (String, Box<dyn BufRead>) = if path == stdin {
@@ -60,26 +69,13 @@ struct Stream<'a> {
     line: u64,
 }
 
-/// An estimate as a line of JSON.
-#[derive(serde::Serialize)]
-struct JsonEstimate {
-    line: u64,
-    x_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    y_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    force_n: Option<f64>,
-    status: &'static str,
-}
-
 impl Stream<'_> {
     fn run(&mut self, mut source: Box<dyn BufRead>, columns: &Columns) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
         let mut line = Vec::new();
         let mut parser = ReadingParser::new(&self.name, columns);
         if !self.json {
-            let heading = if self.is_plane() { "x_mm,y_mm,status\n" } else { "position_mm,status\n" };
-            output::print(&mut out, heading.as_bytes())?;
+            output::print(&mut out, estimate_line::heading(self.is_plane()).as_bytes())?;
         }
         while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
             match parser.parse_line(&line) {
@@ -111,7 +107,11 @@ impl Stream<'_> {
     fn locate(&mut self, reading: &[f64], out: &mut impl Write) -> Result<(), Failure> {
         match self.locator.locate(reading) {
             Ok(estimate) => {
-                let line = if self.json { self.json_line(&estimate)? } else { self.csv_line(&estimate) };
+                let line = if self.json {
+                    estimate_line::json(&estimate, self.line, self.is_plane())?
+                } else {
+                    estimate_line::csv(&estimate, self.is_plane())
+                };
                 output::print(out, line.as_bytes())?;
                 // A reader at the other end of a pipe wants each estimate now.
                 out.flush().map_err(|_| Failure::NobodyReads)
@@ -130,26 +130,5 @@ impl Stream<'_> {
 
     fn is_plane(&self) -> bool {
         self.locator.bench.surface.extent().width_m.is_some()
-    }
-
-    fn csv_line(&self, estimate: &Estimate) -> String {
-        let (x_mm, y_mm) = (estimate.contact.position.x_m * 1e3, estimate.contact.position.y_m * 1e3);
-        let status = estimate.status.name();
-        if self.is_plane() {
-            format!("{x_mm:.4},{y_mm:.4},{status}\n")
-        } else {
-            format!("{x_mm:.4},{status}\n")
-        }
-    }
-
-    fn json_line(&self, estimate: &Estimate) -> Result<String, Failure> {
-        let object = JsonEstimate {
-            line: self.line,
-            x_mm: estimate.contact.position.x_m * 1e3,
-            y_mm: self.is_plane().then_some(estimate.contact.position.y_m * 1e3),
-            force_n: estimate.contact.force_n,
-            status: estimate.status.name(),
-        };
-        serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
     }
 }

@@ -1,5 +1,6 @@
 //! What a rig's `[estimator]` section says.
 
+use crate::influence::InfluenceConfig;
 use crate::network::NetworkConfig;
 
 /// A configured method; fitting it to a recording gives a locator.
@@ -7,16 +8,18 @@ use crate::network::NetworkConfig;
 pub enum EstimatorConfig {
     /// The founding paper's network (`kind = "network"`).
     Network(NetworkConfig),
+    /// Influence functions, inverted (`kind = "influence"`).
+    Influence(InfluenceConfig),
 }
 
 impl EstimatorConfig {
     /// Every `kind` that a rig can name.
-    pub const KINDS: &'static [&'static str] = &["network"];
+    pub const KINDS: &'static [&'static str] = &["network", "influence"];
 
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {
         match self {
-            Self::Network(_) => 2,
+            Self::Network(_) | Self::Influence(_) => 2,
         }
     }
 
@@ -24,6 +27,7 @@ impl EstimatorConfig {
     pub fn most_rounds(&self) -> u64 {
         match self {
             Self::Network(config) => u64::from(config.training.max_epochs),
+            Self::Influence(_) => 1,
         }
     }
 
@@ -31,6 +35,7 @@ impl EstimatorConfig {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Network(_) => "network",
+            Self::Influence(_) => "influence",
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use super::{EstimatorConfig, Locator, LocatorProvenance, Method};
 use crate::bench::Bench;
+use crate::influence::InfluenceFitError;
+use crate::method::{Fit, FitTask};
 use crate::network::{
     InstructionSet, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork, TrainingOutcome,
     train_many, train_one,
@@ -22,6 +24,9 @@ pub enum FitError {
     /// What the network has to say.
     #[error(transparent)]
     Network(#[from] NetworkFitError),
+    /// What the influence estimator has to say.
+    #[error(transparent)]
+    Influence(#[from] InfluenceFitError),
 }
 
 /// Where [`Fitting::fit_many`] takes its seeds from and leaves its locators.
@@ -44,7 +49,10 @@ pub struct Fitting {
 
 #[derive(Clone, Debug)]
 enum MethodFitting {
+    /// Coded once for all seeds.
     Network(NetworkFitting),
+    /// Fitted from the recording as it is.
+    Other(EstimatorConfig, Recording),
 }
 
 impl Fitting {
@@ -60,50 +68,62 @@ impl Fitting {
         if recording.channels.len() != bench.layout.len() {
             return Err(FitError::Channels { needed: bench.layout.len(), found: recording.channels.len() });
         }
-        let EstimatorConfig::Network(config) = estimator;
-        let (extent, model) = (bench.surface.extent(), bench.surface.model());
-        let method = NetworkFitting::prepare(config, extent, model, bench.force_n, recording)?;
-        Ok(Self {
-            bench: bench.clone(),
-            recording: recording.provenance.clone(),
-            method: MethodFitting::Network(method),
-        })
+        let method = match estimator {
+            EstimatorConfig::Network(config) => {
+                let (extent, model) = (bench.surface.extent(), bench.surface.model());
+                let fitting = NetworkFitting::prepare(config, extent, model, bench.force_n, recording)?;
+                MethodFitting::Network(fitting)
+            }
+            other => MethodFitting::Other(other.clone(), recording.clone()),
+        };
+        Ok(Self { bench: bench.clone(), recording: recording.provenance.clone(), method })
     }
 
     /// Fits once; `None` when `keep_going`, asked often, says no.
-    pub fn fit(&self, seed: u64, keep_going: &mut dyn FnMut() -> bool) -> Option<Locator> {
-        let MethodFitting::Network(network) = &self.method;
-        train_one(Precision::F64, &network.task(), seed, keep_going)
-            .map(|trained| self.locator(seed, trained))
+    ///
+    /// # Errors
+    /// [`FitError`] when the recording does not suit the estimator.
+    pub fn fit(&self, seed: u64, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<Locator>, FitError> {
+        let method = match &self.method {
+            MethodFitting::Network(network) => {
+                let trained = train_one(Precision::F64, &network.task(), seed, keep_going);
+                trained.map(|trained| Method::Network(network.locator(trained)))
+            }
+            MethodFitting::Other(config, recording) => {
+                fit_method(config, FitTask { bench: &self.bench, recording, seed }, keep_going)?
+            }
+        };
+        Ok(method.map(|method| self.locator(seed, method)))
     }
 
-    /// Fits once for every seed of the queue, as many at once as `set` has lanes. A seed gives the same locator as
-    /// [`Fitting::fit`] does in the same precision.
+    /// Trains a network for every seed of the queue, as many at once as `set` has lanes; takes nothing from the queue
+    /// for another method. A seed gives the same locator as [`Fitting::fit`] does in the same precision.
     pub fn fit_many(&self, set: InstructionSet, precision: Precision, queue: &mut dyn LocatorQueue) {
-        let MethodFitting::Network(network) = &self.method;
-        train_many(set, precision, &network.task(), &mut Seeds { fitting: self, queue });
+        if let MethodFitting::Network(network) = &self.method {
+            train_many(set, precision, &network.task(), &mut Seeds { fitting: self, network, queue });
+        }
     }
 
-    /// The locator that an earlier fit gave, from its parameters and outcome; `None` when their number is not the
-    /// method's.
-    pub fn restore(&self, seed: u64, parameters: Vec<f64>, outcome: TrainingOutcome) -> Option<Locator> {
-        let MethodFitting::Network(network) = &self.method;
-        (parameters.len() == network.topology.weight_count()).then(|| {
-            self.locator(
-                seed,
-                TrainedNetwork { topology: network.topology.clone(), weights: parameters, outcome },
-            )
+    /// The network locator that an earlier fit gave, from its weights and outcome; `None` when their number is not the
+    /// network's, or for another method.
+    pub fn restore(&self, seed: u64, weights: Vec<f64>, outcome: TrainingOutcome) -> Option<Locator> {
+        let MethodFitting::Network(network) = &self.method else { return None };
+        let topology = network.topology.clone();
+        (weights.len() == topology.weight_count()).then(|| {
+            let trained = TrainedNetwork { topology, weights, outcome };
+            self.locator(seed, Method::Network(network.locator(trained)))
         })
     }
 
-    /// Patterns that one epoch of iterative fitting presents.
+    /// Patterns that one epoch of training presents; 0 for a method that is not trained by epochs.
     pub fn patterns(&self) -> usize {
-        let MethodFitting::Network(network) = &self.method;
-        network.patterns.count()
+        match &self.method {
+            MethodFitting::Network(network) => network.patterns.count(),
+            MethodFitting::Other(..) => 0,
+        }
     }
 
-    fn locator(&self, seed: u64, trained: TrainedNetwork) -> Locator {
-        let MethodFitting::Network(network) = &self.method;
+    fn locator(&self, seed: u64, method: Method) -> Locator {
         Locator {
             bench: self.bench.clone(),
             provenance: LocatorProvenance {
@@ -111,14 +131,28 @@ impl Fitting {
                 seed,
                 recording: self.recording.clone(),
             },
-            method: Method::Network(network.locator(trained)),
+            method,
         }
     }
+}
+
+/// Fits a method other than the paper's network.
+fn fit_method(
+    config: &EstimatorConfig,
+    task: FitTask,
+    keep_going: &mut dyn FnMut() -> bool,
+) -> Result<Option<Method>, FitError> {
+    Ok(match config {
+        // Prepared networks never come here.
+        EstimatorConfig::Network(_) => None,
+        EstimatorConfig::Influence(config) => config.fit(task, keep_going)?.map(Method::Influence),
+    })
 }
 
 /// A queue of networks in front of a queue of locators.
 struct Seeds<'a> {
     fitting: &'a Fitting,
+    network: &'a NetworkFitting,
     queue: &'a mut dyn LocatorQueue,
 }
 
@@ -127,7 +161,8 @@ impl SeedQueue for Seeds<'_> {
         self.queue.next_seed()
     }
     fn finished(&mut self, seed: u64, network: TrainedNetwork) {
-        self.queue.fitted(seed, self.fitting.locator(seed, network));
+        let method = Method::Network(self.network.locator(network));
+        self.queue.fitted(seed, self.fitting.locator(seed, method));
     }
     fn keep_going(&mut self) -> bool {
         self.queue.keep_going()

@@ -1,9 +1,11 @@
 //! What fitting gives: all that a reading needs to become an estimate.
 
 use crate::bench::Bench;
+use crate::influence::BeamLocator;
+use crate::method::{Locate, LocatorFault};
 use crate::network::{NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
-use palpate_core::{Estimate, Status};
+use palpate_core::Estimate;
 
 /// A fitted estimator. It carries its surface, layout, scaling and provenance, so that nothing it needs is outside it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -35,6 +37,18 @@ pub struct LocatorProvenance {
 pub enum Method {
     /// The founding paper's network.
     Network(NetworkLocator),
+    /// Influence functions, inverted.
+    Influence(BeamLocator),
+}
+
+impl Method {
+    /// What every method can do.
+    fn locate(&self) -> &dyn Locate {
+        match self {
+            Self::Network(network) => network,
+            Self::Influence(influence) => influence,
+        }
+    }
 }
 
 /// A reading that no estimate can be made of.
@@ -58,42 +72,95 @@ pub enum ReadingError {
     },
 }
 
+/// A channel that cannot be left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LeaveOutError {
+    /// There is no such channel.
+    #[error("there is no channel {channel}; the locator has channels 1 to {channels}")]
+    NoChannel {
+        /// Which was named, from 1.
+        channel: usize,
+        /// Channels of the locator.
+        channels: usize,
+    },
+    /// The method cannot do without it.
+    #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
+    Needed {
+        /// The locator's kind.
+        kind: &'static str,
+    },
+    /// It is the last one.
+    #[error("it is the last living channel; at least 1 must be left")]
+    NoneLeft,
+}
+
 impl Locator {
     /// Where the surface is touched when the sensors read `reading`: one value a channel, in SI units or raw.
     ///
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        let mismatch = ReadingError::Channels { needed: self.bench.layout.len(), found: reading.len() };
-        if reading.len() != self.bench.layout.len() {
-            return Err(mismatch);
+        let (needed, found) = (self.bench.layout.len(), reading.len());
+        if needed != found {
+            return Err(ReadingError::Channels { needed, found });
         }
         if let Some(i) = reading.iter().position(|value| !value.is_finite()) {
             return Err(ReadingError::NotFinite { channel: i + 1, value: reading[i] });
         }
-        let Method::Network(network) = &self.method;
-        let position = network.position(reading).ok_or(mismatch)?;
-        let on_surface = self.bench.surface.extent().contains(position);
-        let status = if on_surface { Status::Located } else { Status::OutsideSurface };
-        Ok(Estimate::of_position(position, status))
+        Ok(self.method.locate().locate(reading))
+    }
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    pub fn check(&self) -> Result<(), LocatorFault> {
+        self.method.locate().check(&self.bench)
+    }
+
+    /// Leaves a dead channel out of all sums from now on, without fitting again.
+    ///
+    /// # Errors
+    /// [`LeaveOutError`] when there is no such channel, or the method needs it.
+    pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
+        let channels = self.bench.layout.len();
+        if channel >= channels {
+            return Err(LeaveOutError::NoChannel { channel: channel + 1, channels });
+        }
+        let kind = self.kind();
+        match &mut self.method {
+            Method::Influence(influence) => {
+                if !influence.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
+            _ => return Err(LeaveOutError::Needed { kind }),
+        }
+        self.bench.layout.sensors[channel].channel.dead = true;
+        Ok(())
     }
 
     /// The `kind` under which a rig names its estimator.
     pub fn kind(&self) -> &'static str {
         match self.method {
             Method::Network(_) => "network",
+            Method::Influence(_) => "influence",
         }
     }
 
-    /// The numbers that fitting found.
-    pub fn parameters(&self) -> &[f64] {
-        let Method::Network(network) = &self.method;
-        &network.weights
+    /// The weights of a network; nothing for another method.
+    pub fn weights(&self) -> &[f64] {
+        match &self.method {
+            Method::Network(network) => &network.weights,
+            _ => &[],
+        }
     }
 
-    /// How its training ended.
-    pub fn training_outcome(&self) -> TrainingOutcome {
-        let Method::Network(network) = &self.method;
-        network.outcome
+    /// How its training ended, where it was trained by epochs.
+    pub fn training_outcome(&self) -> Option<TrainingOutcome> {
+        match &self.method {
+            Method::Network(network) => Some(network.outcome),
+            _ => None,
+        }
     }
 }

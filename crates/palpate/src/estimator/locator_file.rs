@@ -1,7 +1,7 @@
 //! The locator file: JSON with a format version.
 
-use super::{Locator, Method};
-use crate::network::NetworkLocatorError;
+use super::Locator;
+use crate::method::LocatorFault;
 
 /// The `format` of every locator file.
 const FORMAT: &str = "palpate-locator";
@@ -31,7 +31,7 @@ pub enum LocatorFileError {
     },
     /// Numbers that do not fit together.
     #[error(transparent)]
-    Network(#[from] NetworkLocatorError),
+    Fault(#[from] LocatorFault),
 }
 
 impl LocatorFileError {
@@ -91,8 +91,7 @@ impl Locator {
             return Err(LocatorFileError::Version { found: heading.format_version });
         }
         let Read { locator, .. } = serde_json::from_str(text)?;
-        let Method::Network(network) = &locator.method;
-        network.check(locator.bench.layout.len())?;
+        locator.check()?;
         Ok(locator)
     }
 }

@@ -8,7 +8,7 @@ mod settings;
 
 pub use config::EstimatorConfig;
 pub use fitting::{FitError, Fitting, LocatorQueue};
-pub use locator::{Locator, LocatorProvenance, Method, ReadingError};
+pub use locator::{LeaveOutError, Locator, LocatorProvenance, Method, ReadingError};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
-pub use palpate_core::{Estimate, Status};
+pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 pub use settings::Setting;

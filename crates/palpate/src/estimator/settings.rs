@@ -1,6 +1,7 @@
 //! An estimator's settings in words, so that a report can list those of any method.
 
 use super::EstimatorConfig;
+use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::network::{
     Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
 };
@@ -22,8 +23,26 @@ impl EstimatorConfig {
     pub fn settings(&self) -> Vec<Setting> {
         match self {
             Self::Network(config) => network(config),
+            Self::Influence(config) => influence(*config),
         }
     }
+}
+
+fn influence(config: InfluenceConfig) -> Vec<Setting> {
+    let from = match config.from {
+        InfluenceSource::Recording => "the recording alone",
+        InfluenceSource::Mechanics => "the mechanics alone",
+        InfluenceSource::Corrected => "the mechanics, corrected by the recording",
+    };
+    let force = match config.force_sd_n {
+        Some(sd_n) => format!("about the bench's, ± {sd_n} N (1 σ)"),
+        None => "as the bench says: known, or unknown".to_owned(),
+    };
+    vec![
+        Setting { key: "from", name: "influence functions from", value: from.to_owned() },
+        Setting { key: "contacts", name: "contacts at once, at most", value: config.contacts.to_string() },
+        Setting { key: "force_sd", name: "contact force", value: force },
+    ]
 }
 
 fn network(config: &NetworkConfig) -> Vec<Setting> {

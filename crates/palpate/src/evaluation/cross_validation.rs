@@ -34,7 +34,7 @@ pub fn cross_validate(
     let mut pooled = Evaluation { length_m: rig.bench.surface.extent().length_m, located: Vec::new() };
     for fold in recording.folds(folds)? {
         let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording.subset(&fold.training))?;
-        let Some(locator) = fitting.fit(seed, keep_going) else { return Ok(None) };
+        let Some(locator) = fitting.fit(seed, keep_going)? else { return Ok(None) };
         let part = Evaluation::of(&locator, &recording.subset(&fold.held_out))?;
         pooled.located.extend(part.located);
     }

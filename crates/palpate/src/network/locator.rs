@@ -1,8 +1,11 @@
 //! A fitted network: scaling, weights and coding, all that a reading needs to become a position.
 
 use super::{Topology, TrainingOutcome};
+use crate::bench::Bench;
 use crate::contact::Position;
 use crate::mechanics::Extent;
+use crate::method::{Locate, LocatorFault};
+use palpate_core::{Estimate, Status};
 
 /// How a channel's reading r becomes an input: (r − offset) / divisor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,45 +42,15 @@ pub struct NetworkLocator {
     pub outcome: TrainingOutcome,
 }
 
-/// A network locator whose numbers do not fit together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NetworkLocatorError {
-    /// A list has the wrong length.
-    #[error("the network has {found} {what}; its layers ask for {needed}")]
-    Count {
-        /// What the list holds.
-        what: &'static str,
-        /// Length that the topology asks for.
-        needed: usize,
-        /// Length of the list.
-        found: usize,
-    },
-    /// A layer without nodes, or no layer at all.
-    #[error("the network's layers are not at least 2, each with at least 1 node")]
-    EmptyLayer,
-    /// A number that is infinite or not a number, or a scale that is not greater than 0.
-    #[error("the network's {what} number {number} is not a usable number")]
-    BadNumber {
-        /// What the list holds.
-        what: &'static str,
-        /// Which one, from 1.
-        number: usize,
-    },
-}
-
 impl NetworkLocator {
-    /// Checks what a file may have got wrong, for locators of `channels` channels.
-    ///
-    /// # Errors
-    /// [`NetworkLocatorError`], naming the list.
-    pub fn check(&self, channels: usize) -> Result<(), NetworkLocatorError> {
+    fn check_numbers(&self, channels: usize) -> Result<(), LocatorFault> {
         let sizes = &self.topology.sizes;
-        if sizes.len() < 2 || sizes.contains(&0) {
-            return Err(NetworkLocatorError::EmptyLayer);
+        let count = LocatorFault::check_count;
+        if sizes.len() < 2 {
+            return Err(LocatorFault::Count { what: "layers", needed: 2, found: sizes.len() });
         }
-        let count = |what, needed, found| {
-            if needed == found { Ok(()) } else { Err(NetworkLocatorError::Count { what, needed, found }) }
-        };
+        let nodes = sizes.iter().map(|nodes| *nodes as f64);
+        LocatorFault::check_numbers("layer", nodes, |nodes| nodes > 0.0, "of at least 1 node")?;
         count("inputs", channels, self.topology.inputs())?;
         count("channel scalings", channels, self.scaling.len())?;
         count("output scales", self.topology.outputs(), self.output_scale_m.len())?;
@@ -86,10 +59,13 @@ impl NetworkLocator {
             pair[1].checked_mul(pair[0].checked_add(usize::from(self.topology.biases))?)?.checked_add(sum)
         });
         count("weights", weights.unwrap_or(usize::MAX), self.weights.len())?;
-        usable("weight", self.weights.iter().map(|w| w.is_finite()))?;
-        let scaled = |s: &ChannelScaling| s.offset.is_finite() && s.divisor.is_finite() && s.divisor > 0.0;
-        usable("scaling", self.scaling.iter().map(scaled))?;
-        usable("output scale", self.output_scale_m.iter().map(|s| s.is_finite() && *s > 0.0))
+        let finite = "a finite number";
+        LocatorFault::check_numbers("weight", self.weights.iter().copied(), |_| true, finite)?;
+        let offsets = self.scaling.iter().map(|scaling| scaling.offset);
+        LocatorFault::check_numbers("scaling's offset", offsets, |_| true, finite)?;
+        let scales =
+            self.scaling.iter().map(|scaling| scaling.divisor).chain(self.output_scale_m.iter().copied());
+        LocatorFault::check_numbers("scale", scales, |scale| scale > 0.0, "greater than 0")
     }
 
     /// The position for a reading of as many channels as the network has inputs; elsewhere `None`.
@@ -110,9 +86,14 @@ impl NetworkLocator {
     }
 }
 
-fn usable(what: &'static str, mut ok: impl Iterator<Item = bool>) -> Result<(), NetworkLocatorError> {
-    match ok.position(|ok| !ok) {
-        Some(i) => Err(NetworkLocatorError::BadNumber { what, number: i + 1 }),
-        None => Ok(()),
+impl Locate for NetworkLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let position = self.position(reading).unwrap_or(Position::along(f64::NAN));
+        let on_surface = self.extent.contains(position);
+        Estimate::of_position(position, if on_surface { Status::Located } else { Status::OutsideSurface })
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        self.check_numbers(bench.layout.len())
     }
 }

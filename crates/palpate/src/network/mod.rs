@@ -13,7 +13,7 @@ mod train;
 pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
 pub use lanes::{InstructionSet, Precision};
-pub use locator::{ChannelScaling, NetworkLocator, NetworkLocatorError};
+pub use locator::{ChannelScaling, NetworkLocator};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;
 pub use patterns::Patterns;

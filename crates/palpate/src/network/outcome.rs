@@ -35,6 +35,13 @@ pub struct TrainingOutcome {
     pub aggregate_error: f64,
 }
 
+impl Default for TrainingOutcome {
+    /// That of a method which is not trained by epochs: converged before the first.
+    fn default() -> Self {
+        Self { status: TrainingStatus::Converged, epochs: 0, aggregate_error: 0.0 }
+    }
+}
+
 impl TrainingOutcome {
     /// The verdict after an epoch: `None` while training goes on.
     pub(super) fn after_epoch(epochs: u32, error: f64, rule: &super::BackPropagation) -> Option<Self> {

@@ -1,6 +1,7 @@
 //! The rig file as it is written, before anything is checked: every key optional, every value with its place.
 
 use std::fmt;
+use std::ops::Range;
 
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
@@ -84,7 +85,7 @@ pub(crate) struct EstimatorSection {
     pub hidden: Key<Vec<Spanned<i64>>>,
     pub hidden_activation: Key<String>,
     pub output_activation: Key<String>,
-    pub biases: Option<bool>,
+    pub biases: Key<bool>,
     pub output: Key<String>,
     pub input_scale: Key<RawQuantity>,
     pub learning_rate: Key<f64>,
@@ -93,9 +94,37 @@ pub(crate) struct EstimatorSection {
     pub max_epochs: Key<i64>,
     pub order: Key<String>,
     pub initial_weights: Key<f64>,
+    pub from: Key<String>,
+    pub contacts: Key<i64>,
+    pub force_sd: Key<RawQuantity>,
 }
 
 impl EstimatorSection {
+    /// The keys that are there but for `kind`, with their places.
+    pub fn present(&self) -> Vec<(&'static str, Range<usize>)> {
+        fn place<T>(name: &'static str, key: &Key<T>) -> Option<(&'static str, Range<usize>)> {
+            key.as_ref().map(|key| (name, key.span()))
+        }
+        let keys = [
+            place("hidden", &self.hidden),
+            place("hidden_activation", &self.hidden_activation),
+            place("output_activation", &self.output_activation),
+            place("biases", &self.biases),
+            place("output", &self.output),
+            place("input_scale", &self.input_scale),
+            place("learning_rate", &self.learning_rate),
+            place("momentum", &self.momentum),
+            place("aggregate_error", &self.aggregate_error),
+            place("max_epochs", &self.max_epochs),
+            place("order", &self.order),
+            place("initial_weights", &self.initial_weights),
+            place("from", &self.from),
+            place("contacts", &self.contacts),
+            place("force_sd", &self.force_sd),
+        ];
+        keys.into_iter().flatten().collect()
+    }
+
     /// These keys, and those of `base` where this section is silent.
     pub fn over(self, base: &Self) -> Self {
         let base = base.clone();
@@ -113,6 +142,9 @@ impl EstimatorSection {
             max_epochs: self.max_epochs.or(base.max_epochs),
             order: self.order.or(base.order),
             initial_weights: self.initial_weights.or(base.initial_weights),
+            from: self.from.or(base.from),
+            contacts: self.contacts.or(base.contacts),
+            force_sd: self.force_sd.or(base.force_sd),
         }
     }
 }

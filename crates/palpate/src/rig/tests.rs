@@ -29,7 +29,7 @@ fn the_water_strip_maps_foreign_columns() {
     let rig = Rig::from_toml(FSI_WATER).unwrap();
     assert_eq!(rig.bench.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
     assert_eq!(rig.bench.layout.names(), ["Pl", "Pr"]);
-    let EstimatorConfig::Network(network) = &rig.estimator;
+    let EstimatorConfig::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
     assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));
     let columns = rig.bench.columns.unwrap();
     assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
@@ -332,7 +332,9 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
 #[test]
 fn an_input_scale_is_a_reading_of_the_sensors() {
     let text = BENCH.replace("kind = \"network\"", "kind = \"network\"\ninput_scale = \"5 mm\"");
-    let EstimatorConfig::Network(network) = Rig::from_toml(&text).unwrap().estimator;
+    let EstimatorConfig::Network(network) = Rig::from_toml(&text).unwrap().estimator else {
+        panic!("not a network")
+    };
     assert_eq!(network.input_scale, InputScale::DivideBy(0.005));
 }
 

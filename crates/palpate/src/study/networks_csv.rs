@@ -61,8 +61,8 @@ impl<'a> NetworksCsv<'a> {
 
     /// The row of a fit.
     pub fn row(&self, trained: &Trained) -> String {
-        let outcome = trained.fit.locator.training_outcome();
-        let weights: Vec<String> = trained.fit.locator.parameters().iter().map(f64::to_string).collect();
+        let outcome = trained.fit.outcome();
+        let weights: Vec<String> = trained.fit.locator.weights().iter().map(f64::to_string).collect();
         let mut cells = vec![
             self.study.study.arms[trained.arm].name.clone(),
             trained.fit.seed.to_string(),

@@ -119,13 +119,12 @@ impl ArmResults {
                 max_error_percent: error(Some(*portion), |s| s.largest_m)?,
             })
         });
-        let converged =
-            |fit: &&TrainedSeed| fit.locator.training_outcome().status == TrainingStatus::Converged;
+        let converged = |fit: &&TrainedSeed| fit.outcome().status == TrainingStatus::Converged;
         Some(Self {
             name: outcome.name.clone(),
             seeds: outcome.fits.len(),
             converged: outcome.fits.iter().filter(converged).count(),
-            epochs: spread(&|fit| Some(f64::from(fit.locator.training_outcome().epochs)))?,
+            epochs: spread(&|fit| Some(f64::from(fit.outcome().epochs)))?,
             error_percent: error(None, |s| s.average_m)?,
             max_error_percent: error(None, |s| s.largest_m)?,
             effective_length_percent: spread(&|fit| {

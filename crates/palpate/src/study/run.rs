@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use super::{Judging, Study};
-use crate::estimator::{FitError, Fitting, Locator, LocatorQueue, ReadingError};
+use crate::estimator::{EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError};
 use crate::evaluation::Evaluation;
-use crate::network::InstructionSet;
+use crate::network::{InstructionSet, TrainingOutcome};
 use crate::recording::Recording;
 use crate::simulate::{SimulateError, simulate, simulate_at};
 
@@ -20,6 +20,16 @@ pub enum PrepareError {
         arm: String,
         /// Why.
         error: SimulateError,
+    },
+    /// An arm's estimator is not trained from seeds.
+    #[error(
+        "arm `{arm}` is of kind `{kind}`; a study trains networks: `palpate compare` puts methods side by side"
+    )]
+    NotANetwork {
+        /// The arm.
+        arm: String,
+        /// The kind of its estimator.
+        kind: &'static str,
     },
     /// An arm's estimator cannot be fitted.
     #[error("arm `{arm}`: {error}")]
@@ -55,6 +65,13 @@ pub struct TrainedSeed {
     pub locator: Locator,
     /// Its answers where the study judges.
     pub evaluation: Evaluation,
+}
+
+impl TrainedSeed {
+    /// How its training ended.
+    pub fn outcome(&self) -> TrainingOutcome {
+        self.locator.training_outcome().unwrap_or_default()
+    }
 }
 
 /// A fitted seed with the place of its arm in the study.
@@ -101,6 +118,10 @@ impl PreparedStudy {
     /// [`PrepareError`], naming the arm.
     pub fn new(study: Study) -> Result<Self, PrepareError> {
         let arms = study.arms.iter().map(|arm| {
+            if !matches!(arm.rig.estimator, EstimatorConfig::Network(_)) {
+                let kind = arm.rig.estimator.kind();
+                return Err(PrepareError::NotANetwork { arm: arm.name.clone(), kind });
+            }
             let simulated = |error| PrepareError::Simulate { arm: arm.name.clone(), error };
             let mut clean = arm.rig.bench.clone();
             for sensor in &mut clean.layout.sensors {

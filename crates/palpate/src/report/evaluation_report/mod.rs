@@ -215,19 +215,21 @@ impl EvaluationReport<'_> {
 }
 
 fn locator_facts(locator: &Locator) -> Vec<(&'static str, Markup)> {
-    let outcome = locator.training_outcome();
-    let ended = format!("{} after {} epochs", outcome.status, whole(f64::from(outcome.epochs)));
+    let training = locator.training_outcome().map(|outcome| {
+        ("training", text(format!("{} after {} epochs", outcome.status, whole(f64::from(outcome.epochs)))))
+    });
     let fitted_to = &locator.provenance.recording;
-    vec![
-        ("estimator", text(locator.kind())),
-        ("training", text(ended)),
+    let mut facts = vec![("estimator", text(locator.kind()))];
+    facts.extend(training);
+    facts.extend([
         (
             "fitted to",
             html! { (fitted_to.source) ", " (counted(fitted_to.rows, "row", "rows")) (digests(fitted_to)) },
         ),
         ("fitted from seed", text(locator.provenance.seed.to_string())),
         ("fitted by palpate", text(&locator.provenance.palpate)),
-    ]
+    ]);
+    facts
 }
 
 fn rig_facts(rig: &Rig, folds: usize, seed: u64) -> Vec<(&'static str, Markup)> {

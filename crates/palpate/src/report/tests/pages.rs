@@ -208,8 +208,11 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let rig = Rig::from_toml(&include_str!("../../../../../examples/paper.toml").replace("1_000_000", "50"))
         .unwrap();
     let recording = simulate(&rig, 0).unwrap();
-    let locator =
-        Fitting::prepare(&rig.bench, &rig.estimator, &recording).unwrap().fit(0, &mut || true).unwrap();
+    let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
+        .unwrap()
+        .fit(0, &mut || true)
+        .unwrap()
+        .unwrap();
     let positions: Vec<_> = recording.distinct_positions();
     let other = simulate_at(&rig.bench, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
@@ -246,8 +249,11 @@ fn an_evaluation_of_nothing_has_a_report() {
     let rig = Rig::from_toml(&include_str!("../../../../../examples/paper.toml").replace("1_000_000", "5"))
         .unwrap();
     let recording = simulate(&rig, 0).unwrap();
-    let locator =
-        Fitting::prepare(&rig.bench, &rig.estimator, &recording).unwrap().fit(0, &mut || true).unwrap();
+    let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
+        .unwrap()
+        .fit(0, &mut || true)
+        .unwrap()
+        .unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
         evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },

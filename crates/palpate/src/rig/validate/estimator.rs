@@ -3,6 +3,7 @@
 use toml::Spanned;
 
 use crate::estimator::EstimatorConfig;
+use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::network::{
     Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
 };
@@ -10,23 +11,70 @@ use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::EstimatorSection;
 use crate::rig::value::{RawQuantity, choice, count, number, out_of_range, positive};
 use crate::sensing::Layout;
+use crate::units::Dimension;
 
 const ACTIVATIONS: [(&str, Activation); 3] =
     [("logistic", Activation::Logistic), ("tanh", Activation::Tanh), ("linear", Activation::Linear)];
+const NETWORK_KEYS: [&str; 12] = [
+    "hidden",
+    "hidden_activation",
+    "output_activation",
+    "biases",
+    "output",
+    "input_scale",
+    "learning_rate",
+    "momentum",
+    "aggregate_error",
+    "max_epochs",
+    "order",
+    "initial_weights",
+];
 const MOST_LAYERS: usize = 16;
 const MOST_NODES: usize = 1000;
 
 pub(super) fn validate(
     section: Option<&Spanned<EstimatorSection>>,
     layout: &Layout,
+    force_n: Option<f64>,
 ) -> Result<EstimatorConfig, RigError> {
     let Some(section) = section else { return Ok(EstimatorConfig::default()) };
     let keys = section.get_ref();
-    if let Some(kind) = &keys.kind {
-        let known: Vec<(&'static str, ())> = EstimatorConfig::KINDS.iter().map(|kind| (*kind, ())).collect();
-        choice("kind", kind, &known)?;
+    let known: Vec<(&'static str, &'static str)> =
+        EstimatorConfig::KINDS.iter().map(|kind| (*kind, *kind)).collect();
+    let kind = keys.kind.as_ref().map_or(Ok("network"), |kind| choice("kind", kind, &known))?;
+    let (with, of_kind): (_, &[&str]) = match kind {
+        "influence" => ("kind = \"influence\"", &["from", "contacts", "force_sd"]),
+        _ => ("kind = \"network\"", &NETWORK_KEYS),
+    };
+    if let Some((key, span)) = keys.present().into_iter().find(|(key, _)| !of_kind.contains(key)) {
+        return Err(RigProblem::UnusedKey { key, with }.at(span));
     }
-    network(keys, layout).map(EstimatorConfig::Network)
+    match kind {
+        "influence" => influence(keys, force_n).map(EstimatorConfig::Influence),
+        _ => network(keys, layout).map(EstimatorConfig::Network),
+    }
+}
+
+fn influence(keys: &EstimatorSection, force_n: Option<f64>) -> Result<InfluenceConfig, RigError> {
+    let default = InfluenceConfig::default();
+    let sources = [
+        ("recording", InfluenceSource::Recording),
+        ("mechanics", InfluenceSource::Mechanics),
+        ("corrected", InfluenceSource::Corrected),
+    ];
+    let contacts = keys.contacts.as_ref();
+    let force_sd_n =
+        keys.force_sd.as_ref().map(|raw| positive("force_sd", raw, Dimension::Force)).transpose()?;
+    if let (Some(raw), None) = (&keys.force_sd, force_n) {
+        let with = "an unknown force; give [contact] `force`, about which it spreads";
+        return Err(RigProblem::UnusedKey { key: "force_sd", with }.at(raw.span()));
+    }
+    Ok(InfluenceConfig {
+        from: keys.from.as_ref().map_or(Ok(default.from), |raw| choice("from", raw, &sources))?,
+        contacts: contacts
+            .map_or(Ok(default.contacts), |raw| count("contacts", raw, 1..=3, "at least 1 and at most 3"))?,
+        force_sd_n,
+    })
 }
 
 fn network(keys: &EstimatorSection, layout: &Layout) -> Result<NetworkConfig, RigError> {
@@ -47,7 +95,7 @@ fn network(keys: &EstimatorSection, layout: &Layout) -> Result<NetworkConfig, Ri
             &keys.output_activation,
             default.output_activation,
         )?,
-        biases: keys.biases.unwrap_or(default.biases),
+        biases: keys.biases.as_ref().map_or(default.biases, |biases| *biases.get_ref()),
         output: keys.output.as_ref().map_or(Ok(default.output), |raw| choice("output", raw, &codings))?,
         input_scale: keys
             .input_scale

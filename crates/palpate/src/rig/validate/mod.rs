@@ -34,7 +34,7 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
             return Err(RigProblem::TooManyValues { values, most: MOST_VALUES }.at(section.span()));
         }
     }
-    let estimator = estimator::validate(sections.estimator.as_ref(), &layout)?;
+    let estimator = estimator::validate(sections.estimator.as_ref(), &layout, force_n)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
     Ok(Rig { bench, training, estimator })

@@ -1,0 +1,100 @@
+//! An estimate as a line of CSV or JSON.
+
+use crate::failure::{Complaint, Failure};
+use palpate::estimator::{ContactEstimate, Estimate};
+
+/// The columns of [`csv`]. What a locator does not estimate stays empty.
+pub fn heading(plane: bool) -> &'static str {
+    if plane {
+        "x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n"
+    } else {
+        "position_mm,force_n,low_mm,high_mm,status\n"
+    }
+}
+
+/// A line of CSV: position, force, the ends of the 95 % interval, status.
+pub fn csv(estimate: &Estimate, plane: bool) -> String {
+    let contact = &estimate.contact;
+    let mm = |value: Option<f64>| value.map_or_else(String::new, |x_m| format!("{:.4}", x_m * 1e3));
+    let mut cells = vec![mm(Some(contact.position.x_m))];
+    if plane {
+        cells.push(mm(Some(contact.position.y_m)));
+    }
+    cells.push(contact.force_n.map_or_else(String::new, |force_n| format!("{force_n:.4}")));
+    let ends = contact.uncertainty.map(|uncertainty| (uncertainty.x_95_m, uncertainty.y_95_m));
+    cells.extend([mm(ends.map(|(x, _)| x.0)), mm(ends.map(|(x, _)| x.1))]);
+    if plane {
+        cells.extend([mm(ends.map(|(_, y)| y.0)), mm(ends.map(|(_, y)| y.1))]);
+    }
+    cells.push(estimate.status.name().to_owned());
+    cells.join(",") + "\n"
+}
+
+/// An estimate as JSON.
+#[derive(serde::Serialize)]
+struct JsonEstimate {
+    line: u64,
+    #[serde(flatten)]
+    contact: JsonContact,
+    status: &'static str,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    modes: Vec<JsonMode>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    further: Vec<JsonContact>,
+}
+
+#[derive(serde::Serialize)]
+struct JsonMode {
+    #[serde(flatten)]
+    contact: JsonContact,
+    probability: f64,
+}
+
+#[derive(serde::Serialize)]
+struct JsonContact {
+    x_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    x_95_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_95_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd_force_n: Option<f64>,
+}
+
+/// A line of JSON: all that the locator says of the reading in line `line` of its source.
+pub fn json(estimate: &Estimate, line: u64, plane: bool) -> Result<String, Failure> {
+    let mode = |mode: &palpate::estimator::Mode| JsonMode {
+        contact: json_contact(&mode.contact, plane),
+        probability: mode.probability,
+    };
+    let object = JsonEstimate {
+        line,
+        contact: json_contact(&estimate.contact, plane),
+        status: estimate.status.name(),
+        modes: estimate.modes.as_slice().iter().map(mode).collect(),
+        further: estimate.further.as_slice().iter().map(|further| json_contact(further, plane)).collect(),
+    };
+    serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+}
+
+fn json_contact(contact: &ContactEstimate, plane: bool) -> JsonContact {
+    let uncertainty = contact.uncertainty.as_ref();
+    let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
+    // JSON has no infinity: what is not known at all is left out.
+    let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
+    JsonContact {
+        x_mm: contact.position.x_m * 1e3,
+        y_mm: plane.then_some(contact.position.y_m * 1e3),
+        force_n: contact.force_n,
+        x_95_mm: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
+        y_95_mm: uncertainty.filter(|_| plane).map(|uncertainty| mm(uncertainty.y_95_m)),
+        sd_mm: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
+        sd_force_n: uncertainty.and_then(|u| sd(u.covariance[5])),
+    }
+}

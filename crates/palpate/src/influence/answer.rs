@@ -1,0 +1,184 @@
+//! From minima of the misfit to an estimate that owns up to what it does not know.
+
+use super::search::{Minimum, Scratch, Search, worst_misfit};
+use super::several::{criterion, explain};
+use crate::contact::Position;
+use crate::numerics::normal_distribution;
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+
+/// Another place with at least this share of the probability is said.
+const MODE_THAT_MATTERS: f64 = 0.01;
+/// Half the width of a normal distribution's 95 % interval, in standard deviations.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// The estimate of one contact.
+pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
+    let square = search.whiten(reading, scratch);
+    let (minima, count) = search.minima(square, scratch);
+    let minima = &minima[..count];
+    let best = minima[0];
+    if is_no_contact(search, square, best.misfit) {
+        let contact = ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
+        return Estimate::of_contact(contact, Status::NoContact);
+    }
+    let shares = shares(minima, search.table.length_m);
+    let x_95_m = interval(search, minima, &shares, &scratch.whitened);
+    let mut estimate = Estimate::of_contact(contact(search, &best, x_95_m), Status::Located);
+    for (minimum, share) in minima.iter().zip(&shares).skip(1) {
+        if *share >= MODE_THAT_MATTERS {
+            let alone = single_interval(minimum, search.table.length_m);
+            let mode = Mode { contact: contact(search, minimum, alone), probability: *share };
+            estimate.modes.push(mode);
+            estimate.status = Status::Ambiguous;
+        }
+    }
+    if best.misfit > search.worst_misfit {
+        estimate.status = Status::OutsideModel;
+    }
+    estimate
+}
+
+/// The estimate of as many contacts as the reading shows, up to `most`.
+pub(super) fn locate_several(
+    search: &Search,
+    most: usize,
+    reading: &[f64],
+    scratch: &mut Scratch,
+) -> Estimate {
+    let one = locate_one(search, reading, scratch);
+    if one.status != Status::OutsideModel {
+        return one;
+    }
+    let square = scratch.whitened.iter().map(|d| d * d).sum();
+    let single = search.minima(square, scratch).0[0];
+    let mut least = criterion(single.misfit, 1, search.force.unknowns(), search);
+    let mut best = None;
+    for count in 2..=most {
+        let Some(together) = explain(search, scratch, count) else { break };
+        let (cost, misfit) = (together.criterion(search), together.misfit);
+        if cost < least {
+            (least, best) = (cost, Some(together));
+        }
+        // One more contact costs this much, and cannot take off more misfit than there is.
+        if criterion(0.0, 1, 2, search) > misfit {
+            break;
+        }
+    }
+    let Some(together) = best else { return one };
+    let mut contacts = together.contacts(search.table.length_m).into_iter();
+    let Some(strongest) = contacts.next() else { return one };
+    let mut estimate = Estimate::of_contact(strongest, Status::Located);
+    for contact in contacts {
+        estimate.further.push(contact);
+    }
+    let freedom = search.live.len() - 2 * (1 + estimate.further.as_slice().len());
+    if together.misfit > worst_misfit(freedom) {
+        estimate.status = Status::OutsideModel;
+    }
+    estimate
+}
+
+/// Whether noise alone explains a reading of whitened length `square`, and better than a contact whose best misfit is
+/// `misfit`, by the criterion that also counts several contacts.
+fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
+    square <= criterion(misfit, 1, search.force.unknowns(), search) && square <= search.worst_noise
+}
+
+fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEstimate {
+    let [xx, xf, ff] = minimum.covariance;
+    // On a line of length l nothing is known less than of a uniform distribution.
+    let most = search.table.length_m.powi(2) / 12.0;
+    let uncertainty =
+        Uncertainty { covariance: [xx.min(most), 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
+    ContactEstimate {
+        position: Position::along(minimum.x_m),
+        force_n: Some(minimum.force_n),
+        uncertainty: Some(uncertainty),
+    }
+}
+
+/// Each minimum's share of the probability, by Laplace's approximation within the surface's ends.
+fn shares(minima: &[Minimum], length_m: f64) -> [f64; super::search::MOST_MINIMA] {
+    let mut shares = [0.0; super::search::MOST_MINIMA];
+    if minima.len() == 1 {
+        shares[0] = 1.0;
+        return shares;
+    }
+    let best = minima[0].misfit;
+    for (share, minimum) in shares.iter_mut().zip(minima) {
+        let sd_m = minimum.covariance[0].sqrt().min(length_m);
+        *share = (0.5 * (best - minimum.misfit)).exp() * sd_m * mass(minimum.x_m, sd_m, length_m);
+    }
+    let sum: f64 = shares.iter().sum();
+    shares.map(|share| share / sum)
+}
+
+/// How much of a normal distribution lies on the surface.
+fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
+    normal_distribution((length_m - mean_m) / sd_m) - normal_distribution(-mean_m / sd_m)
+}
+
+/// The 95 % interval of the position over all minima.
+fn interval(search: &Search, minima: &[Minimum], shares: &[f64], whitened: &[f64]) -> (f64, f64) {
+    let length_m = search.table.length_m;
+    let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > 1.5 * search.table.spacing_m();
+    if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
+        return interval_of_profile(search, whitened);
+    }
+    if minima.len() == 1 {
+        return single_interval(&minima[0], length_m);
+    }
+    let cumulative = |x_m: f64| {
+        let parts = minima.iter().zip(shares).map(|(minimum, share)| {
+            let sd_m = minimum.covariance[0].sqrt();
+            let below = |x_m: f64| normal_distribution((x_m - minimum.x_m) / sd_m);
+            share * (below(x_m) - below(0.0)) / mass(minimum.x_m, sd_m, length_m).max(f64::MIN_POSITIVE)
+        });
+        parts.sum::<f64>()
+    };
+    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+}
+
+/// The 95 % interval of one minimum, held to the surface.
+fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
+    let sd_m = minimum.covariance[0].sqrt();
+    let (left, right) = (minimum.x_m / sd_m, (length_m - minimum.x_m) / sd_m);
+    if left > 4.0 && right > 4.0 {
+        return (minimum.x_m - NORMAL_95 * sd_m, minimum.x_m + NORMAL_95 * sd_m);
+    }
+    let (low, high) = (normal_distribution(-left), normal_distribution(right));
+    let cumulative = |x_m: f64| (normal_distribution((x_m - minimum.x_m) / sd_m) - low) / (high - low);
+    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+}
+
+/// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
+/// is flat in the position and in the size of the signal.
+fn interval_of_profile(search: &Search, whitened: &[f64]) -> (f64, f64) {
+    let nodes = search.table.nodes();
+    let misfits: Vec<f64> =
+        (0..nodes).map(|node| search.profile(whitened, search.table.node_m(node)).0).collect();
+    let best = misfits.iter().copied().fold(f64::INFINITY, f64::min);
+    let density: Vec<f64> = misfits.iter().map(|misfit| (0.5 * (best - misfit)).exp()).collect();
+    let mut cumulative = vec![0.0; nodes];
+    for node in 1..nodes {
+        cumulative[node] = cumulative[node - 1] + 0.5 * (density[node - 1] + density[node]);
+    }
+    let all = cumulative[nodes - 1];
+    let quantile = |share: f64| {
+        let after = cumulative.partition_point(|c| *c < share * all).clamp(1, nodes - 1);
+        let (low, high) = (cumulative[after - 1], cumulative[after]);
+        let part = if high > low { (share * all - low) / (high - low) } else { 0.0 };
+        (after as f64 - 1.0 + part) * search.table.spacing_m()
+    };
+    (quantile(0.025), quantile(0.975))
+}
+
+/// Where a rising function of the position reaches `share`.
+fn bisect(length_m: f64, share: f64, cumulative: &dyn Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, length_m);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if cumulative(middle) < share { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}

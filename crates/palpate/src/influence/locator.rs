@@ -1,0 +1,157 @@
+//! A fitted influence locator of a surface with a model.
+
+use super::answer::{locate_one, locate_several};
+use super::belief::ForceBelief;
+use super::search::{Scratch, Search};
+use super::table::InfluenceTable;
+use crate::bench::Bench;
+use crate::method::{Locate, LocatorFault};
+use palpate_core::Estimate;
+use serde::{Deserialize, Serialize};
+
+/// Influence functions in a table, ready to be inverted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct BeamLocator {
+    stored: Stored,
+    search: Search,
+}
+
+/// What fitting finds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BeamParts {
+    /// Influence functions.
+    pub table: InfluenceTable,
+    /// Offset of each channel, in its SI unit.
+    pub offsets: Vec<f64>,
+    /// Noise of each channel, in its SI unit.
+    pub noise_sd: Vec<f64>,
+}
+
+/// What a locator file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    parts: BeamParts,
+    /// Channels that are left out.
+    dead: Vec<bool>,
+    force: ForceBelief,
+    /// Mean force of the calibration, in newtons.
+    reference_force_n: f64,
+    /// The most contacts at once.
+    contacts: usize,
+}
+
+impl BeamLocator {
+    pub(super) fn new(
+        parts: BeamParts,
+        dead: Vec<bool>,
+        force: ForceBelief,
+        reference_force_n: f64,
+        contacts: usize,
+    ) -> Self {
+        let stored = Stored { parts, dead, force, reference_force_n, contacts };
+        Self { search: stored.search(), stored }
+    }
+
+    /// The influence functions.
+    pub fn table(&self) -> &InfluenceTable {
+        &self.stored.parts.table
+    }
+
+    /// What is known of the force.
+    pub fn force(&self) -> ForceBelief {
+        self.stored.force
+    }
+
+    /// The most contacts that it looks for.
+    pub fn contacts(&self) -> usize {
+        self.stored.contacts
+    }
+
+    /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
+    /// nothing changes.
+    pub fn leave_out(&mut self, channel: usize) -> bool {
+        let mut stored = self.stored.clone();
+        if let Some(dead) = stored.dead.get_mut(channel) {
+            *dead = true;
+        }
+        let lives = stored.dead.iter().any(|dead| !dead);
+        if lives {
+            *self = Self { search: stored.search(), stored };
+        }
+        lives
+    }
+
+    /// [`Locate::locate`] with memory of the caller's.
+    pub fn locate_with(&self, reading: &[f64], scratch: &mut Scratch) -> Estimate {
+        match self.stored.contacts {
+            1 => locate_one(&self.search, reading, scratch),
+            most => locate_several(&self.search, most, reading, scratch),
+        }
+    }
+}
+
+impl Locate for BeamLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        self.locate_with(reading, &mut Scratch::default())
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("channels", bench.layout.len(), self.stored.parts.table.sensors)
+    }
+}
+
+impl Stored {
+    fn search(&self) -> Search {
+        let BeamParts { table, offsets, noise_sd } = &self.parts;
+        Search::new(table, offsets, noise_sd, &self.dead, self.force, self.reference_force_n)
+    }
+
+    /// Checks what a file may have got wrong.
+    fn check(&self) -> Result<(), LocatorFault> {
+        let BeamParts { table, offsets, noise_sd } = &self.parts;
+        let count = LocatorFault::check_count;
+        let cells = table.sensors.saturating_mul(InfluenceTable::NODES);
+        count("influence values", cells, table.values.len())?;
+        count("influence slopes", cells, table.slopes.len())?;
+        count("influence variances", cells, table.variances.len())?;
+        count("offsets", table.sensors, offsets.len())?;
+        count("noises", table.sensors, noise_sd.len())?;
+        count("marks of dead channels", table.sensors, self.dead.len())?;
+        if self.dead.iter().all(|dead| *dead) {
+            return Err(LocatorFault::Count { what: "living channels", needed: 1, found: 0 });
+        }
+        if !(1..=3).contains(&self.contacts) {
+            return Err(LocatorFault::Count { what: "contacts at most", needed: 1, found: self.contacts });
+        }
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        numbers("influence value", &table.values, |_| true, "a finite number")?;
+        numbers("influence slope", &table.slopes, |_| true, "a finite number")?;
+        numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
+        numbers("offset", offsets, |_| true, "a finite number")?;
+        numbers("noise", noise_sd, |sd| sd > 0.0, "greater than 0")?;
+        let positive = [table.length_m, self.reference_force_n];
+        numbers("length or force", &positive, |x| x > 0.0, "greater than 0")?;
+        let force = if self.force.is_usable() { 1.0 } else { f64::NAN };
+        numbers("belief about the force", &[force], |_| true, "greater than 0")
+    }
+}
+
+impl TryFrom<Stored> for BeamLocator {
+    type Error = LocatorFault;
+
+    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+        stored.check()?;
+        Ok(Self { search: stored.search(), stored })
+    }
+}
+
+impl From<BeamLocator> for Stored {
+    fn from(locator: BeamLocator) -> Self {
+        locator.stored
+    }
+}

@@ -1,0 +1,136 @@
+//! Influence functions as a table: values and slopes at evenly spaced nodes, cubic between them.
+
+use serde::{Deserialize, Serialize};
+
+/// What every sensor reads per newton, with its uncertainty, as a function of the contact's position along the surface.
+///
+/// Between nodes the functions are cubic Hermite polynomials. Numbers are stored node by node, and within a node
+/// sensor by sensor, so that all sensors of a place lie side by side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InfluenceTable {
+    /// Sensors S.
+    pub sensors: usize,
+    /// Length of the surface in metres; nodes are at i·length/(nodes − 1).
+    pub length_m: f64,
+    /// Reading per newton, in the sensors' SI units or raw, nodes × S.
+    pub values: Vec<f64>,
+    /// Derivative of the values along the surface, per metre, nodes × S.
+    pub slopes: Vec<f64>,
+    /// Variance of the values, from calibrating with finitely many noisy presses, nodes × S.
+    pub variances: Vec<f64>,
+}
+
+/// A place between two nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cell {
+    /// The node to the left.
+    pub node: usize,
+    /// Weights of left value, right value, left slope, right slope in the function.
+    value: [f64; 4],
+    /// The same for the function's derivative.
+    slope: [f64; 4],
+}
+
+impl InfluenceTable {
+    /// Nodes of a table: eight sensors' influence functions are then interpolated to 10⁻⁷ of full scale.
+    pub const NODES: usize = 129;
+
+    /// How many nodes there are.
+    pub fn nodes(&self) -> usize {
+        self.values.len() / self.sensors.max(1)
+    }
+
+    /// Distance between nodes, in metres.
+    pub fn spacing_m(&self) -> f64 {
+        self.length_m / (self.nodes() - 1) as f64
+    }
+
+    /// Where a node is, in metres.
+    pub fn node_m(&self, node: usize) -> f64 {
+        node as f64 * self.spacing_m()
+    }
+
+    /// The values of all sensors at a node.
+    pub fn at_node(&self, node: usize) -> &[f64] {
+        &self.values[node * self.sensors..(node + 1) * self.sensors]
+    }
+
+    /// The cell that holds `x_m`, which is held to the surface.
+    #[inline]
+    pub(super) fn cell(&self, x_m: f64) -> Cell {
+        let h = self.spacing_m();
+        let place = (x_m / h).clamp(0.0, (self.nodes() - 1) as f64);
+        let node = (place as usize).min(self.nodes() - 2);
+        let t = place - node as f64;
+        let (t2, t3) = (t * t, t * t * t);
+        Cell {
+            node,
+            value: [2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, h * (t3 - 2.0 * t2 + t), h * (t3 - t2)],
+            slope: [
+                (6.0 * t2 - 6.0 * t) / h,
+                (6.0 * t - 6.0 * t2) / h,
+                3.0 * t2 - 4.0 * t + 1.0,
+                3.0 * t2 - 2.0 * t,
+            ],
+        }
+    }
+
+    /// Calls `each` with sensor, value and slope, for every sensor at a place.
+    #[inline]
+    pub(super) fn for_each(&self, cell: Cell, mut each: impl FnMut(usize, f64, f64)) {
+        let s = self.sensors;
+        let (left, right) = (cell.node * s, (cell.node + 1) * s);
+        let (v0, v1) = (&self.values[left..right], &self.values[right..right + s]);
+        let (d0, d1) = (&self.slopes[left..right], &self.slopes[right..right + s]);
+        for i in 0..s {
+            let mix = |w: &[f64; 4]| w[0] * v0[i] + w[1] * v1[i] + w[2] * d0[i] + w[3] * d1[i];
+            each(i, mix(&cell.value), mix(&cell.slope));
+        }
+    }
+
+    /// The variances of all sensors at the node nearest to a place.
+    #[inline]
+    pub(super) fn variances_near(&self, x_m: f64) -> &[f64] {
+        let node = ((x_m / self.spacing_m()).round().max(0.0) as usize).min(self.nodes() - 1);
+        &self.variances[node * self.sensors..(node + 1) * self.sensors]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cubic() -> InfluenceTable {
+        let f = |x: f64| 2.0 * x * x * x - x + 0.5;
+        let d = |x: f64| 6.0 * x * x - 1.0;
+        let nodes = (0..9).map(|i| f64::from(i) * 0.4 / 8.0);
+        InfluenceTable {
+            sensors: 1,
+            length_m: 0.4,
+            values: nodes.clone().map(f).collect(),
+            slopes: nodes.map(d).collect(),
+            variances: vec![0.0; 9],
+        }
+    }
+
+    #[test]
+    fn a_cubic_is_given_back() {
+        let table = cubic();
+        for i in 0..=100 {
+            let x = f64::from(i) * 0.004;
+            table.for_each(table.cell(x), |_, value, slope| {
+                assert!((value - (2.0 * x * x * x - x + 0.5)).abs() < 1e-14, "{x}");
+                assert!((slope - (6.0 * x * x - 1.0)).abs() < 1e-12, "{x}");
+            });
+        }
+    }
+
+    #[test]
+    fn places_beyond_the_ends_are_held_to_them() {
+        let table = cubic();
+        table.for_each(table.cell(-1.0), |_, value, _| assert_eq!(value, 0.5));
+        table.for_each(table.cell(9.0), |_, value, _| assert!((value - 0.228).abs() < 1e-12));
+        assert_eq!(table.variances_near(f64::INFINITY).len(), 1);
+    }
+}
