@@ -5,6 +5,7 @@ pub mod bench;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;
+pub mod limit;
 pub mod mechanics;
 pub mod method;
 pub mod network;

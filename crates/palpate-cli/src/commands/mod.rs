@@ -3,6 +3,7 @@
 pub mod evaluate;
 pub mod fit;
 pub mod inspect;
+pub mod limit;
 pub mod locate;
 pub mod simulate;
 pub mod study;
