@@ -76,6 +76,24 @@ pub fn length(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A force in newtons, from a command line argument.
+pub fn force(text: &str) -> Result<f64, String> {
+    match Quantity::parse_as(text, Dimension::Force) {
+        Ok(force_n) if force_n > 0.0 => Ok(force_n),
+        Ok(_) => Err(format!("`{text}` must be greater than 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// A quantity greater than 0 in whatever unit, from a command line argument.
+pub fn quantity(text: &str) -> Result<Quantity, String> {
+    match text.parse::<Quantity>() {
+        Ok(quantity) if quantity.value > 0.0 => Ok(quantity),
+        Ok(_) => Err(format!("`{text}` must be greater than 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
     let complaint = Complaint::new(&error);
     let complaint = match error.help() {

@@ -29,6 +29,7 @@ enum Command {
     Fit(commands::fit::Arguments),
     Evaluate(commands::evaluate::Arguments),
     Locate(commands::locate::Arguments),
+    Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
 }
 
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Fit(arguments) => commands::fit::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Locate(arguments) => commands::locate::run(&arguments),
+        Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
     };
     match result {

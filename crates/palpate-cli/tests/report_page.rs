@@ -1,4 +1,4 @@
-//! The paper's report in a browser, on a phone and on a screen.
+//! The reports of studies and of a limit in a browser, on a phone and on a screen.
 #![forbid(unsafe_code)]
 
 mod support {
@@ -8,8 +8,10 @@ mod support {
 
 use std::fs;
 
+use palpate::limit::{Force, Limit, LimitCurve, limit_warnings};
 use palpate::network::{InstructionSet, Precision};
-use palpate::report::{ReportFile, StudyReport, paper_report, study_report};
+use palpate::report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
+use palpate::rig::Rig;
 use palpate::study::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};
 use support::browser::measure;
 use tempfile::TempDir;
@@ -47,10 +49,29 @@ fn pages() -> [Vec<ReportFile>; 2] {
     [paper_report(&report).unwrap(), study_report(&report).unwrap()]
 }
 
+/// The page of the limit of the paper's bench.
+fn limit_page() -> Vec<ReportFile> {
+    let bench = Rig::from_toml(include_str!("../../../examples/paper.toml")).unwrap().bench;
+    let limit = Limit::of(&bench).unwrap();
+    let [known, unknown] =
+        [Force::Known, Force::Unknown].map(|force| LimitCurve::over(&limit, 3.0, force).unwrap());
+    let report = LimitReport {
+        title: "The limit",
+        bench: &bench,
+        limit: &limit,
+        known: &known,
+        unknown: &unknown,
+        force: Force::Unknown,
+        warnings: &limit_warnings(&limit, 3.0, Force::Unknown).unwrap(),
+        listed: &known.points.iter().step_by(50).map(|point| point.position).collect::<Vec<_>>(),
+    };
+    limit_report(&report).unwrap()
+}
+
 #[test]
-fn a_browser_finds_no_fault_with_the_pages_of_a_study() {
+fn a_browser_finds_no_fault_with_the_pages() {
     let folder = TempDir::new().unwrap();
-    for files in pages() {
+    for files in pages().into_iter().chain([limit_page()]) {
         let page = folder.path().join("report.html");
         let report = files.iter().find(|file| file.name == "report.html").unwrap();
         fs::write(&page, &report.bytes).unwrap();

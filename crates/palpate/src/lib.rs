@@ -6,6 +6,7 @@ pub mod contact;
 pub mod estimator;
 pub mod evaluation;
 pub mod influence;
+pub mod limit;
 pub mod mechanics;
 pub mod method;
 pub mod network;

@@ -4,6 +4,7 @@ pub mod estimate_line;
 pub mod evaluate;
 pub mod fit;
 pub mod inspect;
+pub mod limit;
 pub mod locate;
 pub mod simulate;
 pub mod study;

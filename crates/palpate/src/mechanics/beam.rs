@@ -140,6 +140,23 @@ impl Surface for Beam {
         }
     }
 
+    /// In closed form: of the deflection, the slope with sensor and force exchanged (Maxwell's reciprocity,
+    /// y(x; a) = y(a; x)); of the slope, (l² − 3·b² − 3·x²)/(6·E·I·l) on either side; of the strain, −(t/2)·x/(E·I·l)
+    /// and mirrored with the sign changed, with its kink over the sensor; of the reactions, −1/l and 1/l.
+    fn influence_gradient(&self, kind: SensorKind, sensor: Position, contact: Position) -> [f64; 2] {
+        let (l, stiffness) = (self.length_m, self.bending_stiffness());
+        let Span { b, x, direction, .. } = Span::new(l, sensor.x_m, contact.x_m);
+        let along = match kind {
+            SensorKind::Deflection => self.slope(Span::new(l, contact.x_m, sensor.x_m)),
+            SensorKind::Slope => (l * l - 3.0 * b * b - 3.0 * x * x) / (6.0 * stiffness * l),
+            SensorKind::Strain => -direction * 0.5 * self.thickness_m * x / (stiffness * l),
+            // A reaction is linear in the contact's position.
+            SensorKind::Reaction => (self.reaction(sensor.x_m, l) - self.reaction(sensor.x_m, 0.0)) / l,
+            SensorKind::Raw => 0.0,
+        };
+        [along, 0.0]
+    }
+
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;
     /// strain t·l/(8·E·I) at mid-span; reaction 1 under the force.
     fn full_scale(&self, kind: SensorKind) -> f64 {

@@ -1,6 +1,7 @@
 //! What a sensor reads when a unit force acts somewhere on the surface; nothing of recordings or estimators.
 
 mod beam;
+mod differences;
 mod extent;
 mod surface_spec;
 
@@ -20,6 +21,16 @@ pub trait Surface {
     ///
     /// Both positions must be on the surface; elsewhere the value has no meaning.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64;
+
+    /// How fast the influence changes as the contact moves along x and along y: (∂/∂x, ∂/∂y) of [`Surface::influence`],
+    /// in its unit per metre; 0 along y on a one-dimensional surface. Where the influence has a kink, some value
+    /// between those of its two sides.
+    ///
+    /// A model that knows it in closed form says so. This default takes differences of second order, precise to about
+    /// 10⁻¹⁰ of the full scale over the size of the surface.
+    fn influence_gradient(&self, kind: SensorKind, sensor: Position, contact: Position) -> [f64; 2] {
+        differences::gradient(self.extent(), contact, |at| self.influence(kind, sensor, at))
+    }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
     fn full_scale(&self, kind: SensorKind) -> f64;

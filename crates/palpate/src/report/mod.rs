@@ -24,6 +24,7 @@
 //! # Ok::<(), palpate::report::PngError>(())
 //! ```
 
+mod beam_drawing;
 mod bench_drawing;
 mod canvas;
 mod chart;
@@ -32,6 +33,8 @@ mod evaluation_report;
 mod geometry;
 mod layout;
 mod legend;
+mod limit_line;
+mod limit_report;
 mod numbers;
 mod page;
 mod paper_report;
@@ -54,6 +57,7 @@ pub use chart::{
 };
 pub use chart_svg::chart_to_svg;
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
+pub use limit_report::{LimitReport, limit_report};
 pub use paper_report::paper_report;
 pub use png::{PngError, svg_to_png};
 pub use report_file::{ReportError, ReportFile};

@@ -45,6 +45,12 @@ pub(crate) fn mm(length_m: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// A number as a rig states it, freed of rounding errors: "3", "200", "0.25".
+pub(crate) fn stated(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
 /// Median with the range from the 5th to the 95th percentile: "2.38 (2.26–2.73)"; the median alone where they all read
 /// the same.
 pub(crate) fn spread(spread: Spread, shown: fn(f64) -> String) -> String {

@@ -2,9 +2,11 @@
 
 use maud::{Markup, html};
 
+use super::limit_line::limit_line_or_assumed;
 use super::numbers::{counted, mm, number, whole};
 use super::page::{Table, numeric, short, text, words};
 use super::{Axis, BandPoint, Chart, Mark, Series, SeriesKind, Stroke, StudyReport};
+use crate::bench::Bench;
 use crate::evaluation::{Located, Portion, Spread};
 use crate::study::{ArmOutcome, ArmResults};
 
@@ -20,6 +22,11 @@ impl<'a> StudyReport<'a> {
     /// The outcome of an arm that has at least one fit.
     pub(crate) fn outcome(&self, arm: &str) -> Option<&'a ArmOutcome> {
         self.outcomes.iter().find(|outcome| outcome.name == arm && !outcome.fits.is_empty())
+    }
+
+    /// The bench of an arm.
+    fn bench(&self, arm: &str) -> Option<&'a Bench> {
+        self.study.study.arms.iter().find(|other| other.name == arm).map(|arm| &arm.rig.bench)
     }
 
     /// Fits of all arms.
@@ -90,13 +97,16 @@ pub(crate) fn banded(drawn: Drawn<'_>, along: &[(f64, Spread)], seeds: usize) ->
 
 /// Location error along the surface, in mm on a logarithmic axis; `None` where no arm has a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[Drawn]) -> Option<Chart> {
-    let series: Vec<Series> = arms
+    let mut series: Vec<Series> = arms
         .iter()
         .filter_map(|drawn| Some((drawn, report.outcome(drawn.arm)?)))
         .flat_map(|(drawn, outcome)| {
             banded(*drawn, &along(outcome, |located| located.error_m() * 1e3), outcome.fits.len())
         })
         .collect();
+    if !series.is_empty() {
+        series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(report.bench(drawn.arm)?)));
+    }
     let tolerance_m = report.study.judging().tolerance_m;
     (!series.is_empty()).then(|| Chart {
         title: title.to_owned(),

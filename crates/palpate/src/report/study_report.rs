@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::limit_line::limit_in_words;
 use super::numbers::{counted, mm, number};
 use super::page::{Figure, Figures, Page, Section};
 use super::study_parts::{Drawn, arms_table, error_chart, footer, glossary, run_table};
@@ -49,7 +50,7 @@ fn figures(report: &StudyReport) -> Vec<Figure> {
         let chart = error_chart(report, &title, &[Drawn { arm: &arm.name, label, colour: i }])?;
         let caption = html! {
             "Location error of " b { (arm.name) } " by load position, over "
-            (counted(arm.seeds, "seed", "seeds")) "."
+            (counted(arm.seeds, "seed", "seeds")) "." (limit_in_words(&chart))
         };
         Some(Figure { number: i + 1, alternative: title, svg: chart_to_svg(&chart), caption })
     });

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::EvaluationReport;
 use crate::evaluation::{ErrorSummary, Evaluation, Located, Spread};
+use crate::report::limit_line::{limit_in_words, limit_line};
 use crate::report::numbers::mm;
 use crate::report::page::Figure;
 use crate::report::{Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, Stroke, chart_to_svg};
@@ -27,6 +28,7 @@ pub(super) fn error_figure(report: &EvaluationReport) -> Figure {
     if several {
         series.push(drawn("largest of the readings there", 1, Marker::Triangle, |summary| summary.largest_m));
     }
+    series.extend(limit_line(report.bench()));
     let chart = Chart {
         title: "Location error along the surface".to_owned(),
         x: along_surface(report.evaluation, "contact position, mm"),
@@ -38,7 +40,11 @@ pub(super) fn error_figure(report: &EvaluationReport) -> Figure {
         }],
         ..Chart::default()
     };
-    figure(1, &chart, html! { "Location error at each contact position, on a logarithmic axis." })
+    let caption = html! {
+        "Location error at each contact position, on a logarithmic axis."
+        (limit_in_words(&chart))
+    };
+    figure(1, &chart, caption)
 }
 
 pub(super) fn estimate_figure(report: &EvaluationReport) -> Figure {

@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use super::Paper;
 use crate::evaluation::Spread;
+use crate::report::limit_line::limit_in_words;
 use crate::report::page::Figure;
 use crate::report::study_parts::{Drawn, along, banded, error_chart};
 use crate::report::{Axis, Chart, ErrorPoint, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
@@ -143,22 +144,22 @@ impl Paper<'_> {
     }
 
     fn errors_of_codings(&self) -> Option<Figure> {
-        let caption = html! {
-            "Location error by load position with ten equally spaced training positions, for the two codings of the output. "
-            (self.band_in_words())
-        };
         let chart =
             self.errors_of("Location error of the two codings, 10 positions", &[POSITION, NORMALIZED])?;
+        let caption = html! {
+            "Location error by load position with ten equally spaced training positions, for the two codings of the output. "
+            (self.band_in_words()) (limit_in_words(&chart))
+        };
         Some(figure(7, &chart, caption))
     }
 
     fn errors_of_arrangements(&self) -> Option<Figure> {
-        let caption = html! {
-            "Location error by load position with ten training positions in the three arrangements, all with the normalized \
-             output. " (self.band_in_words())
-        };
         let families = [EVEN, MIDDLE_6, MIDDLE_4];
         let chart = self.errors_of("Location error of the three arrangements, 10 positions", &families)?;
+        let caption = html! {
+            "Location error by load position with ten training positions in the three arrangements, all with the normalized \
+             output. " (self.band_in_words()) (limit_in_words(&chart))
+        };
         Some(figure(8, &chart, caption))
     }
 

@@ -3,10 +3,9 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use super::set_up::stated;
 use crate::estimator::Setting;
 use crate::mechanics::{Beam, Surface};
-use crate::report::numbers::number;
+use crate::report::numbers::{number, stated};
 use crate::report::page::{Table, text, words};
 use crate::rig::Rig;
 use crate::sensing::SensorKind;

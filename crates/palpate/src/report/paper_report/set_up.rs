@@ -3,18 +3,13 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use crate::contact::Position;
 use crate::mechanics::{Beam, Surface, SurfaceSpec};
-use crate::report::numbers::{counted, mm, number};
+use crate::report::ReportError;
+use crate::report::beam_drawing::beam_drawing;
+use crate::report::numbers::{counted, mm, number, stated};
 use crate::report::page::{Figure, Figures};
-use crate::report::{BenchDrawing, BenchSupport, BenchSupportKind, ReportError, bench_to_svg};
 use crate::rig::Rig;
 use crate::sensing::SensorKind;
-
-/// Where the drawn load acts, as a share of the length: off the middle, so that the shape is seen to be askew.
-const DRAWN_LOAD: f64 = 0.35;
-/// Points of the drawn shape.
-const SHAPE_STEPS: u32 = 200;
 
 impl Paper<'_> {
     /// What is on the bench, where the surface is a beam. All arms of the paper share it.
@@ -36,22 +31,7 @@ impl Paper<'_> {
     /// Figure 1.
     pub(super) fn bench_figure(&self) -> Result<Option<Figure>, ReportError> {
         let Some((rig, beam, force_n)) = self.bench() else { return Ok(None) };
-        let length_mm = beam.length_m * 1e3;
-        let load = Position::along(DRAWN_LOAD * beam.length_m);
-        let deflection_mm = (0..=SHAPE_STEPS).map(|i| {
-            let at = Position::along(f64::from(i) / f64::from(SHAPE_STEPS) * beam.length_m);
-            (at.x_m * 1e3, force_n * beam.influence(SensorKind::Deflection, at, load) * 1e3)
-        });
-        let wedge = |position_mm| BenchSupport { position_mm, kind: BenchSupportKind::Simple };
-        let svg = bench_to_svg(&BenchDrawing {
-            length_mm,
-            supports: vec![wedge(0.0), wedge(length_mm)],
-            sensors_mm: rig.bench.layout.sensors.iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
-            load_mm: load.x_m * 1e3,
-            load_label: format!("{} N", stated(force_n)),
-            deflection_mm: deflection_mm.collect(),
-            width_px: 760,
-        })?;
+        let (svg, load) = beam_drawing(&beam, &rig.bench.layout, force_n)?;
         let caption = html! {
             "The bench: a beam on two wedges, " (counted(rig.bench.layout.len(), "sensor", "sensors")) " beneath it and a load of "
             (stated(force_n)) " N, here at " (mm(load.x_m)) " mm. Blue: the bent beam, in closed form."
@@ -140,10 +120,4 @@ fn kinds(rig: &Rig) -> String {
     let mut names: Vec<&str> = rig.bench.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();
     names.join(", ")
-}
-
-/// A number as a rig states it, freed of rounding errors: "3", "200", "0.25".
-pub(super) fn stated(value: f64) -> String {
-    let text = format!("{value:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

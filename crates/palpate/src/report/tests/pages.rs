@@ -4,9 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::estimator::Fitting;
 use crate::evaluation::{Evaluation, Portion};
+use crate::limit::{Force, Limit, LimitCurve, limit_warnings};
 use crate::network::{InstructionSet, Precision};
 use crate::report::{
-    EvaluationReport, Judged, ReportFile, StudyReport, evaluation_report, paper_report, study_report,
+    EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
+    paper_report, study_report,
 };
 use crate::rig::Rig;
 use crate::simulate::{simulate, simulate_at};
@@ -263,4 +265,67 @@ fn an_evaluation_of_nothing_has_a_report() {
         tolerance_m: 2e-3,
     });
     assert_sound(&files.unwrap(), &[1, 2]);
+}
+
+/// The report of a rig's limit, for what is known of the force.
+fn limits(toml: &str, force: Force) -> Vec<ReportFile> {
+    let bench = Rig::from_toml(toml).unwrap().bench;
+    let limit = Limit::of(&bench).unwrap();
+    let curve = |force| LimitCurve::over(&limit, 3.0, force).unwrap();
+    let files = limit_report(&LimitReport {
+        title: "The limit of <paper>",
+        bench: &bench,
+        limit: &limit,
+        known: &curve(Force::Known),
+        unknown: &curve(Force::Unknown),
+        force,
+        warnings: &limit_warnings(&limit, 3.0, force).unwrap(),
+        listed: &[0.0, 0.05, 0.2].map(crate::contact::Position::along),
+    });
+    files.unwrap()
+}
+
+#[test]
+fn a_limit_is_drawn_and_told() {
+    let paper = include_str!("../../../../../examples/paper.toml");
+    let reactions = paper
+        .replace("\"deflection\"\ncount = 8 ", "\"reaction\"\npositions = [\"0 mm\", \"400 mm\"] ")
+        .replace("5 um", "0.01 N");
+    let one = paper.replace("count = 8 ", "count = 1 ");
+    let cases = [
+        (paper, Force::Known, "7.7 %"),
+        (paper, Force::Unknown, "reaction sensors at the supports"),
+        (&reactions, Force::Unknown, "Nothing to warn of"),
+        (&one, Force::Unknown, "do not tell the position anywhere"),
+    ];
+    for (toml, force, said) in cases {
+        let files = limits(toml, force);
+        assert_sound(&files, &[1, 2]);
+        let text = shown_text(page(&files));
+        for fact in [said, "3 N", "Cramér–Rao", "standard deviation"] {
+            assert!(text.contains(fact), "{fact} is missing: {text}");
+        }
+    }
+}
+
+#[test]
+fn errors_are_drawn_against_the_limit_where_there_is_one() {
+    let legend = "limit: what physics allows";
+    let assumed = format!("{legend} at 5 µm noise");
+    let run = run(&with_arms(&[("only", "{ arrangement = \"even\", count = 5 }")]), 1);
+    assert!(page(&study_report(&run.report()).unwrap()).contains(&assumed), "the paper's readings are clean");
+    let quick = include_str!("../../../../../examples/paper.toml").replace("1_000_000", "5");
+    for (toml, drawn) in [(quick.clone(), true), (quick.replace("5 um", "0 um"), false)] {
+        let rig = Rig::from_toml(&toml).unwrap();
+        let recording = simulate(&rig, 0).unwrap();
+        let report = EvaluationReport {
+            title: "Errors",
+            evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
+            recording: &recording.provenance,
+            judged: Judged::CrossValidated { rig: &rig, folds: 5, seed: 0 },
+            portions: &[],
+            tolerance_m: 2e-3,
+        };
+        assert_eq!(page(&evaluation_report(&report).unwrap()).contains(legend), drawn);
+    }
 }

@@ -1,0 +1,330 @@
+//! `palpate limit`: what physics allows on a rig's bench, position by position.
+
+use crate::failure::{Complaint, Failure};
+use crate::table::table;
+use crate::{input, output};
+use palpate::bench::Bench;
+use palpate::contact::{Contact, Position};
+use palpate::limit::{Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings};
+use palpate::mechanics::Extent;
+use palpate::report::{LimitReport, limit_report};
+use palpate::units::{Quantity, format_count, format_length_mm};
+use std::path::{Path, PathBuf};
+
+/// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, and what the bench cannot tell.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The rig file
+    rig: PathBuf,
+    /// List every so far instead of a few positions, as in `--every "10 mm"`
+    #[arg(long, value_name = "LENGTH", value_parser = input::length)]
+    every: Option<f64>,
+    /// The contact force [default: the rig's]
+    #[arg(long, value_name = "FORCE", value_parser = input::force)]
+    force: Option<f64>,
+    /// Warn of what cannot be told when the force is not known; so it is for a rig without a force
+    #[arg(long)]
+    unknown_force: bool,
+    /// Noise of every sensor that measures in this unit, instead of the rig's, as in `--noise "5 um"`; may be repeated
+    #[arg(long, value_name = "NOISE", value_parser = input::quantity)]
+    noise: Vec<Quantity>,
+    /// Folder for a report
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print the limit as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is printed as JSON. A limit that is not there, because the readings do not tell, is null.
+#[derive(serde::Serialize)]
+struct Findings {
+    palpate: &'static str,
+    rig: String,
+    length_mm: f64,
+    sensors: usize,
+    sensors_alive: usize,
+    force_n: f64,
+    /// What the rig knows of it: what the warnings are about.
+    force: Force,
+    known_force: Option<Summary>,
+    unknown_force: Option<Summary>,
+    positions: Vec<At>,
+    warnings: Vec<Warning>,
+}
+
+/// Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
+#[derive(serde::Serialize)]
+struct Summary {
+    mean_mm: f64,
+    median_mm: f64,
+    mean_error_mm: f64,
+    least_mm: f64,
+    least_at_mm: [f64; 2],
+    largest_mm: f64,
+    largest_at_mm: [f64; 2],
+    positions_without: usize,
+}
+
+#[derive(serde::Serialize)]
+struct At {
+    x_mm: f64,
+    y_mm: f64,
+    known_force_mm: Option<f64>,
+    unknown_force_mm: Option<f64>,
+    force_sd_n: Option<f64>,
+}
+
+#[derive(serde::Serialize)]
+struct Warning {
+    kind: &'static str,
+    from_mm: [f64; 2],
+    to_mm: [f64; 2],
+    /// Millimetres for a blind zone, standard deviations for the others.
+    value: Option<f64>,
+    bound: f64,
+    message: String,
+    help: String,
+}
+
+/// The limit for both kinds of knowledge of the force.
+struct Limits<'a> {
+    limit: &'a Limit<'a>,
+    force_n: f64,
+    force: Force,
+    known: LimitCurve,
+    unknown: LimitCurve,
+    listed: Vec<Position>,
+    warnings: Vec<LimitWarning>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let bench = bench(arguments)?;
+    let complain = |error| complaint(error, &arguments.rig);
+    let limit = Limit::of(&bench).map_err(complain)?;
+    let limits = limits(&limit, &bench, arguments).map_err(complain)?;
+    if let Some(out) = &arguments.out {
+        write_report(&limits, &bench, arguments, out)?;
+    }
+    if arguments.json {
+        output::say_json(&findings(&limits, &bench, arguments))
+    } else {
+        print(&limits, &bench, arguments)
+    }
+}
+
+/// The rig's bench, with the force and the noise of the command line.
+fn bench(arguments: &Arguments) -> Result<Bench, Failure> {
+    let mut bench = input::read_rig(&arguments.rig)?.bench;
+    for noise in &arguments.noise {
+        let mut meant = bench
+            .layout
+            .sensors
+            .iter_mut()
+            .filter(|sensor| sensor.kind.dimension() == noise.dimension)
+            .peekable();
+        if meant.peek().is_none() {
+            let complaint = Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
+            return Err(complaint.help("give the noise in the unit of the readings, as in \"5 um\"").into());
+        }
+        meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
+    }
+    Ok(bench)
+}
+
+fn complaint(error: LimitError, rig: &Path) -> Failure {
+    let complaint = Complaint::new(format!("{}: {error}", rig.display()));
+    let help = match error {
+        LimitError::NoModel => {
+            "give a surface with a model, such as `kind = \"beam\"`; how far a locator is off on recordings says `palpate evaluate`"
+        }
+        LimitError::SingularNoise { .. } => {
+            "add `noise = \"5 um\"` to [sensors], or try one with --noise \"5 um\""
+        }
+        LimitError::AllDead { .. } => "take sensors out of `dead` in [sensors]",
+        LimitError::NoForce => "--force \"3 N\" gives one, or `force = \"3 N\"` in [contact]",
+        LimitError::Force { .. } => "--force takes a force such as \"3 N\"",
+        LimitError::Positions { .. } => "--every takes a length between two positions, such as \"10 mm\"",
+    };
+    complaint.help(help).into()
+}
+
+fn limits<'a>(
+    limit: &'a Limit<'a>,
+    bench: &Bench,
+    arguments: &Arguments,
+) -> Result<Limits<'a>, LimitError> {
+    let force_n = arguments.force.or(bench.force_n).ok_or(LimitError::NoForce)?;
+    let unknown = arguments.unknown_force || bench.force_n.is_none();
+    let force = if unknown { Force::Unknown } else { Force::Known };
+    let extent = bench.surface.extent();
+    let listed = match arguments.every {
+        Some(every_m) => {
+            let curve = LimitCurve::every(limit, force_n, force, every_m)?;
+            curve.points.iter().map(|point| point.position).collect()
+        }
+        None => a_few(extent),
+    };
+    Ok(Limits {
+        limit,
+        force_n,
+        force,
+        known: LimitCurve::over(limit, force_n, Force::Known)?,
+        unknown: LimitCurve::over(limit, force_n, Force::Unknown)?,
+        listed,
+        warnings: limit_warnings(limit, force_n, force)?,
+    })
+}
+
+/// From one end to the other along the middle of the surface; for the paper's beam 1, 20, 50, 100, 200 mm and mirrored.
+fn a_few(extent: Extent) -> Vec<Position> {
+    const SHARES: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
+    let y_m = extent.width_m.map_or(0.0, |width_m| 0.5 * width_m);
+    SHARES.map(|share| Position { x_m: share * extent.length_m, y_m }).to_vec()
+}
+
+impl Limits<'_> {
+    fn at(&self, position: Position) -> [Option<Bound>; 2] {
+        let contact = Contact { position, force_n: self.force_n };
+        [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force))
+    }
+}
+
+fn write_report(
+    limits: &Limits,
+    bench: &Bench,
+    arguments: &Arguments,
+    out: &Path,
+) -> Result<(), Failure> {
+    let report = LimitReport {
+        title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
+        bench,
+        limit: limits.limit,
+        known: &limits.known,
+        unknown: &limits.unknown,
+        force: limits.force,
+        warnings: &limits.warnings,
+        listed: &limits.listed,
+    };
+    let files = limit_report(&report).map_err(Complaint::new)?;
+    output::make_folder(out)?;
+    for file in files {
+        output::write_file(&out.join(&file.name), &file.bytes)?;
+    }
+    Ok(())
+}
+
+fn findings(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Findings {
+    let at = |&position: &Position| {
+        let [known, unknown] = limits.at(position);
+        let [x_mm, y_mm] = in_mm(position);
+        At {
+            x_mm,
+            y_mm,
+            known_force_mm: known.map(|bound| bound.sd_position_m * 1e3),
+            unknown_force_mm: unknown.map(|bound| bound.sd_position_m * 1e3),
+            force_sd_n: unknown.and_then(|bound| bound.sd_force_n),
+        }
+    };
+    Findings {
+        palpate: env!("CARGO_PKG_VERSION"),
+        rig: arguments.rig.display().to_string(),
+        length_mm: bench.surface.extent().length_m * 1e3,
+        sensors: bench.layout.len(),
+        sensors_alive: limits.limit.alive(),
+        force_n: limits.force_n,
+        force: limits.force,
+        known_force: limits.known.summary().map(summary),
+        unknown_force: limits.unknown.summary().map(summary),
+        positions: limits.listed.iter().map(at).collect(),
+        warnings: limits.warnings.iter().map(warning).collect(),
+    }
+}
+
+fn summary(summary: LimitSummary) -> Summary {
+    Summary {
+        mean_mm: summary.mean_m * 1e3,
+        median_mm: summary.median_m * 1e3,
+        mean_error_mm: summary.mean_error_m * 1e3,
+        least_mm: summary.best.1 * 1e3,
+        least_at_mm: in_mm(summary.best.0),
+        largest_mm: summary.worst.1 * 1e3,
+        largest_at_mm: in_mm(summary.worst.0),
+        positions_without: summary.without,
+    }
+}
+
+fn warning(warning: &LimitWarning) -> Warning {
+    let unit = if matches!(warning, LimitWarning::Blind { .. }) { 1e3 } else { 1.0 };
+    let ((value, bound), zone) = (warning.value_and_bound(), warning.zone());
+    Warning {
+        kind: warning.kind(),
+        from_mm: in_mm(zone.from),
+        to_mm: in_mm(zone.to),
+        value: value.map(|value| value * unit),
+        bound: bound * unit,
+        message: warning.to_string(),
+        help: warning.help(),
+    }
+}
+
+fn in_mm(position: Position) -> [f64; 2] {
+    [position.x_m * 1e3, position.y_m * 1e3]
+}
+
+fn print(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Result<(), Failure> {
+    output::say(format!(
+        "{}: {} of {} sensors alive, {} N, force {}\n",
+        arguments.rig.display(),
+        limits.limit.alive(),
+        bench.layout.len(),
+        limits.force_n,
+        limits.force.name()
+    ))?;
+    let heading = ["limit, mm", "force known", "force unknown", "force itself, N"];
+    let rows = limits.listed.iter().map(|&position| {
+        let [known, unknown] = limits.at(position);
+        let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
+        let force = figure(unknown.and_then(|bound| bound.sd_force_n));
+        vec![place(position, bench.surface.extent()), limit(known), limit(unknown), force]
+    });
+    output::say(table(&heading, rows.chain(summary_rows(limits))))?;
+    for warning in &limits.warnings {
+        output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
+    }
+    match &arguments.out {
+        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
+        None => Ok(()),
+    }
+}
+
+/// Of the whole surface, whatever positions are listed.
+fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
+    let summaries = [limits.known.summary(), limits.unknown.summary()];
+    let row = |name: &str, of: fn(&LimitSummary) -> f64| {
+        let [known, unknown] = summaries.map(|summary| figure(summary.as_ref().map(|s| of(s) * 1e3)));
+        vec![name.to_owned(), known, unknown, String::new()]
+    };
+    vec![
+        row("surface: mean", |summary| summary.mean_m),
+        row("median", |summary| summary.median_m),
+        row("largest", |summary| summary.worst.1),
+        row("mean error at the limit", |summary| summary.mean_error_m),
+    ]
+}
+
+fn place(position: Position, extent: Extent) -> String {
+    match extent.width_m {
+        Some(_) => format!("{} × {}", format_length_mm(position.x_m), format_length_mm(position.y_m)),
+        None => format_length_mm(position.x_m),
+    }
+}
+
+/// Three decimals, or a whole number where there are many digits before them; a dash for none.
+fn figure(value: Option<f64>) -> String {
+    match value {
+        None => "–".to_owned(),
+        Some(value) if value >= 100.0 => format_count(value.round() as u64),
+        Some(value) => format!("{value:.3}"),
+    }
+}

@@ -1,0 +1,178 @@
+//! The limit: the Cramér–Rao bound of contact position and force for a surface, its layout and its noise.
+//!
+//! Sensor i reads y_i(a, W) = W·f_i(a) plus independent Gaussian noise of variance σ_i² + q_i²/12, where a is the contact
+//! position, W its force, f_i the sensor's influence function, σ_i its noise and q_i its resolution (quantisation as noise
+//! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). For a known force on a line the bound is
+//! 1/√(Σ_i (W·f_i′(a)/σ_i)²); an unknown force is estimated along and costs part of that information.
+//!
+//! Left out: dead channels, and those that are saturated at the contact. Not counted: gain and offset errors, which
+//! calibration removes. The bound is one of unbiased estimators and small errors; where it nears the size of the surface it
+//! says "blind" and no more, and that two contacts far apart may read alike is for [`LimitWarning`] to say.
+
+mod bound;
+mod curve;
+mod error;
+mod grid;
+mod information;
+mod twins;
+mod warning;
+mod zone;
+
+pub use bound::Bound;
+pub use curve::{LimitCurve, LimitPoint, LimitSummary};
+pub use error::LimitError;
+pub use warning::{AMBIGUOUS_DISTANCE, BLIND_SHARE, FAINT_SIGNAL, LimitWarning, limit_warnings};
+pub use zone::Zone;
+
+use crate::bench::Bench;
+use crate::contact::{Contact, Position};
+use crate::mechanics::Surface;
+use crate::sensing::{Layout, SensorKind};
+
+/// What is known of the contact force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Force {
+    /// Its value.
+    Known,
+    /// Nothing: it is estimated together with the position.
+    Unknown,
+}
+
+impl Force {
+    /// "known" or "unknown".
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Known => "known",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// A surface with the sensors that are alive and the noise of each.
+#[derive(Clone)]
+pub struct Limit<'a> {
+    surface: &'a dyn Surface,
+    channels: Vec<Channel>,
+}
+
+/// A live sensor.
+#[derive(Clone, Copy)]
+struct Channel {
+    kind: SensorKind,
+    position: Position,
+    /// √(σ² + q²/12).
+    sd: f64,
+    range: Option<(f64, f64)>,
+}
+
+impl<'a> Limit<'a> {
+    /// The limit of a surface read by `layout`; dead channels are left out.
+    ///
+    /// # Errors
+    /// [`LimitError::SingularNoise`] for the first live sensor with neither noise nor resolution, [`LimitError::AllDead`].
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
+        let alive = layout.sensors.iter().enumerate().filter(|(_, sensor)| !sensor.channel.dead);
+        let channels = alive.map(|(i, sensor)| {
+            let (noise_sd, resolution) = (sensor.channel.noise_sd, sensor.channel.resolution);
+            let sd = noise_sd.hypot(resolution / 12f64.sqrt());
+            if !(sd > 0.0 && sd.is_finite()) {
+                return Err(LimitError::SingularNoise { number: i + 1, kind: sensor.kind, noise_sd, resolution });
+            }
+            Ok(Channel { kind: sensor.kind, position: sensor.position, sd, range: sensor.channel.range })
+        });
+        let channels = channels.collect::<Result<Vec<_>, _>>()?;
+        if channels.is_empty() {
+            return Err(LimitError::AllDead { count: layout.len() });
+        }
+        Ok(Self { surface, channels })
+    }
+
+    /// The limit of a bench.
+    ///
+    /// # Errors
+    /// [`LimitError::NoModel`] for a measured surface, and those of [`Limit::new`].
+    pub fn of(bench: &'a Bench) -> Result<Self, LimitError> {
+        Self::new(bench.surface.model().ok_or(LimitError::NoModel)?, &bench.layout)
+    }
+
+    /// The surface.
+    pub fn surface(&self) -> &'a dyn Surface {
+        self.surface
+    }
+
+    /// How many sensors are alive.
+    pub fn alive(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// The bound at a contact; `None` where the readings do not tell the position at all, which is where the Fisher
+    /// information is singular: no force, no sensor that notices, or a change of position that a change of force undoes.
+    pub fn at(&self, contact: Contact, force: Force) -> Option<Bound> {
+        let Columns { force: by_force, along, across } = self.derivatives(contact);
+        match (force, across) {
+            (Force::Known, None) => {
+                let [[xx]] = information::inverse_information([along])?;
+                Some(Bound::new([[xx, 0.0], [0.0, 0.0]], None))
+            }
+            (Force::Known, Some(across)) => {
+                Some(Bound::new(information::inverse_information([along, across])?, None))
+            }
+            (Force::Unknown, None) => {
+                let [[ff, _], [_, xx]] = information::inverse_information([by_force, along])?;
+                Some(Bound::new([[xx, 0.0], [0.0, 0.0]], Some(ff)))
+            }
+            (Force::Unknown, Some(across)) => {
+                let covariance = information::inverse_information([by_force, along, across])?;
+                let [[ff, ..], [_, xx, xy], [_, _, yy]] = covariance;
+                Some(Bound::new([[xx, xy], [xy, yy]], Some(ff)))
+            }
+        }
+    }
+
+    /// Each live sensor's reading at a contact, without noise, over the standard deviation of its noise.
+    pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
+        self.channels.iter().map(|channel| self.clean(channel, contact) / channel.sd).collect()
+    }
+
+    /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
+    pub fn signal_to_noise(&self, contact: Contact) -> f64 {
+        information::norm(&self.whitened_reading(contact))
+    }
+
+    /// What a sensor reads without noise, held at the ends of its range.
+    fn clean(&self, channel: &Channel, contact: Contact) -> f64 {
+        let value = contact.force_n * self.surface.influence(channel.kind, channel.position, contact.position);
+        channel.range.map_or(value, |(low, high)| value.max(low).min(high))
+    }
+
+    /// Derivatives of the whitened readings; those of saturated channels are 0.
+    fn derivatives(&self, contact: Contact) -> Columns {
+        let Contact { position, force_n } = contact;
+        let mut columns = Columns::default();
+        let mut across = Vec::new();
+        for &Channel { kind, position: sensor, sd, range } in &self.channels {
+            let influence = self.surface.influence(kind, sensor, position);
+            let [along_x, along_y] = self.surface.influence_gradient(kind, sensor, position);
+            let reading = force_n * influence;
+            let free = range.is_none_or(|(low, high)| low < reading && reading < high);
+            let weight = if free { 1.0 / sd } else { 0.0 };
+            columns.force.push(weight * influence);
+            columns.along.push(weight * force_n * along_x);
+            across.push(weight * force_n * along_y);
+        }
+        columns.across = self.surface.extent().width_m.is_some().then_some(across);
+        columns
+    }
+}
+
+/// Derivatives of the whitened readings with respect to force, x and, on a plane, y.
+#[derive(Default)]
+struct Columns {
+    force: Vec<f64>,
+    along: Vec<f64>,
+    across: Option<Vec<f64>>,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,301 @@
+//! What a limit warns of, in words: where, how bad, and what would help.
+
+use std::fmt;
+
+use super::curve::check_force;
+use super::grid::Grid;
+use super::twins::{Twin, TwinSearch};
+use super::zone::{Zone, zones};
+use super::{Force, Limit, LimitError};
+use crate::contact::{Contact, Position};
+use crate::sensing::SensorKind;
+
+/// A limit above this share of the length is called blind.
+pub const BLIND_SHARE: f64 = 0.1;
+/// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
+/// for the other contact's more than once in a hundred times (2·2.326).
+pub const AMBIGUOUS_DISTANCE: f64 = 4.653;
+/// A touch that stands out of the noise by fewer standard deviations than this is called faint.
+pub const FAINT_SIGNAL: f64 = 5.0;
+/// Readings that differ by fewer standard deviations than this are the same.
+const SAME: f64 = 0.05;
+
+/// Something that a bench cannot tell, whatever the estimator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LimitWarning {
+    /// The limit is a large part of the surface, or there is none.
+    Blind {
+        /// Where.
+        zone: Zone,
+        /// What is known of the force.
+        force: Force,
+        /// Where it is worst.
+        at: Position,
+        /// The limit there, in metres; `None` where the readings do not tell the position.
+        sd_m: Option<f64>,
+        /// Limits up to this, in metres, are not called blind.
+        bound_m: f64,
+        /// The limit there if the force were known, in metres; `None` where it is, or where that does not help.
+        known_force_sd_m: Option<f64>,
+        /// Whether there are supports without a reaction sensor at work.
+        reactions_would_help: bool,
+    },
+    /// Two contacts far apart whose readings are alike.
+    Mirror {
+        /// Where.
+        zone: Zone,
+        /// Where the other contacts are.
+        twins: Zone,
+        /// What is known of the force.
+        force: Force,
+        /// The contact whose twin is nearest.
+        at: Position,
+        /// Its twin.
+        twin: Position,
+        /// How far apart the two readings are, in standard deviations.
+        distance: f64,
+    },
+    /// A contact that hardly shows in the readings.
+    Faint {
+        /// Where.
+        zone: Zone,
+        /// Where it is faintest.
+        at: Position,
+        /// By how many standard deviations it stands out of the noise.
+        signal_to_noise: f64,
+        /// The contact force, in newtons.
+        force_n: f64,
+    },
+}
+
+/// Everything that a limit warns of, for contacts of `force_n` newtons: blind zones, then mirror ambiguity, then faint
+/// contacts, each from left to right.
+///
+/// # Errors
+/// [`LimitError::Force`] for a force that is not positive and finite.
+pub fn limit_warnings(limit: &Limit, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
+    check_force(force_n)?;
+    let survey = Survey { limit, force_n, force, grid: Grid::over(limit.surface.extent()) };
+    let mut warnings = survey.blind();
+    warnings.extend(survey.mirrors());
+    warnings.extend(survey.faint());
+    Ok(warnings)
+}
+
+/// One look all over the surface.
+struct Survey<'a> {
+    limit: &'a Limit<'a>,
+    force_n: f64,
+    force: Force,
+    grid: Grid,
+}
+
+impl Survey<'_> {
+    fn sd_m(&self, position: Position, force: Force) -> Option<f64> {
+        self.limit.at(Contact { position, force_n: self.force_n }, force).map(|bound| bound.sd_position_m)
+    }
+
+    fn signal(&self, position: Position) -> f64 {
+        self.limit.signal_to_noise(Contact { position, force_n: self.force_n })
+    }
+
+    fn blind(&self) -> Vec<LimitWarning> {
+        let extent = self.limit.surface.extent();
+        let bound_m = BLIND_SHARE * extent.length_m;
+        let size = |position: Position| self.sd_m(position, self.force).unwrap_or(f64::INFINITY);
+        let found = zones(extent, &self.grid, |position| size(position) > bound_m);
+        let warning = |(zone, inside): (Zone, Vec<Position>)| {
+            let at = inside.into_iter().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
+            let known = (self.force == Force::Unknown).then(|| self.sd_m(at, Force::Known)).flatten();
+            Some(LimitWarning::Blind {
+                zone,
+                force: self.force,
+                at,
+                sd_m: self.sd_m(at, self.force),
+                bound_m,
+                known_force_sd_m: known.filter(|sd_m| *sd_m <= bound_m),
+                reactions_would_help: self.lacks_reactions(),
+            })
+        };
+        found.into_iter().filter_map(warning).collect()
+    }
+
+    fn lacks_reactions(&self) -> bool {
+        let reacts = |channel: &super::Channel| channel.kind == SensorKind::Reaction;
+        self.limit.surface.full_scale(SensorKind::Reaction) > 0.0 && !self.limit.channels.iter().any(reacts)
+    }
+
+    /// Each pair of zones once, however it was found.
+    fn mirrors(&self) -> Vec<LimitWarning> {
+        let search = TwinSearch::new(self.limit, self.force_n, self.force, AMBIGUOUS_DISTANCE);
+        let twin = |position: Position| {
+            let clear = self.signal(position) >= FAINT_SIGNAL;
+            clear.then(|| search.twin_of(position)).flatten()
+        };
+        let found = zones(self.limit.surface.extent(), &self.grid, |position| twin(position).is_some());
+        let mut warnings: Vec<LimitWarning> = Vec::new();
+        for (zone, inside) in found {
+            let pairs: Vec<(Position, Twin)> =
+                inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
+            let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+            let ends = [zone.from, zone.to].into_iter().filter_map(twin);
+            let twins = Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
+            let (Some(&(at, nearest)), Some(twins)) = (nearest, twins) else { continue };
+            let said = |warning: &LimitWarning| match warning {
+                LimitWarning::Mirror { zone, twins, .. } => {
+                    twins.contains(at) || zone.contains(nearest.position)
+                }
+                _ => false,
+            };
+            if !warnings.iter().any(said) {
+                let (twin, distance) = (nearest.position, nearest.distance);
+                warnings.push(LimitWarning::Mirror { zone, twins, force: self.force, at, twin, distance });
+            }
+        }
+        warnings
+    }
+
+    fn faint(&self) -> Vec<LimitWarning> {
+        let extent = self.limit.surface.extent();
+        let found = zones(extent, &self.grid, |position| self.signal(position) < FAINT_SIGNAL);
+        let warning = |(zone, inside): (Zone, Vec<Position>)| {
+            let at = inside.into_iter().min_by(|a, b| self.signal(*a).total_cmp(&self.signal(*b)))?;
+            let signal_to_noise = self.signal(at);
+            Some(LimitWarning::Faint { zone, at, signal_to_noise, force_n: self.force_n })
+        };
+        found.into_iter().filter_map(warning).collect()
+    }
+}
+
+impl LimitWarning {
+    /// "blind", "mirror" or "faint".
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Blind { .. } => "blind",
+            Self::Mirror { .. } => "mirror",
+            Self::Faint { .. } => "faint",
+        }
+    }
+
+    /// Where it is.
+    pub const fn zone(&self) -> Zone {
+        match self {
+            Self::Blind { zone, .. } | Self::Mirror { zone, .. } | Self::Faint { zone, .. } => *zone,
+        }
+    }
+
+    /// How bad it is where it is worst, and the bound that this is held against: metres for a blind zone, standard
+    /// deviations for the others. `None` where there is no limit at all.
+    pub const fn value_and_bound(&self) -> (Option<f64>, f64) {
+        match self {
+            Self::Blind { sd_m, bound_m, .. } => (*sd_m, *bound_m),
+            Self::Mirror { distance, .. } => (Some(*distance), AMBIGUOUS_DISTANCE),
+            Self::Faint { signal_to_noise, .. } => (Some(*signal_to_noise), FAINT_SIGNAL),
+        }
+    }
+
+    /// Probability that a reading of the one ambiguous contact is nearer to that of the other: that a standard normal
+    /// variable exceeds half their distance. `None` of other warnings.
+    pub fn mistaken(&self) -> Option<f64> {
+        match self {
+            Self::Mirror { distance, .. } => Some(upper_tail(0.5 * distance)),
+            Self::Blind { .. } | Self::Faint { .. } => None,
+        }
+    }
+
+    /// What would help.
+    pub fn help(&self) -> String {
+        let (value, bound) = self.value_and_bound();
+        match self {
+            Self::Blind { known_force_sd_m, reactions_would_help, .. } => {
+                let mut ways = Vec::new();
+                if let Some(sd_m) = known_force_sd_m {
+                    ways.push(format!("a known force (the limit would be {} mm)", figure(sd_m * 1e3)));
+                }
+                if *reactions_would_help {
+                    ways.push("reaction sensors at the supports".to_owned());
+                }
+                ways.push(match value {
+                    Some(sd_m) => less_noise(sd_m / bound),
+                    None => "a sensor that notices a contact there".to_owned(),
+                });
+                ways.join(", or ")
+            }
+            // Readings that are the same stay so, however quiet the sensors are.
+            Self::Mirror { distance, .. } if *distance < SAME => {
+                "a sensor that breaks the symmetry; less noise does not help".to_owned()
+            }
+            Self::Mirror { distance, .. } => {
+                format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
+            }
+            Self::Faint { signal_to_noise, .. } => {
+                let factor = bound / signal_to_noise;
+                format!("{}, a harder touch, or a sensor that is nearer", less_noise(factor))
+            }
+        }
+    }
+}
+
+fn less_noise(factor: f64) -> String {
+    if factor.is_finite() {
+        format!("noise {} times smaller", figure(factor))
+    } else {
+        "sensors that notice a contact there".to_owned()
+    }
+}
+
+impl fmt::Display for LimitWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Blind { zone, force, at, sd_m: Some(sd_m), bound_m, .. } => write!(
+                f,
+                "blind at {zone} with {} force: the limit is up to {} mm (at {}), more than {} mm, a tenth of the length",
+                force.name(),
+                figure(sd_m * 1e3),
+                place(*at),
+                figure(bound_m * 1e3)
+            ),
+            Self::Blind { zone, force, sd_m: None, .. } => {
+                write!(f, "blind at {zone} with {} force: the readings do not tell the position", force.name())
+            }
+            Self::Mirror { zone, twins, force, at, twin, distance } => {
+                let (at, twin, force) = (place(*at), place(*twin), force.name());
+                write!(f, "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; ")?;
+                if *distance < SAME {
+                    return write!(f, "{at} and {twin} read the same");
+                }
+                let (distance, bound) = (figure(*distance), figure(AMBIGUOUS_DISTANCE));
+                let mistaken = figure(100.0 * self.mistaken().unwrap_or(0.0));
+                write!(
+                    f,
+                    "{at} and {twin} differ by {distance} standard deviations, fewer than {bound}, and are mistaken for each \
+                     other with a probability of up to {mistaken} %"
+                )
+            }
+            Self::Faint { zone, at, signal_to_noise, force_n } => write!(
+                f,
+                "faint at {zone}: {force_n} N at {} stand out of the noise by {} standard deviations, fewer than \
+                 {FAINT_SIGNAL}",
+                place(*at),
+                figure(*signal_to_noise)
+            ),
+        }
+    }
+}
+
+fn place(position: Position) -> String {
+    Zone { from: position, to: position }.to_string()
+}
+
+/// About two significant digits, and no exponent: "0.087", "3.3", "8300".
+fn figure(value: f64) -> String {
+    let digits = 1 - value.abs().max(1e-6).log10().floor() as i32;
+    let unit = 10f64.powi(-digits);
+    let decimals = digits.max(0) as usize;
+    format!("{:.decimals$}", (value / unit).round() * unit)
+}
+
+/// P(z > x) of a standard normal z, for x ≥ 0: half the complementary error function of x/√2.
+fn upper_tail(x: f64) -> f64 {
+    0.5 * libm::erfc(x / std::f64::consts::SQRT_2)
+}

@@ -1,0 +1,65 @@
+//! The limit as a line among errors: what physics allows, for the eye to compare with.
+
+use super::{Chart, Series, SeriesKind, Stroke};
+use crate::bench::Bench;
+use crate::limit::{Bound, Force, Limit, LimitCurve, LimitError, LimitPoint};
+use crate::sensing::{Layout, Sensor, SensorKind};
+
+/// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
+/// the noise that a plain displacement sensor has, as in `examples/paper.toml`.
+const ASSUMED_NOISE_M: f64 = 5e-6;
+/// What the line is called in a legend, at the beginning.
+const LABEL: &str = "limit";
+
+/// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` where there is
+/// none: a surface without a model, clean sensors, a force that is not known.
+pub(super) fn limit_line(bench: &Bench) -> Option<Series> {
+    Some(line(&curve(bench, &bench.layout).ok()?, format!("{LABEL}: what physics allows")))
+}
+
+/// The same; where deflection sensors are clean, for a noise that the legend states.
+pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
+    let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
+    match curve(bench, &bench.layout) {
+        Err(LimitError::SingularNoise { .. }) if bench.layout.sensors.iter().all(clean) => {
+            let mut layout = bench.layout.clone();
+            layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
+            let label = format!("{LABEL}: what physics allows at {} µm noise", ASSUMED_NOISE_M * 1e6);
+            Some(line(&curve(bench, &layout).ok()?, label))
+        }
+        _ => limit_line(bench),
+    }
+}
+
+/// A sentence on the line, for the caption of a chart that has it; else nothing.
+pub(super) fn limit_in_words(chart: &Chart) -> &'static str {
+    if chart.series.iter().any(|series| series.label.starts_with(LABEL)) {
+        " Black dashes: the limit, the mean error of the best unbiased estimator where the readings are noisy and the force \
+         is known (Cramér–Rao bound)."
+    } else {
+        ""
+    }
+}
+
+fn curve(bench: &Bench, layout: &Layout) -> Result<LimitCurve, LimitError> {
+    let limit = Limit::new(bench.surface.model().ok_or(LimitError::NoModel)?, layout)?;
+    LimitCurve::over(&limit, bench.force_n.ok_or(LimitError::NoForce)?, Force::Known)
+}
+
+fn line(curve: &LimitCurve, label: String) -> Series {
+    let points = along(curve, |bound| bound.mean_error_m() * 1e3);
+    Series { label, colour: 6, kind: SeriesKind::Line { points, stroke: Stroke::Dashed } }
+}
+
+/// A figure of the bound by x in mm, on a plane its mean across the width; a gap where there is no bound.
+pub(super) fn along(curve: &LimitCurve, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
+    let mut points: Vec<_> = curve.points.iter().collect();
+    points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
+    let columns = points.chunk_by(|a, b| a.position.x_m == b.position.x_m);
+    let mean = |column: &[&LimitPoint]| {
+        let figures: Option<Vec<f64>> =
+            column.iter().map(|point| point.bound.as_ref().map(&figure)).collect();
+        figures.map_or(f64::NAN, |figures| figures.iter().sum::<f64>() / figures.len() as f64)
+    };
+    columns.map(|column| (column[0].position.x_m * 1e3, mean(column))).collect()
+}
