@@ -2,6 +2,7 @@
 
 pub mod arrangement;
 pub mod bench;
+pub mod centroid;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;
