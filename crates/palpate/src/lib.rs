@@ -3,6 +3,7 @@
 pub mod arrangement;
 pub mod bench;
 pub mod centroid;
+pub mod closed_form;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;
