@@ -10,6 +10,7 @@ pub mod method;
 pub mod network;
 pub mod numerics;
 pub mod recording;
+pub mod regression;
 pub mod report;
 pub mod rig;
 pub mod sensing;
