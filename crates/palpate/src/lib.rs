@@ -5,6 +5,8 @@ pub mod bench;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;
+pub mod features;
+pub mod gaussian_process;
 pub mod mechanics;
 pub mod method;
 pub mod network;

@@ -32,12 +32,7 @@ impl Hyperparameters {
         Ok(())
     }
 
-    /// Their logarithms: the length scales', then the noise ratio's.
-    pub(super) fn logarithms(&self) -> Vec<f64> {
-        self.length_scales.iter().chain([&self.noise_ratio]).map(|value| value.ln()).collect()
-    }
-
-    /// The inverse of [`Self::logarithms`].
+    /// From their logarithms: the length scales', then the noise ratio's.
     pub(super) fn from_logarithms(logarithms: &[f64]) -> Self {
         let mut values: Vec<f64> = logarithms.iter().map(|value| value.exp()).collect();
         let noise_ratio = values.pop().unwrap_or(1.0);

