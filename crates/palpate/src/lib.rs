@@ -2,16 +2,21 @@
 
 pub mod arrangement;
 pub mod bench;
+pub mod centroid;
+pub mod closed_form;
 pub mod contact;
 pub mod estimator;
 pub mod evaluation;
 pub mod influence;
 pub mod limit;
+pub mod features;
+pub mod gaussian_process;
 pub mod mechanics;
 pub mod method;
 pub mod network;
 pub mod numerics;
 pub mod recording;
+pub mod regression;
 pub mod report;
 pub mod rig;
 pub mod sensing;

@@ -1,5 +1,9 @@
 //! What every method can do: be fitted to a recording, and locate.
 
+mod held_out;
+
+pub use held_out::HeldOutSpread;
+
 use crate::bench::Bench;
 use crate::recording::Recording;
 use palpate_core::Estimate;

@@ -8,7 +8,7 @@ use super::used_paths::used_paths;
 const SOURCE: &str = "crates/palpate/src/";
 
 /// Top to bottom: a module may use those above it.
-const ORDER: [&str; 27] = [
+const ORDER: [&str; 28] = [
     "units",
     "numerics",
     "regression",
@@ -19,6 +19,7 @@ const ORDER: [&str; 27] = [
     "bench",
     "arrangement",
     "method",
+    "features",
     "network",
     "influence",
     "gaussian_process",

@@ -4,7 +4,7 @@
 //! nearly all of the n³/3 multiply-adds, and is a matrix product, which ndarray hands to a tuned kernel.
 
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
 
 /// Columns that are factored before the rest of the matrix is updated.
 const BLOCK: usize = 64;
@@ -66,13 +66,20 @@ impl Cholesky {
 
     /// L⁻¹·b.
     pub fn solve_lower(&self, b: &Array1<f64>) -> Array1<f64> {
-        let mut x = b.clone();
-        for i in 0..self.size() {
-            let row = self.lower.row(i);
-            let sum = row.slice(s![..i]).dot(&x.slice(s![..i]));
-            x[i] = (x[i] - sum) / row[i];
+        let mut x = b.to_vec();
+        self.solve_lower_in_place(&mut x);
+        Array1::from(x)
+    }
+
+    /// L⁻¹·b in the place of b.
+    ///
+    /// # Panics
+    /// When b is shorter than the matrix.
+    pub fn solve_lower_in_place(&self, b: &mut [f64]) {
+        for (i, row) in self.lower.outer_iter().enumerate() {
+            let sum = row.slice(s![..i]).dot(&ArrayView1::from(&b[..i]));
+            b[i] = (b[i] - sum) / row[i];
         }
-        x
     }
 
     /// L⁻ᵀ·b.
@@ -114,8 +121,44 @@ impl Cholesky {
 
     /// A⁻¹.
     pub fn inverse(&self) -> Array2<f64> {
-        let inverse_lower = self.solve_lower_matrix(Array2::eye(self.size()));
-        inverse_lower.t().dot(&inverse_lower)
+        Self::gram_of_lower(&self.inverse_lower())
+    }
+
+    /// L⁻¹, lower triangular.
+    pub fn inverse_lower(&self) -> Array2<f64> {
+        let size = self.size();
+        let mut inverse = Array2::eye(size);
+        for start in (0..size).step_by(BLOCK) {
+            let end = (start + BLOCK).min(size);
+            // Right of the diagonal block, these rows stay 0.
+            let (mut done, mut rest) = inverse.slice_mut(s![.., ..end]).split_at(Axis(0), end);
+            for i in start..end {
+                let (above, mut below) = done.view_mut().split_at(Axis(0), i);
+                let mut row = below.row_mut(0);
+                for k in start..i {
+                    row.scaled_add(-self.lower[[i, k]], &above.row(k));
+                }
+                row /= self.lower[[i, i]];
+            }
+            let left = self.lower.slice(s![end.., start..end]);
+            general_mat_mul(-1.0, &left, &done.slice(s![start.., ..]), 1.0, &mut rest);
+        }
+        inverse
+    }
+
+    /// Mᵀ·M for a lower triangular M: A⁻¹ where M = L⁻¹.
+    pub fn gram_of_lower(lower: &Array2<f64>) -> Array2<f64> {
+        let size = lower.nrows();
+        let mut gram = Array2::zeros((size, size));
+        for start in (0..size).step_by(BLOCK) {
+            let end = (start + BLOCK).min(size);
+            let left = lower.slice(s![start.., start..end]);
+            let right = lower.slice(s![start.., ..end]);
+            general_mat_mul(1.0, &left.t(), &right, 0.0, &mut gram.slice_mut(s![start..end, ..end]));
+            let square = gram.slice(s![start..end, ..start]).to_owned();
+            gram.slice_mut(s![..start, start..end]).assign(&square.t());
+        }
+        gram
     }
 }
 

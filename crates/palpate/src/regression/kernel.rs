@@ -1,0 +1,78 @@
+//! How alike two points are, and what lies beneath.
+
+use ndarray::{Array2, ArrayView2};
+
+/// A correlation of two points as a function of r² = Σ_k ((x_k − x′_k)/ℓ_k)², with a length scale ℓ_k a coordinate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kernel {
+    /// c = (1 + √5·r + 5r²/3)·e^(−√5·r): functions with two derivatives (Rasmussen and Williams, eq. 4.17).
+    #[default]
+    Matern52,
+    /// c = e^(−r²/2): functions with every derivative (their eq. 4.9).
+    SquaredExponential,
+}
+
+impl Kernel {
+    /// c, for r² ≥ 0.
+    pub fn correlation(self, r2: f64) -> f64 {
+        self.correlation_and_slope(r2).0
+    }
+
+    /// c and dc/d(r²), for r² ≥ 0. Both kernels have a finite slope at 0.
+    pub fn correlation_and_slope(self, r2: f64) -> (f64, f64) {
+        match self {
+            Self::Matern52 => {
+                // Beyond 1000 the decay is 0, and an infinity must not meet it.
+                let scaled = (5.0 * r2).sqrt().min(1000.0);
+                let decay = (-scaled).exp();
+                ((1.0 + scaled + scaled * scaled / 3.0) * decay, -5.0 / 6.0 * (1.0 + scaled) * decay)
+            }
+            Self::SquaredExponential => {
+                let c = (-0.5 * r2).exp();
+                (c, -0.5 * c)
+            }
+        }
+    }
+}
+
+/// What the function does far from every row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Trend {
+    /// h = (1): it returns to a constant.
+    #[default]
+    Constant,
+    /// h = (1, z_1 … z_d), z the coordinates standardized: it returns to a plane.
+    Linear,
+}
+
+impl Trend {
+    /// Length of h for `coordinates` coordinates.
+    pub(super) fn size(self, coordinates: usize) -> usize {
+        match self {
+            Self::Constant => 1,
+            Self::Linear => 1 + coordinates,
+        }
+    }
+
+    /// h at every row, n×q, for standardized coordinates, d×n.
+    pub(super) fn basis(self, standardized: ArrayView2<f64>) -> Array2<f64> {
+        let (coordinates, rows) = standardized.dim();
+        Array2::from_shape_fn((rows, self.size(coordinates)), |(row, term)| match term {
+            0 => 1.0,
+            _ => standardized[[term - 1, row]],
+        })
+    }
+}
+
+/// r² from a point to the first `out.len()` rows, all divided by their length scales; rows are d×n.
+pub(super) fn squared_distances_into(out: &mut [f64], rows: ArrayView2<f64>, point: impl Fn(usize) -> f64) {
+    out.fill(0.0);
+    for (k, coordinate) in rows.outer_iter().enumerate() {
+        let x = point(k);
+        for (r2, u) in out.iter_mut().zip(coordinate) {
+            *r2 += (u - x) * (u - x);
+        }
+    }
+}
