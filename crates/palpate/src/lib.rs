@@ -13,6 +13,7 @@ pub mod features;
 pub mod gaussian_process;
 pub mod mechanics;
 pub mod method;
+pub mod neighbours;
 pub mod network;
 pub mod numerics;
 pub mod recording;
