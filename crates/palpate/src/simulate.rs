@@ -58,7 +58,7 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
 pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
     let training = rig.training.as_ref().ok_or(SimulateError::NoTraining)?;
     let positions = training.positions(rig.bench.surface.extent().length_m)?;
-    simulate_at(&rig.bench, &positions, training.repeats, seed)
+    simulate_at(&rig.pressed_bench(), &positions, training.repeats, seed)
 }
 
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its

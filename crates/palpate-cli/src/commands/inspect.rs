@@ -152,6 +152,9 @@ fn method(method: &Method) -> Vec<String> {
             influence.table().nodes(),
             influence.contacts()
         )],
+        Method::GaussianProcess(_) | Method::ClosedForm(_) | Method::Neighbours(_) | Method::Centroid(_) => {
+            Vec::new()
+        }
     }
 }
 

@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(every_m) => {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
             simulate_at(
-                &rig.bench,
+                &rig.pressed_bench(),
                 &inner_positions(rig.bench.surface.extent().length_m, every_m)?,
                 repeats,
                 arguments.seed,

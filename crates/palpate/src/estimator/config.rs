@@ -1,6 +1,12 @@
 //! What a rig's `[estimator]` section says.
 
+use crate::bench::Bench;
+use crate::centroid::CentroidConfig;
+use crate::closed_form::ClosedFormConfig;
+use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::InfluenceConfig;
+use crate::mechanics::SurfaceSpec;
+use crate::neighbours::NeighboursConfig;
 use crate::network::NetworkConfig;
 
 /// A configured method; fitting it to a recording gives a locator.
@@ -10,16 +16,52 @@ pub enum EstimatorConfig {
     Network(NetworkConfig),
     /// Influence functions, inverted (`kind = "influence"`).
     Influence(InfluenceConfig),
+    /// Gaussian-process regression of the position (`kind = "gaussian-process"`).
+    GaussianProcess(GaussianProcessConfig),
+    /// The beam's own equations (`kind = "closed-form"`).
+    ClosedForm(ClosedFormConfig),
+    /// Nearest neighbours (`kind = "neighbours"`).
+    Neighbours(NeighboursConfig),
+    /// The calibrated centroid of array sensors (`kind = "centroid"`).
+    Centroid(CentroidConfig),
+    /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
+    Auto,
 }
 
 impl EstimatorConfig {
     /// Every `kind` that a rig can name.
-    pub const KINDS: &'static [&'static str] = &["network", "influence"];
+    pub const KINDS: &'static [&'static str] = &[
+        "network",
+        "influence",
+        "gaussian-process",
+        "closed-form",
+        "neighbours",
+        "centroid",
+        "auto",
+    ];
+
+    /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
+    pub fn contenders(bench: &Bench) -> Vec<Self> {
+        let mut contenders = vec![
+            Self::Influence(InfluenceConfig::default()),
+            Self::GaussianProcess(GaussianProcessConfig::default()),
+        ];
+        if matches!(bench.surface, SurfaceSpec::Beam(_)) {
+            contenders.push(Self::ClosedForm(ClosedFormConfig));
+        }
+        contenders.extend([
+            Self::Neighbours(NeighboursConfig::default()),
+            Self::Centroid(CentroidConfig),
+            Self::Network(NetworkConfig::default()),
+        ]);
+        contenders
+    }
 
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {
         match self {
-            Self::Network(_) | Self::Influence(_) => 2,
+            Self::ClosedForm(_) => 1,
+            _ => 2,
         }
     }
 
@@ -27,7 +69,7 @@ impl EstimatorConfig {
     pub fn most_rounds(&self) -> u64 {
         match self {
             Self::Network(config) => u64::from(config.training.max_epochs),
-            Self::Influence(_) => 1,
+            _ => 1,
         }
     }
 
@@ -36,6 +78,11 @@ impl EstimatorConfig {
         match self {
             Self::Network(_) => "network",
             Self::Influence(_) => "influence",
+            Self::GaussianProcess(_) => "gaussian-process",
+            Self::ClosedForm(_) => "closed-form",
+            Self::Neighbours(_) => "neighbours",
+            Self::Centroid(_) => "centroid",
+            Self::Auto => "auto",
         }
     }
 }

@@ -2,7 +2,11 @@
 
 use super::{EstimatorConfig, Locator, LocatorProvenance, Method};
 use crate::bench::Bench;
+use crate::centroid::CentroidFitError;
+use crate::closed_form::ClosedFormFitError;
+use crate::gaussian_process::GaussianProcessError;
 use crate::influence::InfluenceFitError;
+use crate::neighbours::NeighboursFitError;
 use crate::method::{Fit, FitTask};
 use crate::network::{
     InstructionSet, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork, TrainingOutcome,
@@ -27,6 +31,21 @@ pub enum FitError {
     /// What the influence estimator has to say.
     #[error(transparent)]
     Influence(#[from] InfluenceFitError),
+    /// What the Gaussian process has to say.
+    #[error(transparent)]
+    GaussianProcess(#[from] GaussianProcessError),
+    /// What the closed form has to say.
+    #[error(transparent)]
+    ClosedForm(#[from] ClosedFormFitError),
+    /// What the nearest neighbours have to say.
+    #[error(transparent)]
+    Neighbours(#[from] NeighboursFitError),
+    /// What the centroid has to say.
+    #[error(transparent)]
+    Centroid(#[from] CentroidFitError),
+    /// The estimator is still to be chosen.
+    #[error("the estimator is `auto`; it is chosen by cross-validation before it can be fitted")]
+    Undecided,
 }
 
 /// Where [`Fitting::fit_many`] takes its seeds from and leaves its locators.
@@ -146,6 +165,11 @@ fn fit_method(
         // Prepared networks never come here.
         EstimatorConfig::Network(_) => None,
         EstimatorConfig::Influence(config) => config.fit(task, keep_going)?.map(Method::Influence),
+        EstimatorConfig::GaussianProcess(config) => config.fit(task, keep_going)?.map(Method::GaussianProcess),
+        EstimatorConfig::ClosedForm(config) => config.fit(task, keep_going)?.map(Method::ClosedForm),
+        EstimatorConfig::Neighbours(config) => config.fit(task, keep_going)?.map(Method::Neighbours),
+        EstimatorConfig::Centroid(config) => config.fit(task, keep_going)?.map(Method::Centroid),
+        EstimatorConfig::Auto => return Err(FitError::Undecided),
     })
 }
 

@@ -1,8 +1,12 @@
 //! What fitting gives: all that a reading needs to become an estimate.
 
 use crate::bench::Bench;
+use crate::centroid::CentroidLocator;
+use crate::closed_form::ClosedFormLocator;
+use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::BeamLocator;
 use crate::method::{Locate, LocatorFault};
+use crate::neighbours::NeighboursLocator;
 use crate::network::{NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
 use palpate_core::Estimate;
@@ -39,6 +43,14 @@ pub enum Method {
     Network(NetworkLocator),
     /// Influence functions, inverted.
     Influence(BeamLocator),
+    /// Gaussian-process regression.
+    GaussianProcess(GaussianProcessLocator),
+    /// The beam's own equations.
+    ClosedForm(ClosedFormLocator),
+    /// Nearest neighbours.
+    Neighbours(NeighboursLocator),
+    /// The calibrated centroid.
+    Centroid(CentroidLocator),
 }
 
 impl Method {
@@ -47,6 +59,10 @@ impl Method {
         match self {
             Self::Network(network) => network,
             Self::Influence(influence) => influence,
+            Self::GaussianProcess(process) => process,
+            Self::ClosedForm(form) => form,
+            Self::Neighbours(neighbours) => neighbours,
+            Self::Centroid(centroid) => centroid,
         }
     }
 }
@@ -145,6 +161,10 @@ impl Locator {
         match self.method {
             Method::Network(_) => "network",
             Method::Influence(_) => "influence",
+            Method::GaussianProcess(_) => "gaussian-process",
+            Method::ClosedForm(_) => "closed-form",
+            Method::Neighbours(_) => "neighbours",
+            Method::Centroid(_) => "centroid",
         }
     }
 

@@ -126,7 +126,7 @@ pub enum RigProblem {
         count: usize,
     },
     /// The rig is to be simulated, but its force is unknown.
-    #[error("the surface is to be simulated at these training positions, but [contact] has no `force`")]
+    #[error("the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`")]
     NoForce,
     /// The training positions, their repeats and the sensors make a recording too large to hold.
     #[error("training positions × repeats × sensors make {values} values; at most {most} can be held")]
@@ -184,7 +184,7 @@ impl RigError {
             RigProblem::MissingSection { section } => Some(format!("add a section [{section}]")),
             RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
             RigProblem::NoForce => {
-                Some("add `[contact]` with `force = \"3 N\"`, or leave [training] out".to_owned())
+                Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             _ => None,

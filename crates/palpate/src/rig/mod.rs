@@ -37,6 +37,8 @@ pub struct Training {
     pub count: usize,
     /// How often each is pressed; at least 1.
     pub repeats: usize,
+    /// The force of these presses in newtons, where it is not the contact's.
+    pub force_n: Option<f64>,
 }
 
 impl Training {
@@ -50,6 +52,12 @@ impl Training {
 }
 
 impl Rig {
+    /// The bench as it is when pressed to calibrate: with the force of the training presses.
+    pub fn pressed_bench(&self) -> Bench {
+        let force_n = self.training.as_ref().and_then(|training| training.force_n);
+        Bench { force_n: force_n.or(self.bench.force_n), ..self.bench.clone() }
+    }
+
     /// Reads a rig file.
     ///
     /// # Errors

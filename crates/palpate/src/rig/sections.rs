@@ -75,6 +75,7 @@ pub(crate) struct TrainingSection {
     pub portion: Key<Vec<Spanned<RawQuantity>>>,
     pub positions: Key<Vec<Spanned<RawQuantity>>>,
     pub repeats: Key<i64>,
+    pub force: Key<RawQuantity>,
 }
 
 /// `[estimator]`

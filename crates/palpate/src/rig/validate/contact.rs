@@ -54,7 +54,8 @@ pub(super) fn validate_training(
     };
     let repeats =
         keys.repeats.as_ref().map_or(Ok(1), |raw| self::count("repeats", raw, 1..=MOST, MOST_BOUND))?;
-    let training = Training { arrangement, count, repeats };
+    let force_n = keys.force.as_ref().map(|force| positive("force", force, Dimension::Force)).transpose()?;
+    let training = Training { arrangement, count, repeats, force_n };
     let laid_out = training.positions(extent.length_m);
     laid_out.map_err(|error| {
         let span = culprit(section, &error);

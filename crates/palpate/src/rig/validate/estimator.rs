@@ -2,8 +2,12 @@
 
 use toml::Spanned;
 
+use crate::centroid::CentroidConfig;
+use crate::closed_form::ClosedFormConfig;
 use crate::estimator::EstimatorConfig;
+use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::{InfluenceConfig, InfluenceSource};
+use crate::neighbours::NeighboursConfig;
 use crate::network::{
     Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
 };
@@ -44,13 +48,19 @@ pub(super) fn validate(
     let kind = keys.kind.as_ref().map_or(Ok("network"), |kind| choice("kind", kind, &known))?;
     let (with, of_kind): (_, &[&str]) = match kind {
         "influence" => ("kind = \"influence\"", &["from", "contacts", "force_sd"]),
-        _ => ("kind = \"network\"", &NETWORK_KEYS),
+        "network" => ("kind = \"network\"", &NETWORK_KEYS),
+        _ => ("a kind other than \"network\" and \"influence\"", &[]),
     };
     if let Some((key, span)) = keys.present().into_iter().find(|(key, _)| !of_kind.contains(key)) {
         return Err(RigProblem::UnusedKey { key, with }.at(span));
     }
     match kind {
         "influence" => influence(keys, force_n).map(EstimatorConfig::Influence),
+        "gaussian-process" => Ok(EstimatorConfig::GaussianProcess(GaussianProcessConfig::default())),
+        "closed-form" => Ok(EstimatorConfig::ClosedForm(ClosedFormConfig)),
+        "neighbours" => Ok(EstimatorConfig::Neighbours(NeighboursConfig::default())),
+        "centroid" => Ok(EstimatorConfig::Centroid(CentroidConfig)),
+        "auto" => Ok(EstimatorConfig::Auto),
         _ => network(keys, layout).map(EstimatorConfig::Network),
     }
 }

@@ -25,7 +25,8 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let force_n = contact::validate_force(sections.contact.as_ref())?;
     let training = contact::validate_training(sections.training.as_ref(), surface.extent())?;
     let simulated = surface.model().is_some() && sections.recording.is_none();
-    if let (Some(training), None, true) = (&sections.training, force_n, simulated) {
+    let pressed_n = training.as_ref().and_then(|training| training.force_n).or(force_n);
+    if let (Some(training), None, true) = (&sections.training, pressed_n, simulated) {
         return Err(RigProblem::NoForce.at(training.span()));
     }
     if let (Some(section), Some(training)) = (&sections.training, &training) {
