@@ -29,6 +29,7 @@ enum Command {
     Fit(commands::fit::Arguments),
     Evaluate(commands::evaluate::Arguments),
     Locate(commands::locate::Arguments),
+    Compare(commands::compare::Arguments),
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
 }
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Fit(arguments) => commands::fit::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Locate(arguments) => commands::locate::run(&arguments),
+        Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
     };

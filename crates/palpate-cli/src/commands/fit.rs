@@ -2,11 +2,14 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
-use crate::{input, output};
-use palpate::estimator::Fitting;
+use crate::{input, interrupt, output};
+use palpate::estimator::{EstimatorConfig, Fitting};
+use palpate::evaluation::choose;
 use palpate::network::{TrainingOutcome, TrainingStatus};
+use palpate::recording::Recording;
+use palpate::rig::Rig;
 use palpate::simulate::simulate;
-use palpate::units::format_count;
+use palpate::units::{format_count, format_length_mm};
 use std::path::PathBuf;
 
 /// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
@@ -49,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 .help("--data names a recording to fit")
         })?,
     };
+    let rig = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
     let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
@@ -85,6 +89,29 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         recording.rows.len(),
         arguments.out.display()
     ))
+}
+
+/// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.
+fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<Rig, Failure> {
+    if rig.estimator != EstimatorConfig::Auto {
+        return Ok(rig);
+    }
+    const FOLDS: usize = 5;
+    let choice = choose(&rig, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
+    let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
+    let choice = choice.map_err(Complaint::new)?.ok_or_else(stopped)?;
+    let errors: Vec<String> = choice
+        .mean_errors_m
+        .iter()
+        .map(|(kind, error_m)| format!("{kind} {}", format_length_mm(*error_m)))
+        .collect();
+    eprintln!(
+        "auto: {} has the least mean error at positions held out ({FOLDS} folds): {}",
+        choice.best.kind(),
+        errors.join(", ")
+    );
+    rig.estimator = choice.best;
+    Ok(rig)
 }
 
 fn in_words(outcome: TrainingOutcome) -> String {

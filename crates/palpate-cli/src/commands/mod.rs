@@ -1,5 +1,6 @@
 //! One module a verb.
 
+pub mod compare;
 pub mod estimate_line;
 pub mod evaluate;
 pub mod fit;

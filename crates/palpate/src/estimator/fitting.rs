@@ -6,8 +6,8 @@ use crate::centroid::CentroidFitError;
 use crate::closed_form::ClosedFormFitError;
 use crate::gaussian_process::GaussianProcessError;
 use crate::influence::InfluenceFitError;
-use crate::neighbours::NeighboursFitError;
 use crate::method::{Fit, FitTask};
+use crate::neighbours::NeighboursFitError;
 use crate::network::{
     InstructionSet, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork, TrainingOutcome,
     train_many, train_one,
@@ -165,7 +165,9 @@ fn fit_method(
         // Prepared networks never come here.
         EstimatorConfig::Network(_) => None,
         EstimatorConfig::Influence(config) => config.fit(task, keep_going)?.map(Method::Influence),
-        EstimatorConfig::GaussianProcess(config) => config.fit(task, keep_going)?.map(Method::GaussianProcess),
+        EstimatorConfig::GaussianProcess(config) => {
+            config.fit(task, keep_going)?.map(Method::GaussianProcess)
+        }
         EstimatorConfig::ClosedForm(config) => config.fit(task, keep_going)?.map(Method::ClosedForm),
         EstimatorConfig::Neighbours(config) => config.fit(task, keep_going)?.map(Method::Neighbours),
         EstimatorConfig::Centroid(config) => config.fit(task, keep_going)?.map(Method::Centroid),

@@ -24,9 +24,11 @@ impl EstimatorConfig {
         match self {
             Self::Network(config) => network(config),
             Self::Influence(config) => influence(*config),
-            Self::GaussianProcess(_) | Self::ClosedForm(_) | Self::Neighbours(_) | Self::Centroid(_) | Self::Auto => {
-                Vec::new()
-            }
+            Self::GaussianProcess(_)
+            | Self::ClosedForm(_)
+            | Self::Neighbours(_)
+            | Self::Centroid(_)
+            | Self::Auto => Vec::new(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Errors at positions that the estimator was not fitted to.
 
-use super::{Evaluation, ReadingError};
-use crate::estimator::{FitError, Fitting};
+use super::{Evaluation, ReadingError, choose};
+use crate::estimator::{EstimatorConfig, FitError, Fitting};
 use crate::recording::{Recording, TooFewPositions};
 use crate::rig::Rig;
 
@@ -33,7 +33,16 @@ pub fn cross_validate(
 ) -> Result<Option<Evaluation>, CrossValidationError> {
     let mut pooled = Evaluation { length_m: rig.bench.surface.extent().length_m, located: Vec::new() };
     for fold in recording.folds(folds)? {
-        let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording.subset(&fold.training))?;
+        let training = recording.subset(&fold.training);
+        // An estimator that is to be chosen is chosen without the held-out rows.
+        let estimator = match &rig.estimator {
+            EstimatorConfig::Auto => match choose(rig, &training, folds, seed, keep_going)? {
+                Some(choice) => choice.best,
+                None => return Ok(None),
+            },
+            decided => decided.clone(),
+        };
+        let fitting = Fitting::prepare(&rig.bench, &estimator, &training)?;
         let Some(locator) = fitting.fit(seed, keep_going)? else { return Ok(None) };
         let part = Evaluation::of(&locator, &recording.subset(&fold.held_out))?;
         pooled.located.extend(part.located);

@@ -1,13 +1,16 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
+mod comparison;
 mod cross_validation;
 mod statistics;
 
+pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
 pub use cross_validation::{CrossValidationError, cross_validate};
 pub use statistics::{Spread, percentile};
 
 use crate::contact::Position;
-use crate::estimator::{Locator, ReadingError};
+use crate::estimator::{ContactEstimate, Locator, ReadingError};
+use crate::mechanics::Extent;
 use crate::recording::Recording;
 
 /// One reading whose contact was known, and where the locator saw it.
@@ -15,8 +18,12 @@ use crate::recording::Recording;
 pub struct Located {
     /// Where the contact was.
     pub truth: Position,
+    /// How hard it was, in newtons, where that is known.
+    pub force_n: Option<f64>,
     /// Where the locator saw it.
     pub estimate: Position,
+    /// Whether the locator's 95 % region held it, where the locator has one.
+    pub covered: Option<bool>,
 }
 
 impl Located {
@@ -73,6 +80,20 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
     error_m / length_m * 100.0
 }
 
+/// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
+/// (e − t)ᵀ·C⁻¹·(e − t) ≤ 5.991, the 95th percentile of χ² with two degrees of freedom.
+fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
+    let uncertainty = contact.uncertainty?;
+    if extent.width_m.is_none() {
+        let (low, high) = uncertainty.x_95_m;
+        return Some((low..=high).contains(&truth.x_m));
+    }
+    let [xx, xy, _, yy, ..] = uncertainty.covariance;
+    let (dx, dy) = (contact.position.x_m - truth.x_m, contact.position.y_m - truth.y_m);
+    let determinant = xx * yy - xy * xy;
+    Some((dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) <= 5.991 * determinant)
+}
+
 impl Evaluation {
     /// Locates every reading of a recording.
     ///
@@ -80,8 +101,13 @@ impl Evaluation {
     /// [`ReadingError`] when the recording's channels are not the locator's.
     pub fn of(locator: &Locator, recording: &Recording) -> Result<Self, ReadingError> {
         let locate = |row: &crate::recording::Row| {
-            let estimate = locator.locate(&row.reading)?.contact.position;
-            Ok(Located { truth: row.position, estimate })
+            let contact = locator.locate(&row.reading)?.contact;
+            Ok(Located {
+                truth: row.position,
+                force_n: row.force_n,
+                estimate: contact.position,
+                covered: covered(&contact, row.position, locator.bench.surface.extent()),
+            })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
         Ok(Self { length_m: locator.bench.surface.extent().length_m, located })
@@ -108,6 +134,13 @@ impl Evaluation {
     pub fn effective_percent(&self, tolerance_m: f64) -> f64 {
         let good = self.located.iter().filter(|located| located.error_m() <= tolerance_m).count();
         100.0 * good as f64 / self.located.len() as f64
+    }
+
+    /// Share of the 95 % regions that hold their contact, in %; `None` where the locator has none.
+    pub fn coverage_percent(&self) -> Option<f64> {
+        let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
+        let held = told.iter().filter(|covered| **covered).count();
+        (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
     }
 
     /// Errors of each distinct position, by x and then y.

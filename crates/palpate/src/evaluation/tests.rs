@@ -6,7 +6,8 @@ use super::*;
 fn evaluation() -> Evaluation {
     let located = (1..=10).map(|k| {
         let truth = Position::along(f64::from(k) * 0.01 - 0.005);
-        Located { truth, estimate: Position::along(truth.x_m + f64::from(k) * 0.5e-3) }
+        let estimate = Position::along(truth.x_m + f64::from(k) * 0.5e-3);
+        Located { truth, force_n: None, estimate, covered: None }
     });
     Evaluation { length_m: 0.1, located: located.collect() }
 }

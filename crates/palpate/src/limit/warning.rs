@@ -139,7 +139,8 @@ impl Survey<'_> {
                 inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
             let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
             let ends = [zone.from, zone.to].into_iter().filter_map(twin);
-            let twins = Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
+            let twins =
+                Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
             let (Some(&(at, nearest)), Some(twins)) = (nearest, twins) else { continue };
             let said = |warning: &LimitWarning| match warning {
                 LimitWarning::Mirror { zone, twins, .. } => {
@@ -256,11 +257,18 @@ impl fmt::Display for LimitWarning {
                 figure(bound_m * 1e3)
             ),
             Self::Blind { zone, force, sd_m: None, .. } => {
-                write!(f, "blind at {zone} with {} force: the readings do not tell the position", force.name())
+                write!(
+                    f,
+                    "blind at {zone} with {} force: the readings do not tell the position",
+                    force.name()
+                )
             }
             Self::Mirror { zone, twins, force, at, twin, distance } => {
                 let (at, twin, force) = (place(*at), place(*twin), force.name());
-                write!(f, "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; ")?;
+                write!(
+                    f,
+                    "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; "
+                )?;
                 if *distance < SAME {
                     return write!(f, "{at} and {twin} read the same");
                 }

@@ -126,7 +126,9 @@ pub enum RigProblem {
         count: usize,
     },
     /// The rig is to be simulated, but its force is unknown.
-    #[error("the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`")]
+    #[error(
+        "the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`"
+    )]
     NoForce,
     /// The training positions, their repeats and the sensors make a recording too large to hold.
     #[error("training positions × repeats × sensors make {values} values; at most {most} can be held")]

@@ -19,7 +19,10 @@ fn the_papers_bench_is_what_the_paper_says() {
     layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6);
     assert_eq!(rig.bench.layout, layout);
     assert_eq!(rig.bench.force_n, Some(3.0));
-    assert_eq!(rig.training, Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None }));
+    assert_eq!(
+        rig.training,
+        Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
+    );
     assert_eq!(rig.estimator, EstimatorConfig::Network(NetworkConfig::default()));
     assert_eq!(rig.bench.columns, None);
 }

@@ -47,7 +47,11 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
         title: report.title.to_owned(),
         opening: report.summary(),
         sections: vec![
-            section("limit", "The limit along the surface", html! { (figures.show(2)) (report.limit_table(1)) }),
+            section(
+                "limit",
+                "The limit along the surface",
+                html! { (figures.show(2)) (report.limit_table(1)) },
+            ),
             section("warnings", "What this bench cannot tell", report.warnings_in_words()),
             section("bench", "The bench", html! { (figures.show(1)) (report.sensor_table(2)) }),
             section("meaning", "What the limit means", meaning()),
@@ -96,7 +100,8 @@ impl LimitReport<'_> {
 
     fn limit_table(&self, table: usize) -> Markup {
         let contact = |position| crate::contact::Contact { position, force_n: self.known.force_n };
-        let cell = |limit_m: Option<f64>, unit: f64| text(number(limit_m.map_or(f64::NAN, |limit| limit * unit)));
+        let cell =
+            |limit_m: Option<f64>, unit: f64| text(number(limit_m.map_or(f64::NAN, |limit| limit * unit)));
         let rows = self.listed.iter().map(|&position| {
             let bound = |force| self.limit.at(contact(position), force);
             let (known, unknown) = (bound(Force::Known), bound(Force::Unknown));
