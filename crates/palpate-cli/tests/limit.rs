@@ -72,7 +72,10 @@ fn the_json_has_the_papers_figures() {
 fn what_the_readings_do_not_tell_is_null() {
     let one = PAPER.replacen("count = 8 ", "count = 1 ", 1);
     let found = json(&one, &[]);
-    assert!(found["unknown_force"].is_null() && found["positions"][0]["unknown_force_mm"].is_null(), "{found}");
+    assert!(
+        found["unknown_force"].is_null() && found["positions"][0]["unknown_force_mm"].is_null(),
+        "{found}"
+    );
     assert!(limit(&one, &[]).contains("read the same"));
 }
 

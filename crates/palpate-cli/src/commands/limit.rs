@@ -5,7 +5,9 @@ use crate::table::table;
 use crate::{input, output};
 use palpate::bench::Bench;
 use palpate::contact::{Contact, Position};
-use palpate::limit::{Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings};
+use palpate::limit::{
+    Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
+};
 use palpate::mechanics::Extent;
 use palpate::report::{LimitReport, limit_report};
 use palpate::units::{Quantity, format_count, format_length_mm};
@@ -124,7 +126,8 @@ fn bench(arguments: &Arguments) -> Result<Bench, Failure> {
             .filter(|sensor| sensor.kind.dimension() == noise.dimension)
             .peekable();
         if meant.peek().is_none() {
-            let complaint = Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
+            let complaint =
+                Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
             return Err(complaint.help("give the noise in the unit of the readings, as in \"5 um\"").into());
         }
         meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
@@ -149,11 +152,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
     complaint.help(help).into()
 }
 
-fn limits<'a>(
-    limit: &'a Limit<'a>,
-    bench: &Bench,
-    arguments: &Arguments,
-) -> Result<Limits<'a>, LimitError> {
+fn limits<'a>(limit: &'a Limit<'a>, bench: &Bench, arguments: &Arguments) -> Result<Limits<'a>, LimitError> {
     let force_n = arguments.force.or(bench.force_n).ok_or(LimitError::NoForce)?;
     let unknown = arguments.unknown_force || bench.force_n.is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };
@@ -190,12 +189,7 @@ impl Limits<'_> {
     }
 }
 
-fn write_report(
-    limits: &Limits,
-    bench: &Bench,
-    arguments: &Arguments,
-    out: &Path,
-) -> Result<(), Failure> {
+fn write_report(limits: &Limits, bench: &Bench, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
     let report = LimitReport {
         title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
         bench,

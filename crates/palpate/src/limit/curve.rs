@@ -67,7 +67,8 @@ impl LimitCurve {
     /// [`LimitError::Force`] for a force that is not positive and finite.
     pub fn at(limit: &Limit, force_n: f64, force: Force, positions: &[Position]) -> Result<Self, LimitError> {
         check_force(force_n)?;
-        let point = |&position| LimitPoint { position, bound: limit.at(Contact { position, force_n }, force) };
+        let point =
+            |&position| LimitPoint { position, bound: limit.at(Contact { position, force_n }, force) };
         Ok(Self {
             extent: limit.surface.extent(),
             force_n,

@@ -77,7 +77,12 @@ impl<'a> Limit<'a> {
             let (noise_sd, resolution) = (sensor.channel.noise_sd, sensor.channel.resolution);
             let sd = noise_sd.hypot(resolution / 12f64.sqrt());
             if !(sd > 0.0 && sd.is_finite()) {
-                return Err(LimitError::SingularNoise { number: i + 1, kind: sensor.kind, noise_sd, resolution });
+                return Err(LimitError::SingularNoise {
+                    number: i + 1,
+                    kind: sensor.kind,
+                    noise_sd,
+                    resolution,
+                });
             }
             Ok(Channel { kind: sensor.kind, position: sensor.position, sd, range: sensor.channel.range })
         });
@@ -142,7 +147,8 @@ impl<'a> Limit<'a> {
 
     /// What a sensor reads without noise, held at the ends of its range.
     fn clean(&self, channel: &Channel, contact: Contact) -> f64 {
-        let value = contact.force_n * self.surface.influence(channel.kind, channel.position, contact.position);
+        let value =
+            contact.force_n * self.surface.influence(channel.kind, channel.position, contact.position);
         channel.range.map_or(value, |(low, high)| value.max(low).min(high))
     }
 

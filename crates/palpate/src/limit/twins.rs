@@ -38,8 +38,7 @@ pub(super) struct TwinSearch<'a> {
 impl<'a> TwinSearch<'a> {
     pub fn new(limit: &'a Limit<'a>, force_n: f64, force: Force, bound: f64) -> Self {
         let grid = Grid::over(limit.surface.extent());
-        let mut search =
-            Self { limit, force_n, force, bound, grid, shapes: Vec::new(), spreads: Vec::new() };
+        let mut search = Self { limit, force_n, force, bound, grid, shapes: Vec::new(), spreads: Vec::new() };
         search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();
         let spread = |i: usize| {
             let differences =

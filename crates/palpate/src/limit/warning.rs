@@ -99,9 +99,13 @@ impl Survey<'_> {
         self.limit.signal_to_noise(Contact { position, force_n: self.force_n })
     }
 
+    fn blind_from_m(&self) -> f64 {
+        BLIND_SHARE * self.limit.surface.extent().length_m
+    }
+
     fn blind(&self) -> Vec<LimitWarning> {
         let extent = self.limit.surface.extent();
-        let bound_m = BLIND_SHARE * extent.length_m;
+        let bound_m = self.blind_from_m();
         let size = |position: Position| self.sd_m(position, self.force).unwrap_or(f64::INFINITY);
         let found = zones(extent, &self.grid, |position| size(position) > bound_m);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
@@ -128,10 +132,12 @@ impl Survey<'_> {
     /// Each pair of zones once, however it was found.
     fn mirrors(&self) -> Vec<LimitWarning> {
         let search = TwinSearch::new(self.limit, self.force_n, self.force, AMBIGUOUS_DISTANCE);
-        let twin = |position: Position| {
-            let clear = self.signal(position) >= FAINT_SIGNAL;
-            clear.then(|| search.twin_of(position)).flatten()
+        // Where a contact is faint or blind anyway, everything around it reads alike.
+        let clear = |position: Position| {
+            self.signal(position) >= FAINT_SIGNAL
+                && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
         };
+        let twin = |position: Position| clear(position).then(|| search.twin_of(position)).flatten();
         let found = zones(self.limit.surface.extent(), &self.grid, |position| twin(position).is_some());
         let mut warnings: Vec<LimitWarning> = Vec::new();
         for (zone, inside) in found {
@@ -139,7 +145,8 @@ impl Survey<'_> {
                 inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
             let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
             let ends = [zone.from, zone.to].into_iter().filter_map(twin);
-            let twins = Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
+            let twins =
+                Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
             let (Some(&(at, nearest)), Some(twins)) = (nearest, twins) else { continue };
             let said = |warning: &LimitWarning| match warning {
                 LimitWarning::Mirror { zone, twins, .. } => {
@@ -256,11 +263,18 @@ impl fmt::Display for LimitWarning {
                 figure(bound_m * 1e3)
             ),
             Self::Blind { zone, force, sd_m: None, .. } => {
-                write!(f, "blind at {zone} with {} force: the readings do not tell the position", force.name())
+                write!(
+                    f,
+                    "blind at {zone} with {} force: the readings do not tell the position",
+                    force.name()
+                )
             }
             Self::Mirror { zone, twins, force, at, twin, distance } => {
                 let (at, twin, force) = (place(*at), place(*twin), force.name());
-                write!(f, "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; ")?;
+                write!(
+                    f,
+                    "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; "
+                )?;
                 if *distance < SAME {
                     return write!(f, "{at} and {twin} read the same");
                 }

@@ -47,9 +47,13 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
         title: report.title.to_owned(),
         opening: report.summary(),
         sections: vec![
-            section("limit", "The limit along the surface", html! { (figures.show(2)) (report.limit_table(1)) }),
-            section("warnings", "What this bench cannot tell", report.warnings_in_words()),
             section("bench", "The bench", html! { (figures.show(1)) (report.sensor_table(2)) }),
+            section(
+                "limit",
+                "The limit along the surface",
+                html! { (figures.show(2)) (report.limit_table(1)) },
+            ),
+            section("warnings", "What this bench cannot tell", report.warnings_in_words()),
             section("meaning", "What the limit means", meaning()),
         ],
         footer: html! { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) "." } },
@@ -96,7 +100,8 @@ impl LimitReport<'_> {
 
     fn limit_table(&self, table: usize) -> Markup {
         let contact = |position| crate::contact::Contact { position, force_n: self.known.force_n };
-        let cell = |limit_m: Option<f64>, unit: f64| text(number(limit_m.map_or(f64::NAN, |limit| limit * unit)));
+        let cell =
+            |limit_m: Option<f64>, unit: f64| text(number(limit_m.map_or(f64::NAN, |limit| limit * unit)));
         let rows = self.listed.iter().map(|&position| {
             let bound = |force| self.limit.at(contact(position), force);
             let (known, unknown) = (bound(Force::Known), bound(Force::Unknown));
@@ -136,7 +141,7 @@ impl LimitReport<'_> {
             } @else {
                 ul {
                     @for warning in self.warnings {
-                        li { b { (warning.to_string()) "." } " What would help: " (warning.help()) "." }
+                        li { (sentence(&warning.to_string())) " " b { "What would help:" } " " (warning.help()) "." }
                     }
                 }
             }
@@ -160,6 +165,13 @@ impl LimitReport<'_> {
         }
         .markup()
     }
+}
+
+/// With a capital at its beginning and a full stop at its end.
+fn sentence(words: &str) -> String {
+    let mut characters = words.chars();
+    let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", characters.as_str())
 }
 
 /// "50", or "50, 20" on a plane.
