@@ -12,48 +12,45 @@ const EXPLAINED: f64 = 1e-9;
 
 /// F⁻¹ for the columns of J, P by P, in their order; `None` where F is singular to rounding.
 pub(super) fn inverse_information<const P: usize>(mut columns: [Vec<f64>; P]) -> Option<[[f64; P]; P]> {
-    let upper = orthogonalise(&mut columns)?;
-    let inverse = inverse_upper(&upper);
+    let inverse = inverse(&orthogonalise(&mut columns)?);
     let mut covariance = [[0.0; P]; P];
     for (i, row) in covariance.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {
-            *entry = (i.max(j)..P).map(|k| inverse[i][k] * inverse[j][k]).sum();
+            *entry = inverse.iter().map(|column| column[i] * column[j]).sum();
         }
     }
     covariance.iter().flatten().all(|entry| entry.is_finite()).then_some(covariance)
 }
 
-/// Modified Gram–Schmidt: the columns become those of Q, and R is returned.
+/// Modified Gram–Schmidt: the columns of J become those of Q, and the columns of R are returned.
 fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<[[f64; P]; P]> {
-    let mut upper = [[0.0; P]; P];
-    for j in 0..P {
+    let mut triangle = [[0.0; P]; P];
+    for (j, shares) in triangle.iter_mut().enumerate() {
         let (before, rest) = columns.split_at_mut(j);
         let column = &mut rest[0];
         let length = norm(column);
-        for (i, unit) in before.iter().enumerate() {
-            let share = dot(unit, column);
-            column.iter_mut().zip(unit).for_each(|(value, unit)| *value -= share * unit);
-            upper[i][j] = share;
+        for (unit, share) in before.iter().zip(shares.iter_mut()) {
+            *share = dot(unit, column);
+            column.iter_mut().zip(unit).for_each(|(value, unit)| *value -= *share * unit);
         }
         let left = norm(column);
-        // Written so that NaN counts as nothing left.
-        if !(left > EXPLAINED * length) || !left.is_normal() {
+        if !left.is_normal() || left <= EXPLAINED * length {
             return None;
         }
         column.iter_mut().for_each(|value| *value /= left);
-        upper[j][j] = left;
+        shares[j] = left;
     }
-    Some(upper)
+    Some(triangle)
 }
 
-/// R⁻¹ of an upper triangle, by back-substitution.
-fn inverse_upper<const P: usize>(upper: &[[f64; P]; P]) -> [[f64; P]; P] {
+/// The columns of R⁻¹ from those of R, by back-substitution.
+fn inverse<const P: usize>(triangle: &[[f64; P]; P]) -> [[f64; P]; P] {
     let mut inverse = [[0.0; P]; P];
-    for column in 0..P {
-        for row in (0..=column).rev() {
-            let unit = if row == column { 1.0 } else { 0.0 };
-            let known: f64 = (row + 1..=column).map(|k| upper[row][k] * inverse[k][column]).sum();
-            inverse[row][column] = (unit - known) / upper[row][row];
+    for (j, solved) in inverse.iter_mut().enumerate() {
+        for row in (0..=j).rev() {
+            let unit = if row == j { 1.0 } else { 0.0 };
+            let known: f64 = (row + 1..=j).map(|k| triangle[k][row] * solved[k]).sum();
+            solved[row] = (unit - known) / triangle[row][row];
         }
     }
     inverse
@@ -65,4 +62,31 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 pub(super) fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_undoes_the_information() {
+        let columns = [vec![1.0, 2.0, 0.5, -1.0], vec![0.3, -1.0, 2.0, 0.0], vec![4.0, 0.1, 0.2, 0.7]];
+        let covariance = inverse_information(columns.clone()).unwrap();
+        for (i, row) in covariance.iter().enumerate() {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| row[k] * dot(&columns[k], &columns[j])).sum();
+                assert!((product - if i == j { 1.0 } else { 0.0 }).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn columns_that_say_the_same_are_singular() {
+        let column = vec![1.0, 2.0, 3.0];
+        let twice: Vec<f64> = column.iter().map(|value| 2.0 * value).collect();
+        assert_eq!(inverse_information([column.clone(), twice]), None);
+        assert_eq!(inverse_information([vec![0.0; 3]]), None);
+        assert_eq!(inverse_information([vec![f64::NAN; 3]]), None);
+        assert_eq!(inverse_information([column, vec![f64::INFINITY; 3]]), None);
+    }
 }

@@ -45,7 +45,8 @@ fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     for (force, figures) in [(Force::Known, known), (Force::Unknown, unknown)] {
         for (a_mm, limit_mm) in figures {
             let seen = sd_mm(&limit, a_mm, force);
-            assert!((seen / limit_mm - 1.0).abs() < 0.025, "{a_mm} mm, {force:?}: {seen}, not {limit_mm}");
+            // They are given with two digits.
+            assert!((seen / limit_mm - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {seen}, not {limit_mm}");
         }
     }
     let summary = LimitCurve::over(&limit, 3.0, Force::Known).unwrap().summary().unwrap();

@@ -99,9 +99,13 @@ impl Survey<'_> {
         self.limit.signal_to_noise(Contact { position, force_n: self.force_n })
     }
 
+    fn blind_from_m(&self) -> f64 {
+        BLIND_SHARE * self.limit.surface.extent().length_m
+    }
+
     fn blind(&self) -> Vec<LimitWarning> {
         let extent = self.limit.surface.extent();
-        let bound_m = BLIND_SHARE * extent.length_m;
+        let bound_m = self.blind_from_m();
         let size = |position: Position| self.sd_m(position, self.force).unwrap_or(f64::INFINITY);
         let found = zones(extent, &self.grid, |position| size(position) > bound_m);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
@@ -128,10 +132,12 @@ impl Survey<'_> {
     /// Each pair of zones once, however it was found.
     fn mirrors(&self) -> Vec<LimitWarning> {
         let search = TwinSearch::new(self.limit, self.force_n, self.force, AMBIGUOUS_DISTANCE);
-        let twin = |position: Position| {
-            let clear = self.signal(position) >= FAINT_SIGNAL;
-            clear.then(|| search.twin_of(position)).flatten()
+        // Where a contact is faint or blind anyway, everything around it reads alike.
+        let clear = |position: Position| {
+            self.signal(position) >= FAINT_SIGNAL
+                && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
         };
+        let twin = |position: Position| clear(position).then(|| search.twin_of(position)).flatten();
         let found = zones(self.limit.surface.extent(), &self.grid, |position| twin(position).is_some());
         let mut warnings: Vec<LimitWarning> = Vec::new();
         for (zone, inside) in found {

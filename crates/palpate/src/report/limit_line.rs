@@ -24,21 +24,28 @@ pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
         Err(LimitError::SingularNoise { .. }) if bench.layout.sensors.iter().all(clean) => {
             let mut layout = bench.layout.clone();
             layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
-            let label = format!("{LABEL}: what physics allows at {} µm noise", ASSUMED_NOISE_M * 1e6);
-            Some(line(&curve(bench, &layout).ok()?, label))
+            Some(line(&curve(bench, &layout).ok()?, assumed_label()))
         }
         _ => limit_line(bench),
     }
 }
 
-/// A sentence on the line, for the caption of a chart that has it; else nothing.
-pub(super) fn limit_in_words(chart: &Chart) -> &'static str {
-    if chart.series.iter().any(|series| series.label.starts_with(LABEL)) {
-        " Black dashes: the limit, the mean error of the best unbiased estimator where the readings are noisy and the force \
-         is known (Cramér–Rao bound)."
-    } else {
-        ""
+/// What to say of the line in the caption of a chart that has it; else nothing.
+pub(super) fn limit_in_words(chart: &Chart) -> String {
+    let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
+        return String::new();
+    };
+    let mut words = " Black dashes: the limit, which is the mean error of the best unbiased estimator for noisy readings and a \
+                     known force (Cramér–Rao bound)."
+        .to_owned();
+    if line.label == assumed_label() {
+        words += " The readings here are clean, so errors may lie below it.";
     }
+    words
+}
+
+fn assumed_label() -> String {
+    format!("{LABEL}: what physics allows at {} µm noise", ASSUMED_NOISE_M * 1e6)
 }
 
 fn curve(bench: &Bench, layout: &Layout) -> Result<LimitCurve, LimitError> {

@@ -49,9 +49,7 @@ pub(super) fn limit_figure(report: &LimitReport) -> Figure {
     let caption: Markup = html! {
         "The limit at each contact position, for " (stated(report.known.force_n)) " N. No unbiased estimator has a smaller \
          standard deviation; where its errors are Gaussian, its mean error is √(2/π) ≈ 0.8 of it on a line."
-        @if report.warnings.iter().any(|warning| !matches!(warning, LimitWarning::Mirror { .. })) {
-            " Shaded: where the warnings see blind zones and faint contacts."
-        }
+        @if !report.warnings.is_empty() { " Shaded: what the warnings are about." }
         @if cut_off(report, length_mm) {
             " Limits above " (stated(MOST_LENGTHS)) " lengths are not shown: contacts there cannot be located."
         }
@@ -100,7 +98,12 @@ fn marks(report: &LimitReport, length_mm: f64) -> Vec<Mark> {
     for warning in report.warnings {
         let zone = warning.zone();
         let (low, high) = (zone.from.x_m * 1e3, zone.to.x_m * 1e3);
-        let label = warning.kind().to_owned();
+        let label = match warning {
+            LimitWarning::Blind { .. } => "blind",
+            LimitWarning::Mirror { .. } => "ambiguous",
+            LimitWarning::Faint { .. } => "faint",
+        }
+        .to_owned();
         match warning {
             LimitWarning::Blind { .. } | LimitWarning::Faint { .. } => {
                 marks.push(Mark::Span { low, high, label });

@@ -47,13 +47,13 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
         title: report.title.to_owned(),
         opening: report.summary(),
         sections: vec![
+            section("bench", "The bench", html! { (figures.show(1)) (report.sensor_table(2)) }),
             section(
                 "limit",
                 "The limit along the surface",
                 html! { (figures.show(2)) (report.limit_table(1)) },
             ),
             section("warnings", "What this bench cannot tell", report.warnings_in_words()),
-            section("bench", "The bench", html! { (figures.show(1)) (report.sensor_table(2)) }),
             section("meaning", "What the limit means", meaning()),
         ],
         footer: html! { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) "." } },
@@ -141,7 +141,7 @@ impl LimitReport<'_> {
             } @else {
                 ul {
                     @for warning in self.warnings {
-                        li { b { (warning.to_string()) "." } " What would help: " (warning.help()) "." }
+                        li { (sentence(&warning.to_string())) " " b { "What would help:" } " " (warning.help()) "." }
                     }
                 }
             }
@@ -165,6 +165,13 @@ impl LimitReport<'_> {
         }
         .markup()
     }
+}
+
+/// With a capital at its beginning and a full stop at its end.
+fn sentence(words: &str) -> String {
+    let mut characters = words.chars();
+    let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", characters.as_str())
 }
 
 /// "50", or "50, 20" on a plane.
