@@ -30,7 +30,7 @@ pub(super) struct Points {
 impl Points {
     /// From coordinates, d×n, their centre and spread, and the length scales.
     pub fn new(
-        coordinates: ArrayView2<f64>,
+        coordinates: &ArrayView2<f64>,
         centre: &[f64],
         spread: &[f64],
         length_scales: &[f64],
@@ -40,7 +40,7 @@ impl Points {
             let (d, n) = coordinates.dim();
             Array2::from_shape_fn((d, n), |(k, i)| (coordinates[[k, i]] - centre[k]) / divisors[k])
         };
-        Self { scaled: over(length_scales), basis: trend.basis(over(spread).view()) }
+        Self { scaled: over(length_scales), basis: trend.basis(&over(spread).view()) }
     }
 
     /// C, and dC/d(r²) where `slopes` wants it; lower triangles.
@@ -49,7 +49,7 @@ impl Points {
         let mut c = Array2::zeros((n, n));
         let mut r2 = vec![0.0; n];
         for (i, mut row) in c.outer_iter_mut().enumerate() {
-            squared_distances_into(&mut r2[..=i], self.scaled.view(), |k| self.scaled[[k, i]]);
+            squared_distances_into(&mut r2[..=i], &self.scaled.view(), |k| self.scaled[[k, i]]);
             match &mut slopes {
                 None => row.iter_mut().zip(&r2[..=i]).for_each(|(c, r2)| *c = kernel.correlation(*r2)),
                 Some(slopes) => {

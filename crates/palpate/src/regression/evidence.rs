@@ -55,7 +55,7 @@ impl Evidence<'_> {
         let groups = self.groups;
         let (scales, ratio) = (&hyperparameters.length_scales, hyperparameters.noise_ratio);
         let points =
-            Points::new(groups.coordinates.view(), &groups.centre, &groups.spread, scales, self.trend);
+            Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, self.trend);
         let noise = Self::noise(groups, ratio);
         let mut slopes = Array2::zeros((groups.len(), groups.len()));
         let correlations = points.correlations(self.kernel, Some(&mut slopes));

@@ -56,7 +56,7 @@ impl Groups {
     pub fn of(samples: Samples) -> Result<Self, RegressionError> {
         check(samples)?;
         let outputs = samples.outputs;
-        let (offset, variance) = moments(outputs, Axis(1));
+        let (offset, variance) = moments(&outputs, Axis(1));
         let pooled = variance.iter().sum::<f64>() / variance.len() as f64;
         let scale = match samples.noise_variance {
             Some(_) => vec![1.0; variance.len()],
@@ -69,7 +69,7 @@ impl Groups {
         };
         let standardized =
             Array2::from_shape_fn(outputs.dim(), |(r, j)| (outputs[[r, j]] - offset[j]) / scale[j]);
-        let mut groups = collapse(samples.coordinates, &standardized, &relative);
+        let mut groups = collapse(&samples.coordinates, &standardized, &relative);
         (groups.offset, groups.scale) = (offset, scale);
         groups.noise_given = samples.noise_variance.is_some();
         Ok(groups)
@@ -111,11 +111,11 @@ impl Groups {
     }
 }
 
-fn collapse(coordinates: ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f64]) -> Groups {
+fn collapse(coordinates: &ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f64]) -> Groups {
     let members = members(coordinates);
     let (count, dimensions) = (members.len(), coordinates.ncols());
     let points = Array2::from_shape_fn((dimensions, count), |(k, i)| coordinates[[members[i][0], k]]);
-    let (centre, variance) = moments(points.view(), Axis(0));
+    let (centre, variance) = moments(&points.view(), Axis(0));
     let mut groups = Groups {
         coordinates: points,
         centre,
@@ -143,7 +143,7 @@ fn collapse(coordinates: ArrayView2<f64>, outputs: &Array2<f64>, relative: &[f64
 }
 
 /// Mean and variance of every lane of a table.
-fn moments(table: ArrayView2<f64>, axis: Axis) -> (Vec<f64>, Vec<f64>) {
+fn moments(table: &ArrayView2<f64>, axis: Axis) -> (Vec<f64>, Vec<f64>) {
     let moments = |lane: ArrayView1<f64>| {
         let count = lane.len() as f64;
         let mean = lane.sum() / count;
@@ -156,7 +156,7 @@ fn moments(table: ArrayView2<f64>, axis: Axis) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Rows of each distinct point, points in the order of their first rows.
-fn members(coordinates: ArrayView2<f64>) -> Vec<Vec<usize>> {
+fn members(coordinates: &ArrayView2<f64>) -> Vec<Vec<usize>> {
     // −0 and 0 are one place.
     let order = |a: &usize, b: &usize| {
         let (a, b) = (coordinates.row(*a), coordinates.row(*b));

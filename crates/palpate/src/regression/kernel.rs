@@ -57,7 +57,7 @@ impl Trend {
     }
 
     /// h at every row, n×q, for standardized coordinates, d×n.
-    pub(super) fn basis(self, standardized: ArrayView2<f64>) -> Array2<f64> {
+    pub(super) fn basis(self, standardized: &ArrayView2<f64>) -> Array2<f64> {
         let (coordinates, rows) = standardized.dim();
         Array2::from_shape_fn((rows, self.size(coordinates)), |(row, term)| match term {
             0 => 1.0,
@@ -67,7 +67,7 @@ impl Trend {
 }
 
 /// r² from a point to the first `out.len()` rows, all divided by their length scales; rows are d×n.
-pub(super) fn squared_distances_into(out: &mut [f64], rows: ArrayView2<f64>, point: impl Fn(usize) -> f64) {
+pub(super) fn squared_distances_into(out: &mut [f64], rows: &ArrayView2<f64>, point: impl Fn(usize) -> f64) {
     out.fill(0.0);
     for (k, coordinate) in rows.outer_iter().enumerate() {
         let x = point(k);

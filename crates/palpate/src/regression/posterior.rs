@@ -58,7 +58,7 @@ impl GaussianProcess {
     ) -> Result<Self, RegressionError> {
         let ratio = hyperparameters.noise_ratio;
         let scales = &hyperparameters.length_scales;
-        let points = Points::new(groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
         let noise = Evidence::noise(groups, ratio);
         let covariance = Covariance::steadied(&points, kernel, &noise)?;
         let (alpha, beta) = covariance.solve(&groups.means);
@@ -229,7 +229,7 @@ impl GaussianProcess {
         for (k, h) in scratch.basis[1..].iter_mut().enumerate() {
             *h = (point[k] - centre[k]) / spread[k];
         }
-        squared_distances_into(&mut scratch.correlations, self.points.scaled.view(), |k| scratch.point[k]);
+        squared_distances_into(&mut scratch.correlations, &self.points.scaled.view(), |k| scratch.point[k]);
     }
 
     /// Means from h and the correlations.
@@ -262,7 +262,7 @@ impl TryFrom<PosteriorData> for GaussianProcess {
         };
         let coordinates = shape(&data.inputs, n, d).reversed_axes();
         let scales = &data.hyperparameters.length_scales;
-        let points = Points::new(coordinates.view(), &data.centre, &data.spread, scales, data.trend);
+        let points = Points::new(&coordinates.view(), &data.centre, &data.spread, scales, data.trend);
         let covariance = Covariance::steadied(&points, data.kernel, &data.noise)?;
         let weights = shape(&data.weights, m, n);
         let trend = shape(&data.trend_coefficients, m, data.trend.size(d));
