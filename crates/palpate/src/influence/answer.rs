@@ -22,7 +22,7 @@ pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch
         return Estimate::of_contact(contact, Status::NoContact);
     }
     let shares = shares(minima, search.table.length_m);
-    let x_95_m = interval(search, minima, &shares, &scratch.whitened);
+    let x_95_m = interval(search, minima, &shares, &scratch.misfits);
     let mut estimate = Estimate::of_contact(contact(search, &best, x_95_m), Status::Located);
     for (minimum, share) in minima.iter().zip(&shares).skip(1) {
         if *share >= MODE_THAT_MATTERS {
@@ -119,11 +119,11 @@ fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
 }
 
 /// The 95 % interval of the position over all minima.
-fn interval(search: &Search, minima: &[Minimum], shares: &[f64], whitened: &[f64]) -> (f64, f64) {
+fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64]) -> (f64, f64) {
     let length_m = search.table.length_m;
     let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > 1.5 * search.table.spacing_m();
     if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
-        return interval_of_profile(search, whitened);
+        return interval_of_profile(misfits, length_m);
     }
     if minima.len() == 1 {
         return single_interval(&minima[0], length_m);
@@ -153,10 +153,8 @@ fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
 
 /// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
 /// is flat in the position and in the size of the signal.
-fn interval_of_profile(search: &Search, whitened: &[f64]) -> (f64, f64) {
-    let nodes = search.table.nodes();
-    let misfits: Vec<f64> =
-        (0..nodes).map(|node| search.profile(whitened, search.table.node_m(node)).0).collect();
+fn interval_of_profile(misfits: &[f64], length_m: f64) -> (f64, f64) {
+    let nodes = misfits.len();
     let best = misfits.iter().copied().fold(f64::INFINITY, f64::min);
     let density: Vec<f64> = misfits.iter().map(|misfit| (0.5 * (best - misfit)).exp()).collect();
     let mut cumulative = vec![0.0; nodes];
@@ -168,7 +166,7 @@ fn interval_of_profile(search: &Search, whitened: &[f64]) -> (f64, f64) {
         let after = cumulative.partition_point(|c| *c < share * all).clamp(1, nodes - 1);
         let (low, high) = (cumulative[after - 1], cumulative[after]);
         let part = if high > low { (share * all - low) / (high - low) } else { 0.0 };
-        (after as f64 - 1.0 + part) * search.table.spacing_m()
+        (after as f64 - 1.0 + part) * length_m / (nodes - 1) as f64
     };
     (quantile(0.025), quantile(0.975))
 }

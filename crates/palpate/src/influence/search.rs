@@ -20,10 +20,12 @@ pub(super) struct Search {
     offsets: Vec<f64>,
     /// f, f′ and the variance of f, of the channels in use.
     pub table: InfluenceTable,
-    /// f at every second node, channel by channel.
-    coarse: Vec<f64>,
-    /// |f|² at every second node.
+    /// f at every STRIDE-th node: blocks of nodes, in each block channel by channel, padded with zeros.
+    coarse: Vec<[f64; BLOCK]>,
+    /// |f|² at every STRIDE-th node.
     norms: Vec<f64>,
+    /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's; cells × channels.
+    weights: Vec<f64>,
     pub force: ForceBelief,
     /// The calibration's mean force, in newtons: its offsets are as uncertain as its influences at this force.
     reference_force_n: f64,
@@ -33,13 +35,19 @@ pub(super) struct Search {
     pub worst_noise: f64,
 }
 
+/// The search looks at every so many nodes; misfits between them are smooth.
+pub(super) const STRIDE: usize = 4;
+
+/// Nodes that are searched side by side, so that their sums stay in registers.
+const BLOCK: usize = 8;
+
 /// Memory for locating a reading.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     /// d.
     pub(super) whitened: Vec<f64>,
-    /// d·f at every second node, then the misfit there.
-    misfits: Vec<f64>,
+    /// The misfit at every STRIDE-th node.
+    pub(super) misfits: Vec<f64>,
 }
 
 /// A minimum of the misfit.
@@ -85,11 +93,18 @@ impl Search {
             slopes: whiten(&table.slopes, 1),
             variances: whiten(&table.variances, 2),
         };
-        let nodes: Vec<usize> = (0..table.nodes()).step_by(2).collect();
-        let coarse = (0..live.len()).flat_map(|s| nodes.iter().map(move |node| (s, *node)));
-        let coarse = coarse.map(|(s, node)| table.at_node(node)[s]).collect();
+        let nodes: Vec<usize> = (0..table.nodes()).step_by(STRIDE).collect();
+        let blocks = nodes.chunks(BLOCK).flat_map(|block| (0..live.len()).map(move |s| (block, s)));
+        let coarse = blocks.map(|(block, s)| {
+            std::array::from_fn(|i| block.get(i).map_or(0.0, |node| table.at_node(*node)[s]))
+        });
+        let coarse = coarse.collect();
         let norms = nodes.iter().map(|node| table.at_node(*node).iter().map(|f| f * f).sum()).collect();
         let offsets = live.iter().map(|s| offsets[*s]).collect();
+        let force_squared = reference_force_n.powi(2);
+        let (left, right) = (&table.variances[..], &table.variances[live.len()..]);
+        let cells = left.iter().zip(right);
+        let weights = cells.map(|(a, b)| 1.0 / (1.0 + 0.5 * force_squared * (a + b))).collect();
         Self {
             worst_misfit: worst_misfit(live.len().saturating_sub(force.unknowns())),
             worst_noise: worst_misfit(live.len()),
@@ -99,6 +114,7 @@ impl Search {
             table,
             coarse,
             norms,
+            weights,
             force,
             reference_force_n,
         }
@@ -129,7 +145,8 @@ impl Search {
         let mut found = [NOWHERE; MOST_MINIMA];
         let mut count = 0;
         for node in candidates.into_iter().flatten() {
-            let minimum = self.refine(&scratch.whitened, self.table.node_m(2 * node));
+            let start_m = vertex(&scratch.misfits, node) * STRIDE as f64 * self.table.spacing_m();
+            let minimum = self.refine(&scratch.whitened, start_m);
             let is_new = |other: &Minimum| (other.x_m - minimum.x_m).abs() > 0.5 * self.table.spacing_m();
             if found[..count].iter().all(is_new) {
                 found[count] = minimum;
@@ -142,17 +159,20 @@ impl Search {
         (found, count.max(1))
     }
 
-    /// The misfit at every second node, with the best force there.
+    /// The misfit at every STRIDE-th node, with the best force there.
     fn scan(&self, square: f64, scratch: &mut Scratch) {
-        let nodes = self.norms.len();
         scratch.misfits.clear();
-        scratch.misfits.resize(nodes, 0.0);
-        let products = &mut scratch.misfits[..nodes];
-        for (column, d) in self.coarse.chunks_exact(nodes).zip(&scratch.whitened) {
-            for (product, f) in products.iter_mut().zip(column) {
-                *product += d * f;
+        for block in self.coarse.chunks_exact(self.live.len()) {
+            let mut products = [0.0; BLOCK];
+            for (f, d) in block.iter().zip(&scratch.whitened) {
+                for i in 0..BLOCK {
+                    products[i] += d * f[i];
+                }
             }
+            scratch.misfits.extend_from_slice(&products);
         }
+        scratch.misfits.truncate(self.norms.len());
+        let products = &mut scratch.misfits;
         match self.force {
             ForceBelief::Known(force_n) => {
                 for (product, norm) in products.iter_mut().zip(&self.norms) {
@@ -170,12 +190,6 @@ impl Search {
         }
     }
 
-    /// The misfit of a place with the best force there, and that force.
-    pub fn profile(&self, whitened: &[f64], x_m: f64) -> (f64, f64) {
-        let sums = self.sums(whitened, x_m, None);
-        (self.misfit(&sums), sums.force_n)
-    }
-
     /// The minimum near `x_m`.
     pub fn refine(&self, whitened: &[f64], mut x_m: f64) -> Minimum {
         const MOST_STEPS: usize = 16;
@@ -185,14 +199,16 @@ impl Search {
         for _ in 0..MOST_STEPS {
             let (step_m, step_n) = sums.step(self.force);
             let next = (x_m + step_m.clamp(-reach, reach)).clamp(0.0, self.table.length_m);
-            let moved = (next - x_m).abs();
+            let moved = next - x_m;
             x_m = next;
             force_n = Some((sums.force_n + step_n).max(0.0));
-            sums = self.sums(whitened, x_m, force_n);
-            let enough = (1e-3 * sums.covariance(self.force)[0].sqrt()).max(1e-12 * self.table.length_m);
-            if moved <= enough {
-                break;
+            // The error that a step leaves is of the order of its square, so the last step is taken on trust.
+            let covariance = sums.covariance(self.force);
+            if moved.abs() <= 0.02 * covariance[0].sqrt() || moved.abs() <= 1e-9 * self.table.length_m {
+                let misfit = self.misfit(&sums) - moved * moved / covariance[0];
+                return Minimum { x_m, force_n: force_n.unwrap_or(sums.force_n), misfit, covariance };
             }
+            sums = self.sums(whitened, x_m, force_n);
         }
         let covariance = sums.covariance(self.force);
         Minimum { x_m, force_n: sums.force_n, misfit: self.misfit(&sums), covariance }
@@ -212,10 +228,14 @@ impl Search {
             _ => self.best_force(whitened, x_m),
         };
         let scale = self.variance_scale(force_n);
-        let variances = self.table.variances_near(x_m);
+        let grown = scale / self.reference_force_n.powi(2);
+        let cell = self.table.cell(x_m);
+        let weights = &self.weights[cell.node * self.live.len()..][..self.live.len()];
         let mut sums = Sums { force_n, ..Sums::default() };
-        self.table.for_each(self.table.cell(x_m), |s, f, slope| {
-            let weight = 1.0 / (1.0 + scale * variances[s]);
+        self.table.for_each(cell, |s, f, slope| {
+            // 1/(1 + g·v) from w = 1/(1 + v), without a division where the force is as in calibration.
+            let weight =
+                if grown > 1.0 { weights[s] / (weights[s] + grown * (1.0 - weights[s])) } else { weights[s] };
             let e = whitened[s] - force_n * f;
             sums.square += weight * e * e;
             sums.ff += weight * f * f;
@@ -303,6 +323,14 @@ const NOWHERE: Minimum = Minimum {
     misfit: f64::INFINITY,
     covariance: [f64::INFINITY, 0.0, f64::INFINITY],
 };
+
+/// The lowest point, in nodes, of the parabola through a node and its neighbours.
+fn vertex(misfits: &[f64], node: usize) -> f64 {
+    let here = node as f64;
+    let (Some(left), Some(right)) = (node.checked_sub(1), misfits.get(node + 1)) else { return here };
+    let (rise, bend) = (right - misfits[left], misfits[left] - 2.0 * misfits[node] + right);
+    if bend > 0.0 { here - (0.5 * rise / bend).clamp(-0.5, 0.5) } else { here }
+}
 
 /// The lowest nodes that are no higher than both neighbours, at most [`MOST_MINIMA`].
 fn coarse_minima(misfits: &[f64]) -> [Option<usize>; MOST_MINIMA] {

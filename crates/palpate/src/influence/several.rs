@@ -5,7 +5,7 @@
 //! numbers. How many there are is decided by the extended Bayesian information criterion (Chen and Chen, Biometrika 95,
 //! 2008), which also charges for the number of places that a contact could have been at.
 
-use super::search::{Scratch, Search};
+use super::search::{STRIDE, Scratch, Search};
 use crate::contact::Position;
 use crate::numerics::Cholesky;
 use ndarray::{Array1, Array2};
@@ -71,14 +71,14 @@ pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Optio
         return None;
     }
     let start = best_nodes(search, &scratch.whitened, count)?;
-    let spacing_m = 2.0 * search.table.spacing_m();
+    let spacing_m = STRIDE as f64 * search.table.spacing_m();
     refine(search, &scratch.whitened, start.into_iter().map(|node| node as f64 * spacing_m).collect())
 }
 
 /// The nodes whose influences explain the most, with every force at least 0.
 fn best_nodes(search: &Search, whitened: &[f64], count: usize) -> Option<Vec<usize>> {
     let nodes = search.coarse_nodes();
-    let column = |node: usize| search.table.at_node(2 * node);
+    let column = |node: usize| search.table.at_node(STRIDE * node);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let gram = Array2::from_shape_fn((nodes, nodes), |(i, j)| dot(column(i), column(j)));
     let pull: Vec<f64> = (0..nodes).map(|node| dot(column(node), whitened)).collect();

@@ -1,0 +1,69 @@
+//! The influence estimator on the paper's beam: a fit of 10 × 10 presses, and an estimate with its uncertainty; one
+//! core, CPU time, medians. What bounds the estimate is said in `influence/search.rs`.
+
+use cpu_time::ThreadTime;
+use palpate::bench::Bench;
+use palpate::contact::{Contact, Position};
+use palpate::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
+use palpate::method::{Fit, FitTask};
+use palpate::recording::Recording;
+use palpate::rig::Rig;
+use palpate::simulate::{clean_reading, simulate};
+
+const ROUNDS: usize = 201;
+const READINGS: usize = 1000;
+
+fn main() {
+    let text = include_str!("../../../examples/paper.toml").replace("repeats = 1", "repeats = 10");
+    let rig = Rig::from_toml(&text).expect("the paper's rig is sound");
+    let recording = simulate(&rig, 0).expect("the paper's rig can be simulated");
+    for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
+        let config = InfluenceConfig { from, ..InfluenceConfig::default() };
+        let mut times: Vec<f64> = (0..21)
+            .map(|_| {
+                let start = ThreadTime::now();
+                std::hint::black_box(fit(config, &rig.bench, &recording));
+                start.elapsed().as_secs_f64()
+            })
+            .collect();
+        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(&mut times) * 1e3);
+    }
+    for force_n in [Some(3.0), None] {
+        let bench = Bench { force_n, ..rig.bench.clone() };
+        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        let known = if force_n.is_some() { "known" } else { "unknown" };
+        println!("estimate with uncertainty, force {known}: {:.0} ns a reading", nanoseconds(&locator, &rig));
+    }
+}
+
+fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
+    let fitted = config.fit(FitTask { bench, recording, seed: 0 }, &mut || true);
+    fitted.expect("the presses suit the bench").expect("nobody stops it")
+}
+
+/// Median time of an estimate, over readings all along the beam.
+fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> f64 {
+    let surface = rig.bench.surface.model().expect("a beam has a model");
+    let readings: Vec<Vec<f64>> = (0..READINGS)
+        .map(|i| {
+            let position = Position::along(0.02 + 0.36 * i as f64 / READINGS as f64);
+            clean_reading(surface, &rig.bench.layout, Contact { position, force_n: 3.0 })
+        })
+        .collect();
+    let mut scratch = Scratch::default();
+    let mut times: Vec<f64> = (0..ROUNDS)
+        .map(|_| {
+            let start = ThreadTime::now();
+            for reading in &readings {
+                std::hint::black_box(locator.locate_with(reading, &mut scratch));
+            }
+            start.elapsed().as_nanos() as f64 / READINGS as f64
+        })
+        .collect();
+    median(&mut times)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
