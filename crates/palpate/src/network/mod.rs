@@ -1,7 +1,8 @@
-//! The founding paper's estimator: a feed-forward network trained by back-propagation.
+//! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
 
 mod config;
 mod fitting;
+mod forward;
 mod lanes;
 mod locator;
 mod outcome;
@@ -12,6 +13,7 @@ mod train;
 
 pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
+pub use forward::BatchNetwork;
 pub use lanes::{InstructionSet, Precision};
 pub use locator::{ChannelScaling, NetworkLocator, NetworkLocatorError};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
