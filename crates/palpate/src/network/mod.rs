@@ -4,6 +4,7 @@ mod config;
 mod fitting;
 mod forward;
 mod lanes;
+mod levenberg_marquardt;
 mod locator;
 mod outcome;
 mod patterns;
@@ -15,6 +16,10 @@ pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, Prese
 pub use fitting::{NetworkFitError, NetworkFitting};
 pub use forward::BatchNetwork;
 pub use lanes::{InstructionSet, Precision};
+pub use levenberg_marquardt::{
+    LevenbergMarquardtConfig, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
+    OutputScale,
+};
 pub use locator::{ChannelScaling, NetworkLocator, NetworkLocatorError};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;
