@@ -152,9 +152,11 @@ fn method(method: &Method) -> Vec<String> {
             influence.table().nodes(),
             influence.contacts()
         )],
-        Method::GaussianProcess(_) | Method::ClosedForm(_) | Method::Neighbours(_) | Method::Centroid(_) => {
-            Vec::new()
-        }
+        Method::NetworkLm(_)
+        | Method::GaussianProcess(_)
+        | Method::ClosedForm(_)
+        | Method::Neighbours(_)
+        | Method::Centroid(_) => Vec::new(),
     }
 }
 

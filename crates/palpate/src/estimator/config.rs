@@ -7,13 +7,15 @@ use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::InfluenceConfig;
 use crate::mechanics::SurfaceSpec;
 use crate::neighbours::NeighboursConfig;
-use crate::network::NetworkConfig;
+use crate::network::{LevenbergMarquardtConfig, NetworkConfig};
 
 /// A configured method; fitting it to a recording gives a locator.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EstimatorConfig {
     /// The founding paper's network (`kind = "network"`).
     Network(NetworkConfig),
+    /// Networks trained by Levenberg–Marquardt with Bayesian regularisation (`kind = "network-lm"`).
+    NetworkLm(LevenbergMarquardtConfig),
     /// Influence functions, inverted (`kind = "influence"`).
     Influence(InfluenceConfig),
     /// Gaussian-process regression of the position (`kind = "gaussian-process"`).
@@ -45,6 +47,7 @@ impl EstimatorConfig {
         contenders.extend([
             Self::Neighbours(NeighboursConfig::default()),
             Self::Centroid(CentroidConfig),
+            Self::NetworkLm(LevenbergMarquardtConfig::default()),
             Self::Network(NetworkConfig::default()),
         ]);
         contenders
@@ -70,6 +73,7 @@ impl EstimatorConfig {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Network(_) => "network",
+            Self::NetworkLm(_) => "network-lm",
             Self::Influence(_) => "influence",
             Self::GaussianProcess(_) => "gaussian-process",
             Self::ClosedForm(_) => "closed-form",

@@ -9,8 +9,8 @@ use crate::influence::InfluenceFitError;
 use crate::method::{Fit, FitTask};
 use crate::neighbours::NeighboursFitError;
 use crate::network::{
-    InstructionSet, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork, TrainingOutcome,
-    train_many, train_one,
+    InstructionSet, LevenbergMarquardtFitError, NetworkFitError, NetworkFitting, Precision, SeedQueue,
+    TrainedNetwork, TrainingOutcome, train_many, train_one,
 };
 use crate::recording::Recording;
 
@@ -28,6 +28,9 @@ pub enum FitError {
     /// What the network has to say.
     #[error(transparent)]
     Network(#[from] NetworkFitError),
+    /// What the Levenberg–Marquardt networks have to say.
+    #[error(transparent)]
+    NetworkLm(#[from] LevenbergMarquardtFitError),
     /// What the influence estimator has to say.
     #[error(transparent)]
     Influence(#[from] InfluenceFitError),
@@ -164,6 +167,7 @@ fn fit_method(
     Ok(match config {
         // Prepared networks never come here.
         EstimatorConfig::Network(_) => None,
+        EstimatorConfig::NetworkLm(config) => config.fit(task, keep_going)?.map(Method::NetworkLm),
         EstimatorConfig::Influence(config) => config.fit(task, keep_going)?.map(Method::Influence),
         EstimatorConfig::GaussianProcess(config) => {
             config.fit(task, keep_going)?.map(Method::GaussianProcess)

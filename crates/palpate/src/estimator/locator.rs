@@ -7,7 +7,7 @@ use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::BeamLocator;
 use crate::method::{Locate, LocatorFault};
 use crate::neighbours::NeighboursLocator;
-use crate::network::{NetworkLocator, TrainingOutcome};
+use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
 use palpate_core::Estimate;
 
@@ -41,6 +41,8 @@ pub struct LocatorProvenance {
 pub enum Method {
     /// The founding paper's network.
     Network(NetworkLocator),
+    /// Networks trained by Levenberg–Marquardt.
+    NetworkLm(LevenbergMarquardtLocator),
     /// Influence functions, inverted.
     Influence(BeamLocator),
     /// Gaussian-process regression.
@@ -58,6 +60,7 @@ impl Method {
     fn locate(&self) -> &dyn Locate {
         match self {
             Self::Network(network) => network,
+            Self::NetworkLm(networks) => networks,
             Self::Influence(influence) => influence,
             Self::GaussianProcess(process) => process,
             Self::ClosedForm(form) => form,
@@ -160,6 +163,7 @@ impl Locator {
     pub fn kind(&self) -> &'static str {
         match self.method {
             Method::Network(_) => "network",
+            Method::NetworkLm(_) => "network-lm",
             Method::Influence(_) => "influence",
             Method::GaussianProcess(_) => "gaussian-process",
             Method::ClosedForm(_) => "closed-form",

@@ -24,7 +24,8 @@ impl EstimatorConfig {
         match self {
             Self::Network(config) => network(config),
             Self::Influence(config) => influence(*config),
-            Self::GaussianProcess(_)
+            Self::NetworkLm(_)
+            | Self::GaussianProcess(_)
             | Self::ClosedForm(_)
             | Self::Neighbours(_)
             | Self::Centroid(_)

@@ -1,8 +1,10 @@
-//! The founding paper's estimator: a feed-forward network trained by back-propagation.
+//! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
 
 mod config;
 mod fitting;
+mod forward;
 mod lanes;
+mod levenberg_marquardt;
 mod locator;
 mod outcome;
 mod patterns;
@@ -12,7 +14,12 @@ mod train;
 
 pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
+pub use forward::BatchNetwork;
 pub use lanes::{InstructionSet, Precision};
+pub use levenberg_marquardt::{
+    LevenbergMarquardtConfig, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
+    OutputScale,
+};
 pub use locator::{ChannelScaling, NetworkLocator};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;

@@ -1,5 +1,6 @@
 //! Picks the widest arithmetic that the machine has, when the program runs.
 
+use super::forward::{self, Batch};
 use super::portable::Array;
 use super::{Lanes, kernel};
 use crate::network::{SeedQueue, TrainedNetwork, TrainingTask, scalar};
@@ -178,4 +179,35 @@ fn fused_scalar<V: Lanes<1>>(
     }
     #[cfg(not(target_arch = "x86_64"))]
     scalar::train::<V>(task, seed, keep_going)
+}
+
+/// Sends a batch through its network, a reading a lane, with `set`; another one than [`InstructionSet::available`] has is replaced by the
+/// portable.
+pub(crate) fn forward_lanes(set: InstructionSet, batch: &Batch<f32>, outputs: &mut [f32]) {
+    let set = if InstructionSet::available().contains(&set) { set } else { InstructionSet::Portable };
+    match set {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `available` has found the features.
+        InstructionSet::Avx512 => unsafe { forward_avx512(batch, outputs) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `available` has found the features.
+        InstructionSet::Avx2 => unsafe { forward_fma(batch, outputs) },
+        _ => forward::run::<Array<f32, 8, false>, 8>(batch, outputs),
+    }
+}
+
+/// # Safety
+/// The machine must have AVX-512 F and DQ.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,fma")]
+unsafe fn forward_avx512(batch: &Batch<f32>, outputs: &mut [f32]) {
+    forward::run::<super::avx512::F32x16, 16>(batch, outputs);
+}
+
+/// # Safety
+/// The machine must have AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn forward_fma(batch: &Batch<f32>, outputs: &mut [f32]) {
+    forward::run::<super::avx2::F32x8, 8>(batch, outputs);
 }

@@ -10,13 +10,15 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod dispatch;
+mod forward;
 mod kernel;
 mod logistic;
 mod order;
 mod portable;
 
 pub use dispatch::{InstructionSet, Precision};
-pub(super) use dispatch::{train_lanes, train_scalar};
+pub(super) use dispatch::{forward_lanes, train_lanes, train_scalar};
+pub(super) use forward::Batch;
 pub(super) use logistic::{activate, derivative};
 pub(super) use order::{OrderDrawer, Streams};
 

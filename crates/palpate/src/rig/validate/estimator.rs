@@ -9,7 +9,8 @@ use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::neighbours::NeighboursConfig;
 use crate::network::{
-    Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
+    Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
+    PresentationOrder,
 };
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::EstimatorSection;
@@ -56,6 +57,7 @@ pub(super) fn validate(
     }
     match kind {
         "influence" => influence(keys, force_n).map(EstimatorConfig::Influence),
+        "network-lm" => Ok(EstimatorConfig::NetworkLm(LevenbergMarquardtConfig::default())),
         "gaussian-process" => Ok(EstimatorConfig::GaussianProcess(GaussianProcessConfig::default())),
         "closed-form" => Ok(EstimatorConfig::ClosedForm(ClosedFormConfig)),
         "neighbours" => Ok(EstimatorConfig::Neighbours(NeighboursConfig::default())),
