@@ -7,6 +7,7 @@ pub mod estimator;
 pub mod evaluation;
 pub mod features;
 pub mod gaussian_process;
+pub mod influence;
 pub mod mechanics;
 pub mod method;
 pub mod network;
