@@ -5,7 +5,7 @@ use cpu_time::ThreadTime;
 use palpate::bench::Bench;
 use palpate::contact::{Contact, Position};
 use palpate::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
-use palpate::method::{Fit, FitTask};
+use palpate::method::FitTask;
 use palpate::recording::Recording;
 use palpate::rig::Rig;
 use palpate::simulate::{clean_reading, simulate};
@@ -37,7 +37,7 @@ fn main() {
 }
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    let fitted = config.fit(FitTask { bench, recording, seed: 0 }, &mut || true);
+    let fitted = config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true);
     fitted.expect("the presses suit the bench").expect("nobody stops it")
 }
 

@@ -86,7 +86,7 @@ pub fn simulate_at(
         let clean = clean_reading(surface, &bench.layout, Contact { position, force_n });
         for _ in 0..repeats {
             let reading = measure(&bench.layout, &clean, &errors, &mut rng);
-            rows.push(Row { position, force_n: Some(force_n), reading });
+            rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
         }
     }
     let source = "simulation".to_owned();

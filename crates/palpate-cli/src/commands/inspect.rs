@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::{input, output};
 use palpate::bench::Bench;
 use palpate::estimator::Method;
+use palpate::influence::InfluenceLocator;
 use palpate::mechanics::SurfaceSpec;
 use palpate::network::Topology;
 use palpate::rig::{Rig, Training};
@@ -146,12 +147,15 @@ fn method(method: &Method) -> Vec<String> {
                 ),
             ]
         }
-        Method::Influence(influence) => vec![format!(
+        Method::Influence(InfluenceLocator::Beam(beam)) => vec![format!(
             "influence functions of {} sensors at {} nodes; at most {} contacts at once",
-            influence.table().sensors,
-            influence.table().nodes(),
-            influence.contacts()
+            beam.table().sensors,
+            beam.table().nodes(),
+            beam.contacts()
         )],
+        Method::Influence(InfluenceLocator::Measured(_)) => {
+            vec!["influence functions learnt from the recording alone".to_owned()]
+        }
         Method::NetworkLm(_)
         | Method::GaussianProcess(_)
         | Method::ClosedForm(_)

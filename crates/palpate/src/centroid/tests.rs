@@ -53,7 +53,12 @@ fn scales() -> Bench {
 
 fn lever(x_m: f64, force_n: f64) -> Row {
     let right = force_n * x_m / 0.4;
-    Row { position: Position::along(x_m), force_n: Some(force_n), reading: vec![force_n - right, right] }
+    Row {
+        position: Position::along(x_m),
+        force_n: Some(force_n),
+        hidden: None,
+        reading: vec![force_n - right, right],
+    }
 }
 
 #[test]
@@ -76,7 +81,7 @@ fn raw_channels_find_their_positions() {
         let weights = [i as f64, j as f64, (5 - i - j) as f64].map(|w| w / 5.0);
         let along = |axis: usize| (0..3).map(|c| weights[c] * places[c][axis]).sum::<f64>();
         let position = Position { x_m: along(0), y_m: along(1) };
-        Row { position, force_n: None, reading: weights.iter().map(|w| -3.0 * w).collect() }
+        Row { position, force_n: None, hidden: None, reading: weights.iter().map(|w| -3.0 * w).collect() }
     };
     let rows: Vec<Row> = (0..=5).flat_map(|i| (0..=5 - i).map(move |j| row(i, j))).collect();
     let locator = fit(&bench, rows.clone()).unwrap();

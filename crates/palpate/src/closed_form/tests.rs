@@ -31,7 +31,12 @@ fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
 const SCALES: [(SensorKind, f64); 2] = [(SensorKind::Reaction, 0.0), (SensorKind::Reaction, 0.4)];
 
 fn fit(bench: &Bench) -> Result<ClosedFormLocator, ClosedFormFitError> {
-    let row = Row { position: Position::along(0.1), force_n: None, reading: vec![0.0; bench.layout.len()] };
+    let row = Row {
+        position: Position::along(0.1),
+        force_n: None,
+        hidden: None,
+        reading: vec![0.0; bench.layout.len()],
+    };
     let provenance = Provenance { source: "test".into(), rows: 1, digests: vec![], seed: None };
     let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
     let recording = Recording { channels, kinds, rows: vec![row], provenance };

@@ -32,8 +32,16 @@ pub enum EstimatorConfig {
 
 impl EstimatorConfig {
     /// Every `kind` that a rig can name.
-    pub const KINDS: &'static [&'static str] =
-        &["network", "influence", "gaussian-process", "closed-form", "neighbours", "centroid", "auto"];
+    pub const KINDS: &'static [&'static str] = &[
+        "network",
+        "network-lm",
+        "influence",
+        "gaussian-process",
+        "closed-form",
+        "neighbours",
+        "centroid",
+        "auto",
+    ];
 
     /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
     pub fn contenders(bench: &Bench) -> Vec<Self> {

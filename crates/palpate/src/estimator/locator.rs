@@ -4,7 +4,7 @@ use crate::bench::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
 use crate::gaussian_process::GaussianProcessLocator;
-use crate::influence::BeamLocator;
+use crate::influence::InfluenceLocator;
 use crate::method::{Locate, LocatorFault};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
@@ -44,7 +44,7 @@ pub enum Method {
     /// Networks trained by Levenberg–Marquardt.
     NetworkLm(LevenbergMarquardtLocator),
     /// Influence functions, inverted.
-    Influence(BeamLocator),
+    Influence(InfluenceLocator),
     /// Gaussian-process regression.
     GaussianProcess(GaussianProcessLocator),
     /// The beam's own equations.
@@ -149,6 +149,9 @@ impl Locator {
         let kind = self.kind();
         match &mut self.method {
             Method::Influence(influence) => {
+                if matches!(influence, InfluenceLocator::Measured(_)) {
+                    return Err(LeaveOutError::Needed { kind });
+                }
                 if !influence.leave_out(channel) {
                     return Err(LeaveOutError::NoneLeft);
                 }

@@ -45,7 +45,7 @@ fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Ro
         force_n * (-off * off).exp() + noise * error
     };
     let reading = (0..4).map(&mut channel).collect();
-    Row { position: Position::along(x_m), force_n: None, reading }
+    Row { position: Position::along(x_m), force_n: None, hidden: None, reading }
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_pad_is_two_dimensional() {
         let (u, v) = (x_m / 0.2, y_m / 0.1);
         let mut reading = vec![(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v, 5.0];
         reading[..4].iter_mut().for_each(|value| *value *= 0.4 + 0.2 * f64::from(i % 4));
-        Row { position: Position { x_m, y_m }, force_n: None, reading }
+        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading }
     });
     let bench = bench(extent, 5, None);
     let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
@@ -102,7 +102,7 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
     // Presses as far as the edge, and a reading that a press beyond it would give.
     let rows = (0..41).map(|i| {
         let x_m = 0.01 * f64::from(i);
-        Row { position: Position::along(x_m), force_n: None, reading: vec![x_m, 1.0 - x_m] }
+        Row { position: Position::along(x_m), force_n: None, hidden: None, reading: vec![x_m, 1.0 - x_m] }
     });
     let bench = bench(EXTENT, 2, Some(1.0));
     let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
@@ -198,6 +198,7 @@ fn strip(file: &str) -> Option<(Bench, Recording)> {
     let row = |cells: &Vec<f64>| Row {
         position: Position::along(1e-3 * cells[0]),
         force_n: None,
+        hidden: None,
         reading: cells[1..3].to_vec(),
     };
     let rows = numbers(&format!("tactile-fsi/{file}"))?.iter().map(row).collect();
@@ -244,7 +245,7 @@ fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     let (left, low) = (least(1), least(2));
     let rows = contacts.iter().zip(&readings).map(|(contact, reading)| {
         let (x_m, y_m) = (1e-3 * (contact[1].round() - left), 1e-3 * (contact[2].round() - low));
-        Row { position: Position { x_m, y_m }, force_n: None, reading: reading[1..].to_vec() }
+        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading: reading[1..].to_vec() }
     });
     let recording = recording_of(rows.collect());
     let bench = bench(Extent { length_m: 0.03, width_m: Some(0.03) }, 15, None);

@@ -4,6 +4,7 @@ use super::belief::ForceBelief;
 use super::config::{InfluenceConfig, InfluenceSource};
 use super::hyperparameters::{MOST_PRESSES, most_evident};
 use super::locator::{BeamLocator, BeamParts};
+use super::measured::MeasuredError;
 use super::posterior::{Posterior, SensorPresses};
 use super::presses::Presses;
 use super::prior::{Mean, Prior, Remainders, Spread};
@@ -14,8 +15,11 @@ use crate::numerics::NotPositiveDefinite;
 use crate::sensing::{Layout, SensorKind};
 
 /// Why influence functions cannot be fitted to a recording.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InfluenceFitError {
+    /// What a surface without a model has to say.
+    #[error(transparent)]
+    Measured(#[from] MeasuredError),
     /// The surface has no model.
     #[error("the surface is `measured`: it has no mechanics that influence functions could start from")]
     NoModel,

@@ -7,6 +7,7 @@ mod config;
 mod fitting;
 mod hyperparameters;
 mod locator;
+pub mod measured;
 mod posterior;
 mod presses;
 mod prior;
@@ -21,18 +22,77 @@ pub use locator::BeamLocator;
 pub use search::Scratch;
 pub use table::InfluenceTable;
 
-use crate::method::{Fit, FitTask};
+use crate::bench::Bench;
+use crate::method::{Fit, FitTask, Locate, LocatorFault};
+use measured::{MeasuredConfig, MeasuredLocator};
+use palpate_core::Estimate;
+use serde::{Deserialize, Serialize};
+
+/// Influence functions, inverted: of a surface with a model, or of one that is known by its recording alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InfluenceLocator {
+    /// Of a surface with a model.
+    Beam(Box<BeamLocator>),
+    /// Of a surface without one.
+    Measured(Box<MeasuredLocator>),
+}
 
 impl Fit for InfluenceConfig {
-    type Locator = BeamLocator;
+    type Locator = InfluenceLocator;
     type Error = InfluenceFitError;
 
     fn fit(
         &self,
         task: FitTask,
         keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<InfluenceLocator>, InfluenceFitError> {
+        if task.bench.surface.model().is_none() {
+            let fitted = MeasuredConfig::default().fit(task, keep_going)?;
+            return Ok(fitted.map(|locator| InfluenceLocator::Measured(Box::new(locator))));
+        }
+        let fitted = self.fit_beam(task, keep_going)?;
+        Ok(fitted.map(|locator| InfluenceLocator::Beam(Box::new(locator))))
+    }
+}
+
+impl InfluenceConfig {
+    /// Fits the influence functions of a surface with a model; `None` when `keep_going`, asked now and then, says no.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
+    pub fn fit_beam(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
     ) -> Result<Option<BeamLocator>, InfluenceFitError> {
         fitting::fit_modelled(*self, task, keep_going)
+    }
+}
+
+impl InfluenceLocator {
+    /// Leaves channel `channel` (from 0) out of all sums from now on; false, and no change, where that cannot be.
+    pub fn leave_out(&mut self, channel: usize) -> bool {
+        match self {
+            Self::Beam(beam) => beam.leave_out(channel),
+            Self::Measured(_) => false,
+        }
+    }
+}
+
+impl Locate for InfluenceLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        match self {
+            Self::Beam(beam) => beam.locate(reading),
+            Self::Measured(measured) => measured.locate(reading),
+        }
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        match self {
+            Self::Beam(beam) => beam.check(bench),
+            Self::Measured(measured) => measured.check(bench),
+        }
     }
 }
 

@@ -21,7 +21,7 @@ fn rig(noise: &str, repeats: usize) -> Rig {
 }
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    config.fit(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
+    config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
 }
 
 fn clean(bench: &Bench, contacts: &[(f64, f64)]) -> Vec<f64> {
@@ -226,7 +226,7 @@ fn presses_that_say_too_little_are_refused() {
     let rig = rig("5 um", 1);
     let mut recording = simulate(&rig, 1).unwrap();
     let refuse = |config: InfluenceConfig, bench: &Bench, recording: &Recording| {
-        config.fit(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap_err()
+        config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap_err()
     };
     let from = InfluenceSource::Recording;
     recording.rows.truncate(2);

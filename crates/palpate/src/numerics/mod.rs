@@ -2,6 +2,8 @@
 
 mod cholesky;
 mod distributions;
+mod eigen;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{chi_squared_quantile, normal_distribution, normal_quantile};
+pub use eigen::symmetric_eigen;

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::contact::Position;
 use crate::mechanics::Extent;
 use crate::sensing::SensorKind;
 use crate::units::Unit;
@@ -17,10 +18,38 @@ pub struct Columns {
     pub position: PositionColumns,
     /// The unit of length of the position columns.
     pub position_unit: Unit,
+    /// How the file's coordinates become positions on the surface.
+    #[serde(default)]
+    pub frame: Frame,
     /// One column for each sensor, in the layout's order.
     pub channels: Vec<ValueColumn>,
     /// Where the contact force stands, if anywhere.
     pub force: Option<ForceColumn>,
+    /// Where the hidden coordinate stands, if anywhere; see [`Row::hidden`](super::Row::hidden).
+    #[serde(default)]
+    pub hidden: Option<ValueColumn>,
+}
+
+/// How a file's coordinates become positions on the surface: rounded, then less the origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frame {
+    /// The file's coordinates of the surface's left support or lower left corner, in metres.
+    pub origin: Position,
+    /// Coordinates are rounded to whole multiples of this, in metres, greater than 0, so that presses of one place that
+    /// were logged a little apart have one position; `None` to take them as they are.
+    pub round_m: Option<f64>,
+}
+
+impl Frame {
+    /// Where on the surface the file's (x, y), in metres, is.
+    pub fn position(&self, x_m: f64, y_m: f64) -> Position {
+        let rounded = |value_m: f64| match self.round_m {
+            Some(step_m) => (value_m / step_m).round() * step_m,
+            None => value_m,
+        };
+        Position { x_m: rounded(x_m) - self.origin.x_m, y_m: rounded(y_m) - self.origin.y_m }
+    }
 }
 
 /// Whether a CSV file's first line names its columns.
@@ -118,8 +147,10 @@ impl Columns {
             header: Header::Present,
             position,
             position_unit: millimetre,
+            frame: Frame::default(),
             channels: channels.collect(),
             force: Some(ForceColumn { values: force, need: Need::Optional }),
+            hidden: None,
         }
     }
 }

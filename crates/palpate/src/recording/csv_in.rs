@@ -5,7 +5,7 @@ use std::io::Read;
 use sha2::{Digest, Sha256};
 
 use super::cells::Cells;
-use super::columns::{Columns, Header, Need, PositionColumns};
+use super::columns::{Columns, Frame, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem, Place};
 use super::reading_parser::{ChannelFields, is_passed_over, without_mark};
 use super::{Provenance, Recording, Row};
@@ -39,8 +39,8 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         Ok((ContactFields::find(head, schema.columns)?, ChannelFields::find(head, schema.columns)?))
     };
     let rows = file.rows(schema.columns.header, find, |cells, (contact, channels)| {
-        let (position, force_n) = contact.contact(cells, schema)?;
-        Ok(Row { position, force_n, reading: channels.reading(cells)? })
+        let Touch { position, force_n, hidden } = contact.touch(cells, schema)?;
+        Ok(Row { position, force_n, hidden, reading: channels.reading(cells)? })
     })?;
     Ok(schema.recording(source.to_owned(), rows, vec![file.digest]))
 }
@@ -69,14 +69,15 @@ pub fn read_pair(
     let contact_rows = contacts.rows(
         header,
         |head| ContactFields::find(head, columns),
-        |cells, contact| contact.contact(cells, schema),
+        |cells, contact| contact.touch(cells, schema),
     )?;
     if reading_rows.len() != contact_rows.len() {
         let problem = CsvProblem::RowsDiffer { readings: reading_rows.len(), contacts: contact_rows.len() };
         return Err(problem.of_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let rows = rows.map(|(reading, (position, force_n))| Row { position, force_n, reading }).collect();
+    let row = |(reading, Touch { position, force_n, hidden })| Row { position, force_n, hidden, reading };
+    let rows = rows.map(row).collect();
     Ok(schema.recording(source, rows, vec![readings.digest, contacts.digest]))
 }
 
@@ -150,12 +151,21 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
     CsvProblem::NotUtf8.at(source, Place { line, column: None, text: before + &after, span: mark })
 }
 
+/// What a row says of its contact.
+struct Touch {
+    position: Position,
+    force_n: Option<f64>,
+    hidden: Option<f64>,
+}
+
 /// Which fields of a row say where and how hard the contact was.
 struct ContactFields {
     x: usize,
     y: Option<usize>,
     position_unit: Unit,
+    frame: Frame,
     force: Option<(usize, Unit)>,
+    hidden: Option<(usize, Unit)>,
 }
 
 impl ContactFields {
@@ -171,19 +181,22 @@ impl ContactFields {
             }
             _ => None,
         };
-        Ok(Self { x, y, position_unit: columns.position_unit, force })
+        let hidden = columns.hidden.as_ref().map(|hidden| Ok((find(&hidden.column)?, hidden.unit)));
+        let (position_unit, frame) = (columns.position_unit, columns.frame);
+        Ok(Self { x, y, position_unit, frame, force, hidden: hidden.transpose()? })
     }
 
-    fn contact(&self, cells: &Cells, schema: &Schema) -> Result<(Position, Option<f64>), CsvError> {
+    fn touch(&self, cells: &Cells, schema: &Schema) -> Result<Touch, CsvError> {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
-        let position = Position { x_m, y_m };
+        let position = self.frame.position(x_m, y_m);
         let extent = schema.extent;
         if !extent.contains(position) {
-            let across = self.y.filter(|_| extent.contains(Position { x_m, y_m: 0.0 }));
+            let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
             return Err(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent }));
         }
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
-        Ok((position, force_n.or(schema.known_force_n)))
+        let hidden = self.hidden.map(|(field, unit)| cells.number(field, unit)).transpose()?;
+        Ok(Touch { position, force_n: force_n.or(schema.known_force_n), hidden })
     }
 }

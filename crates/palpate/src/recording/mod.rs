@@ -12,7 +12,7 @@ mod warnings;
 
 use serde::{Deserialize, Serialize};
 
-pub use columns::{Column, Columns, ForceColumn, Header, Need, PositionColumns, ValueColumn};
+pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{Schema, read, read_pair};
 pub use csv_out::write;
@@ -43,6 +43,9 @@ pub struct Row {
     pub position: Position,
     /// Its force in newtons, positive downward; `None` where nobody measured it.
     pub force_n: Option<f64>,
+    /// Something else about the contact that shapes the reading, is known here, and is unknown when a reading is to be
+    /// located: the depth of indentation, say. In the SI unit of its column; `None` where the recording has no such column.
+    pub hidden: Option<f64>,
     /// One finite value per channel, in the SI unit of its kind (or raw).
     pub reading: Vec<f64>,
 }

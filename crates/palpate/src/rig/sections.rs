@@ -163,6 +163,10 @@ pub(crate) struct RecordingSection {
     pub channel_unit: Key<UnitNames>,
     pub force: Key<RawColumn>,
     pub force_unit: Key<String>,
+    pub hidden: Key<RawColumn>,
+    pub hidden_unit: Key<String>,
+    pub origin: Key<Vec<Spanned<RawQuantity>>>,
+    pub round: Key<RawQuantity>,
 }
 
 /// One unit for all channels, or one for each

@@ -85,6 +85,7 @@ fn recording(bench: &Bench, contacts: impl Iterator<Item = (f64, f64)>, seed: u6
     let row = |(x_m, force_n)| Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
+        hidden: None,
         reading: reading(bench, x_m, force_n, &mut rng),
     };
     let rows: Vec<Row> = contacts.map(row).collect();
@@ -211,7 +212,7 @@ fn strip(name: &str) -> Option<(Bench, Recording)> {
     let row = |line: &str| {
         let cells: Vec<f64> = line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect();
         let reading = vec![cells[1], cells[2]];
-        Row { position: Position::along(cells[0] * 1e-3), force_n: Some(cells[3]), reading }
+        Row { position: Position::along(cells[0] * 1e-3), force_n: Some(cells[3]), hidden: None, reading }
     };
     let rows: Vec<Row> = text.lines().skip(1).map(row).collect();
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);

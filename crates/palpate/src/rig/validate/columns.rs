@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use crate::contact::Position;
 use crate::mechanics::Extent;
-use crate::recording::{Column, Columns, ForceColumn, Header, Need, PositionColumns, ValueColumn};
+use crate::recording::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{RecordingSection, UnitNames};
-use crate::rig::value::{RawColumn, out_of_range};
+use crate::rig::value::{RawColumn, RawQuantity, out_of_range, positive, quantity};
 use crate::sensing::{Layout, SensorKind};
 use crate::units::{Dimension, Unit, UnitError};
 
@@ -28,8 +29,10 @@ pub(super) fn validate(
         position_unit: keys.position_unit.as_ref().map_or(Ok(own.position_unit), |raw| {
             unit("position_unit", raw.get_ref(), raw.span(), Dimension::Length)
         })?,
+        frame: frame(keys, extent)?,
         channels: channels(keys, layout, own.channels)?,
         force: force(keys, own.force)?,
+        hidden: hidden(keys)?,
     };
     check_numbered(&columns, section)?;
     Ok(Some(columns))
@@ -148,6 +151,41 @@ fn force(keys: &RecordingSection, own: Option<ForceColumn>) -> Result<Option<For
     }))
 }
 
+fn hidden(keys: &RecordingSection) -> Result<Option<ValueColumn>, RigError> {
+    let missing = |unit: &Spanned<String>| {
+        Err(RigProblem::MissingKey { section: "recording", key: "hidden" }.at(unit.span()))
+    };
+    match (&keys.hidden, &keys.hidden_unit) {
+        (None, None) => Ok(None),
+        (None, Some(unit)) => missing(unit),
+        (Some(raw), None) => Ok(Some(ValueColumn { column: column("hidden", raw)?, unit: Unit::NONE })),
+        (Some(raw), Some(symbol)) => {
+            let unit = Unit::from_symbol(symbol.get_ref()).ok_or_else(|| {
+                let error = UnitError::UnknownUnit { unit: symbol.get_ref().clone() };
+                RigProblem::Unit { key: "hidden_unit", error }.at(symbol.span())
+            })?;
+            Ok(Some(ValueColumn { column: column("hidden", raw)?, unit }))
+        }
+    }
+}
+
+/// Origin and rounding; as many coordinates as the surface has.
+fn frame(keys: &RecordingSection, extent: Extent) -> Result<Frame, RigError> {
+    let round_m = keys.round.as_ref().map(|raw| positive("round", raw, Dimension::Length)).transpose()?;
+    let Some(raw) = &keys.origin else { return Ok(Frame { round_m, ..Frame::default() }) };
+    let length = |value: &Spanned<RawQuantity>| quantity("origin", value, Dimension::Length);
+    let origin = match (raw.get_ref().as_slice(), extent.width_m) {
+        ([x], None) => Position::along(length(x)?),
+        ([x, y], Some(_)) => Position { x_m: length(x)?, y_m: length(y)? },
+        (listed, width) => {
+            let bound = if width.is_some() { "a list of 2, x and y" } else { "a list of 1" };
+            let value = format!("a list of {}", listed.len());
+            return Err(RigProblem::OutOfRange { key: "origin", value, bound }.at(raw.span()));
+        }
+    };
+    Ok(Frame { origin, round_m })
+}
+
 /// Without a header, columns must be numbers; an optional one that has a name is simply not there.
 fn check_numbered(columns: &Columns, section: &Spanned<RecordingSection>) -> Result<(), RigError> {
     if columns.header == Header::Present {
@@ -160,7 +198,8 @@ fn check_numbered(columns: &Columns, section: &Spanned<RecordingSection>) -> Res
     let force =
         columns.force.iter().filter(|force| force.need == Need::Required).map(|force| &force.values.column);
     let channels = columns.channels.iter().map(|channel| &channel.column);
-    for column in position.into_iter().chain(force).chain(channels) {
+    let hidden = columns.hidden.iter().map(|hidden| &hidden.column);
+    for column in position.into_iter().chain(force).chain(hidden).chain(channels) {
         if let Column::Name(name) = column {
             let span = place_of(name, section);
             return Err(RigProblem::NameWithoutHeader { name: name.clone() }.at(span));
@@ -172,7 +211,7 @@ fn check_numbered(columns: &Columns, section: &Spanned<RecordingSection>) -> Res
 /// Where the section names the column `name`; the whole section when it does not.
 fn place_of(name: &str, section: &Spanned<RecordingSection>) -> Range<usize> {
     let keys = section.get_ref();
-    let single = [&keys.position, &keys.x, &keys.y, &keys.force].into_iter().flatten();
+    let single = [&keys.position, &keys.x, &keys.y, &keys.force, &keys.hidden].into_iter().flatten();
     let listed = keys.channels.iter().flat_map(|channels| channels.get_ref());
     let named = |raw: &&Spanned<RawColumn>| matches!(raw.get_ref(), RawColumn::Name(written) if written.trim() == name);
     single.chain(listed).find(named).map_or_else(|| section.span(), Spanned::span)

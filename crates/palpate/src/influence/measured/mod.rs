@@ -1,0 +1,31 @@
+//! A surface without a model: what the sensors read is learnt as a function of where, and how, it is touched.
+//!
+//! The forward way: reading = f(position, hidden) + noise, with f a Gaussian process, and *hidden* whatever else shapes
+//! the reading, is known while calibrating and unknown afterwards: the force, or how deep the surface is indented. A
+//! reading is located by its posterior over position and hidden coordinate, every value of both within the presses
+//! that were made (and half a gap beyond) held as likely as any other before the reading is seen:
+//!
+//! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d hidden,
+//!
+//! f̄ and v the process's mean and relative variance, S its signal's covariance, C that of the noise. The position is
+//! the posterior's mean, which has the least mean square error.
+
+mod axis;
+mod config;
+mod fitting;
+mod line;
+mod locator;
+mod noise;
+mod posterior;
+mod scale;
+mod table;
+
+pub use axis::Axis;
+pub use config::{MeasuredConfig, MeasuredError};
+pub use locator::{HiddenRole, MeasuredLocator};
+pub use noise::Whitening;
+pub use scale::Scale;
+pub use table::Table;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,134 @@
+//! The learnt readings, tabulated over position and hidden coordinate.
+
+use super::Axis;
+use super::line::Line;
+
+/// Whitened mean readings and their relative variance at the nodes of a grid.
+///
+/// Index of a node: (x·count_y + y)·count_hidden + hidden.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// Along the surface, in metres.
+    pub x: Axis,
+    /// Across it, in metres; a single node on a one-dimensional surface.
+    pub y: Axis,
+    /// The hidden coordinate on its scale; a single node where there is none.
+    pub hidden: Axis,
+    /// W·f̄, channel by channel, node by node.
+    pub means: Vec<f64>,
+    /// v: the process's variance over its signal's, 0 to 1, node by node.
+    pub variances: Vec<f64>,
+    /// For each place (x, y), half the longest whitened distance to a neighbouring place: how far a reading within the
+    /// place's cell can lie from the place's own.
+    pub reaches: Vec<f64>,
+    /// Into how many parts each cell is cut along each axis when a reading is located within it.
+    pub parts: usize,
+}
+
+/// A finely cut cell has about this whitened length, so that sums over it are integrals.
+const FINE: f64 = 0.7;
+/// The finest cut.
+const MOST_PARTS: usize = 8;
+
+impl Table {
+    /// From means and variances at the nodes.
+    pub(super) fn new(
+        [x, y, hidden]: [Axis; 3],
+        means: Vec<f64>,
+        variances: Vec<f64>,
+        channels: usize,
+    ) -> Self {
+        let mut table = Self { x, y, hidden, means, variances, reaches: Vec::new(), parts: 1 };
+        table.reaches = (0..table.places()).map(|place| table.reach(place, channels)).collect();
+        let typical = 2.0 * table.reaches.iter().sum::<f64>() / table.reaches.len().max(1) as f64;
+        table.parts = ((typical / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
+        table
+    }
+
+    /// Places (x, y).
+    pub fn places(&self) -> usize {
+        self.x.count * self.y.count
+    }
+
+    /// The nodes of one place.
+    pub(super) fn line(&self, place: usize) -> Line<'_> {
+        let nodes = self.hidden.count;
+        let width = nodes * self.channels();
+        Line {
+            means: &self.means[place * width..(place + 1) * width],
+            variances: &self.variances[place * nodes..(place + 1) * nodes],
+        }
+    }
+
+    /// Channels of a reading.
+    pub(super) fn channels(&self) -> usize {
+        self.means.len() / self.variances.len().max(1)
+    }
+
+    /// The line at (x, y) between places, in nodes from the first, by cubic interpolation through four places each way.
+    pub(super) fn line_between<'a>(&self, x: f64, y: f64, buffer: &'a mut LineBuffer) -> Line<'a> {
+        buffer.means.clear();
+        buffer.means.resize(self.hidden.count * self.channels(), 0.0);
+        buffer.variances.clear();
+        buffer.variances.resize(self.hidden.count, 0.0);
+        let (first_x, weights_x) = cubic(x, self.x.count);
+        let (first_y, weights_y) = cubic(y, self.y.count);
+        for (i, wx) in weights_x.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            for (j, wy) in weights_y.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                let line = self.line((first_x + i) * self.y.count + first_y + j);
+                let weight = wx * wy;
+                let add = |sums: &mut [f64], values: &[f64]| {
+                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+                };
+                add(&mut buffer.means, line.means);
+                add(&mut buffer.variances, line.variances);
+            }
+        }
+        buffer.variances.iter_mut().for_each(|v| *v = v.max(0.0));
+        Line { means: &buffer.means, variances: &buffer.variances }
+    }
+
+    /// The places next to one, diagonally too.
+    fn neighbours(&self, place: usize) -> impl Iterator<Item = usize> {
+        let (x, y) = (place / self.y.count, place % self.y.count);
+        let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+        let (columns, rows, across) = (around(x, self.x.count), around(y, self.y.count), self.y.count);
+        columns
+            .flat_map(move |i| rows.clone().map(move |j| i * across + j))
+            .filter(move |other| *other != place)
+    }
+
+    fn reach(&self, place: usize, channels: usize) -> f64 {
+        let here = self.line(place);
+        let mut most: f64 = 0.0;
+        for other in self.neighbours(place) {
+            let there = self.line(other);
+            let pairs = here.means.chunks_exact(channels).zip(there.means.chunks_exact(channels));
+            for (a, b) in pairs {
+                most = most.max(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
+            }
+        }
+        0.5 * most.sqrt()
+    }
+}
+
+/// Room for an interpolated line.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LineBuffer {
+    means: Vec<f64>,
+    variances: Vec<f64>,
+}
+
+/// Lagrange's weights of four nodes around `place`, or of fewer where there are no four, and the first of them.
+fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
+    let used = count.min(4);
+    let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
+    let at = place - first as f64;
+    let mut weights = [0.0; 4];
+    for (i, weight) in weights[..used].iter_mut().enumerate() {
+        let others = (0..used).filter(|j| *j != i);
+        *weight = others.map(|j| (at - j as f64) / (i as f64 - j as f64)).product();
+    }
+    (first, weights)
+}
