@@ -4,8 +4,9 @@ use crate::failure::{Complaint, Failure};
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate::evaluation::{Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator};
+use palpate::report::{ComparisonReport, comparison_report};
 use palpate::rig::Rig;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Every estimator on the same folds of a recording (or on simulated calibrations), against what physics allows.
@@ -86,6 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let (data, trials) = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
+    if let Some(out) = &arguments.out {
+        write_report(arguments, &rig, &data, &comparisons, &left_out, out)?;
+    }
     let rows = comparisons.iter().filter_map(|comparison| row(&rig, comparison, arguments.tolerance));
     let findings = Findings {
         palpate: env!("CARGO_PKG_VERSION"),
@@ -99,7 +103,44 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         estimators: rows.collect(),
         left_out,
     };
-    if arguments.json { output::say_json(&findings) } else { print(&findings) }
+    if arguments.json {
+        return output::say_json(&findings);
+    }
+    print(&findings)?;
+    match &arguments.out {
+        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
+        None => Ok(()),
+    }
+}
+
+fn write_report(
+    arguments: &Arguments,
+    rig: &Rig,
+    data: &str,
+    comparisons: &[Comparison],
+    left_out: &[LeftOut],
+    out: &Path,
+) -> Result<(), Failure> {
+    output::make_folder(out)?;
+    let trials = if arguments.data.is_some() {
+        format!("{data}, cross-validated in {} folds by position", arguments.folds)
+    } else {
+        format!("{} simulated calibrations, judged at 399 positions each", arguments.calibrations)
+    };
+    let left_out: Vec<_> = left_out.iter().map(|left_out| (left_out.name, left_out.why.clone())).collect();
+    let report = ComparisonReport {
+        title: &format!("Estimators compared on {}", arguments.rig.display()),
+        bench: &rig.bench,
+        trials: &trials,
+        comparisons,
+        left_out: &left_out,
+        tolerance_m: arguments.tolerance,
+        seed: arguments.seed,
+    };
+    for file in comparison_report(&report).map_err(Complaint::new)? {
+        output::write_file(&out.join(&file.name), &file.bytes)?;
+    }
+    Ok(())
 }
 
 /// What the estimators are tried on, and what it is called.

@@ -29,6 +29,7 @@ mod bench_drawing;
 mod canvas;
 mod chart;
 mod chart_svg;
+mod comparison_report;
 mod evaluation_report;
 mod geometry;
 mod layout;
@@ -56,6 +57,7 @@ pub use chart::{
     Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
 };
 pub use chart_svg::chart_to_svg;
+pub use comparison_report::{ComparisonReport, comparison_report};
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
 pub use limit_report::{LimitReport, limit_report};
 pub use paper_report::paper_report;
