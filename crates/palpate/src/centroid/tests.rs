@@ -115,7 +115,7 @@ fn what_does_not_calibrate_is_named() {
         message(&bench, rows[..1].to_vec()),
         "the recording has 1 distinct positions; at least 2 are needed"
     );
-    let silent = rows.iter().cloned().map(|row| Row { reading: vec![0.0; 2], ..row }).collect();
+    let silent = rows.iter().map(|row| Row { reading: vec![0.0; 2], ..row.clone() }).collect();
     assert_eq!(
         message(&bench, silent),
         "every reaction reading of the recording is 0; a centroid weighs sensors by what they read"

@@ -109,7 +109,7 @@ impl LevenbergMarquardtLocator {
         let mut outputs: Vec<Array1<f64>> = Vec::with_capacity(self.members.len());
         let mut covariance = vec![vec![0.0; count]; count];
         for member in &self.members {
-            let (output, gradients) = jacobians(&self.topology, &member.weights, inputs);
+            let (output, gradients) = jacobians(&self.topology, &member.weights, &inputs);
             let sent: Vec<Vec<f64>> = gradients
                 .into_iter()
                 .map(|gradient| member.solve_lower(gradient.into_raw_vec_and_offset().0))

@@ -8,7 +8,7 @@ use ndarray::{Array2, ArrayView2};
 use crate::network::{Activation, Topology};
 
 /// Outputs of every row of inputs, a row each.
-pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: ArrayView2<f64>) -> Array2<f64> {
+pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: &ArrayView2<f64>) -> Array2<f64> {
     let mut outputs = Array2::zeros((inputs.nrows(), topology.outputs()));
     let mut layers = Activations::new(topology);
     for (input, mut output) in inputs.outer_iter().zip(outputs.outer_iter_mut()) {
@@ -22,7 +22,7 @@ pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: ArrayView2<f
 pub(super) fn jacobians(
     topology: &Topology,
     weights: &[f64],
-    inputs: ArrayView2<f64>,
+    inputs: &ArrayView2<f64>,
 ) -> (Array2<f64>, Vec<Array2<f64>>) {
     let (rows, count) = (inputs.nrows(), topology.weight_count());
     let mut outputs = Array2::zeros((rows, topology.outputs()));

@@ -30,13 +30,13 @@ fn jacobians_are_those_of_finite_differences() {
         let weights: Vec<f64> = (0..topology.weight_count()).map(|k| (k as f64 * 1.7).sin()).collect();
         let inputs =
             Array2::from_shape_fn((5, topology.inputs()), |(i, j)| (i as f64 - 2.0 * j as f64).cos());
-        let (at, analytic) = jacobians(&topology, &weights, inputs.view());
-        assert_eq!(at, outputs(&topology, &weights, inputs.view()));
+        let (at, analytic) = jacobians(&topology, &weights, &inputs.view());
+        assert_eq!(at, outputs(&topology, &weights, &inputs.view()));
         for k in 0..weights.len() {
             let shifted = |step: f64| {
                 let mut weights = weights.clone();
                 weights[k] += step;
-                outputs(&topology, &weights, inputs.view())
+                outputs(&topology, &weights, &inputs.view())
             };
             let difference = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
             for (output, jacobian) in analytic.iter().enumerate() {

@@ -92,12 +92,12 @@ impl Training<'_> {
     }
 
     fn errors(&self, weights: &Array1<f64>) -> Array2<f64> {
-        self.targets - &outputs(self.topology, weights.as_slice().unwrap_or(&[]), self.inputs.view())
+        self.targets - &outputs(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view())
     }
 
     fn place(&self, weights: &Array1<f64>) -> Place {
         let (outputs, jacobians) =
-            jacobians(self.topology, weights.as_slice().unwrap_or(&[]), self.inputs.view());
+            jacobians(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view());
         let products = jacobians.iter().map(|jacobian| jacobian.t().dot(jacobian)).collect();
         Place { errors: self.targets - &outputs, jacobians, products }
     }
