@@ -1,9 +1,11 @@
 //! From a recording to a locator.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis as Along, s};
 
+use super::line::Line;
 use super::noise::Noise;
 use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
@@ -16,9 +18,12 @@ use crate::regression::{GaussianProcess, Regression, Samples};
 const LEAST_POSITIONS: usize = 2;
 /// Most nodes along a one-dimensional surface, along either axis of a plane, and along the hidden coordinate.
 const MOST_ALONG: usize = 400;
-const MOST_OF_PLANE: usize = 64;
+const MOST_OF_PLANE: usize = 80;
 const MOST_HIDDEN: usize = 64;
 const MOST_HIDDEN_OF_PLANE: usize = 16;
+/// Distinct positions from which on some can be held out to judge the noise, and the least that this may change it.
+const LEAST_TO_JUDGE: usize = 15;
+const LEAST_MISFIT: f64 = 0.01;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
@@ -44,7 +49,19 @@ impl Fit for MeasuredConfig {
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
         let whitening = presses.whitening(&process, role)?;
-        let Some(table) = presses.table(&process, &whitening, bench, keep_going) else { return Ok(None) };
+        let whitening = match presses.misfit(&regression, &process, &whitening)? {
+            Some(factor) => whitening.widened(factor),
+            None => whitening,
+        };
+        let axes = presses.axes(&process, bench);
+        let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
+        let finer = presses.finer(axes, coarse.too_coarse());
+        let table =
+            if finer == axes { Some(coarse) } else { presses.table(finer, &process, &whitening, keep_going) };
+        let Some(table) = table else { return Ok(None) };
+        // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
+        let factor = table.too_coarse();
+        let (table, whitening) = (table.widened(factor), whitening.widened(factor));
         let mut locator = MeasuredLocator {
             readings: presses.readings,
             whitening,
@@ -77,6 +94,7 @@ fn hidden_coordinate(
     if named.is_some() {
         return Ok((HiddenRole::Other, named));
     }
+    // A force that is known, or always the same, shapes nothing.
     if bench.force_n.is_some() {
         return Ok((HiddenRole::None, None));
     }
@@ -173,15 +191,66 @@ impl Presses {
         Ok(Whitening::of(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
     }
 
+    /// By what factor errors at positions that were not learnt exceed what noise and process say, as a deviation:
+    /// every fifth position is held out of the same process. `None` with too few positions to tell.
+    ///
+    /// It is what the smoothness that the process found does not know of: texture that repeats itself.
+    fn misfit(
+        &self,
+        regression: &Regression,
+        process: &GaussianProcess,
+        whitening: &Whitening,
+    ) -> Result<Option<f64>, MeasuredError> {
+        let dimensions = self.coordinates.ncols() - usize::from(self.has_hidden);
+        let mut positions: Vec<Vec<f64>> =
+            self.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
+        let places = positions.clone();
+        let order = |a: &Vec<f64>, b: &Vec<f64>| {
+            a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
+        };
+        positions.sort_by(order);
+        positions.dedup();
+        if positions.len() < LEAST_TO_JUDGE {
+            return Ok(None);
+        }
+        let index = |place: &Vec<f64>| positions.partition_point(|other| order(other, place).is_lt());
+        let (held_out, kept): (Vec<usize>, Vec<usize>) =
+            (0..places.len()).partition(|i| index(&places[*i]) % 5 == 2);
+        let (coordinates, means) =
+            (self.coordinates.select(Along(0), &kept), self.means.select(Along(0), &kept));
+        let samples =
+            Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
+        let other = regression.condition(samples, process.hyperparameters())?;
+        let signal = other.signal_variance(0);
+        let mut held = vec![false; places.len()];
+        held_out.iter().for_each(|i| held[*i] = true);
+        let (mut square, mut rows) = (0.0, 0);
+        let mut known: Vec<Option<(Vec<f64>, f64)>> = vec![None; places.len()];
+        let mut white = vec![0.0; whitening.channels()];
+        for (place, output) in self.places.iter().zip(self.outputs.outer_iter()).filter(|(p, _)| held[**p]) {
+            let (mean, variance) = known[*place].get_or_insert_with(|| {
+                let (mean, variance) = other.predict(&self.coordinates.row(*place).to_vec());
+                let mut white = vec![0.0; mean.len()];
+                whitening.apply(&mean, &mut white);
+                (white, if signal > 0.0 { variance[0] / signal } else { 0.0 })
+            });
+            whitening.apply(&output.to_vec(), &mut white);
+            let line = Line { means: mean, variances: std::slice::from_ref(variance) };
+            square += line.nearest(&white, whitening).residual;
+            rows += 1;
+        }
+        let mean = square / (rows * whitening.channels()).max(1) as f64;
+        Ok(Some(mean.clamp(LEAST_MISFIT, 1.0 / LEAST_MISFIT).sqrt()))
+    }
+
     /// The process at every node; `None` when `keep_going` says no.
     fn table(
         &self,
+        axes: [Axis; 3],
         process: &GaussianProcess,
         whitening: &Whitening,
-        bench: &Bench,
         keep_going: &mut dyn FnMut() -> bool,
     ) -> Option<Table> {
-        let axes = self.axes(process, bench);
         let [x, y, hidden] = axes;
         let channels = self.means.ncols();
         let nodes = x.count * y.count * hidden.count;
@@ -204,6 +273,12 @@ impl Presses {
             variances.push(if signal > 0.0 { variance[0] / signal } else { 0.0 });
         }
         Some(Table::new(axes, means, variances, channels))
+    }
+
+    /// The axes of position with about `factor` times the nodes, as far as there may be so many.
+    fn finer(&self, [x, y, hidden]: [Axis; 3], factor: f64) -> [Axis; 3] {
+        let most = if y.count > 1 { MOST_OF_PLANE } else { MOST_ALONG };
+        [x.finer(factor, most), y.finer(factor, most), hidden]
     }
 
     fn axes(&self, process: &GaussianProcess, bench: &Bench) -> [Axis; 3] {
@@ -240,6 +315,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let mut residuals: Vec<f64> = tried
         .filter_map(|row| locator.whitened(&row.reading))
         .map(|reading| Posterior::of(locator, &reading).residual())
+        .filter(|residual| residual.is_finite())
         .collect();
     residuals.sort_by(f64::total_cmp);
     let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);

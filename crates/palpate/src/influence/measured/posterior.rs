@@ -6,8 +6,8 @@ use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
 use crate::contact::Position;
 
-/// Costs further than this above the least have no probability worth adding up: e⁻¹⁵.
-const CUT: f64 = 30.0;
+/// Costs further than this above the least have no probability worth adding up: e⁻¹⁰.
+const CUT: f64 = 20.0;
 /// A cell belongs to a mode when its density is at least this share of the greatest.
 const VALLEY: f64 = 0.01;
 /// Another mode matters from this probability on.

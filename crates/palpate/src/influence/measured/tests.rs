@@ -122,7 +122,6 @@ fn repeats_tell_a_pads_noise_and_gain_and_its_intervals_cover() {
     let locator = fit(&bench(PAD, 4, None), &recording_of(rows));
     assert_eq!((locator.role, locator.readings), (HiddenRole::None, Scale::Linear));
     assert!((0.043..0.057).contains(&locator.whitening.gain), "{}", locator.whitening.gain);
-    eprintln!("{:?}", locator.whitening);
     let (mut covered, mut scores) = (0, 0.0);
     for _ in 0..200 {
         let position = Position { x_m: rng.random_range(0.002..0.028), y_m: rng.random_range(0.002..0.028) };
