@@ -1,11 +1,10 @@
 //! From a recording to a locator.
 
-use std::cmp::Ordering;
 use std::collections::HashMap;
 
-use ndarray::{Array1, Array2, Axis as Along, s};
+use ndarray::{Array1, Array2};
 
-use super::line::Line;
+use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
@@ -21,9 +20,6 @@ const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_HIDDEN: usize = 64;
 const MOST_HIDDEN_OF_PLANE: usize = 16;
-/// Distinct positions from which on some can be held out to judge the noise, and the least that this may change it.
-const LEAST_TO_JUDGE: usize = 15;
-const LEAST_MISFIT: f64 = 0.01;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
@@ -49,10 +45,7 @@ impl Fit for MeasuredConfig {
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
         let whitening = presses.whitening(&process, role)?;
-        let whitening = match presses.misfit(&regression, &process, &whitening)? {
-            Some(factor) => whitening.widened(factor),
-            None => whitening,
-        };
+        let misfit = misfit(&presses, &regression, &process, &whitening)?.unwrap_or(1.0);
         let axes = presses.axes(&process, bench);
         let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
         let finer = presses.finer(axes, coarse.too_coarse());
@@ -68,6 +61,7 @@ impl Fit for MeasuredConfig {
             table,
             role,
             hidden: presses.hidden,
+            misfit,
             residual_limit: f64::INFINITY,
             force_n: bench.force_n,
         };
@@ -106,18 +100,18 @@ fn hidden_coordinate(
 ///
 /// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
 /// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
-struct Presses {
+pub(super) struct Presses {
     readings: Scale,
     hidden: Scale,
     /// Position along, across where the surface has a width, and hidden where there is one: n×d.
-    coordinates: Array2<f64>,
+    pub coordinates: Array2<f64>,
     /// Mean scaled readings, n×m.
-    means: Array2<f64>,
+    pub means: Array2<f64>,
     /// To which press each row belongs.
-    places: Vec<usize>,
+    pub places: Vec<usize>,
     /// Scaled readings, row by row.
-    outputs: Array2<f64>,
-    has_hidden: bool,
+    pub outputs: Array2<f64>,
+    pub has_hidden: bool,
 }
 
 impl Presses {
@@ -189,58 +183,6 @@ impl Presses {
             Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
         };
         Ok(Whitening::of(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
-    }
-
-    /// By what factor errors at positions that were not learnt exceed what noise and process say, as a deviation:
-    /// every fifth position is held out of the same process. `None` with too few positions to tell.
-    ///
-    /// It is what the smoothness that the process found does not know of: texture that repeats itself.
-    fn misfit(
-        &self,
-        regression: &Regression,
-        process: &GaussianProcess,
-        whitening: &Whitening,
-    ) -> Result<Option<f64>, MeasuredError> {
-        let dimensions = self.coordinates.ncols() - usize::from(self.has_hidden);
-        let mut positions: Vec<Vec<f64>> =
-            self.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
-        let places = positions.clone();
-        let order = |a: &Vec<f64>, b: &Vec<f64>| {
-            a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
-        };
-        positions.sort_by(order);
-        positions.dedup();
-        if positions.len() < LEAST_TO_JUDGE {
-            return Ok(None);
-        }
-        let index = |place: &Vec<f64>| positions.partition_point(|other| order(other, place).is_lt());
-        let (held_out, kept): (Vec<usize>, Vec<usize>) =
-            (0..places.len()).partition(|i| index(&places[*i]) % 5 == 2);
-        let (coordinates, means) =
-            (self.coordinates.select(Along(0), &kept), self.means.select(Along(0), &kept));
-        let samples =
-            Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
-        let other = regression.condition(samples, process.hyperparameters())?;
-        let signal = other.signal_variance(0);
-        let mut held = vec![false; places.len()];
-        held_out.iter().for_each(|i| held[*i] = true);
-        let (mut square, mut rows) = (0.0, 0);
-        let mut known: Vec<Option<(Vec<f64>, f64)>> = vec![None; places.len()];
-        let mut white = vec![0.0; whitening.channels()];
-        for (place, output) in self.places.iter().zip(self.outputs.outer_iter()).filter(|(p, _)| held[**p]) {
-            let (mean, variance) = known[*place].get_or_insert_with(|| {
-                let (mean, variance) = other.predict(&self.coordinates.row(*place).to_vec());
-                let mut white = vec![0.0; mean.len()];
-                whitening.apply(&mean, &mut white);
-                (white, if signal > 0.0 { variance[0] / signal } else { 0.0 })
-            });
-            whitening.apply(&output.to_vec(), &mut white);
-            let line = Line { means: mean, variances: std::slice::from_ref(variance) };
-            square += line.nearest(&white, whitening).residual;
-            rows += 1;
-        }
-        let mean = square / (rows * whitening.channels()).max(1) as f64;
-        Ok(Some(mean.clamp(LEAST_MISFIT, 1.0 / LEAST_MISFIT).sqrt()))
     }
 
     /// The process at every node; `None` when `keep_going` says no.

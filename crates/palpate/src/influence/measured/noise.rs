@@ -40,8 +40,9 @@ impl Whitening {
         Self { matrix: Vec::new(), signal: vec![0.0; channels], gain: 0.0 }
     }
 
-    /// The same for noise of `factor` times the deviation.
+    /// The same for noise, gain and signal of `factor` times the deviation.
     pub(super) fn widened(mut self, factor: f64) -> Self {
+        self.gain *= factor;
         self.matrix.iter_mut().for_each(|weight| *weight /= factor);
         self
     }

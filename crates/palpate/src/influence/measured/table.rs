@@ -67,6 +67,21 @@ impl Table {
         self.x.count * self.y.count
     }
 
+    /// The middle of every block of 3 places, or of 3×3.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = usize> + use<> {
+        let across = self.y.count;
+        let middles = |count: usize| (0..count).step_by(3).map(move |start| (start + 1).min(count - 1));
+        middles(self.x.count).flat_map(move |x| middles(across).map(move |y| x * across + y))
+    }
+
+    /// The places of the block around `middle`.
+    pub(super) fn block(&self, middle: usize) -> impl Iterator<Item = usize> + use<> {
+        let across = self.y.count;
+        let range = |at: usize, count: usize| at / 3 * 3..(at / 3 * 3 + 3).min(count);
+        let (columns, rows) = (range(middle / across, self.x.count), range(middle % across, across));
+        columns.flat_map(move |x| rows.clone().map(move |y| x * across + y))
+    }
+
     /// The nodes of one place.
     pub(super) fn line(&self, place: usize) -> Line<'_> {
         let nodes = self.hidden.count;
