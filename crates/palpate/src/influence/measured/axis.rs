@@ -36,6 +36,16 @@ impl Axis {
         Self { start: from, step: (to - from) / (count - 1) as f64, count }
     }
 
+    /// The same span with `factor` times the nodes, but no more than `most`; unchanged where that is no more.
+    pub(super) fn finer(self, factor: f64, most: usize) -> Self {
+        let wanted = (self.count as f64 * factor).ceil().min(most as f64) as usize;
+        if self.count < 2 || wanted <= self.count {
+            return self;
+        }
+        let span = self.step * (self.count - 1) as f64;
+        Self { step: span / (wanted - 1) as f64, count: wanted, ..self }
+    }
+
     /// The coordinate at `place`, in nodes from the first.
     pub fn at(&self, place: f64) -> f64 {
         self.start + self.step * place

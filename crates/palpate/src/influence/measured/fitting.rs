@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use ndarray::{Array1, Array2};
 
+use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
@@ -16,7 +17,7 @@ use crate::regression::{GaussianProcess, Regression, Samples};
 const LEAST_POSITIONS: usize = 2;
 /// Most nodes along a one-dimensional surface, along either axis of a plane, and along the hidden coordinate.
 const MOST_ALONG: usize = 400;
-const MOST_OF_PLANE: usize = 64;
+const MOST_OF_PLANE: usize = 80;
 const MOST_HIDDEN: usize = 64;
 const MOST_HIDDEN_OF_PLANE: usize = 16;
 /// The least variance of noise, over the signal's.
@@ -44,13 +45,23 @@ impl Fit for MeasuredConfig {
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
         let whitening = presses.whitening(&process, role)?;
-        let Some(table) = presses.table(&process, &whitening, bench, keep_going) else { return Ok(None) };
+        let misfit = misfit(&presses, &regression, &process, &whitening)?.unwrap_or(1.0);
+        let axes = presses.axes(&process, bench);
+        let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
+        let finer = presses.finer(axes, coarse.too_coarse());
+        let table =
+            if finer == axes { Some(coarse) } else { presses.table(finer, &process, &whitening, keep_going) };
+        let Some(table) = table else { return Ok(None) };
+        // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
+        let factor = table.too_coarse();
+        let (table, whitening) = (table.widened(factor), whitening.widened(factor));
         let mut locator = MeasuredLocator {
             readings: presses.readings,
             whitening,
             table,
             role,
             hidden: presses.hidden,
+            misfit,
             residual_limit: f64::INFINITY,
             force_n: bench.force_n,
         };
@@ -78,6 +89,7 @@ fn hidden_coordinate(
     if named.is_some() {
         return Ok((HiddenRole::Other, named));
     }
+    // A force that is known, or always the same, shapes nothing.
     if bench.force_n.is_some() {
         return Ok((HiddenRole::None, None));
     }
@@ -89,18 +101,18 @@ fn hidden_coordinate(
 ///
 /// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
 /// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
-struct Presses {
+pub(super) struct Presses {
     readings: Scale,
     hidden: Scale,
     /// Position along, across where the surface has a width, and hidden where there is one: n×d.
-    coordinates: Array2<f64>,
+    pub coordinates: Array2<f64>,
     /// Mean scaled readings, n×m.
-    means: Array2<f64>,
+    pub means: Array2<f64>,
     /// To which press each row belongs.
-    places: Vec<usize>,
+    pub places: Vec<usize>,
     /// Scaled readings, row by row.
-    outputs: Array2<f64>,
-    has_hidden: bool,
+    pub outputs: Array2<f64>,
+    pub has_hidden: bool,
 }
 
 impl Presses {
@@ -177,12 +189,11 @@ impl Presses {
     /// The process at every node; `None` when `keep_going` says no.
     fn table(
         &self,
+        axes: [Axis; 3],
         process: &GaussianProcess,
         whitening: &Whitening,
-        bench: &Bench,
         keep_going: &mut dyn FnMut() -> bool,
     ) -> Option<Table> {
-        let axes = self.axes(process, bench);
         let [x, y, hidden] = axes;
         let channels = self.means.ncols();
         let nodes = x.count * y.count * hidden.count;
@@ -208,6 +219,12 @@ impl Presses {
             variances.push(if signal > 0.0 { variance[0] / signal } else { 0.0 });
         }
         Some(Table::new(axes, means, variances, channels))
+    }
+
+    /// The axes of position with about `factor` times the nodes, as far as there may be so many.
+    fn finer(&self, [x, y, hidden]: [Axis; 3], factor: f64) -> [Axis; 3] {
+        let most = if y.count > 1 { MOST_OF_PLANE } else { MOST_ALONG };
+        [x.finer(factor, most), y.finer(factor, most), hidden]
     }
 
     fn axes(&self, process: &GaussianProcess, bench: &Bench) -> [Axis; 3] {
@@ -244,6 +261,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let mut residuals: Vec<f64> = tried
         .filter_map(|row| locator.whitened(&row.reading))
         .map(|reading| Posterior::of(locator, &reading).residual())
+        .filter(|residual| residual.is_finite())
         .collect();
     residuals.sort_by(f64::total_cmp);
     let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);

@@ -15,6 +15,7 @@ mod config;
 mod fitting;
 mod line;
 mod locator;
+mod misfit;
 mod noise;
 mod posterior;
 mod scale;

@@ -2,12 +2,13 @@
 
 use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 
+use super::line::Nearest;
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
 use crate::contact::Position;
 
-/// Costs further than this above the least have no probability worth adding up: e⁻¹⁵.
-const CUT: f64 = 30.0;
+/// Costs further than this above the least have no probability worth adding up: e⁻¹⁰.
+const CUT: f64 = 20.0;
 /// A cell belongs to a mode when its density is at least this share of the greatest.
 const VALLEY: f64 = 0.01;
 /// Another mode matters from this probability on.
@@ -45,6 +46,21 @@ struct Cell {
     peak: f64,
 }
 
+/// A place, and how well it explains the reading.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    place: usize,
+    nearest: Nearest,
+}
+
+impl Seen {
+    /// Whether somewhere `reach` closer, in deviations, could matter beside the cost `least`.
+    fn within(&self, reach: f64, least: f64) -> bool {
+        let closest = (self.nearest.residual.sqrt() - reach).max(0.0);
+        closest * closest + self.nearest.log_variance <= least + CUT
+    }
+}
+
 /// The posterior of one reading.
 #[derive(Debug)]
 pub(super) struct Posterior<'a> {
@@ -56,24 +72,30 @@ pub(super) struct Posterior<'a> {
 }
 
 impl<'a> Posterior<'a> {
-    /// Of a whitened reading: every place's own nodes first, then the cells that could matter, cut finely.
+    /// Of a whitened reading: the middles of blocks of places first, then the places of blocks that could matter, and of
+    /// those the cells that could, cut finely.
     pub fn of(locator: &'a MeasuredLocator, reading: &[f64]) -> Self {
         let (table, noise) = (&locator.table, &locator.whitening);
-        let nearest: Vec<_> =
-            (0..table.places()).map(|place| table.line(place).nearest(reading, noise)).collect();
-        let best = (0..nearest.len()).min_by(|a, b| nearest[*a].cost().total_cmp(&nearest[*b].cost()));
+        let look = |place: usize| Seen { place, nearest: table.line(place).nearest(reading, noise) };
+        let cheapest = |seen: &mut dyn Iterator<Item = Seen>| {
+            seen.min_by(|a, b| a.nearest.cost().total_cmp(&b.nearest.cost()))
+        };
         let mut posterior = Self { locator, cells: Vec::new(), parts: Vec::new(), residual: f64::INFINITY };
-        let Some(best) = best else { return posterior };
+        let blocks: Vec<Seen> = table.blocks().map(look).collect();
+        let Some(block) = cheapest(&mut blocks.iter().copied()) else { return posterior };
+        let Some(best) = cheapest(&mut table.block(block.place).map(look)) else { return posterior };
         let mut buffer = LineBuffer::default();
-        let mut least = nearest[best].cost();
-        for (x, y) in parts_of(table, best) {
+        let mut least = best.nearest.cost();
+        for (x, y) in parts_of(table, best.place) {
             let found = table.line_between(x, y, &mut buffer).nearest(reading, noise);
             least = least.min(found.cost());
         }
-        for (place, nearest) in nearest.iter().enumerate() {
-            let closest = (nearest.residual.sqrt() - table.reaches[place]).max(0.0);
-            if closest * closest + nearest.log_variance <= least + CUT {
-                posterior.add_cell(place, reading, least, &mut buffer);
+        // From a block's middle to its other places is twice the reach, and from there half as far as that again.
+        for block in blocks.iter().filter(|block| block.within(3.5 * table.reaches[block.place], least)) {
+            for seen in table.block(block.place).map(look) {
+                if seen.within(table.reaches[seen.place], least) {
+                    posterior.add_cell(seen.place, reading, least, &mut buffer);
+                }
             }
         }
         posterior
@@ -120,22 +142,25 @@ impl<'a> Posterior<'a> {
             return Estimate::of_position(middle, Status::OutsideModel);
         }
         let (x_95_m, y_95_m) = self.intervals(total.weight);
-        let whole = |sums: Sums| {
-            let contact = self.contact(sums);
-            let uncertainty = Uncertainty { x_95_m, y_95_m, ..contact.uncertainty.unwrap_or_default() };
-            ContactEstimate { uncertainty: Some(uncertainty), ..contact }
+        let mut contact = self.contact(total);
+        let Position { x_m, y_m } = contact.position;
+        let widened = |(low, high): (f64, f64), middle: f64| {
+            let factor = self.locator.misfit;
+            (middle + factor * (low - middle), middle + factor * (high - middle))
         };
+        let covariance = contact.uncertainty.unwrap_or_default().covariance;
+        contact.uncertainty =
+            Some(Uncertainty { covariance, x_95_m: widened(x_95_m, x_m), y_95_m: widened(y_95_m, y_m) });
         if !(self.residual <= self.locator.residual_limit) {
-            return Estimate::of_contact(whole(total), Status::OutsideModel);
+            return Estimate::of_contact(contact, Status::OutsideModel);
         }
         let modes = self.modes();
         let Some((first, others)) = modes.split_first().filter(|(_, others)| !others.is_empty()) else {
-            return Estimate::of_contact(whole(total), Status::Located);
+            return Estimate::of_contact(contact, Status::Located);
         };
-        let covariance = self.contact(total).uncertainty.unwrap_or_default().covariance;
-        let mut contact = self.contact(*first);
-        contact.uncertainty = Some(Uncertainty { covariance, x_95_m, y_95_m });
-        let mut estimate = Estimate::of_contact(contact, Status::Ambiguous);
+        // The most probable place, with the uncertainty of all.
+        let most_probable = ContactEstimate { uncertainty: contact.uncertainty, ..self.contact(*first) };
+        let mut estimate = Estimate::of_contact(most_probable, Status::Ambiguous);
         estimate.modes = Few::none(Mode::default());
         for sums in others {
             let mode = Mode { contact: self.contact(*sums), probability: sums.weight / total.weight };
@@ -155,6 +180,7 @@ impl<'a> Posterior<'a> {
             true => covariance,
             false => [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0],
         };
+        let covariance = covariance.map(|value| value * self.locator.misfit * self.locator.misfit);
         let around = |mean_m: f64, variance_m2: f64| {
             let half_m = QUANTILE_975 * variance_m2.sqrt();
             (mean_m - half_m, mean_m + half_m)

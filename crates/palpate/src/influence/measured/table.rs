@@ -1,6 +1,6 @@
 //! The learnt readings, tabulated over position and hidden coordinate.
 
-use super::Axis;
+use super::{Axis, Whitening};
 use super::line::Line;
 
 /// Whitened mean readings and their relative variance at the nodes of a grid.
@@ -19,17 +19,17 @@ pub struct Table {
     pub means: Vec<f64>,
     /// v: the process's variance over its signal's, 0 to 1, node by node.
     pub variances: Vec<f64>,
-    /// For each place (x, y), half the longest whitened distance to a neighbouring place: how far a reading within the
-    /// place's cell can lie from the place's own.
+    /// For each place (x, y), half the longest whitened distance from one of its nodes to the line of a neighbouring
+    /// place: about how far the line of anywhere in the place's cell can lie from the place's own.
     pub reaches: Vec<f64>,
     /// Into how many parts each cell is cut along each axis when a reading is located within it.
     pub parts: usize,
 }
 
 /// A finely cut cell has about this whitened length, so that sums over it are integrals.
-const FINE: f64 = 0.7;
+const FINE: f64 = 1.2;
 /// The finest cut.
-const MOST_PARTS: usize = 8;
+const MOST_PARTS: usize = 12;
 
 impl Table {
     /// From means and variances at the nodes.
@@ -40,15 +40,46 @@ impl Table {
         channels: usize,
     ) -> Self {
         let mut table = Self { x, y, hidden, means, variances, reaches: Vec::new(), parts: 1 };
-        table.reaches = (0..table.places()).map(|place| table.reach(place, channels)).collect();
-        let typical = 2.0 * table.reaches.iter().sum::<f64>() / table.reaches.len().max(1) as f64;
-        table.parts = ((typical / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
+        let unit = Whitening::unit(channels);
+        table.reaches = (0..table.places()).map(|place| table.reach(place, &unit)).collect();
+        table.parts = ((table.cell_length() / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
         table
+    }
+
+    /// The whitened length of a typical cell.
+    fn cell_length(&self) -> f64 {
+        2.0 * self.reaches.iter().sum::<f64>() / self.reaches.len().max(1) as f64
+    }
+
+    /// By how much noise of unit deviation is too small for the finest cut; 1 where it is not.
+    pub(super) fn too_coarse(&self) -> f64 {
+        (self.cell_length() / (FINE * MOST_PARTS as f64)).max(1.0)
+    }
+
+    /// The same for noise of `factor` times the deviation.
+    pub(super) fn widened(mut self, factor: f64) -> Self {
+        self.means.iter_mut().chain(&mut self.reaches).for_each(|value| *value /= factor);
+        self
     }
 
     /// Places (x, y).
     pub fn places(&self) -> usize {
         self.x.count * self.y.count
+    }
+
+    /// The middle of every block of 3 places, or of 3×3.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = usize> + use<> {
+        let across = self.y.count;
+        let middles = |count: usize| (0..count).step_by(3).map(move |start| (start + 1).min(count - 1));
+        middles(self.x.count).flat_map(move |x| middles(across).map(move |y| x * across + y))
+    }
+
+    /// The places of the block around `middle`.
+    pub(super) fn block(&self, middle: usize) -> impl Iterator<Item = usize> + use<> {
+        let across = self.y.count;
+        let range = |at: usize, count: usize| at / 3 * 3..(at / 3 * 3 + 3).min(count);
+        let (columns, rows) = (range(middle / across, self.x.count), range(middle % across, across));
+        columns.flat_map(move |x| rows.clone().map(move |y| x * across + y))
     }
 
     /// The nodes of one place.
@@ -99,17 +130,14 @@ impl Table {
             .filter(move |other| *other != place)
     }
 
-    fn reach(&self, place: usize, channels: usize) -> f64 {
+    fn reach(&self, place: usize, unit: &Whitening) -> f64 {
         let here = self.line(place);
-        let mut most: f64 = 0.0;
-        for other in self.neighbours(place) {
-            let there = self.line(other);
-            let pairs = here.means.chunks_exact(channels).zip(there.means.chunks_exact(channels));
-            for (a, b) in pairs {
-                most = most.max(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
-            }
-        }
-        0.5 * most.sqrt()
+        let to_line = |mean: &[f64], other| Line::nearest(self.line(other), mean, unit).residual;
+        let distances = here
+            .means
+            .chunks_exact(unit.channels().max(1))
+            .flat_map(|mean| self.neighbours(place).map(move |other| to_line(mean, other)));
+        0.5 * distances.fold(0.0, f64::max).sqrt()
     }
 }
 
