@@ -66,15 +66,15 @@ fn rigs_are_refused_at_the_place() {
 #[test]
 fn recordings_are_refused_at_the_place() {
     let cases: [(&str, &[u8]); 9] = [
-        ("a text cell", b"X,Pl,Pr,F\n10,1,2,3\n12,one,2,3\n"),
-        ("NaN", b"X,Pl,Pr,F\n10,1,NaN,3\n"),
-        ("a short row", b"X,Pl,Pr,F\n10,1,2,3\n12,1\n"),
+        ("a text cell", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n12,one,2,3,4\n"),
+        ("NaN", b"X,Pl,Pr,F,depth\n10,1,NaN,3,4\n"),
+        ("a short row", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n12,1\n"),
         ("an empty file", b""),
-        ("a header alone", b"X,Pl,Pr,F\n"),
-        ("a missing column", b"X,Pl,F\n10,1,2\n"),
-        ("a position off the surface", b"X,Pl,Pr,F\n10,1,2,3\n101,1,2,3\n"),
-        ("not UTF-8", b"X,Pl,Pr,F\n10,1,\xff,3\n"),
-        ("one position only", b"X,Pl,Pr,F\n10,1,2,3\n10,1.5,2,3\n"),
+        ("a header alone", b"X,Pl,Pr,F,depth\n"),
+        ("a missing column", b"X,Pl,F,depth\n10,1,2,3\n"),
+        ("a position off the surface", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n101,1,2,3,4\n"),
+        ("not UTF-8", b"X,Pl,Pr,F,depth\n10,1,\xff,3,4\n"),
+        ("one position only", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n10,1.5,2,3,4\n"),
     ];
     let messages: Vec<String> =
         cases.iter().map(|(what, csv)| format!("{what}:\n{}", csv_complaint(csv))).collect();

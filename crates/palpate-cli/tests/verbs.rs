@@ -75,7 +75,7 @@ fn readings_are_located_as_they_come() {
         .unwrap();
     let mut readings = child.stdin.take().unwrap();
     let mut estimates = BufReader::new(child.stdout.take().unwrap()).lines();
-    assert_eq!(estimates.next().unwrap().unwrap(), "position_mm,status");
+    assert_eq!(estimates.next().unwrap().unwrap(), "position_mm,force_n,low_mm,high_mm,status");
     for _ in 0..3 {
         // The answer comes before the next reading goes in.
         writeln!(readings, "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();

@@ -3,12 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::balance::Balance;
-use super::posterior::{Posterior, chi_squared_999};
+use super::posterior::{Posterior, RARE};
 use super::segment::Segment;
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::mechanics::{Beam, Surface};
 use crate::method::{Locate, LocatorFault};
+use crate::numerics::chi_squared_bound;
 use crate::sensing::{Layout, Sensor, SensorKind};
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
@@ -80,7 +81,7 @@ impl ClosedFormLocator {
         };
         let misfit_n = balance.left_n + balance.right_n - balanced.force_n;
         let tolerated = match noise {
-            Noise::Known => chi_squared_999(1) * variances.iter().sum::<f64>(),
+            Noise::Known => chi_squared_bound(RARE, 1) * variances.iter().sum::<f64>(),
             Noise::Unknown => (0.1 * balanced.force_n).powi(2),
         };
         let [xx, xf, ff] = balanced.covariance;
@@ -130,7 +131,7 @@ impl Locate for ClosedFormLocator {
         let Weights { weights, noise } = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
         let size: f64 = whitened.iter().map(|r| r * r).sum();
-        let silent = if noise == Noise::Known { chi_squared_999(whitened.len()) } else { 0.0 };
+        let silent = if noise == Noise::Known { chi_squared_bound(RARE, whitened.len()) } else { 0.0 };
         if size <= silent {
             return Estimate::of_position(Position::default(), Status::NoContact);
         }

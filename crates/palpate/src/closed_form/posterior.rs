@@ -3,10 +3,14 @@
 use super::locator::Noise;
 use super::segment::Segment;
 use crate::contact::Position;
+use crate::numerics::chi_squared_bound;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 /// Modes whose probabilities sum to less than this are not spoken of.
 const NEGLIGIBLE: f64 = 0.05;
+
+/// A reading that noise gives as rarely as this has another cause.
+pub(super) const RARE: f64 = 1e-3;
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.
 const ROUNDING: f64 = 1e-13;
@@ -156,7 +160,7 @@ impl Posterior<'_> {
     fn tolerated(&self) -> f64 {
         let unknowns = 1 + usize::from(self.force_n.is_none());
         match self.noise {
-            Noise::Known => chi_squared_999(self.reading.len().saturating_sub(unknowns).max(1)),
+            Noise::Known => chi_squared_bound(RARE, self.reading.len().saturating_sub(unknowns).max(1)),
             Noise::Unknown => 0.01 * self.size(),
         }
     }
@@ -176,12 +180,4 @@ impl Posterior<'_> {
             uncertainty: (self.noise == Noise::Known).then_some(uncertainty),
         }
     }
-}
-
-/// What χ² with `degrees` degrees of freedom exceeds once in a thousand times, by the cube-root approximation of Wilson and Hilferty
-/// (1931), right to 2 %.
-pub(super) fn chi_squared_999(degrees: usize) -> f64 {
-    let k = degrees as f64;
-    let spread = 2.0 / (9.0 * k);
-    k * (1.0 - spread + 3.0902 * spread.sqrt()).powi(3)
 }

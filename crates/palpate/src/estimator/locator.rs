@@ -38,6 +38,7 @@ pub struct LocatorProvenance {
 /// The methods that can locate.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "a program holds one locator, or a few")]
 pub enum Method {
     /// The founding paper's network.
     Network(NetworkLocator),

@@ -179,12 +179,12 @@ impl Places {
         for node in 0..table.nodes() {
             let [left, here, right] = [3 * node, 3 * node + 1, 3 * node + 2];
             let parts = [left, here, right].map(|place| prior.parts(self.0[place]));
-            let mean = |i: usize| posterior.mean(parts[i], remainders.places.row(left + i));
+            let mean = |i: usize| posterior.mean(parts[i], &remainders.places.row(left + i));
             let at = node * table.sensors + s;
             table.values[at] = mean(1);
             table.slopes[at] = (mean(2) - mean(0)) / (self.0[right] - self.0[left]);
             table.variances[at] =
-                posterior.variance(parts[1], remainders.places.row(here), remainders.own[here]);
+                posterior.variance(parts[1], &remainders.places.row(here), remainders.own[here]);
         }
     }
 }

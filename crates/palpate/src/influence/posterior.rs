@@ -115,7 +115,7 @@ impl Posterior<'_, '_> {
 
     /// Covariance of the influence with each press's reading, of the influence alone; `remainders` are those of the
     /// place with the presses.
-    fn with_presses(&self, at: Parts, remainders: ArrayView1<f64>) -> Array1<f64> {
+    fn with_presses(&self, at: Parts, remainders: &ArrayView1<f64>) -> Array1<f64> {
         let SensorPresses { prior, parts, force_n, .. } = self.presses;
         let presses = parts.iter().zip(force_n).zip(remainders);
         let covariance = |((press, force_n), remainder): ((&Parts, &f64), &f64)| {
@@ -125,13 +125,13 @@ impl Posterior<'_, '_> {
     }
 
     /// The posterior mean of the influence.
-    pub fn mean(&self, at: Parts, remainders: ArrayView1<f64>) -> f64 {
+    pub fn mean(&self, at: Parts, remainders: &ArrayView1<f64>) -> f64 {
         self.presses.prior.mean(at) + self.with_presses(at, remainders).dot(&self.weights)
     }
 
     /// The posterior variance of the influence and of the offset shared over the mean force; `own` is the remainder's
     /// covariance of the place with itself.
-    pub fn variance(&self, at: Parts, remainders: ArrayView1<f64>, own: f64) -> f64 {
+    pub fn variance(&self, at: Parts, remainders: &ArrayView1<f64>, own: f64) -> f64 {
         let force_n = self.presses.mean_force_n;
         let offset = self.presses.offset_variance(&self.spread);
         let covariance = self.with_presses(at, remainders) + offset / force_n;

@@ -8,7 +8,7 @@
 
 use super::belief::ForceBelief;
 use super::table::InfluenceTable;
-use crate::numerics::chi_squared_quantile;
+use crate::numerics::chi_squared_bound;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -313,7 +313,7 @@ impl Sums {
 pub(super) fn worst_misfit(freedom: usize) -> f64 {
     match freedom {
         0 => f64::INFINITY,
-        freedom => chi_squared_quantile(0.9999, freedom as f64),
+        freedom => chi_squared_bound(1e-4, freedom),
     }
 }
 

@@ -118,9 +118,8 @@ fn gain(gram: &Array2<f64>, pull: &[f64], chosen: &[usize]) -> Option<f64> {
         }
         for r in p + 1..n {
             let factor = a[r][p] / a[p][p];
-            for c in p..=n {
-                a[r][c] -= factor * a[p][c];
-            }
+            let pivot = a[p];
+            a[r][p..=n].iter_mut().zip(&pivot[p..=n]).for_each(|(value, above)| *value -= factor * above);
         }
     }
     let mut force = [0.0; MOST_CONTACTS];

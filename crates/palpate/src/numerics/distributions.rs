@@ -15,11 +15,30 @@ pub fn normal_quantile(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// The value below which a χ² variable of `freedom` degrees of freedom lies with probability `share`, within 2 % for
-/// shares of 0.5 and more: the cube-root approximation of Wilson and Hilferty (PNAS 17, 1931).
-pub fn chi_squared_quantile(share: f64, freedom: f64) -> f64 {
-    let spread = 2.0 / (9.0 * freedom);
-    freedom * (1.0 - spread + normal_quantile(share) * spread.sqrt()).powi(3)
+/// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0.
+///
+/// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees, and erfc(√x) plus the
+/// same over j = ½, 3/2, … < freedom/2 for an odd one (Abramowitz and Stegun, 26.4.4 and 26.4.5).
+pub fn chi_squared_exceeds(value: f64, freedom: usize) -> f64 {
+    let x = 0.5 * value;
+    let odd = freedom % 2 == 1;
+    let start = if odd { libm::erfc(x.sqrt()) } else { 0.0 };
+    let terms = (0..freedom / 2).map(|j| if odd { j as f64 + 0.5 } else { j as f64 });
+    start + terms.map(|j| (j * x.ln() - x - libm::lgamma(j + 1.0)).exp()).sum::<f64>()
+}
+
+/// The value that a χ² variable of `freedom` ≥ 1 degrees of freedom exceeds with probability `tail`, between 0 and 1, by
+/// bisection.
+pub fn chi_squared_bound(tail: f64, freedom: usize) -> f64 {
+    let (mut low, mut high) = (0.0, freedom as f64);
+    while chi_squared_exceeds(high, freedom) > tail {
+        (low, high) = (high, 2.0 * high);
+    }
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if chi_squared_exceeds(middle, freedom) > tail { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 #[cfg(test)]
@@ -30,12 +49,17 @@ mod tests {
     fn tables_are_met() {
         assert!((normal_distribution(1.959_963_984_540_054) - 0.975).abs() < 1e-15);
         assert!((normal_quantile(0.975) - 1.959_963_984_540_054).abs() < 1e-12);
-        // Tables of χ²: 95 % and 99.99 %.
-        for (share, freedom, value) in
-            [(0.95, 1.0, 3.841), (0.95, 8.0, 15.507), (0.9999, 7.0, 29.88), (0.9999, 1.0, 15.137)]
-        {
-            let found = chi_squared_quantile(share, freedom);
-            assert!((found / value - 1.0).abs() < 0.03, "{share} {freedom}: {found}");
+        // Tables of χ²: 95 %, 99.99 % and one in a million.
+        for (tail, freedom, value) in [
+            (0.05, 1, 3.841_459),
+            (0.05, 8, 15.507_313),
+            (1e-4, 7, 29.877_504),
+            (1e-4, 1, 15.136_705),
+            (1e-6, 2, 27.631_021),
+            (0.05, 1000, 1_074.679_449),
+        ] {
+            let found = chi_squared_bound(tail, freedom);
+            assert!((found / value - 1.0).abs() < 1e-6, "{tail} {freedom}: {found}");
         }
     }
 }

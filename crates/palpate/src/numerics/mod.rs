@@ -5,5 +5,5 @@ mod distributions;
 mod eigen;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
-pub use distributions::{chi_squared_quantile, normal_distribution, normal_quantile};
+pub use distributions::{chi_squared_bound, normal_distribution, normal_quantile};
 pub use eigen::symmetric_eigen;

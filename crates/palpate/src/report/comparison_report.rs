@@ -205,6 +205,7 @@ fn share_figure(report: &ComparisonReport) -> Figure {
 fn shares(located: &[Located]) -> Vec<(f64, f64)> {
     let mut errors: Vec<f64> = located.iter().map(|located| located.error_m() * 1e3).collect();
     errors.sort_by(f64::total_cmp);
-    let share = |percent: u32| percentile(&errors, f64::from(percent)).map(|error| (error, f64::from(percent)));
+    let share =
+        |percent: u32| percentile(&errors, f64::from(percent)).map(|error| (error, f64::from(percent)));
     (1..=100).filter_map(share).filter(|(error, _)| *error > 0.0).collect()
 }

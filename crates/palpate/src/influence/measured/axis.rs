@@ -27,7 +27,7 @@ impl Axis {
         let gap = values.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
         let (from, to) = ((first - 0.5 * gap).max(bounds.0), (last + 0.5 * gap).min(bounds.1));
         // One value alone, or none that differ by more than rounding.
-        if !(to - from > 1e-9 * (from.abs() + to.abs())) {
+        if (to - from).is_nan() || to - from <= 1e-9 * (from.abs() + to.abs()) {
             return Self { start: *first, ..Self::NONE };
         }
         let by_values = 2 * values.len() - 1;

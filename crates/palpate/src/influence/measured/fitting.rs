@@ -10,6 +10,7 @@ use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
 use crate::bench::Bench;
 use crate::method::{Fit, FitTask};
+use crate::numerics::chi_squared_bound;
 use crate::recording::Recording;
 use crate::regression::{GaussianProcess, Regression, Samples};
 
@@ -35,7 +36,7 @@ impl Fit for MeasuredConfig {
         let FitTask { bench, recording, seed } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let (role, hidden) = hidden_coordinate(bench, recording)?;
-        let presses = Presses::of(self, bench, recording, hidden)?;
+        let presses = Presses::of(self, bench, recording, hidden.as_deref())?;
         let samples = Samples {
             coordinates: presses.coordinates.view(),
             outputs: presses.means.view(),
@@ -45,7 +46,11 @@ impl Fit for MeasuredConfig {
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
         let whitening = presses.whitening(&process, role)?;
-        let misfit = misfit(&presses, &regression, &process, &whitening)?.unwrap_or(1.0);
+        // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
+        let whitening = match misfit(&presses, &regression, &process, &whitening)? {
+            Some(factor) => whitening.widened(factor),
+            None => whitening,
+        };
         let axes = presses.axes(&process, bench);
         let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
         let finer = presses.finer(axes, coarse.too_coarse());
@@ -61,7 +66,6 @@ impl Fit for MeasuredConfig {
             table,
             role,
             hidden: presses.hidden,
-            misfit,
             residual_limit: f64::INFINITY,
             force_n: bench.force_n,
         };
@@ -120,12 +124,12 @@ impl Presses {
         config: &MeasuredConfig,
         bench: &Bench,
         recording: &Recording,
-        hidden: Option<Vec<f64>>,
+        hidden: Option<&[f64]>,
     ) -> Result<Self, MeasuredError> {
         let rows = &recording.rows;
         let values = || rows.iter().flat_map(|row| row.reading.iter().copied());
         let readings = config.readings.unwrap_or_else(|| Scale::for_values(values()));
-        let hidden_values = || hidden.iter().flatten().copied();
+        let hidden_values = || hidden.unwrap_or_default().iter().copied();
         let hidden_scale = config.hidden.unwrap_or_else(|| Scale::for_values(hidden_values()));
 
         let channels = rows.first().map_or(0, |row| row.reading.len());
@@ -140,7 +144,7 @@ impl Presses {
         for (i, row) in rows.iter().enumerate() {
             let mut at = vec![row.position.x_m];
             at.extend(wide.then_some(row.position.y_m));
-            if let Some(hidden) = &hidden {
+            if let Some(hidden) = hidden {
                 at.push(scaled(hidden_scale, "the hidden coordinate", i, hidden[i])?);
             }
             let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
@@ -177,8 +181,7 @@ impl Presses {
             .iter()
             .map(|signal| if most > 0.0 { LEAST_NOISE * signal.max(LEAST_NOISE * most) } else { 1.0 })
             .collect();
-        let (outputs, means) = (self.outputs.view(), self.means.view());
-        let repeats = Noise::of_repeats(&self.places, outputs, means, &floor, with_gain)?;
+        let repeats = Noise::of_repeats(&self.places, &self.outputs, &self.means, &floor, with_gain)?;
         let fitted = || {
             let variances = (0..channels).map(|j| process.noise_variance(j).unwrap_or_default() + floor[j]);
             Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
@@ -255,7 +258,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     const TRIED: usize = 400;
     let table = &locator.table;
     let fitted = [table.x, table.y, table.hidden].iter().filter(|axis| axis.count > 1).count();
-    let freedom = locator.whitening.channels().saturating_sub(fitted).max(1) as f64;
+    let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
     let every = recording.rows.len().div_ceil(TRIED);
     let tried = recording.rows.iter().step_by(every);
     let mut residuals: Vec<f64> = tried
@@ -265,12 +268,5 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
         .collect();
     residuals.sort_by(f64::total_cmp);
     let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);
-    chi_square_quantile(freedom).max(2.0 * usual)
-}
-
-/// What a χ² variable of `freedom` degrees exceeds once in a million (Wilson and Hilferty 1931).
-fn chi_square_quantile(freedom: f64) -> f64 {
-    const NORMAL_QUANTILE: f64 = 4.753_424_309;
-    let spread = 2.0 / (9.0 * freedom);
-    freedom * (1.0 - spread + NORMAL_QUANTILE * spread.sqrt()).powi(3)
+    chi_squared_bound(1e-6, freedom).max(2.0 * usual)
 }

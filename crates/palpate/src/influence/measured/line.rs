@@ -16,26 +16,10 @@ pub(super) struct Line<'a> {
     pub variances: &'a [f64],
 }
 
-/// The best that a place can do.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Nearest {
-    /// The squared residual, over the variance of noise and process.
-    pub residual: f64,
-    /// Σ ln of that variance, channel by channel.
-    pub log_variance: f64,
-}
-
-impl Nearest {
-    /// Minus twice the log likelihood, up to a constant.
-    pub fn cost(self) -> f64 {
-        self.residual + self.log_variance
-    }
-}
-
 /// How probable a place is: the likelihood integrated over the hidden coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marginal {
-    /// ∫ exp(−(cost − reference)/2), over the hidden coordinate in nodes.
+    /// ∫ exp(−(residual − reference)/2), over the hidden coordinate in nodes.
     pub weight: f64,
     /// The same with the hidden coordinate, in nodes, as a factor; and with its square.
     pub hidden: f64,
@@ -51,28 +35,16 @@ struct Stretch {
     aa: f64,
     ad: f64,
     dd: f64,
-    /// Π of the variances.
-    variance: f64,
 }
 
 impl<'a> Line<'a> {
-    /// What comes nearest to the whitened reading.
-    pub fn nearest(self, reading: &[f64], noise: &Whitening) -> Nearest {
-        let mut best = Nearest { residual: f64::INFINITY, log_variance: 0.0 };
-        for stretch in self.stretches(reading, noise) {
-            let residual = stretch.residual_at(stretch.foot());
-            // The variance is at least 1, so its logarithm can only add.
-            if residual < best.cost() {
-                let found = Nearest { residual, log_variance: stretch.variance.ln() };
-                if found.cost() < best.cost() {
-                    best = found;
-                }
-            }
-        }
-        best
+    /// The least squared residual of the whitened reading, over the variance of noise and process.
+    pub fn residual(self, reading: &[f64], noise: &Whitening) -> f64 {
+        let residuals = self.stretches(reading, noise).map(|stretch| stretch.residual_at(stretch.foot()));
+        residuals.fold(f64::INFINITY, f64::min)
     }
 
-    /// The integral over the hidden coordinate, relative to the likelihood of cost `reference`.
+    /// The integral over the hidden coordinate, relative to the likelihood of the residual `reference`.
     pub fn marginal(self, reading: &[f64], noise: &Whitening, reference: f64) -> Marginal {
         let mut sum = Marginal::default();
         for (i, stretch) in self.stretches(reading, noise).enumerate() {
@@ -92,14 +64,13 @@ impl<'a> Line<'a> {
         (0..nodes.saturating_sub(1).max(1)).map(move |i| {
             let next = (i + 1).min(nodes - 1);
             let share = 0.5 * (self.variances[i] + self.variances[next]);
-            let mut stretch = Stretch { aa: 0.0, ad: 0.0, dd: 0.0, variance: 1.0 };
+            let mut stretch = Stretch { aa: 0.0, ad: 0.0, dd: 0.0 };
             for (((z, from), to), signal) in reading.iter().zip(node(i)).zip(node(next)).zip(&noise.signal) {
                 let variance = 1.0 + share * signal;
                 let (a, d) = (z - from, to - from);
                 stretch.aa += a * a / variance;
                 stretch.ad += a * d / variance;
                 stretch.dd += d * d / variance;
-                stretch.variance *= variance;
             }
             if noise.gain > 0.0 { stretch.with_gain(reading, node(i), share, noise) } else { stretch }
         })
@@ -124,8 +95,7 @@ const SHORT: f64 = 1e-4;
 
 impl Stretch {
     /// With a gain that scatters by γ about 1: the covariance grows by γ²·μ·μᵀ, so with V the variances,
-    /// |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ), and the determinant grows by 1 + γ²·μᵀ·V⁻¹·μ (Sherman and
-    /// Morrison). For a stretch of no length only.
+    /// |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). For a stretch of no length only.
     fn with_gain(mut self, reading: &[f64], mean: &[f64], share: f64, noise: &Whitening) -> Self {
         let (mut mm, mut ma) = (0.0, 0.0);
         for ((z, mean), signal) in reading.iter().zip(mean).zip(&noise.signal) {
@@ -136,7 +106,6 @@ impl Stretch {
         let gain2 = noise.gain * noise.gain;
         let growth = 1.0 + gain2 * mm;
         self.aa = (self.aa - gain2 * ma * ma / growth).max(0.0);
-        self.variance *= growth;
         self
     }
 
@@ -149,14 +118,14 @@ impl Stretch {
         (self.aa - 2.0 * s * self.ad + s * s * self.dd).max(0.0)
     }
 
-    /// ∫₀¹ exp(−(cost(s) − reference)/2) ds.
+    /// ∫₀¹ exp(−(residual(s) − reference)/2) ds.
     fn integral(self, reference: f64) -> Share {
         let foot = self.foot();
         let least = self.residual_at(foot);
         if least - reference > NEGLIGIBLE {
             return Share { weight: 0.0, middle: foot, spread: 0.0 };
         }
-        let scale = |residual: f64| (-0.5 * (residual + self.variance.ln() - reference)).exp();
+        let scale = |residual: f64| (-0.5 * (residual - reference)).exp();
         let length = self.dd.sqrt();
         if length < SHORT {
             return Share { weight: scale(least), middle: 0.5, spread: 1.0 / 12.0 };

@@ -34,9 +34,6 @@ pub struct MeasuredLocator {
     pub role: HiddenRole,
     /// On which scale it is held.
     pub hidden: Scale,
-    /// By what factor errors at held-out positions exceeded the posterior's spread, at least 1: what the estimates'
-    /// intervals and deviations are widened by.
-    pub misfit: f64,
     /// The squared residual, in variances, from which on no contact explains a reading.
     pub residual_limit: f64,
     /// The contact's force in newtons, where it is known.
@@ -114,7 +111,6 @@ impl Locate for MeasuredLocator {
         for (what, values) in ["table variance", "table reach", "signal variance"].into_iter().zip(positive) {
             LocatorFault::check_numbers(what, values.iter().copied(), |v| v >= 0.0, "finite and at least 0")?;
         }
-        LocatorFault::check_numbers("misfit", [self.misfit], |v| v >= 1.0, "at least 1")?;
         LocatorFault::check_numbers("residual limit", [self.residual_limit], |v| v > 0.0, "greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |force| force > 0.0, "finite and greater than 0")
     }

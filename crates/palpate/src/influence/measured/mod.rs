@@ -7,8 +7,13 @@
 //!
 //! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d hidden,
 //!
-//! f̄ and v the process's mean and relative variance, S its signal's covariance, C that of the noise. The position is
-//! the posterior's mean, which has the least mean square error.
+//! f̄ and v the process's mean and relative variance, S its signal's covariance, C that of the noise, and N the normal
+//! density without its determinant: v is least at the presses, so its determinant would pull every estimate towards
+//! them, as if contacts between presses were less probable. The position is the posterior's mean, which has the
+//! least mean square error.
+//!
+//! C is that of repeats, or what the process calls noise where there are none, widened by what positions that were held
+//! out of the recording show it to miss.
 
 mod axis;
 mod config;

@@ -1,6 +1,6 @@
 //! What the noise of the channels does to a comparison of readings.
 
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView1};
 
 use crate::numerics::{Cholesky, NotPositiveDefinite, symmetric_eigen};
 
@@ -29,7 +29,7 @@ impl Whitening {
         let m = noise.covariance.nrows();
         let factor = Cholesky::factor(noise.covariance)?;
         let inverse = factor.solve_lower_matrix(Array2::eye(m));
-        let (values, vectors) = symmetric_eigen(inverse.dot(signal).dot(&inverse.t()));
+        let (values, vectors) = symmetric_eigen(&inverse.dot(signal).dot(&inverse.t()));
         let matrix = vectors.t().dot(&inverse);
         let signal = values.iter().map(|d| d.max(0.0)).collect();
         Ok(Self { matrix: matrix.iter().copied().collect(), signal, gain: noise.gain })
@@ -81,8 +81,8 @@ impl Noise {
     /// variances in `floor` are added.
     pub fn of_repeats(
         places: &[usize],
-        outputs: ArrayView2<f64>,
-        means: ArrayView2<f64>,
+        outputs: &Array2<f64>,
+        means: &Array2<f64>,
         floor: &[f64],
         with_gain: bool,
     ) -> Result<Option<Self>, NotPositiveDefinite> {

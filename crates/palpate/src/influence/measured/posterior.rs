@@ -2,12 +2,11 @@
 
 use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 
-use super::line::Nearest;
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
 use crate::contact::Position;
 
-/// Costs further than this above the least have no probability worth adding up: e⁻¹⁰.
+/// Squared residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
 const CUT: f64 = 20.0;
 /// A cell belongs to a mode when its density is at least this share of the greatest.
 const VALLEY: f64 = 0.01;
@@ -50,14 +49,14 @@ struct Cell {
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     place: usize,
-    nearest: Nearest,
+    residual: f64,
 }
 
 impl Seen {
-    /// Whether somewhere `reach` closer, in deviations, could matter beside the cost `least`.
+    /// Whether somewhere `reach` closer, in deviations, could matter beside the residual `least`.
     fn within(&self, reach: f64, least: f64) -> bool {
-        let closest = (self.nearest.residual.sqrt() - reach).max(0.0);
-        closest * closest + self.nearest.log_variance <= least + CUT
+        let closest = (self.residual.sqrt() - reach).max(0.0);
+        closest * closest <= least + CUT
     }
 }
 
@@ -76,19 +75,17 @@ impl<'a> Posterior<'a> {
     /// those the cells that could, cut finely.
     pub fn of(locator: &'a MeasuredLocator, reading: &[f64]) -> Self {
         let (table, noise) = (&locator.table, &locator.whitening);
-        let look = |place: usize| Seen { place, nearest: table.line(place).nearest(reading, noise) };
-        let cheapest = |seen: &mut dyn Iterator<Item = Seen>| {
-            seen.min_by(|a, b| a.nearest.cost().total_cmp(&b.nearest.cost()))
-        };
+        let look = |place: usize| Seen { place, residual: table.line(place).residual(reading, noise) };
+        let nearest =
+            |seen: &mut dyn Iterator<Item = Seen>| seen.min_by(|a, b| a.residual.total_cmp(&b.residual));
         let mut posterior = Self { locator, cells: Vec::new(), parts: Vec::new(), residual: f64::INFINITY };
         let blocks: Vec<Seen> = table.blocks().map(look).collect();
-        let Some(block) = cheapest(&mut blocks.iter().copied()) else { return posterior };
-        let Some(best) = cheapest(&mut table.block(block.place).map(look)) else { return posterior };
+        let Some(block) = nearest(&mut blocks.iter().copied()) else { return posterior };
+        let Some(best) = nearest(&mut table.block(block.place).map(look)) else { return posterior };
         let mut buffer = LineBuffer::default();
-        let mut least = best.nearest.cost();
+        let mut least = best.residual;
         for (x, y) in parts_of(table, best.place) {
-            let found = table.line_between(x, y, &mut buffer).nearest(reading, noise);
-            least = least.min(found.cost());
+            least = least.min(table.line_between(x, y, &mut buffer).residual(reading, noise));
         }
         // From a block's middle to its other places is twice the reach, and from there half as far as that again.
         for block in blocks.iter().filter(|block| block.within(3.5 * table.reaches[block.place], least)) {
@@ -108,7 +105,7 @@ impl<'a> Posterior<'a> {
             let line = table.line_between(x, y, buffer);
             let marginal = line.marginal(reading, noise, reference);
             if marginal.weight > 0.0 {
-                self.residual = self.residual.min(line.nearest(reading, noise).residual);
+                self.residual = self.residual.min(line.residual(reading, noise));
                 let part = Part { x_m: table.x.at(x), y_m: table.y.at(y), weight: marginal.weight };
                 let node = marginal.hidden / marginal.weight;
                 let spread = (marginal.hidden_square / marginal.weight - node * node).max(0.0);
@@ -143,15 +140,9 @@ impl<'a> Posterior<'a> {
         }
         let (x_95_m, y_95_m) = self.intervals(total.weight);
         let mut contact = self.contact(total);
-        let Position { x_m, y_m } = contact.position;
-        let widened = |(low, high): (f64, f64), middle: f64| {
-            let factor = self.locator.misfit;
-            (middle + factor * (low - middle), middle + factor * (high - middle))
-        };
         let covariance = contact.uncertainty.unwrap_or_default().covariance;
-        contact.uncertainty =
-            Some(Uncertainty { covariance, x_95_m: widened(x_95_m, x_m), y_95_m: widened(y_95_m, y_m) });
-        if !(self.residual <= self.locator.residual_limit) {
+        contact.uncertainty = Some(Uncertainty { covariance, x_95_m, y_95_m });
+        if self.residual.is_nan() || self.residual > self.locator.residual_limit {
             return Estimate::of_contact(contact, Status::OutsideModel);
         }
         let modes = self.modes();
@@ -180,7 +171,6 @@ impl<'a> Posterior<'a> {
             true => covariance,
             false => [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0],
         };
-        let covariance = covariance.map(|value| value * self.locator.misfit * self.locator.misfit);
         let around = |mean_m: f64, variance_m2: f64| {
             let half_m = QUANTILE_975 * variance_m2.sqrt();
             (mean_m - half_m, mean_m + half_m)

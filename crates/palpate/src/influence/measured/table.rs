@@ -1,7 +1,7 @@
 //! The learnt readings, tabulated over position and hidden coordinate.
 
-use super::{Axis, Whitening};
 use super::line::Line;
+use super::{Axis, Whitening};
 
 /// Whitened mean readings and their relative variance at the nodes of a grid.
 ///
@@ -132,7 +132,7 @@ impl Table {
 
     fn reach(&self, place: usize, unit: &Whitening) -> f64 {
         let here = self.line(place);
-        let to_line = |mean: &[f64], other| Line::nearest(self.line(other), mean, unit).residual;
+        let to_line = |mean: &[f64], other| self.line(other).residual(mean, unit);
         let distances = here
             .means
             .chunks_exact(unit.channels().max(1))

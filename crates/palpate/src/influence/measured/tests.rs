@@ -229,27 +229,21 @@ fn data(file: &str) -> Option<File> {
     Some(File::open(folder.join(file)).unwrap())
 }
 
-/// The pooled errors of five folds by position: median and mean, and what the status and intervals were worth.
+/// The pooled errors of five folds by position: median and mean, and the share within the 95 % intervals.
 #[derive(Debug)]
 struct Pooled {
     median_mm: f64,
     mean_mm: f64,
-    rmse_mm: f64,
     coverage: f64,
-    statuses: [usize; 3],
-    locate_us: f64,
 }
 
 fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
-    let (mut errors_mm, mut covered, mut intervals, mut statuses) = (Vec::new(), 0, 0, [0; 3]);
-    let mut spent = std::time::Duration::ZERO;
+    let (mut errors_mm, mut covered, mut intervals) = (Vec::new(), 0, 0);
     for fold in recording.folds(5).unwrap() {
         let locator = fit(bench, &recording.subset(&fold.training));
         let held_out = recording.subset(&fold.held_out);
-        let start = std::time::Instant::now();
-        let estimates: Vec<_> = held_out.rows.iter().map(|row| locator.locate(&row.reading)).collect();
-        spent += start.elapsed();
-        for (row, estimate) in held_out.rows.iter().zip(estimates) {
+        for row in &held_out.rows {
+            let estimate = locator.locate(&row.reading);
             errors_mm.push(1e3 * estimate.contact.position.distance_m(row.position));
             let uncertainty = estimate.contact.uncertainty.unwrap();
             let within = |(low, high): (f64, f64), value| usize::from(low <= value && value <= high);
@@ -259,11 +253,6 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
                 covered += within(uncertainty.y_95_m, row.position.y_m);
                 intervals += 1;
             }
-            match estimate.status {
-                Status::Located => statuses[0] += 1,
-                Status::Ambiguous => statuses[1] += 1,
-                _ => statuses[2] += 1,
-            }
         }
     }
     errors_mm.sort_by(f64::total_cmp);
@@ -271,10 +260,7 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
     Pooled {
         median_mm: crate::evaluation::percentile(&errors_mm, 50.0).unwrap(),
         mean_mm: errors_mm.iter().sum::<f64>() / count,
-        rmse_mm: (errors_mm.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
         coverage: covered as f64 / intervals as f64,
-        statuses,
-        locate_us: 1e6 * spent.as_secs_f64() / count,
     }
 }
 

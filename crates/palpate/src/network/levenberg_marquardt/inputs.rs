@@ -3,9 +3,9 @@
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
-use super::principal::principal_axes;
 use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
 use crate::method::LocatorFault;
+use crate::numerics::symmetric_eigen;
 use crate::recording::Recording;
 use crate::sensing::Layout;
 
@@ -41,7 +41,7 @@ impl NetworkInputs {
             covariance += &column.dot(&column.t());
         }
         covariance /= recording.rows.len() as f64;
-        let (variances, axes) = principal_axes(covariance);
+        let (variances, axes) = symmetric_eigen(&covariance);
         let least = if noise.is_some() { 4.0 } else { 1e-8 * variances[0] };
         let seen = variances.iter().zip(axes.columns()).filter(|(variance, _)| **variance > least);
         inputs.axes = seen.map(|(variance, axis)| (&axis / &unit / variance.sqrt()).to_vec()).collect();

@@ -6,7 +6,6 @@ mod fitting;
 mod inputs;
 mod locator;
 mod perceptron;
-mod principal;
 mod training;
 
 pub use fitting::{LevenbergMarquardtConfig, LevenbergMarquardtFitError};
