@@ -1,9 +1,8 @@
 //! Reading palpate's files, with complaints that point at the place.
 
 use crate::failure::{Complaint, Failure};
-use palpate::bench::Bench;
 use palpate::estimator::{Locator, LocatorFileError};
-use palpate::recording::{CsvError, Recording};
+use palpate::recording::CsvError;
 use palpate::rig::{Rig, RigError};
 use palpate::study::{Study, StudyError, StudyProblem};
 use palpate::units::{Dimension, Quantity};
@@ -54,17 +53,6 @@ pub fn read_locator(path: &Path) -> Result<Locator, Failure> {
 /// A locator, from its file's text.
 pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
-}
-
-/// A recording of a bench, with its warnings said on stderr.
-pub fn read_recording(bench: &Bench, path: &Path) -> Result<Recording, Failure> {
-    let bytes = read_bytes(path)?;
-    let name = path.display().to_string();
-    let recording = bench.read_recording(&name, bytes.as_slice()).map_err(|error| csv_complaint(&error))?;
-    for warning in recording.warnings() {
-        eprintln!("warning: {name}: {warning}");
-    }
-    Ok(recording)
 }
 
 /// A length in metres, from a command line argument.

@@ -7,6 +7,7 @@ mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod recording_files;
 mod table;
 
 use clap::{Parser, Subcommand};

@@ -1,6 +1,7 @@
 //! `palpate compare`: every estimator on the same trials, against the limit.
 
 use crate::failure::{Complaint, Failure};
+use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate::evaluation::{Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator};
@@ -14,9 +15,8 @@ use std::time::Instant;
 pub struct Arguments {
     /// The rig file
     rig: PathBuf,
-    /// The recording, cross-validated by position [default: simulated calibrations, judged at 399 positions]
-    #[arg(long, value_name = "FILE.csv")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    files: RecordingFiles,
     /// Folds of the cross-validation
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     folds: u16,
@@ -85,10 +85,10 @@ struct LeftOut {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
-    let (data, trials) = trials(arguments, &rig)?;
+    let Trials { data, how, trials } = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
     if let Some(out) = &arguments.out {
-        write_report(arguments, &rig, &data, &comparisons, &left_out, out)?;
+        write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
     }
     let rows = comparisons.iter().filter_map(|comparison| row(&rig, comparison, arguments.tolerance));
     let findings = Findings {
@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.json {
         return output::say_json(&findings);
     }
-    print(&findings)?;
+    print(&findings, &how)?;
     match &arguments.out {
         Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
         None => Ok(()),
@@ -116,22 +116,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn write_report(
     arguments: &Arguments,
     rig: &Rig,
-    data: &str,
+    how: &str,
     comparisons: &[Comparison],
     left_out: &[LeftOut],
     out: &Path,
 ) -> Result<(), Failure> {
     output::make_folder(out)?;
-    let trials = if arguments.data.is_some() {
-        format!("{data}, cross-validated in {} folds by position", arguments.folds)
-    } else {
-        format!("{} simulated calibrations, judged at 399 positions each", arguments.calibrations)
-    };
     let left_out: Vec<_> = left_out.iter().map(|left_out| (left_out.name, left_out.why.clone())).collect();
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
         bench: &rig.bench,
-        trials: &trials,
+        trials: how,
         comparisons,
         left_out: &left_out,
         tolerance_m: arguments.tolerance,
@@ -143,19 +138,28 @@ fn write_report(
     Ok(())
 }
 
-/// What the estimators are tried on, and what it is called.
-fn trials(arguments: &Arguments, rig: &Rig) -> Result<(String, Vec<Trial>), Failure> {
-    let Some(path) = &arguments.data else {
+/// What the estimators are tried on, what it is called, and how it is used.
+struct Trials {
+    data: String,
+    how: String,
+    trials: Vec<Trial>,
+}
+
+fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
+    let Some(recording) = arguments.files.read(&rig.bench)? else {
         let trials = Trial::by_simulation(rig, u64::from(arguments.calibrations), arguments.seed);
         let trials = trials.map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
                 .help("--data names a recording to compare on")
         })?;
-        return Ok(("simulation".to_owned(), trials));
+        let calibrations = arguments.calibrations;
+        let how = format!("{calibrations} simulated calibrations, judged at 399 positions each");
+        return Ok(Trials { data: "simulation".to_owned(), how, trials });
     };
-    let recording = input::read_recording(&rig.bench, path)?;
     let trials = Trial::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
-    Ok((path.display().to_string(), trials))
+    let data = recording.provenance.source;
+    let how = format!("{data}, cross-validated in {} folds by position", arguments.folds);
+    Ok(Trials { data, how, trials })
 }
 
 fn compare(
@@ -217,12 +221,7 @@ fn row(rig: &Rig, comparison: &Comparison, tolerance_m: f64) -> Option<Row> {
     })
 }
 
-fn print(findings: &Findings) -> Result<(), Failure> {
-    let how = if findings.data == "simulation" {
-        format!("{} simulated calibrations, judged at 399 positions each", findings.trials)
-    } else {
-        format!("{}, cross-validated in {} folds by position", findings.data, findings.trials)
-    };
+fn print(findings: &Findings, how: &str) -> Result<(), Failure> {
     output::say(format!("{}: {how}; {} readings\n", findings.rig, findings.readings))?;
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
     let rows = findings.estimators.iter().map(|row| {

@@ -2,6 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
+use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, output};
 use palpate::contact::Position;
@@ -18,9 +19,8 @@ use std::path::{Path, PathBuf};
 pub struct Arguments {
     /// A locator; or a rig, whose estimator is then cross-validated on the recording
     subject: PathBuf,
-    /// The recording to judge by [default: the simulation at 399 positions]
-    #[arg(long, value_name = "FILE.csv")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    files: RecordingFiles,
     /// Folds of the cross-validation
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     folds: u16,
@@ -115,8 +115,8 @@ fn is_toml(path: &Path) -> bool {
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
 fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     let rig = input::read_rig(&arguments.subject)?;
-    let recording = match &arguments.data {
-        Some(path) => input::read_recording(&rig.bench, path)?,
+    let recording = match arguments.files.read(&rig.bench)? {
+        Some(recording) => recording,
         None => simulate(&rig, arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
@@ -131,9 +131,8 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
 /// A locator, judged by a recording or by its own bench's simulation.
 fn located(arguments: &Arguments) -> Result<Answers, Failure> {
     let locator = input::read_locator(&arguments.subject)?;
-    let recording = match &arguments.data {
-        Some(path) => {
-            let recording = input::read_recording(&locator.bench, path)?;
+    let recording = match arguments.files.read(&locator.bench)? {
+        Some(recording) => {
             warn_of_training_data(&locator, &recording);
             recording
         }

@@ -2,6 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
+use crate::recording_files::RecordingFiles;
 use crate::{input, interrupt, output};
 use palpate::estimator::{EstimatorConfig, Fitting};
 use palpate::evaluation::choose;
@@ -17,9 +18,8 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// The rig file
     rig: PathBuf,
-    /// The recording to fit
-    #[arg(long, value_name = "FILE.csv")]
-    data: Option<PathBuf>,
+    #[command(flatten)]
+    files: RecordingFiles,
     /// The locator to write
     #[arg(short, long, value_name = "LOCATOR")]
     out: PathBuf,
@@ -45,8 +45,8 @@ struct Outcome<'a> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     output::check_writable(&arguments.out)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let recording = match &arguments.data {
-        Some(path) => input::read_recording(&rig.bench, path)?,
+    let recording = match arguments.files.read(&rig.bench)? {
+        Some(recording) => recording,
         None => simulate(&rig, arguments.seed).map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
                 .help("--data names a recording to fit")

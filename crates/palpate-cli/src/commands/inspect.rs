@@ -1,6 +1,7 @@
 //! `palpate inspect`: what any of palpate's files holds, in words.
 
 use crate::failure::Failure;
+use crate::recording_files::read_recording;
 use crate::{input, output};
 use palpate::bench::Bench;
 use palpate::estimator::Method;
@@ -172,7 +173,7 @@ fn shape(topology: &Topology) -> String {
 fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return Ok(table(text)) };
     let bench = input::read_rig(rig)?.bench;
-    let recording = input::read_recording(&bench, path)?;
+    let recording = read_recording(&bench, path)?;
     let positions = recording.distinct_positions();
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
