@@ -4,8 +4,10 @@ use crate::failure::Failure;
 use crate::recording_files::read_recording;
 use crate::{input, output};
 use palpate::bench::Bench;
+use palpate::centroid::Weighing;
 use palpate::estimator::Method;
 use palpate::influence::InfluenceLocator;
+use palpate::influence::measured::{HiddenRole, MeasuredLocator};
 use palpate::mechanics::SurfaceSpec;
 use palpate::network::Topology;
 use palpate::rig::{Rig, Training};
@@ -149,20 +151,61 @@ fn method(method: &Method) -> Vec<String> {
             ]
         }
         Method::Influence(InfluenceLocator::Beam(beam)) => vec![format!(
-            "influence functions of {} sensors at {} nodes; at most {} contacts at once",
+            "influence functions of {} sensors at {} nodes; {} at once",
             beam.table().sensors,
             beam.table().nodes(),
-            beam.contacts()
+            match beam.contacts() {
+                1 => "one contact".to_owned(),
+                most => format!("up to {most} contacts"),
+            }
         )],
-        Method::Influence(InfluenceLocator::Measured(_)) => {
-            vec!["influence functions learnt from the recording alone".to_owned()]
+        Method::Influence(InfluenceLocator::Measured(measured)) => vec![learnt(measured)],
+        Method::NetworkLm(networks) => networks
+            .members
+            .iter()
+            .map(|member| {
+                format!(
+                    "network: {}, {:.0} of {} weights in effect, log evidence {:.0}, {} iterations",
+                    shape(&networks.topology),
+                    member.effective_parameters,
+                    member.weights.len(),
+                    member.log_evidence,
+                    member.iterations
+                )
+            })
+            .collect(),
+        Method::GaussianProcess(gaussian) => vec![format!(
+            "Gaussian process from {} features through {} presses, log evidence {:.0}",
+            gaussian.process.coordinates(),
+            gaussian.process.points(),
+            gaussian.process.log_evidence()
+        )],
+        Method::ClosedForm(_) => vec!["the beam's own equations; nothing was learnt".to_owned()],
+        Method::Neighbours(neighbours) => {
+            vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
         }
-        Method::NetworkLm(_)
-        | Method::GaussianProcess(_)
-        | Method::ClosedForm(_)
-        | Method::Neighbours(_)
-        | Method::Centroid(_) => Vec::new(),
+        Method::Centroid(centroid) => vec![match centroid.weighing {
+            Weighing::Positions(_) => "the centroid of the sensors' positions, calibrated".to_owned(),
+            Weighing::Channels => {
+                "the centroid of the channels, whose positions calibration finds".to_owned()
+            }
+        }],
     }
+}
+
+fn learnt(measured: &MeasuredLocator) -> String {
+    let table = &measured.table;
+    let counts = [table.x.count, table.y.count, table.hidden.count];
+    let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
+    let hidden = match measured.role {
+        HiddenRole::None => "",
+        HiddenRole::Force => " and force",
+        HiddenRole::Other => " and the hidden coordinate",
+    };
+    format!(
+        "influence functions learnt from the recording, over position{hidden}: {} nodes",
+        nodes.join(" × ")
+    )
 }
 
 fn shape(topology: &Topology) -> String {

@@ -3,7 +3,8 @@
 use super::EstimatorConfig;
 use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::network::{
-    Activation, BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder,
+    Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
+    PresentationOrder,
 };
 use crate::units::format_count;
 
@@ -24,14 +25,29 @@ impl EstimatorConfig {
         match self {
             Self::Network(config) => network(config),
             Self::Influence(config) => influence(*config),
-            Self::NetworkLm(_)
-            | Self::GaussianProcess(_)
-            | Self::ClosedForm(_)
-            | Self::Neighbours(_)
-            | Self::Centroid(_)
-            | Self::Auto => Vec::new(),
+            Self::NetworkLm(config) => levenberg_marquardt(config),
+            Self::Neighbours(config) => vec![Setting {
+                key: "most_neighbours",
+                name: "neighbours tried, at most",
+                value: config.most.to_string(),
+            }],
+            // They have nothing to set.
+            Self::GaussianProcess(_) | Self::ClosedForm(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
         }
     }
+}
+
+fn levenberg_marquardt(config: &LevenbergMarquardtConfig) -> Vec<Setting> {
+    let hidden: Vec<String> = config.hidden.iter().map(usize::to_string).collect();
+    vec![
+        Setting { key: "hidden", name: "nodes in the hidden layers", value: hidden.join(", ") },
+        Setting { key: "ensemble", name: "networks in the ensemble", value: config.ensemble.to_string() },
+        Setting {
+            key: "max_iterations",
+            name: "iterations, at most",
+            value: format_count(u64::from(config.max_iterations)),
+        },
+    ]
 }
 
 fn influence(config: InfluenceConfig) -> Vec<Setting> {

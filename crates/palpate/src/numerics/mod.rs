@@ -3,7 +3,9 @@
 mod cholesky;
 mod distributions;
 mod eigen;
+mod random_order;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{chi_squared_bound, normal_distribution, normal_quantile};
 pub use eigen::symmetric_eigen;
+pub use random_order::random_order;

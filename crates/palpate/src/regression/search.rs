@@ -1,13 +1,12 @@
 //! Finding the hyperparameters: the evidence, with a weak prior, at its greatest.
 
 use ndarray::Axis;
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::evidence::Evidence;
 use super::groups::Groups;
 use super::lbfgs::{Stop, minimise};
 use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, Trend};
+use crate::numerics::random_order;
 
 /// How a Gaussian process is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -92,7 +91,7 @@ impl Regression {
 
     fn search(&self, groups: &Groups, keep_going: &mut dyn FnMut() -> bool) -> Option<Hyperparameters> {
         let prior = Prior::of(groups);
-        let order = shuffled(groups.len(), self.seed);
+        let order = random_order(groups.len(), self.seed);
         let first = |count: usize| {
             let mut chosen = order[..count.min(order.len())].to_vec();
             chosen.sort_unstable();
@@ -177,14 +176,4 @@ impl Prior {
         }
         sum
     }
-}
-
-/// 0…count−1 in random order (Durstenfeld 1964).
-fn shuffled(count: usize, seed: u64) -> Vec<usize> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut order: Vec<usize> = (0..count).collect();
-    for i in (1..count).rev() {
-        order.swap(i, rng.random_range(0..=i));
-    }
-    order
 }

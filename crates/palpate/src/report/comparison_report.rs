@@ -97,7 +97,7 @@ impl ComparisonReport<'_> {
         Table {
             number: table,
             caption: html! {
-                "Location errors in mm, best mean first. Effective: share of the readings within "
+                "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
                 (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. × limit: mean \
                  error over what physics allows, where the limit is at most 1/200 of the length, 1/80 of it away from the ends. A \
                  dash: the estimator or the bench has none."
@@ -107,8 +107,8 @@ impl ComparisonReport<'_> {
                 numeric("mean"),
                 numeric("% of length"),
                 numeric("median"),
-                numeric("95th percentile"),
-                numeric("root mean square"),
+                numeric("95th"),
+                numeric("RMS"),
                 numeric("effective, %"),
                 numeric("covered, %"),
                 numeric("× limit"),

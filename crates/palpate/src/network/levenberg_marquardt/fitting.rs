@@ -29,6 +29,11 @@ impl Default for LevenbergMarquardtConfig {
     }
 }
 
+/// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
+/// *Analyzing bagging*, Annals of Statistics 30, 2002): a step costs presses × weights², and what more presses tell goes into the
+/// ensemble.
+const MOST_PRESSES: usize = 1000;
+
 /// Why networks cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevenbergMarquardtFitError {
@@ -75,8 +80,8 @@ impl Fit for LevenbergMarquardtConfig {
         let topology = self.topology(inputs.axes.len(), scales.len());
         let training = Training {
             topology: &topology,
-            inputs: &input_rows,
-            targets: &targets,
+            inputs: input_rows,
+            targets,
             max_iterations: self.max_iterations,
         };
         let Some(members) = self.ensemble(&training, task.seed, keep_going)? else { return Ok(None) };
@@ -127,7 +132,7 @@ impl LevenbergMarquardtConfig {
                 stopped = stopped || !keep_going();
                 !stopped
             };
-            trained.extend(training.run(seed, &mut ask));
+            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, &mut ask));
             if stopped {
                 return Ok(None);
             }

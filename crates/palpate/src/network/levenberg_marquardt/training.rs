@@ -1,6 +1,6 @@
 //! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994).
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -8,15 +8,15 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::evidence::Hyperparameters;
 use super::perceptron::{jacobians, outputs};
 use crate::network::Topology;
-use crate::numerics::Cholesky;
+use crate::numerics::{Cholesky, random_order};
 
 /// What one network is trained on.
 pub(super) struct Training<'a> {
     pub(super) topology: &'a Topology,
     /// A row a press, a column an input.
-    pub(super) inputs: &'a Array2<f64>,
+    pub(super) inputs: Array2<f64>,
     /// A row a press, a column an output, each with variance 1.
-    pub(super) targets: &'a Array2<f64>,
+    pub(super) targets: Array2<f64>,
     pub(super) max_iterations: u32,
 }
 
@@ -47,6 +47,18 @@ const STEPS_A_UPDATE: u32 = 3;
 const SETTLED: f64 = 0.01;
 
 impl Training<'_> {
+    /// The same of at most `most` presses, drawn at random.
+    pub(super) fn of_some(&self, most: usize, seed: u64) -> Self {
+        let mut rows = random_order(self.inputs.nrows(), seed);
+        rows.truncate(most);
+        rows.sort_unstable();
+        Self {
+            inputs: self.inputs.select(Axis(0), &rows),
+            targets: self.targets.select(Axis(0), &rows),
+            ..*self
+        }
+    }
+
     /// Trains from the weights of a seed; `None` when `keep_going`, asked at every iteration, says no, or when the weights leave the
     /// numbers.
     pub(super) fn run(&self, seed: u64, keep_going: &mut dyn FnMut() -> bool) -> Option<Trained> {
@@ -92,14 +104,14 @@ impl Training<'_> {
     }
 
     fn errors(&self, weights: &Array1<f64>) -> Array2<f64> {
-        self.targets - &outputs(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view())
+        &self.targets - &outputs(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view())
     }
 
     fn place(&self, weights: &Array1<f64>) -> Place {
         let (outputs, jacobians) =
             jacobians(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view());
         let products = jacobians.iter().map(|jacobian| jacobian.t().dot(jacobian)).collect();
-        Place { errors: self.targets - &outputs, jacobians, products }
+        Place { errors: &self.targets - &outputs, jacobians, products }
     }
 
     /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), with μ grown until the objective falls; whether it could be.
