@@ -108,7 +108,7 @@ pub fn try_estimator(
 /// where the rig's estimator is of its kind. Networks trained by back-propagation stop after as many presentations as
 /// take some seconds.
 pub fn contenders(rig: &Rig, rows: usize) -> Vec<EstimatorConfig> {
-    const MOST_PRESENTATIONS: usize = 5_000_000;
+    const MOST_PRESENTATIONS: usize = 20_000_000;
     let mut contenders = EstimatorConfig::contenders(&rig.bench);
     for contender in &mut contenders {
         if contender.kind() == rig.estimator.kind() {
