@@ -2,7 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod support {
+    #[path = "../../../palpate/tests/support/data.rs"]
     pub mod data;
+    #[path = "../../../palpate/tests/support/skip.rs"]
     pub mod skip;
 }
 

@@ -3,6 +3,7 @@
 
 mod support {
     pub mod browser;
+    #[path = "../../../palpate/tests/support/skip.rs"]
     pub mod skip;
 }
 

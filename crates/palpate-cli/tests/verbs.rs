@@ -3,7 +3,9 @@
 
 mod support {
     pub mod command;
+    #[path = "../../../palpate/tests/support/data.rs"]
     pub mod data;
+    #[path = "../../../palpate/tests/support/skip.rs"]
     pub mod skip;
 }
 

@@ -24,3 +24,7 @@ pub mod sensing;
 pub mod simulate;
 pub mod study;
 pub mod units;
+
+#[cfg(test)]
+#[path = "../tests/support/mod.rs"]
+mod support;

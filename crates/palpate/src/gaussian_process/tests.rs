@@ -1,7 +1,5 @@
 //! The method on simulated benches, and on other people's recordings by the protocol that comes with them.
 
-use std::path::PathBuf;
-
 use palpate_core::Status;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -14,6 +12,7 @@ use crate::mechanics::{Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::sensing::{Layout, SensorKind};
+use crate::support::data::recording;
 
 const EXTENT: Extent = Extent { length_m: 0.4, width_m: None };
 
@@ -176,18 +175,7 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
 
 /// The numbers of a CSV in the folder of other people's recordings, or `None` where the folder is absent and may be.
 fn numbers(file: &str) -> Option<Vec<Vec<f64>>> {
-    let workspace = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("PALPATE_DATA").map_or(workspace.join("../shared/data"), PathBuf::from);
-    let path = folder.join(file);
-    if !path.exists() {
-        assert!(
-            std::env::var_os("PALPATE_STRICT").is_none_or(|v| v != "1"),
-            "{} is not there",
-            path.display()
-        );
-        eprintln!("skipped: {} is not there (set PALPATE_DATA)", path.display());
-        return None;
-    }
+    let path = recording(file)?;
     let text = std::fs::read_to_string(path).unwrap();
     let rows = text.lines().filter(|line| !line.starts_with('X'));
     Some(rows.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())

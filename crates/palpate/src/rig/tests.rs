@@ -1,11 +1,10 @@
-use std::path::PathBuf;
-
 use super::*;
 use crate::mechanics::{Beam, Extent, SurfaceSpec};
 use crate::network::{InputScale, NetworkConfig, OutputCoding};
 use crate::recording::{Column, PositionColumns};
 use crate::sensing::Layout;
 use crate::sensing::SensorKind;
+use crate::support::data::recording;
 
 const PAPER: &str = include_str!("../../../../examples/paper.toml");
 const FSI_WATER: &str = include_str!("../../../../examples/fsi-water.toml");
@@ -39,22 +38,9 @@ fn the_water_strip_maps_foreign_columns() {
     assert_eq!(columns.position_unit.symbol(), "mm");
 }
 
-/// The folder of other people's recordings, or `None` where it is absent and may be.
-fn data(file: &str) -> Option<PathBuf> {
-    let workspace = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let folder = std::env::var_os("PALPATE_DATA").map_or(workspace.join("../shared/data"), PathBuf::from);
-    let path = folder.join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    assert!(std::env::var_os("PALPATE_STRICT").is_none_or(|v| v != "1"), "{} is not there", path.display());
-    eprintln!("skipped: {} is not there (set PALPATE_DATA)", path.display());
-    None
-}
-
 #[test]
 fn the_water_strips_recording_is_read() {
-    let Some(path) = data("tactile-fsi/1d-water-1.5mm.csv") else { return };
+    let Some(path) = recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
     let rig = Rig::from_toml(FSI_WATER).unwrap();
     let recording = rig.bench.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
     assert_eq!(recording.rows.len(), 779);

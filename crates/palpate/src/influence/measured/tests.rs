@@ -2,7 +2,6 @@
 //! comes with them.
 
 use std::fs::File;
-use std::path::PathBuf;
 
 use palpate_core::Status;
 use rand::{RngExt, SeedableRng};
@@ -17,6 +16,7 @@ use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{Layout, SensorKind};
+use crate::support::data::recording;
 
 const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
 const PAD: Extent = Extent { length_m: 0.03, width_m: Some(0.03) };
@@ -210,23 +210,8 @@ fn it_comes_back_from_a_file() {
     assert!(damaged.check(&bench(STRIP, 2, None)).is_err());
 }
 
-/// A file of the folder of other people's recordings; `None`, said in one line, where the folder is absent and may be.
 fn data(file: &str) -> Option<File> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("PALPATE_DATA").map_or_else(beside, PathBuf::from);
-    if !folder.is_dir() {
-        assert!(
-            std::env::var_os("PALPATE_STRICT").is_none_or(|v| v != "1"),
-            "{} is not there",
-            folder.display()
-        );
-        eprintln!(
-            "skipped: {} is not there; name the folder of recordings in PALPATE_DATA",
-            folder.display()
-        );
-        return None;
-    }
-    Some(File::open(folder.join(file)).unwrap())
+    recording(file).map(|path| File::open(path).unwrap())
 }
 
 /// The pooled errors of five folds by position: median and mean, and the share within the 95 % intervals.

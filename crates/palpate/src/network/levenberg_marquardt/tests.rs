@@ -13,6 +13,7 @@ use crate::network::{Activation, Topology};
 use crate::numerics::Cholesky;
 use crate::recording::{Provenance, Recording, Row};
 use crate::sensing::{ChannelErrors, ChannelModel, Layout, SensorKind, measure};
+use crate::support::data;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -201,14 +202,8 @@ fn what_cannot_be_trained_is_named() {
 /// A soft strip's recording, by its path in the folder of real recordings; `None`, said in one line, where the folder is absent.
 fn strip(name: &str) -> Option<(Bench, Recording)> {
     use crate::mechanics::Extent;
-    let beside = || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("PALPATE_DATA").map_or_else(beside, Into::into);
-    let Ok(text) = std::fs::read_to_string(folder.join("tactile-fsi").join(name)) else {
-        eprintln!(
-            "skipped: the folder of real recordings is missing; put it at ../shared/data or name it in PALPATE_DATA"
-        );
-        return None;
-    };
+    let path = data::recording(&format!("tactile-fsi/{name}"))?;
+    let text = std::fs::read_to_string(path).unwrap();
     let row = |line: &str| {
         let cells: Vec<f64> = line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect();
         let reading = vec![cells[1], cells[2]];
