@@ -94,7 +94,7 @@ const NO_CONTACT: ContactEstimate =
 const NO_MODE: Mode = Mode { contact: NO_CONTACT, probability: 0.0 };
 
 /// A list of at most N, without allocation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Few<T, const N: usize> {
     items: [T; N],
     len: usize,
@@ -114,9 +114,20 @@ impl<T: Copy, const N: usize> Few<T, N> {
         true
     }
 
+    /// Takes all items out.
+    pub const fn clear(&mut self) {
+        self.len = 0;
+    }
+
     /// The items.
     pub fn as_slice(&self) -> &[T] {
         &self.items[..self.len]
+    }
+}
+
+impl<T: Copy + PartialEq, const N: usize> PartialEq for Few<T, N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
     }
 }
 
@@ -131,5 +142,13 @@ mod tests {
         assert!(few.push(1) && few.push(2));
         assert!(!few.push(3));
         assert_eq!(few.as_slice(), [1, 2]);
+    }
+
+    #[test]
+    fn a_cleared_list_equals_an_empty_one() {
+        let mut few = Few::<u8, 2>::none(0);
+        few.push(7);
+        few.clear();
+        assert_eq!(few, Few::none(0));
     }
 }

@@ -9,6 +9,7 @@ use palpate::method::FitTask;
 use palpate::recording::Recording;
 use palpate::rig::Rig;
 use palpate::simulate::{clean_reading, simulate};
+use palpate_core::{Estimate, Status};
 
 const ROUNDS: usize = 201;
 const READINGS: usize = 1000;
@@ -32,7 +33,13 @@ fn main() {
         let bench = Bench { force_n, ..rig.bench.clone() };
         let locator = fit(InfluenceConfig::default(), &bench, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
-        println!("estimate with uncertainty, force {known}: {:.0} ns a reading", nanoseconds(&locator, &rig));
+        let Times { single, batch } = nanoseconds(&locator, &rig);
+        println!("estimate with uncertainty, force {known}: {single:.0} ns a reading");
+        println!(
+            "the same in batches of {READINGS}: {batch:.0} ns, {:.2} million readings/s, {:.2} times as fast",
+            1e3 / batch,
+            single / batch
+        );
     }
 }
 
@@ -41,26 +48,37 @@ fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLoc
     fitted.expect("the presses suit the bench").expect("nobody stops it")
 }
 
-/// Median time of an estimate, over readings all along the beam.
-fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> f64 {
+/// Nanoseconds a reading.
+struct Times {
+    single: f64,
+    batch: f64,
+}
+
+/// Median times of an estimate, alone and in a batch, over readings all along the beam in no order.
+fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
     let surface = rig.bench.surface.model().expect("a beam has a model");
-    let readings: Vec<Vec<f64>> = (0..READINGS)
-        .map(|i| {
-            let position = Position::along(0.02 + 0.36 * i as f64 / READINGS as f64);
+    let readings: Vec<f64> = (0..READINGS)
+        .flat_map(|i| {
+            let position = Position::along(0.02 + 0.36 * (i * 619 % READINGS) as f64 / READINGS as f64);
             clean_reading(surface, &rig.bench.layout, Contact { position, force_n: 3.0 })
         })
         .collect();
     let mut scratch = Scratch::default();
-    let mut times: Vec<f64> = (0..ROUNDS)
-        .map(|_| {
-            let start = ThreadTime::now();
-            for reading in &readings {
-                std::hint::black_box(locator.locate_with(reading, &mut scratch));
-            }
-            start.elapsed().as_nanos() as f64 / READINGS as f64
-        })
-        .collect();
-    median(&mut times)
+    let nothing = Estimate::of_position(Position::along(0.0), Status::NoContact);
+    let mut estimates = vec![nothing; READINGS];
+    let (mut single, mut batch) = (Vec::new(), Vec::new());
+    for _ in 0..ROUNDS {
+        let start = ThreadTime::now();
+        for reading in readings.chunks_exact(rig.bench.layout.len()) {
+            std::hint::black_box(locator.locate_with(reading, &mut scratch));
+        }
+        single.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
+        let start = ThreadTime::now();
+        locator.locate_batch(&readings, &mut scratch, &mut estimates);
+        std::hint::black_box(&mut estimates);
+        batch.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
+    }
+    Times { single: median(&mut single), batch: median(&mut batch) }
 }
 
 fn median(values: &mut [f64]) -> f64 {

@@ -1,6 +1,9 @@
 //! From minima of the misfit to an estimate that owns up to what it does not know.
 
-use super::search::{Minimum, Scratch, Search, worst_misfit};
+use super::coarse::MOST_MINIMA;
+use super::lanes::{self, Array, Eight};
+use super::scratch::Scratch;
+use super::search::{Minimum, Search, worst_misfit};
 use super::several::{criterion, explain};
 use crate::contact::Position;
 use crate::numerics::normal_distribution;
@@ -8,22 +11,77 @@ use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 /// Another place with at least this share of the probability is said.
 const MODE_THAT_MATTERS: f64 = 0.01;
+/// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
+const MOST_SPACINGS: f64 = 1.5;
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
+/// Readings one after the other, of so many channels each.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub readings: &'a [f64],
+    pub channels: usize,
+}
+
+/// An estimate of nothing, to be written over.
+pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
+
 /// The estimate of one contact.
 pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
-    let square = search.whiten(reading, scratch);
-    let (minima, count) = search.minima(square, scratch);
-    let minima = &minima[..count];
-    let best = minima[0];
-    if is_no_contact(search, square, best.misfit) {
-        let contact = ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
-        return Estimate::of_contact(contact, Status::NoContact);
+    let mut estimate = NOTHING;
+    let rows = Rows { readings: reading, channels: reading.len() };
+    lanes::locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
+    estimate
+}
+
+/// Writes the estimate of one contact for each row.
+#[inline(always)]
+pub(super) fn locate_each<V: Eight>(
+    search: &Search,
+    rows: Rows,
+    scratch: &mut Scratch,
+    estimates: &mut [Estimate],
+) {
+    for (reading, estimate) in rows.readings.chunks_exact(rows.channels.max(1)).zip(estimates) {
+        locate_into::<V>(search, reading, scratch, estimate);
     }
+}
+
+/// Writes the estimate of one contact, and of a used estimate no more than what is read.
+#[inline(always)]
+fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
+    let square = search.whiten::<V>(reading, &mut scratch.whitened);
+    let (minima, count) = search.minima::<V>(square, scratch);
+    let best = minima[0];
+    estimate.modes.clear();
+    estimate.further.clear();
+    if is_no_contact(search, square, best.misfit) {
+        estimate.contact =
+            ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
+        estimate.status = Status::NoContact;
+        return;
+    }
+    let sd_m = best.covariance[0].sqrt();
+    let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
+    if count == 1 && clear && sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite() {
+        let half_m = NORMAL_95 * sd_m;
+        estimate.contact = contact(search, &best, (best.x_m - half_m, best.x_m + half_m));
+        estimate.status = Status::Located;
+    } else {
+        weigh(search, &minima[..count], scratch.profile.misfits(), estimate);
+    }
+    if best.misfit > search.worst_misfit {
+        estimate.status = Status::OutsideModel;
+    }
+}
+
+/// Writes the estimate from minima that compete, or one that is wide or near an end.
+#[cold]
+fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64], estimate: &mut Estimate) {
     let shares = shares(minima, search.table.length_m);
-    let x_95_m = interval(search, minima, &shares, &scratch.misfits);
-    let mut estimate = Estimate::of_contact(contact(search, &best, x_95_m), Status::Located);
+    let x_95_m = interval(search, minima, &shares, misfits);
+    estimate.contact = contact(search, &minima[0], x_95_m);
+    estimate.status = Status::Located;
     for (minimum, share) in minima.iter().zip(&shares).skip(1) {
         if *share >= MODE_THAT_MATTERS {
             let alone = single_interval(minimum, search.table.length_m);
@@ -32,10 +90,6 @@ pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch
             estimate.status = Status::Ambiguous;
         }
     }
-    if best.misfit > search.worst_misfit {
-        estimate.status = Status::OutsideModel;
-    }
-    estimate
 }
 
 /// The estimate of as many contacts as the reading shows, up to `most`.
@@ -49,8 +103,8 @@ pub(super) fn locate_several(
     if one.status != Status::OutsideModel {
         return one;
     }
-    let square = scratch.whitened.iter().map(|d| d * d).sum();
-    let single = search.minima(square, scratch).0[0];
+    let square = scratch.whitened.channels(search.live.len()).iter().map(|d| d * d).sum();
+    let single = search.minima::<Array>(square, scratch).0[0];
     let mut least = criterion(single.misfit, 1, search.force.unknowns(), search);
     let mut best = None;
     for count in 2..=most {
@@ -80,10 +134,12 @@ pub(super) fn locate_several(
 
 /// Whether noise alone explains a reading of whitened length `square`, and better than a contact whose best misfit is
 /// `misfit`, by the criterion that also counts several contacts.
+#[inline(always)]
 fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
-    square <= criterion(misfit, 1, search.force.unknowns(), search) && square <= search.worst_noise
+    square <= misfit + search.charge && square <= search.worst_noise
 }
 
+#[inline(always)]
 fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEstimate {
     let [xx, xf, ff] = minimum.covariance;
     // On a line of length l nothing is known less than of a uniform distribution.
@@ -98,8 +154,8 @@ fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEst
 }
 
 /// Each minimum's share of the probability, by Laplace's approximation within the surface's ends.
-fn shares(minima: &[Minimum], length_m: f64) -> [f64; super::search::MOST_MINIMA] {
-    let mut shares = [0.0; super::search::MOST_MINIMA];
+fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
+    let mut shares = [0.0; MOST_MINIMA];
     if minima.len() == 1 {
         shares[0] = 1.0;
         return shares;
@@ -121,7 +177,7 @@ fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
 /// The 95 % interval of the position over all minima.
 fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64]) -> (f64, f64) {
     let length_m = search.table.length_m;
-    let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > 1.5 * search.table.spacing_m();
+    let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > MOST_SPACINGS * search.spacing.h_m;
     if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
         return interval_of_profile(misfits, length_m);
     }

@@ -1,8 +1,10 @@
 //! A fitted influence locator of a surface with a model.
 
-use super::answer::{locate_one, locate_several};
+use super::answer::{Rows, locate_one, locate_several};
 use super::belief::ForceBelief;
-use super::search::{Scratch, Search};
+use super::lanes;
+use super::scratch::Scratch;
+use super::search::Search;
 use super::table::InfluenceTable;
 use crate::bench::Bench;
 use crate::method::{Locate, LocatorFault};
@@ -60,6 +62,11 @@ impl BeamLocator {
         &self.stored.parts.table
     }
 
+    #[cfg(test)]
+    pub(super) fn search(&self) -> &Search {
+        &self.search
+    }
+
     /// What is known of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
@@ -90,6 +97,26 @@ impl BeamLocator {
             1 => locate_one(&self.search, reading, scratch),
             most => locate_several(&self.search, most, reading, scratch),
         }
+    }
+
+    /// Locates a contact in each reading: `readings` are one after the other, each with a value for every channel, and
+    /// each estimate is written over. As many as both hold are located, and their number is returned.
+    ///
+    /// An estimate is the one that [`BeamLocator::locate_with`] gives; of one that is used again, no more is written than
+    /// what is read.
+    pub fn locate_batch(&self, readings: &[f64], scratch: &mut Scratch, estimates: &mut [Estimate]) -> usize {
+        let channels = self.stored.parts.table.sensors;
+        let count = (readings.len() / channels).min(estimates.len());
+        let rows = Rows { readings, channels };
+        match self.stored.contacts {
+            1 => lanes::locate_rows(&self.search, rows, scratch, estimates),
+            most => {
+                for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+                    *estimate = locate_several(&self.search, most, reading, scratch);
+                }
+            }
+        }
+        count
     }
 }
 

@@ -3,14 +3,18 @@
 
 mod answer;
 mod belief;
+mod coarse;
 mod config;
 mod fitting;
 mod hyperparameters;
+mod lanes;
 mod locator;
 pub mod measured;
 mod posterior;
 mod presses;
 mod prior;
+mod refine;
+mod scratch;
 mod search;
 mod several;
 mod table;
@@ -19,7 +23,7 @@ pub use belief::ForceBelief;
 pub use config::{InfluenceConfig, InfluenceSource};
 pub use fitting::InfluenceFitError;
 pub use locator::BeamLocator;
-pub use search::Scratch;
+pub use scratch::Scratch;
 pub use table::InfluenceTable;
 
 use crate::bench::Bench;
@@ -96,5 +100,7 @@ impl Locate for InfluenceLocator {
     }
 }
 
+#[cfg(test)]
+mod batch_tests;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,9 @@
 //! numbers. How many there are is decided by the extended Bayesian information criterion (Chen and Chen, Biometrika 95,
 //! 2008), which also charges for the number of places that a contact could have been at.
 
-use super::search::{STRIDE, Scratch, Search};
+use super::coarse::{COARSE, STRIDE};
+use super::scratch::Scratch;
+use super::search::Search;
 use crate::contact::Position;
 use crate::numerics::Cholesky;
 use ndarray::{Array1, Array2};
@@ -60,9 +62,12 @@ impl Together {
 
 /// The criterion of [`Together::criterion`] for `contacts` with `unknowns` each.
 pub(super) fn criterion(misfit: f64, contacts: usize, unknowns: usize, search: &Search) -> f64 {
-    let channels = search.live.len() as f64;
-    let places = search.coarse_nodes() as f64;
-    misfit + contacts as f64 * (unknowns as f64 * channels.ln() + 2.0 * places.ln())
+    misfit + contacts as f64 * charge(unknowns, search.live.len())
+}
+
+/// What a contact with `unknowns` costs by the criterion, for `channels` channels.
+pub(super) fn charge(unknowns: usize, channels: usize) -> f64 {
+    unknowns as f64 * (channels as f64).ln() + 2.0 * (COARSE as f64).ln()
 }
 
 /// The best explanation of a whitened reading by `count` contacts, where that can be told at all.
@@ -70,14 +75,15 @@ pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Optio
     if 2 * count > search.live.len() {
         return None;
     }
-    let start = best_nodes(search, &scratch.whitened, count)?;
+    let whitened = scratch.whitened.channels(search.live.len());
+    let start = best_nodes(search, whitened, count)?;
     let spacing_m = STRIDE as f64 * search.table.spacing_m();
-    refine(search, &scratch.whitened, start.into_iter().map(|node| node as f64 * spacing_m).collect())
+    refine(search, whitened, start.into_iter().map(|node| node as f64 * spacing_m).collect())
 }
 
 /// The nodes whose influences explain the most, with every force at least 0.
 fn best_nodes(search: &Search, whitened: &[f64], count: usize) -> Option<Vec<usize>> {
-    let nodes = search.coarse_nodes();
+    let nodes = COARSE;
     let column = |node: usize| search.table.at_node(STRIDE * node);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let gram = Array2::from_shape_fn((nodes, nodes), |(i, j)| dot(column(i), column(j)));

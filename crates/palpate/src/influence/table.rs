@@ -27,9 +27,37 @@ pub(super) struct Cell {
     /// The node to the left.
     pub node: usize,
     /// Weights of left value, right value, left slope, right slope in the function.
-    value: [f64; 4],
+    pub value: [f64; 4],
     /// The same for the function's derivative.
-    slope: [f64; 4],
+    pub slope: [f64; 4],
+}
+
+/// Evenly spaced nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spacing {
+    /// Distance between nodes, in metres.
+    pub h_m: f64,
+    inverse_h: f64,
+    /// The last node.
+    last: usize,
+}
+
+impl Spacing {
+    /// The cell that holds `x_m`, which is held to the surface.
+    #[inline(always)]
+    pub fn cell(&self, x_m: f64) -> Cell {
+        let (h, inverse_h) = (self.h_m, self.inverse_h);
+        let place = (x_m * inverse_h).clamp(0.0, self.last as f64);
+        let node = (place as u32 as usize).min(self.last - 1);
+        let t = place - node as f64;
+        let (t2, t3) = (t * t, t * t * t);
+        let bump = 6.0 * (t - t2) * inverse_h;
+        Cell {
+            node,
+            value: [2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, h * (t3 - 2.0 * t2 + t), h * (t3 - t2)],
+            slope: [-bump, bump, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t],
+        }
+    }
 }
 
 impl InfluenceTable {
@@ -56,24 +84,15 @@ impl InfluenceTable {
         &self.values[node * self.sensors..(node + 1) * self.sensors]
     }
 
+    /// Where the nodes are.
+    pub(super) fn spacing(&self) -> Spacing {
+        let h_m = self.spacing_m();
+        Spacing { h_m, inverse_h: 1.0 / h_m, last: self.nodes() - 1 }
+    }
+
     /// The cell that holds `x_m`, which is held to the surface.
-    #[inline]
     pub(super) fn cell(&self, x_m: f64) -> Cell {
-        let h = self.spacing_m();
-        let place = (x_m / h).clamp(0.0, (self.nodes() - 1) as f64);
-        let node = (place as usize).min(self.nodes() - 2);
-        let t = place - node as f64;
-        let (t2, t3) = (t * t, t * t * t);
-        Cell {
-            node,
-            value: [2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, h * (t3 - 2.0 * t2 + t), h * (t3 - t2)],
-            slope: [
-                (6.0 * t2 - 6.0 * t) / h,
-                (6.0 * t - 6.0 * t2) / h,
-                3.0 * t2 - 4.0 * t + 1.0,
-                3.0 * t2 - 2.0 * t,
-            ],
-        }
+        self.spacing().cell(x_m)
     }
 
     /// Calls `each` with sensor, value and slope, for every sensor at a place.

@@ -1,0 +1,243 @@
+//! Where to look: the misfit at every STRIDE-th node, its valleys, and where in a valley to start.
+//!
+//! Symbols as in [`super::search`]. A chord joins the influences of two neighbouring coarse nodes, times the force where
+//! it is known. How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve strays from
+//! its chord is known beforehand, so a valley's lowest misfit is bounded from below without going there.
+
+use super::belief::ForceBelief;
+use super::lanes::Eight;
+use super::table::InfluenceTable;
+
+/// The search looks at every so many nodes; misfits between them are smooth.
+pub(super) const STRIDE: usize = 4;
+
+/// How many nodes it looks at.
+pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
+
+/// Nodes are searched eight side by side.
+const BLOCKS: usize = COARSE.div_ceil(8);
+
+/// Valleys that may matter; more never compete in practice.
+pub(super) const MOST_MINIMA: usize = 4;
+
+/// A reading's misfits along the surface.
+#[derive(Clone, Debug)]
+pub(super) struct Profile {
+    /// The misfit at every coarse node, after an infinite one and before others that fill up.
+    misfits: [f64; 8 * BLOCKS + 2],
+    /// d·f at every coarse node.
+    products: [[f64; 8]; BLOCKS],
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self { misfits: [f64::INFINITY; 8 * BLOCKS + 2], products: [[0.0; 8]; BLOCKS] }
+    }
+}
+
+impl Profile {
+    /// The misfit at every coarse node.
+    pub fn misfits(&self) -> &[f64] {
+        &self.misfits[1..=COARSE]
+    }
+
+    /// The lowest valleys and how many, lowest first: nodes no higher than both neighbours.
+    #[inline(always)]
+    pub fn valleys<V: Eight>(&self) -> ([usize; MOST_MINIMA], usize) {
+        let (left, here, right) =
+            (self.misfits.as_chunks().0, self.misfits[1..].as_chunks().0, self.misfits[2..].as_chunks().0);
+        let mut bits = 0u64;
+        for b in 0..BLOCKS {
+            let block = V::load(&here[b]).is_minimum(V::load(&left[b]), V::load(&right[b]));
+            bits |= u64::from(block) << (8 * b);
+        }
+        let (mut lowest, mut count) = ([0; MOST_MINIMA], 0);
+        while bits != 0 {
+            let node = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let value = self.misfits[node + 1];
+            let mut rank = count;
+            while rank > 0 && value < self.misfits[lowest[rank - 1] + 1] {
+                rank -= 1;
+            }
+            if rank < MOST_MINIMA {
+                lowest[rank..].rotate_right(1);
+                lowest[rank] = node;
+                count = (count + 1).min(MOST_MINIMA);
+            }
+        }
+        (lowest, count)
+    }
+}
+
+/// The influences at the coarse nodes and between them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Coarse {
+    force: ForceBelief,
+    /// f, channel by channel, padded with zeros to groups of eight channels.
+    influences: Vec<[[f64; 8]; BLOCKS]>,
+    /// What the misfit has beside |d|² and the product, infinite where no node is: |W·f|² where W is known.
+    own: [[f64; 8]; BLOCKS],
+    /// 1/(|f|² + the force's precision).
+    inverse_norms: [[f64; 8]; BLOCKS],
+    /// |f|².
+    norms: Vec<f64>,
+    /// Number k lies before node k; the first and the last lie beyond the ends.
+    chords: Vec<Chord>,
+    /// Distance between coarse nodes.
+    h_m: f64,
+}
+
+/// Between two coarse nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Chord {
+    /// The product of f at the ends.
+    cross: f64,
+    /// The chord's squared length, and one over twice that.
+    square: f64,
+    half_inverse: f64,
+    /// How far the curve is from the chord, at most.
+    sag: f64,
+    /// The least weight of a channel.
+    least_weight: f64,
+}
+
+/// Beyond an end: no way leads there.
+const BEYOND: Chord = Chord { cross: 0.0, square: 0.0, half_inverse: 1.0, sag: 0.0, least_weight: 1.0 };
+
+impl Coarse {
+    /// Of a whitened table; `weights` of every cell's channels, padded to groups of eight.
+    pub fn new(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Self {
+        let at = |node: usize| table.at_node(STRIDE * node);
+        let groups = table.sensors.div_ceil(8);
+        let mut influences = vec![[[0.0; 8]; BLOCKS]; 8 * groups];
+        let (mut own, mut inverse_norms) = ([[f64::INFINITY; 8]; BLOCKS], [[0.0; 8]; BLOCKS]);
+        let norms: Vec<f64> = (0..COARSE).map(|node| at(node).iter().map(|f| f * f).sum()).collect();
+        let (scale, precision) = match force {
+            ForceBelief::Known(force_n) => (force_n, 0.0),
+            belief => (0.0, belief.mean_and_precision().1),
+        };
+        for (node, norm) in norms.iter().enumerate() {
+            let (block, lane) = (node / 8, node % 8);
+            own[block][lane] = scale * scale * norm;
+            inverse_norms[block][lane] = 1.0 / (norm + precision).max(f64::MIN_POSITIVE);
+            influences.iter_mut().zip(at(node)).for_each(|(channel, f)| channel[block][lane] = *f);
+        }
+        let scale = if scale > 0.0 { scale } else { 1.0 };
+        let inner = (1..COARSE).map(|node| {
+            let cells = STRIDE * groups;
+            Chord::new(table, node, scale, &weights[(node - 1) * cells..node * cells])
+        });
+        let chords = std::iter::once(BEYOND).chain(inner).chain([BEYOND]).collect();
+        let h_m = STRIDE as f64 * table.spacing_m();
+        Self { force, influences, own, inverse_norms, norms, chords, h_m }
+    }
+
+    /// The misfit at every coarse node, with the best force there, of a reading that was whitened to length `square`.
+    #[inline(always)]
+    pub fn scan<V: Eight>(&self, square: f64, whitened: &[[f64; 8]], profile: &mut Profile) {
+        let mut products = [V::splat(0.0); BLOCKS];
+        for (channels, d) in self.influences.as_chunks::<8>().0.iter().zip(whitened) {
+            for i in 0..8 {
+                let d = V::splat(d[i]);
+                for b in 0..BLOCKS {
+                    products[b] = products[b].add(d.mul(V::load(&channels[i][b])));
+                }
+            }
+        }
+        let misfits = profile.misfits[1..].as_chunks_mut().0;
+        if let ForceBelief::Known(force_n) = self.force {
+            let (square, twice) = (V::splat(square), V::splat(2.0 * force_n));
+            for b in 0..BLOCKS {
+                square.add(V::load(&self.own[b]).sub(twice.mul(products[b]))).store(&mut misfits[b]);
+            }
+            return;
+        }
+        let (mean, precision) = self.force.mean_and_precision();
+        let constant = V::splat(square + mean * mean * precision);
+        for b in 0..BLOCKS {
+            let pull = products[b].add(V::splat(mean * precision)).max(V::splat(0.0));
+            let explained = pull.mul(pull).mul(V::load(&self.inverse_norms[b]));
+            constant.sub(explained).add(V::load(&self.own[b])).store(&mut misfits[b]);
+            products[b].store(&mut profile.products[b]);
+        }
+    }
+
+    /// Where to start in the valley at `node`, and a misfit below which it does not go.
+    #[inline(always)]
+    pub fn start(&self, profile: &Profile, node: usize) -> (f64, f64) {
+        let (t, floor) = match self.force {
+            ForceBelief::Known(_) => self.along_chords(profile, node),
+            _ => (self.between_rays(profile, node), f64::NEG_INFINITY),
+        };
+        ((node as f64 + t) * self.h_m, floor)
+    }
+
+    /// How far from `node`, in coarse nodes, a chord comes closest to d, and the least misfit that its curve may have.
+    #[inline(always)]
+    fn along_chords(&self, profile: &Profile, node: usize) -> (f64, f64) {
+        let here = profile.misfits[node + 1];
+        let (left, right) = (&self.chords[node], &self.chords[node + 1]);
+        let (t_left, left_square) = left.closest(here, profile.misfits[node]);
+        let (t_right, right_square) = right.closest(here, profile.misfits[node + 2]);
+        let t = if left_square < right_square { -t_left } else { t_right };
+        (t, left.floor(left_square).min(right.floor(right_square)))
+    }
+
+    /// How far from `node`, in coarse nodes, two neighbours' influences mix to what is closest to d with any force.
+    #[inline(always)]
+    fn between_rays(&self, profile: &Profile, node: usize) -> f64 {
+        let product = |node: usize| profile.products.as_flattened()[node];
+        let (p, n) = (product(node), self.norms[node]);
+        for (other, sign) in [(node + 1, 1.0), (node.wrapping_sub(1), -1.0)] {
+            let Some(other_n) = self.norms.get(other) else { continue };
+            let cross = self.chords[other.max(node)].cross;
+            let (here, there) = (p * other_n - product(other) * cross, product(other) * n - p * cross);
+            if here > 0.0 && there >= 0.0 {
+                return sign * there / (here + there);
+            }
+        }
+        0.0
+    }
+}
+
+impl Chord {
+    /// Between coarse node `node` − 1 and `node`, of influences times `scale`; `weights` of its cells.
+    fn new(table: &InfluenceTable, node: usize, scale: f64, weights: &[[f64; 8]]) -> Self {
+        const PARTS: usize = 32;
+        // The curve between the places that are looked at.
+        const MARGIN: f64 = 1.1;
+        let (from, to) = (table.at_node(STRIDE * (node - 1)), table.at_node(STRIDE * node));
+        let ends = || from.iter().zip(to);
+        let square = scale * scale * ends().map(|(a, b)| (b - a) * (b - a)).sum::<f64>();
+        let strays = (1..PARTS).map(|part| {
+            let t = part as f64 / PARTS as f64;
+            let x_m = ((node - 1) as f64 + t) * STRIDE as f64 * table.spacing_m();
+            let mut sum = 0.0;
+            table.for_each(table.cell(x_m), |s, f, _| sum += (f - from[s] - t * (to[s] - from[s])).powi(2));
+            scale * sum.sqrt()
+        });
+        Self {
+            cross: ends().map(|(a, b)| a * b).sum(),
+            square,
+            half_inverse: if square > 0.0 { 0.5 / square } else { 0.0 },
+            sag: MARGIN * strays.fold(0.0, f64::max),
+            least_weight: weights.as_flattened().iter().copied().fold(1.0, f64::min),
+        }
+    }
+
+    /// How far from the end with misfit `here`, no higher than the misfit at the other, the chord comes closest to d,
+    /// and the square of how close.
+    #[inline(always)]
+    fn closest(&self, here: f64, other: f64) -> (f64, f64) {
+        let t = (0.5 + (here - other) * self.half_inverse).max(0.0);
+        (t, (here - t * t * self.square).max(0.0))
+    }
+
+    /// The least misfit on the curve, where the chord comes as close as the root of `square`.
+    #[inline(always)]
+    fn floor(&self, square: f64) -> f64 {
+        let least = (square.sqrt() - self.sag).max(0.0);
+        self.least_weight * least * least
+    }
+}

@@ -1,0 +1,66 @@
+//! Lanes as plain arrays: for every machine, and the twin that the instruction sets are held against.
+
+use super::Eight;
+
+/// Eight numbers in an array.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::influence) struct Array(pub(super) [f64; 8]);
+
+/// Calls to `std::array::from_fn` may stay calls; a loop over a filled array never does.
+macro_rules! each_lane {
+    ($a:expr, $lane:ident => $value:expr) => {{
+        let mut result = $a;
+        for $lane in 0..8 {
+            result[$lane] = $value;
+        }
+        Self(result)
+    }};
+}
+
+impl Eight for Array {
+    #[inline(always)]
+    fn load(values: &[f64; 8]) -> Self {
+        Self(*values)
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64; 8]) {
+        *values = self.0;
+    }
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value; 8])
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        each_lane!(self.0, l => self.0[l] + other.0[l])
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        each_lane!(self.0, l => self.0[l] - other.0[l])
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        each_lane!(self.0, l => self.0[l] * other.0[l])
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        each_lane!(self.0, l => self.0[l] / other.0[l])
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        each_lane!(self.0, l => if self.0[l] > other.0[l] { self.0[l] } else { other.0[l] })
+    }
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let a = self.0;
+        ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
+    }
+    #[inline(always)]
+    fn is_minimum(self, left: Self, right: Self) -> u8 {
+        let mut bits = 0;
+        for l in 0..8 {
+            bits |= u8::from((self.0[l] <= left.0[l]) & (self.0[l] < right.0[l])) << l;
+        }
+        bits
+    }
+}
