@@ -23,6 +23,12 @@ pub enum InfluenceFitError {
     /// The surface has no model.
     #[error("the surface is `measured`: it has no mechanics that influence functions could start from")]
     NoModel,
+    /// What only influence functions of a surface with a model can do.
+    #[error("the surface is `measured`: {what} needs a surface with mechanics, such as a beam")]
+    NotOnMeasured {
+        /// The setting.
+        what: &'static str,
+    },
     /// A sensor that no model explains.
     #[error("sensor {sensor} is a raw channel, which no mechanics explains")]
     RawSensor {

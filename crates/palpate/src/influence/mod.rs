@@ -52,6 +52,7 @@ impl Fit for InfluenceConfig {
         keep_going: &mut dyn FnMut() -> bool,
     ) -> Result<Option<InfluenceLocator>, InfluenceFitError> {
         if task.bench.surface.model().is_none() {
+            self.check_measured()?;
             let fitted = MeasuredConfig::default().fit(task, keep_going)?;
             return Ok(fitted.map(|locator| InfluenceLocator::Measured(Box::new(locator))));
         }
@@ -61,6 +62,19 @@ impl Fit for InfluenceConfig {
 }
 
 impl InfluenceConfig {
+    /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
+    /// correct.
+    fn check_measured(&self) -> Result<(), InfluenceFitError> {
+        match self {
+            Self { from: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
+            Self { contacts: 2.., .. } => {
+                Err(InfluenceFitError::NotOnMeasured { what: "telling several contacts apart" })
+            }
+            Self { force_sd_n: Some(_), .. } => Err(InfluenceFitError::NotOnMeasured { what: "`force_sd`" }),
+            _ => Ok(()),
+        }
+    }
+
     /// Fits the influence functions of a surface with a model; `None` when `keep_going`, asked now and then, says no.
     ///
     /// # Errors
@@ -100,7 +114,5 @@ impl Locate for InfluenceLocator {
     }
 }
 
-#[cfg(test)]
-mod batch_tests;
 #[cfg(test)]
 mod tests;

@@ -1,3 +1,5 @@
+mod batch;
+
 use super::*;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
@@ -16,13 +18,13 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const SOURCES: [InfluenceSource; 2] = [InfluenceSource::Recording, InfluenceSource::Corrected];
 
 /// The paper's bench with another noise and number of repeats.
-pub(super) fn rig(noise: &str, repeats: usize) -> Rig {
+fn rig(noise: &str, repeats: usize) -> Rig {
     let text = include_str!("../../../../examples/paper.toml");
     let text = text.replace("noise = \"5 um\"", &format!("noise = \"{noise}\""));
     Rig::from_toml(&text.replace("repeats = 1", &format!("repeats = {repeats}"))).unwrap()
 }
 
-pub(super) fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
+fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
     config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
 }
 
@@ -38,7 +40,7 @@ fn clean(bench: &Bench, contacts: &[(f64, f64)]) -> Vec<f64> {
 }
 
 /// Readings with the bench's noise.
-pub(super) fn noisy(bench: &Bench, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+fn noisy(bench: &Bench, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     measure(&bench.layout, &clean(bench, contacts), &ChannelErrors::none(&bench.layout), rng)
 }
 

@@ -11,6 +11,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::{HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale};
 use crate::bench::Bench;
 use crate::contact::Position;
+use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::mechanics::{Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
@@ -293,4 +294,21 @@ fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
     let recording = bench.read_recording_pair(("readings", readings), ("contacts", contacts)).unwrap();
     assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
     check("eflesh", &five_folds(&bench, &recording), (0.312, 0.343), 0.10);
+}
+
+#[test]
+fn settings_that_need_mechanics_are_refused() {
+    let bench = Rig::from_toml(include_str!("../../../../../examples/eflesh.toml")).unwrap().bench;
+    let provenance = Provenance { source: String::new(), rows: 0, digests: vec![], seed: None };
+    let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
+    let recording = Recording { channels, kinds, rows: vec![], provenance };
+    let good = InfluenceConfig::default();
+    let refused = |config: InfluenceConfig| {
+        let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
+        config.fit(task, &mut || true).unwrap_err().to_string()
+    };
+    assert!(refused(InfluenceConfig { from: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
+    assert!(refused(InfluenceConfig { contacts: 2, ..good }).contains("several contacts"));
+    assert!(refused(InfluenceConfig { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
+    assert!(refused(good).contains("0 distinct positions"));
 }

@@ -1,12 +1,12 @@
 //! A batch against readings one by one, and every instruction set against plain arrays.
 
-use super::InfluenceConfig;
-use super::answer::{NOTHING, Rows};
-use super::belief::ForceBelief;
-use super::lanes::{InstructionSet, locate_rows_by};
-use super::scratch::Scratch;
-use super::tests::{fit, noisy, rig};
+use super::{fit, noisy, rig};
 use crate::bench::Bench;
+use crate::influence::InfluenceConfig;
+use crate::influence::answer::{NOTHING, Rows};
+use crate::influence::belief::ForceBelief;
+use crate::influence::lanes::{InstructionSet, locate_rows_by};
+use crate::influence::scratch::Scratch;
 use crate::method::Locate;
 use crate::simulate::simulate;
 use palpate_core::{Estimate, Status};
