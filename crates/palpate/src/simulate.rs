@@ -1,15 +1,17 @@
 //! Recordings made by a rig's model instead of its bench.
 
+use std::sync::Arc;
+
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::ArrangementError;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::mechanics::{Extent, Surface};
+use crate::mechanics::{Extent, InfluenceFunction, Surface};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
-use crate::sensing::{ChannelErrors, Layout, measure};
+use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
 use crate::units::format_length_mm;
 
 /// Why a rig cannot be simulated.
@@ -43,12 +45,28 @@ pub enum SimulateError {
     },
 }
 
-/// What the sensors of `layout` would read without any fault when `contact` touches `surface`: force times influence,
-/// in the SI unit of each sensor.
+/// The sensors of a layout under a surface with a model, each with its influence function.
+pub struct CleanSensors<'a> {
+    functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
+}
+
+impl<'a> CleanSensors<'a> {
+    /// The influence functions of all sensors of `layout`.
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
+        let function = |sensor: &Sensor| surface.influence_function(sensor.kind, sensor.position);
+        Self { functions: layout.sensors.iter().map(function).collect() }
+    }
+
+    /// What the sensors would read without any fault at `contact`: force times influence, in the SI unit of each sensor.
+    pub fn reading(&self, contact: Contact) -> Vec<f64> {
+        self.functions.iter().map(|function| contact.force_n * function.at(contact.position)).collect()
+    }
+}
+
+/// What the sensors of `layout` would read without any fault when `contact` touches `surface`; for more than one contact
+/// of the same surface see [`CleanSensors`].
 pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -> Vec<f64> {
-    let influence =
-        |sensor: &crate::sensing::Sensor| surface.influence(sensor.kind, sensor.position, contact.position);
-    layout.sensors.iter().map(|sensor| contact.force_n * influence(sensor)).collect()
+    CleanSensors::new(surface, layout).reading(contact)
 }
 
 /// Presses the rig's simulated surface at its training positions, as often as the rig says; see [`simulate_at`].
@@ -77,13 +95,14 @@ pub fn simulate_at(
     let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
     let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let sensors = CleanSensors::new(surface, &bench.layout);
     let errors = ChannelErrors::draw(&bench.layout, &mut rng);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
         if !surface.contains(position) {
             return Err(SimulateError::OffSurface { number: i + 1, position, extent: surface.extent() });
         }
-        let clean = clean_reading(surface, &bench.layout, Contact { position, force_n });
+        let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
             let reading = measure(&bench.layout, &clean, &errors, &mut rng);
             rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });

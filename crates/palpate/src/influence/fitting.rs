@@ -136,7 +136,7 @@ fn fill_kind(
     let presses_m: Vec<f64> = presses.presses.iter().map(|press| press.x_m).collect();
     let remainders = Remainders::new(surface, kind, &presses_m, &places.0);
     let with = |s: usize, kept: &[usize]| {
-        let prior = Prior { surface, sensor: &layout.sensors[s], mean };
+        let prior = Prior::new(surface, &layout.sensors[s], mean);
         SensorPresses::new(prior, presses, s, presses.noise_variance(layout, s), kept, &remainders.presses)
     };
     let living: Vec<usize> = members.iter().copied().filter(|s| !layout.sensors[*s].channel.dead).collect();

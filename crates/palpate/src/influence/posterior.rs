@@ -49,7 +49,6 @@ impl<'a> SensorPresses<'a> {
         let surprise = |j: usize| of(j).mean[index] - of(j).force_n * prior.mean(parts[j]);
         let mean_force_n = presses.mean_force_n();
         Self {
-            prior,
             force_n: indices.clone().map(|j| of(j).force_n).collect(),
             count: indices.clone().map(|j| of(j).count).collect(),
             surprise: indices.map(surprise).collect(),
@@ -58,8 +57,9 @@ impl<'a> SensorPresses<'a> {
             }),
             parts,
             noise,
-            scale: prior.full_scale() * mean_force_n,
+            scale: prior.full_scale * mean_force_n,
             mean_force_n,
+            prior,
         }
     }
 

@@ -4,9 +4,10 @@
 //! covariance is that of a wrong gain, of a sensor that sits beside its place, and of a remainder (see [`Remainders`]).
 
 use crate::contact::Position;
-use crate::mechanics::Surface;
+use crate::mechanics::{InfluenceFunction, Surface};
 use crate::sensing::{Sensor, SensorKind};
 use ndarray::{Array1, Array2};
+use std::sync::Arc;
 
 /// Standard deviations of what an influence function may deviate by, shared by sensors of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,11 +39,15 @@ pub(super) enum Mean {
 }
 
 /// The prior of one sensor's influence function.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Prior<'a> {
-    pub surface: &'a dyn Surface,
-    pub sensor: &'a Sensor,
-    pub mean: Mean,
+    mean: Mean,
+    /// The largest influence, against which remainders are measured.
+    pub full_scale: f64,
+    function: Arc<dyn InfluenceFunction + 'a>,
+    /// The functions of sensors a little to the left and to the right, and how far apart they are, in metres; none for a
+    /// sensor that cannot sit beside its place.
+    beside: Option<([Arc<dyn InfluenceFunction + 'a>; 2], f64)>,
 }
 
 /// What mechanics says of one sensor and one contact position.
@@ -54,26 +59,28 @@ pub(super) struct Parts {
     pub shift: f64,
 }
 
-impl Prior<'_> {
-    /// The largest influence, against which remainders are measured.
-    pub fn full_scale(&self) -> f64 {
-        self.surface.full_scale(self.sensor.kind)
+impl<'a> Prior<'a> {
+    /// The prior of `sensor` under `surface`.
+    pub fn new(surface: &'a dyn Surface, sensor: &Sensor, mean: Mean) -> Self {
+        let Sensor { kind, position, .. } = *sensor;
+        let function = |x_m| surface.influence_function(kind, Position { x_m, ..position });
+        let l = surface.length_m();
+        // A reaction sensor is part of its support, and does not sit beside it.
+        let beside = (kind != SensorKind::Reaction).then(|| {
+            let (left, right) = ((position.x_m - 1e-4 * l).max(0.0), (position.x_m + 1e-4 * l).min(l));
+            ([function(left), function(right)], right - left)
+        });
+        Self { mean, full_scale: surface.full_scale(kind), function: function(position.x_m), beside }
     }
 
     /// The parts at a contact position.
     pub fn parts(&self, x_m: f64) -> Parts {
-        let Sensor { kind, position, .. } = *self.sensor;
-        let influence = |sensor| self.surface.influence(kind, sensor, Position::along(x_m));
-        let l = self.surface.length_m();
-        // A reaction sensor is part of its support, and does not sit beside it.
-        let shift = if kind == SensorKind::Reaction {
-            0.0
-        } else {
-            let left = Position::along((position.x_m - 1e-4 * l).max(0.0));
-            let right = Position::along((position.x_m + 1e-4 * l).min(l));
-            (influence(right) - influence(left)) / (right.x_m - left.x_m)
-        };
-        Parts { model: influence(position), shift }
+        let contact = Position::along(x_m);
+        let shift = self
+            .beside
+            .as_ref()
+            .map_or(0.0, |([left, right], apart_m)| (right.at(contact) - left.at(contact)) / apart_m);
+        Parts { model: self.function.at(contact), shift }
     }
 
     /// The mean of the influence.
@@ -83,7 +90,7 @@ impl Prior<'_> {
 
     /// Covariance of the influence at a pair of contact positions, whose remainders' covariance is `remainder`.
     pub fn covariance(&self, spread: &Spread, a: Parts, b: Parts, remainder: f64) -> f64 {
-        let scale = self.full_scale() * spread.remainder;
+        let scale = self.full_scale * spread.remainder;
         let explained = spread.gain.powi(2) * a.model * b.model + spread.shift_m.powi(2) * a.shift * b.shift;
         explained + scale * scale * remainder
     }
@@ -129,15 +136,14 @@ fn mixture(surface: &dyn Surface, kind: SensorKind, positions_m: &[f64]) -> Arra
     let lines = if kind == SensorKind::Reaction { 2 } else { 0 };
     let mixed = if kind == SensorKind::Reaction { SensorKind::Deflection } else { kind };
     let scale = surface.full_scale(mixed);
+    let sensor = |column: usize| Position::along((column as f64 + 0.5) * l / MIXED as f64);
+    let functions: Vec<_> = (0..MIXED).map(|c| surface.influence_function(mixed, sensor(c))).collect();
     Array2::from_shape_fn((positions_m.len(), MIXED + lines), |(row, column)| {
         let x_m = positions_m[row];
         match column.checked_sub(MIXED) {
             Some(0) => MIXED as f64,
             Some(_) => MIXED as f64 * x_m / l,
-            None => {
-                let sensor = Position::along((column as f64 + 0.5) * l / MIXED as f64);
-                surface.influence(mixed, sensor, Position::along(x_m)) / scale
-            }
+            None => functions[column].at(Position::along(x_m)) / scale,
         }
     })
 }

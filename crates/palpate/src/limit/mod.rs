@@ -24,9 +24,11 @@ pub use error::LimitError;
 pub use warning::{AMBIGUOUS_DISTANCE, BLIND_SHARE, FAINT_SIGNAL, LimitWarning, limit_warnings};
 pub use zone::Zone;
 
+use std::sync::Arc;
+
 use crate::bench::Bench;
-use crate::contact::{Contact, Position};
-use crate::mechanics::Surface;
+use crate::contact::Contact;
+use crate::mechanics::{InfluenceFunction, Surface};
 use crate::sensing::{Layout, SensorKind};
 
 /// What is known of the contact force.
@@ -53,14 +55,14 @@ impl Force {
 #[derive(Clone)]
 pub struct Limit<'a> {
     surface: &'a dyn Surface,
-    channels: Vec<Channel>,
+    channels: Vec<Channel<'a>>,
 }
 
 /// A live sensor.
-#[derive(Clone, Copy)]
-struct Channel {
+#[derive(Clone)]
+struct Channel<'a> {
     kind: SensorKind,
-    position: Position,
+    influence: Arc<dyn InfluenceFunction + 'a>,
     /// √(σ² + q²/12).
     sd: f64,
     range: Option<(f64, f64)>,
@@ -84,7 +86,8 @@ impl<'a> Limit<'a> {
                     resolution,
                 });
             }
-            Ok(Channel { kind: sensor.kind, position: sensor.position, sd, range: sensor.channel.range })
+            let influence = surface.influence_function(sensor.kind, sensor.position);
+            Ok(Channel { kind: sensor.kind, influence, sd, range: sensor.channel.range })
         });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         if channels.is_empty() {
@@ -137,7 +140,7 @@ impl<'a> Limit<'a> {
 
     /// Each live sensor's reading at a contact, without noise, over the standard deviation of its noise.
     pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
-        self.channels.iter().map(|channel| self.clean(channel, contact) / channel.sd).collect()
+        self.channels.iter().map(|channel| Self::clean(channel, contact) / channel.sd).collect()
     }
 
     /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
@@ -146,9 +149,8 @@ impl<'a> Limit<'a> {
     }
 
     /// What a sensor reads without noise, held at the ends of its range.
-    fn clean(&self, channel: &Channel, contact: Contact) -> f64 {
-        let value =
-            contact.force_n * self.surface.influence(channel.kind, channel.position, contact.position);
+    fn clean(channel: &Channel, contact: Contact) -> f64 {
+        let value = contact.force_n * channel.influence.at(contact.position);
         channel.range.map_or(value, |(low, high)| value.max(low).min(high))
     }
 
@@ -157,9 +159,9 @@ impl<'a> Limit<'a> {
         let Contact { position, force_n } = contact;
         let mut columns = Columns::default();
         let mut across = Vec::new();
-        for &Channel { kind, position: sensor, sd, range } in &self.channels {
-            let influence = self.surface.influence(kind, sensor, position);
-            let [along_x, along_y] = self.surface.influence_gradient(kind, sensor, position);
+        for Channel { influence, sd, range, .. } in &self.channels {
+            let [along_x, along_y] = influence.gradient(position);
+            let influence = influence.at(position);
             let reading = force_n * influence;
             let free = range.is_none_or(|(low, high)| low < reading && reading < high);
             let weight = if free { 1.0 / sd } else { 0.0 };

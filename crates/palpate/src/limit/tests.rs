@@ -6,6 +6,7 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::contact::Position;
 use crate::mechanics::{Beam, Extent};
 use crate::rig::Rig;
 
@@ -82,9 +83,27 @@ struct Pad;
 
 const PAD_WIDTH_M: f64 = 0.02;
 
+/// The influence of a sensor of the [`Pad`] at a position.
+struct Bump(Position);
+
+impl InfluenceFunction for Bump {
+    fn at(&self, contact: Position) -> f64 {
+        1e-4 * (-0.5 * (self.0.distance_m(contact) / PAD_WIDTH_M).powi(2)).exp()
+    }
+
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        let by_distance = -self.at(contact) / PAD_WIDTH_M.powi(2);
+        [by_distance * (contact.x_m - self.0.x_m), by_distance * (contact.y_m - self.0.y_m)]
+    }
+}
+
 impl Surface for Pad {
-    fn influence(&self, _: SensorKind, sensor: Position, contact: Position) -> f64 {
-        1e-4 * (-0.5 * (sensor.distance_m(contact) / PAD_WIDTH_M).powi(2)).exp()
+    fn influence_function(&self, _: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
+        Arc::new(Bump(sensor))
+    }
+
+    fn is_supported_at(&self, _: Position) -> bool {
+        false
     }
 
     fn full_scale(&self, kind: SensorKind) -> f64 {

@@ -1,8 +1,10 @@
 //! The simply supported beam in closed form, after Euler and Bernoulli.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Surface};
+use super::{Extent, InfluenceFunction, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
@@ -128,14 +130,23 @@ impl Span {
     }
 }
 
-impl Surface for Beam {
-    fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
-        let span = Span::new(self.length_m, sensor.x_m, contact.x_m);
+/// The influence function of one sensor on a [`Beam`].
+#[derive(Clone, Copy, Debug)]
+struct BeamInfluence<'a> {
+    beam: &'a Beam,
+    kind: SensorKind,
+    sensor_m: f64,
+}
+
+impl InfluenceFunction for BeamInfluence<'_> {
+    fn at(&self, contact: Position) -> f64 {
+        let Self { beam, kind, sensor_m } = *self;
+        let span = Span::new(beam.length_m, sensor_m, contact.x_m);
         match kind {
-            SensorKind::Deflection => self.deflection(span),
-            SensorKind::Slope => self.slope(span),
-            SensorKind::Strain => self.strain(span),
-            SensorKind::Reaction => self.reaction(sensor.x_m, contact.x_m),
+            SensorKind::Deflection => beam.deflection(span),
+            SensorKind::Slope => beam.slope(span),
+            SensorKind::Strain => beam.strain(span),
+            SensorKind::Reaction => beam.reaction(sensor_m, contact.x_m),
             SensorKind::Raw => 0.0,
         }
     }
@@ -143,18 +154,34 @@ impl Surface for Beam {
     /// In closed form: of the deflection, the slope with sensor and force exchanged (Maxwell's reciprocity,
     /// y(x; a) = y(a; x)); of the slope, (l² − 3·b² − 3·x²)/(6·E·I·l) on either side; of the strain, −(t/2)·x/(E·I·l)
     /// and mirrored with the sign changed, with its kink over the sensor; of the reactions, −1/l and 1/l.
-    fn influence_gradient(&self, kind: SensorKind, sensor: Position, contact: Position) -> [f64; 2] {
-        let (l, stiffness) = (self.length_m, self.bending_stiffness());
-        let Span { b, x, direction, .. } = Span::new(l, sensor.x_m, contact.x_m);
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        let Self { beam, kind, sensor_m } = *self;
+        let (l, stiffness) = (beam.length_m, beam.bending_stiffness());
+        let Span { b, x, direction, .. } = Span::new(l, sensor_m, contact.x_m);
         let along = match kind {
-            SensorKind::Deflection => self.slope(Span::new(l, contact.x_m, sensor.x_m)),
+            SensorKind::Deflection => beam.slope(Span::new(l, contact.x_m, sensor_m)),
             SensorKind::Slope => (l * l - 3.0 * b * b - 3.0 * x * x) / (6.0 * stiffness * l),
-            SensorKind::Strain => -direction * 0.5 * self.thickness_m * x / (stiffness * l),
+            SensorKind::Strain => -direction * 0.5 * beam.thickness_m * x / (stiffness * l),
             // A reaction is linear in the contact's position.
-            SensorKind::Reaction => (self.reaction(sensor.x_m, l) - self.reaction(sensor.x_m, 0.0)) / l,
+            SensorKind::Reaction => (beam.reaction(sensor_m, l) - beam.reaction(sensor_m, 0.0)) / l,
             SensorKind::Raw => 0.0,
         };
         [along, 0.0]
+    }
+}
+
+impl Surface for Beam {
+    fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
+        Arc::new(BeamInfluence { beam: self, kind, sensor_m: sensor.x_m })
+    }
+
+    fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
+        BeamInfluence { beam: self, kind, sensor_m: sensor.x_m }.at(contact)
+    }
+
+    fn is_supported_at(&self, position: Position) -> bool {
+        let l = self.length_m;
+        [0.0, l].iter().any(|support_m| (position.x_m - support_m).abs() <= 1e-9 * l)
     }
 
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;

@@ -1,7 +1,6 @@
 //! What a sensor reads when a unit force acts somewhere on the surface; nothing of recordings or estimators.
 
 mod beam;
-mod differences;
 mod extent;
 mod surface_spec;
 
@@ -9,28 +8,26 @@ pub use beam::{Beam, BeamError};
 pub use extent::Extent;
 pub use surface_spec::SurfaceSpec;
 
+use std::sync::Arc;
+
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
 /// An elastic surface with a model.
 ///
 /// Forces are positive downward, deflections upward, so deflections are negative as in the founding paper's eq. (1).
-pub trait Surface {
-    /// What a sensor of this `kind` at `sensor` reads per newton of downward force at `contact`, in SI units per
-    /// newton (m/N, rad/N, 1/N, N/N); 0 for a raw channel, which no model explains.
-    ///
-    /// Both positions must be on the surface; elsewhere the value has no meaning.
-    fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64;
+pub trait Surface: Send + Sync {
+    /// The influence function of a sensor of this `kind` at `sensor`, which must be on the surface. On a surface that is
+    /// solved by elements this is one solution, so ask once and keep the answer.
+    fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
 
-    /// How fast the influence changes as the contact moves along x and along y: (∂/∂x, ∂/∂y) of [`Surface::influence`],
-    /// in its unit per metre; 0 along y on a one-dimensional surface. Where the influence has a kink, some value
-    /// between those of its two sides.
-    ///
-    /// A model that knows it in closed form says so. This default takes differences of second order, precise to about
-    /// 10⁻¹⁰ of the full scale over the size of the surface.
-    fn influence_gradient(&self, kind: SensorKind, sensor: Position, contact: Position) -> [f64; 2] {
-        differences::gradient(self.extent(), contact, |at| self.influence(kind, sensor, at))
+    /// One value of an influence function, where no other of the same sensor is wanted.
+    fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
+        self.influence_function(kind, sensor).at(contact)
     }
+
+    /// Whether a support at `position` takes up force, so that its reaction can be measured.
+    fn is_supported_at(&self, position: Position) -> bool;
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
     fn full_scale(&self, kind: SensorKind) -> f64;
@@ -47,6 +44,17 @@ pub trait Surface {
     fn contains(&self, position: Position) -> bool {
         self.extent().contains(position)
     }
+}
+
+/// What one sensor reads per newton of downward force, as a function of where the force acts.
+pub trait InfluenceFunction: Send + Sync {
+    /// The reading per newton of downward force at `contact`, in SI units per newton (m/N, rad/N, 1/N, N/N); 0 for a raw
+    /// channel, which no model explains. Off the surface the value has no meaning.
+    fn at(&self, contact: Position) -> f64;
+
+    /// How fast it changes as the contact moves along x and along y, in its unit per metre; 0 along y on a
+    /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
+    fn gradient(&self, contact: Position) -> [f64; 2];
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Beam, Extent, Surface};
 
 /// The surface that is touched.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceSpec {
     /// A simply supported beam.

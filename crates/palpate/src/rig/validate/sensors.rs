@@ -137,13 +137,9 @@ impl Context<'_> {
         positions: &[Position],
         span: impl Fn(usize) -> std::ops::Range<usize>,
     ) -> Result<(), RigError> {
-        if kind != SensorKind::Reaction || self.surface.model().is_none() {
-            return Ok(());
-        }
-        let length_m = self.surface.extent().length_m;
-        let at_support =
-            |x_m: f64| [0.0, length_m].iter().any(|support| (x_m - support).abs() <= 1e-9 * length_m);
-        match positions.iter().position(|position| !at_support(position.x_m)) {
+        let (Some(surface), SensorKind::Reaction) = (self.surface.model(), kind) else { return Ok(()) };
+        let length_m = surface.length_m();
+        match positions.iter().position(|position| !surface.is_supported_at(*position)) {
             Some(i) => {
                 Err(RigProblem::NoSupport { number: i + 1, x_m: positions[i].x_m, length_m }.at(span(i)))
             }
