@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rand::SeedableRng;
+use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::ArrangementError;
@@ -80,7 +80,7 @@ pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
 }
 
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
-/// faulty channels report. Gains and offsets are drawn once for the recording, noise for each reading.
+/// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
 ///
 /// The same seed gives the same recording.
 ///
@@ -95,7 +95,10 @@ pub fn simulate_at(
     let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
     let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let sensors = CleanSensors::new(surface, &bench.layout);
+    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
+    let mut places = rng.clone();
+    places.jump();
+    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
     let errors = ChannelErrors::draw(&bench.layout, &mut rng);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
@@ -111,6 +114,23 @@ pub fn simulate_at(
     let source = "simulation".to_owned();
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
     Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
+}
+
+/// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
+/// surface's edge. A perfectly placed sensor stays where it is.
+pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
+    let mut placed = layout.clone();
+    for sensor in &mut placed.sensors {
+        let error_m = sensor.channel.position_error_m;
+        let mut beside =
+            |at_m: f64, size_m: f64| (at_m + error_m * rng.random_range(-1.0..=1.0)).clamp(0.0, size_m);
+        if error_m > 0.0 {
+            let Position { x_m, y_m } = sensor.position;
+            let y_m = extent.width_m.map_or(y_m, |width_m| beside(y_m, width_m));
+            sensor.position = Position { x_m: beside(x_m, extent.length_m), y_m };
+        }
+    }
+    placed
 }
 
 #[cfg(test)]

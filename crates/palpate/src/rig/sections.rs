@@ -54,6 +54,7 @@ pub(crate) struct SensorsSection {
     pub resolution: Key<RawQuantity>,
     pub gain_error: Key<RawQuantity>,
     pub offset_error: Key<RawQuantity>,
+    pub position_error: Key<RawQuantity>,
     pub range: Key<Vec<Spanned<RawQuantity>>>,
     pub dead: Key<Vec<Spanned<i64>>>,
 }

@@ -139,6 +139,8 @@ fn bad_sensors_are_refused_with_a_caret() {
             ("count = 8", "count = 8\nnoise = \"5 N\""),
             ("count = 8", "count = 8\nnoise = \"-5 um\""),
             ("count = 8", "count = 8\ngain_error = \"100 %\""),
+            ("count = 8", "count = 8\nposition_error = \"5 N\""),
+            ("\"deflection\"\ncount = 8", "\"reaction\"\npositions = [\"0 mm\"]\nposition_error = \"1 mm\""),
             ("count = 8", "count = 8\nrange = [\"5 mm\", \"-5 mm\"]"),
             ("count = 8", "count = 8\nrange = [\"5 mm\"]"),
             ("count = 8", "count = 8\ndead = [3, 9]"),
@@ -239,6 +241,7 @@ fn every_key_can_be_said() {
         resolution = "1 um"
         gain_error = "5 %"
         offset_error = "2 um"
+        position_error = "0.5 mm"
         range = ["-5 mm", "5 mm"]
         dead = [3]
         [[sensors]]

@@ -161,9 +161,21 @@ impl Context<'_> {
             resolution: size("resolution", &self.section.resolution)?,
             gain_error,
             offset_error: size("offset_error", &self.section.offset_error)?,
+            position_error_m: self.position_error(kind)?,
             range: self.range(dimension)?,
             dead: false,
         })
+    }
+
+    /// A reaction sensor is part of its support, and a raw channel's place means nothing.
+    fn position_error(&self, kind: SensorKind) -> Result<f64, RigError> {
+        let Some(raw) = &self.section.position_error else { return Ok(0.0) };
+        let unused = |with| Err(RigProblem::UnusedKey { key: "position_error", with }.at(raw.span()));
+        match kind {
+            SensorKind::Reaction => unused("measure = \"reaction\""),
+            SensorKind::Raw => unused("measure = \"raw\""),
+            _ => not_negative("position_error", raw, Dimension::Length),
+        }
     }
 
     fn range(&self, dimension: Dimension) -> Result<Option<(f64, f64)>, RigError> {
