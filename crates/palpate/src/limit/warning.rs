@@ -65,6 +65,8 @@ pub enum LimitWarning {
         signal_to_noise: f64,
         /// The contact force, in newtons.
         force_n: f64,
+        /// Whether there are supports without a reaction sensor at work.
+        reactions_would_help: bool,
     },
 }
 
@@ -75,7 +77,9 @@ pub enum LimitWarning {
 /// [`LimitError::Force`] for a force that is not positive and finite.
 pub fn limit_warnings(limit: &Limit, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
-    let survey = Survey { limit, force_n, force, grid: Grid::over(limit.surface.extent()) };
+    // A support that stands between the positions of the grid could be missed: next to it little may be told.
+    let grid = Grid::over(limit.surface.extent()).with(&limit.surface.force_supports());
+    let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
     warnings.extend(survey.mirrors());
     warnings.extend(survey.faint());
@@ -168,7 +172,8 @@ impl Survey<'_> {
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
             let at = inside.into_iter().min_by(|a, b| self.signal(*a).total_cmp(&self.signal(*b)))?;
             let signal_to_noise = self.signal(at);
-            Some(LimitWarning::Faint { zone, at, signal_to_noise, force_n: self.force_n })
+            let reactions_would_help = self.lacks_reactions();
+            Some(LimitWarning::Faint { zone, at, signal_to_noise, force_n: self.force_n, reactions_would_help })
         };
         found.into_iter().filter_map(warning).collect()
     }
@@ -235,6 +240,15 @@ impl LimitWarning {
             Self::Mirror { distance, .. } => {
                 format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
             }
+            // Over a rigid support nothing moves, however quiet the sensors are and however hard the touch.
+            Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < SAME => {
+                let sensor = if *reactions_would_help {
+                    "reaction sensors at the supports"
+                } else {
+                    "a sensor that notices a contact there"
+                };
+                format!("{sensor}; less noise or a harder touch does not help")
+            }
             Self::Faint { signal_to_noise, .. } => {
                 let factor = bound / signal_to_noise;
                 format!("{}, a harder touch, or a sensor that is nearer", less_noise(factor))
@@ -286,7 +300,7 @@ impl fmt::Display for LimitWarning {
                      other with a probability of up to {mistaken} %"
                 )
             }
-            Self::Faint { zone, at, signal_to_noise, force_n } => write!(
+            Self::Faint { zone, at, signal_to_noise, force_n, .. } => write!(
                 f,
                 "faint at {zone}: {force_n} N at {} stand out of the noise by {} standard deviations, fewer than \
                  {FAINT_SIGNAL}",
