@@ -66,10 +66,7 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(extent.length_m),
             beam.spec().supports_in_words(),
             beam.spec().sections_in_words(),
-            Quantity {
-                value: beam.spec().youngs_modulus_pa,
-                dimension: palpate::units::Dimension::Modulus
-            }
+            Quantity { value: beam.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
         ),
         SurfaceSpec::Measured(_) => match extent.width_m {
             Some(width_m) => {

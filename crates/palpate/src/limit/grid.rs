@@ -54,7 +54,8 @@ impl Grid {
         let rows = self.positions.len() / self.columns.max(1);
         let slack_m = 1e-6 * self.pitch_m();
         let new = |other: &Position| self.positions.iter().all(|at| (at.x_m - other.x_m).abs() > slack_m);
-        let (Some(first), Some(last), true) = (self.positions.first(), self.positions.last(), rows == 1) else {
+        let (Some(first), Some(last), true) = (self.positions.first(), self.positions.last(), rows == 1)
+        else {
             return self;
         };
         let inside = first.x_m..last.x_m;

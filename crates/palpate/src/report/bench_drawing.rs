@@ -23,6 +23,8 @@ const PROBE_HEIGHT: f64 = 18.0;
 const PROBE_HALF_WIDTH: f64 = 4.5;
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
+/// What springs stand on: beneath the beam at its deepest.
+const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const NUMBER_TOP: f64 = 186.0;
 const NUMBER_LINE: f64 = 16.0;
 const NUMBER_SIZE: f64 = 11.0;
@@ -286,7 +288,9 @@ fn half_thickness(bench: &BenchDrawing, step: Option<&BenchStep>) -> f64 {
     let thickest_mm = bench.steps.iter().map(|step| step.thickness_mm).fold(0.0, f64::max);
     let (largest, least) = STEPPED_HALF_THICKNESS;
     match step {
-        Some(step) if bench.steps.len() > 1 => (largest * step.thickness_mm / thickest_mm).clamp(least, largest),
+        Some(step) if bench.steps.len() > 1 => {
+            (largest * step.thickness_mm / thickest_mm).clamp(least, largest)
+        }
         _ => BEAM_HALF_THICKNESS,
     }
 }
@@ -335,28 +339,35 @@ fn draw_support(canvas: &Canvas<'_>, bench: &BenchDrawing, support: &BenchSuppor
             block(left, right, SUPPORT_HEIGHT);
         }
         BenchSupportKind::Guided => {
-            block(across - 0.4 * SUPPORT_HALF_WIDTH, across + 0.4 * SUPPORT_HALF_WIDTH, 0.5 * SUPPORT_HEIGHT);
+            let at = frame.surface_y(across);
+            let half = 0.4 * SUPPORT_HALF_WIDTH;
+            let (top, bottom) = (at - 0.5 * SUPPORT_HEIGHT, at + 0.5 * SUPPORT_HEIGHT);
+            canvas.rectangle(
+                Rect { left: across - half, right: across + half, top, bottom },
+                QUIET_INK.to_rgba(),
+            );
             for guide in [across - 0.75 * SUPPORT_HALF_WIDTH, across + 0.75 * SUPPORT_HALF_WIDTH] {
-                let ends = [(guide, BEAM_Y - SUPPORT_HEIGHT), (guide, BEAM_Y + SUPPORT_HEIGHT)];
+                let ends = [(guide, top.min(BEAM_Y) - 8.0), (guide, bottom.max(BEAM_Y) + 8.0)];
                 canvas.line(&ends, 2.0, QUIET_INK);
             }
         }
-        BenchSupportKind::Elastic => draw_spring(canvas, (across, top)),
+        BenchSupportKind::Elastic => draw_spring(canvas, (across, frame.surface_y(across))),
     }
 }
 
 /// A zigzag that stands on the ground and carries the point.
 fn draw_spring(canvas: &Canvas<'_>, (across, top): Point) {
     const TURNS: usize = 6;
-    let (head, foot) = (top + 3.0, top + SUPPORT_HEIGHT);
+    let foot = SPRING_GROUND_Y;
+    let head = top + 0.2 * (foot - top);
     let turn = |i: usize| {
         let side = if i.is_multiple_of(2) { 0.6 } else { -0.6 };
         let share = (i as f64 + 0.5) / TURNS as f64;
-        (across + side * SUPPORT_HALF_WIDTH, head + share * (foot - 3.0 - head))
+        (across + side * SUPPORT_HALF_WIDTH, head + share * (foot - 4.0 - head))
     };
     let mut points = vec![(across, top), (across, head)];
     points.extend((0..TURNS).map(turn));
-    points.extend([(across, foot - 3.0), (across, foot)]);
+    points.extend([(across, foot - 4.0), (across, foot)]);
     canvas.line(&points, 1.6, QUIET_INK);
     canvas.line(&[(across - SUPPORT_HALF_WIDTH, foot), (across + SUPPORT_HALF_WIDTH, foot)], 2.0, QUIET_INK);
 }

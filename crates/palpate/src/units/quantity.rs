@@ -77,8 +77,7 @@ impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
         use Dimension::{RotationalStiffness, Stiffness};
-        let all =
-            [Length, Force, Modulus, Angle, Strain, Ratio, Density, Stiffness, RotationalStiffness];
+        let all = [Length, Force, Modulus, Angle, Strain, Ratio, Density, Stiffness, RotationalStiffness];
         let units =
             all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
         for (i, unit) in units.enumerate() {

@@ -198,12 +198,16 @@ impl SupportedBeamError {
     /// What would help.
     pub const fn help(&self) -> Option<&'static str> {
         match self {
-            Self::SectionsEnd { .. } => Some("leave `to` out of the last section: it then reaches to the beam's end"),
+            Self::SectionsEnd { .. } => {
+                Some("leave `to` out of the last section: it then reaches to the beam's end")
+            }
             Self::SupportsTogether { .. } => Some("leave one of them out, or move it"),
             Self::Mechanism { motion: RigidMotion::UpAndDown } => {
                 Some("add a support that takes up force: simple, clamped or elastic")
             }
-            Self::Mechanism { .. } => Some("clamp one support, or have two that take up force: simple, clamped or elastic"),
+            Self::Mechanism { .. } => {
+                Some("clamp one support, or have two that take up force: simple, clamped or elastic")
+            }
             Self::FreeWithin { .. } => Some("leave it out: where no support is listed, the beam is free"),
             _ => None,
         }

@@ -192,7 +192,10 @@ fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
     nodes.dedup_by(|next, before| *next - *before <= SAME_PLACE);
     let hold = |place: &f64| {
         let here = |support: &&BeamSupport| (support.at_m / l - place).abs() <= SAME_PLACE;
-        spec.supports.iter().find(here).map_or(Hold::default(), |support| hold(support.kind, l, stiffness_nm2))
+        spec.supports
+            .iter()
+            .find(here)
+            .map_or(Hold::default(), |support| hold(support.kind, l, stiffness_nm2))
     };
     let element = |ends: &[f64]| {
         let middle_m = 0.5 * (ends[0] + ends[1]) * l;

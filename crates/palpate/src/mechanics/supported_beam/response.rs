@@ -59,7 +59,8 @@ impl Structure {
     /// The site of a sensor: in the element to the right of a node, but for the last one.
     pub fn site(&self, place: f64) -> Site {
         let last = self.elements.len() - 1;
-        let element = self.nodes.partition_point(|node| node - SAME_PLACE <= place).saturating_sub(1).min(last);
+        let element =
+            self.nodes.partition_point(|node| node - SAME_PLACE <= place).saturating_sub(1).min(last);
         let (length, offset) = (self.elements[element].length, place - self.nodes[element]);
         let offset = if offset <= SAME_PLACE {
             0.0
@@ -103,8 +104,11 @@ impl Structure {
         let beyond = last - element;
         let forward = |offset: f64| self.forth.start(element).map(|state| state.advanced(offset, stiffness));
         let backward = |offset: f64| self.back.start(beyond).map(|state| state.advanced(offset, stiffness));
-        let (left, left_element) =
-            if offset > 0.0 { (forward(offset), Some(element)) } else { (self.forth.end(element), element.checked_sub(1)) };
+        let (left, left_element) = if offset > 0.0 {
+            (forward(offset), Some(element))
+        } else {
+            (self.forth.end(element), element.checked_sub(1))
+        };
         let (right, right_element) = if offset < length {
             (backward(length - offset), Some(beyond))
         } else {
@@ -195,9 +199,24 @@ impl Surroundings {
     }
 }
 
-/// The solution of six equations whose last column is their right-hand side, by elimination with the largest pivot of
-/// rows of equal size. Not finite where there is none.
-fn solved(mut system: [[f64; 7]; 6]) -> [f64; 6] {
+/// Six equations, their right-hand side in the last column.
+type System = [[f64; 7]; 6];
+
+/// The solution of six equations; not finite where there is none. Corrected once by what is left over, elimination answers
+/// to rounding for equations near those given, entry by entry, whatever the size of each (Skeel, Math. Comp. 35, 1980).
+fn solved(system: System) -> [f64; 6] {
+    let solution = eliminated(system);
+    let mut left_over = system;
+    for row in &mut left_over {
+        let sum: f64 = row[..6].iter().zip(solution).map(|(value, unknown)| value * unknown).sum();
+        row[6] -= sum;
+    }
+    let correction = eliminated(left_over);
+    std::array::from_fn(|i| solution[i] + correction[i])
+}
+
+/// By elimination with the largest pivot of rows of equal size.
+fn eliminated(mut system: System) -> [f64; 6] {
     for row in &mut system {
         let size = row[..6].iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         row.iter_mut().for_each(|value| *value /= size);

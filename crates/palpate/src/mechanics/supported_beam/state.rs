@@ -26,8 +26,7 @@ impl State {
     pub fn advanced(self, by: f64, stiffness: f64) -> Self {
         let Self { deflection, slope, moment, shear } = self;
         Self {
-            deflection: deflection
-                + by * (slope + by * (moment / 2.0 + by * shear / 6.0) / stiffness),
+            deflection: deflection + by * (slope + by * (moment / 2.0 + by * shear / 6.0) / stiffness),
             slope: slope + by * (moment + by * shear / 2.0) / stiffness,
             moment: moment + by * shear,
             shear,

@@ -15,9 +15,7 @@ use crate::units::Dimension;
 
 /// Whether a beam's section says more than two simple supports and one section.
 pub(super) fn is_described(keys: &SurfaceSection) -> bool {
-    let simple = |supports: &Spanned<SupportsKey>| {
-        matches!(supports.get_ref(), SupportsKey::Word(word) if word == "simple")
-    };
+    let simple = |supports: &Spanned<SupportsKey>| matches!(supports.get_ref(), SupportsKey::Word(word) if word == "simple");
     keys.sections.is_some() || keys.supports.as_ref().is_some_and(|supports| !simple(supports))
 }
 
@@ -33,8 +31,7 @@ pub(super) fn validate(section: &Spanned<SurfaceSection>) -> Result<SupportedBea
         sections: sections(section, length_m)?,
         supports: supports(keys.supports.as_ref(), length_m)?,
     };
-    SupportedBeam::new(spec)
-        .map_err(|error| RigProblem::SupportedBeam(error).at(place(error, section)))
+    SupportedBeam::new(spec).map_err(|error| RigProblem::SupportedBeam(error).at(place(error, section)))
 }
 
 /// As they are listed, each with the beam's width and thickness where it has none of its own; or one, all along.
@@ -53,7 +50,9 @@ fn sections(section: &Spanned<SurfaceSection>, length_m: f64) -> Result<Vec<Beam
         let to_m = match (&own.to, &keys.sections) {
             (Some(to), _) => positive("to", to, Dimension::Length)?,
             (None, Some(all)) if i + 1 < count => {
-                return Err(RigProblem::MissingKey { section: "sections", key: "to" }.at(all.get_ref()[i].span()));
+                return Err(
+                    RigProblem::MissingKey { section: "sections", key: "to" }.at(all.get_ref()[i].span())
+                );
             }
             (None, _) => length_m,
         };
@@ -97,7 +96,8 @@ fn support(section: &Spanned<SupportKeys>) -> Result<BeamSupport, RigError> {
     let kind = choice("kind", keys.kind.as_ref().ok_or_else(|| missing("kind"))?, &WORDS)?;
     let kind = match kind {
         Kind::Rigid(kind) => {
-            let springs = [("stiffness", &keys.stiffness), ("rotational_stiffness", &keys.rotational_stiffness)];
+            let springs =
+                [("stiffness", &keys.stiffness), ("rotational_stiffness", &keys.rotational_stiffness)];
             for (key, spring) in springs {
                 if let Some(spring) = spring {
                     let with = "a support that is not elastic";
@@ -129,15 +129,17 @@ fn place(error: SupportedBeamError, section: &Spanned<SurfaceSection>) -> Range<
         BeamPart::Whole => None,
         BeamPart::Supports => keys.supports.as_ref().map(Spanned::span),
         BeamPart::Support(i) => match keys.supports.as_ref().map(Spanned::get_ref) {
-            Some(SupportsKey::List(listed)) => listed.get(i).map(|support| {
-                support.get_ref().at.as_ref().map_or(support.span(), Spanned::span)
-            }),
+            Some(SupportsKey::List(listed)) => listed
+                .get(i)
+                .map(|support| support.get_ref().at.as_ref().map_or(support.span(), Spanned::span)),
             _ => None,
         },
         BeamPart::Sections => sections,
-        BeamPart::Section(i) => keys.sections.as_ref().and_then(|listed| listed.get_ref().get(i)).map(|section| {
-            section.get_ref().to.as_ref().map_or(section.span(), Spanned::span)
-        }),
+        BeamPart::Section(i) => keys
+            .sections
+            .as_ref()
+            .and_then(|listed| listed.get_ref().get(i))
+            .map(|section| section.get_ref().to.as_ref().map_or(section.span(), Spanned::span)),
     };
     place.unwrap_or(section.span())
 }
