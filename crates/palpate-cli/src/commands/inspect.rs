@@ -61,6 +61,13 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(beam.thickness_m),
             Quantity { value: beam.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
         ),
+        SurfaceSpec::SupportedBeam(beam) => format!(
+            "beam, {} long, {}; section {}; Young's modulus {}",
+            format_length_mm(extent.length_m),
+            beam.spec().supports_in_words(),
+            beam.spec().sections_in_words(),
+            Quantity { value: beam.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
+        ),
         SurfaceSpec::Measured(_) => match extent.width_m {
             Some(width_m) => {
                 format!("measured, {} × {}", format_length_mm(extent.length_m), format_length_mm(width_m))

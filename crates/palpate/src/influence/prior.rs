@@ -16,7 +16,7 @@ pub(super) struct Spread {
     pub gain: f64,
     /// Of the sensor's position, in metres; 0 where the mean is 0.
     pub shift_m: f64,
-    /// Of the remainder at mid-length, relative to full scale.
+    /// Of the remainder where it is largest, relative to full scale.
     pub remainder: f64,
     /// Of the reading's offset, relative to the full-scale reading at the mean force.
     pub offset: f64,
@@ -96,7 +96,7 @@ impl<'a> Prior<'a> {
     }
 }
 
-/// Covariances of the remainders of all sensors of one kind, 1 at mid-length.
+/// Covariances of the remainders of all sensors of one kind, 1 where they are largest.
 ///
 /// A remainder is a random mixture of the influence functions that sensors of the same kind would have elsewhere on
 /// the surface, ∫ I(s, a) dB(s) with B Brownian: it bends as the surface bends, is held where the supports hold it, and
@@ -113,12 +113,16 @@ pub(super) struct Remainders {
 
 /// Sensors whose influence functions are mixed.
 const MIXED: usize = 40;
+/// Stretches between the places at which the largest remainder is looked for.
+const STRETCHES: usize = 64;
 
 impl Remainders {
     /// Of sensors of `kind`, for presses and places along the surface, in metres.
     pub fn new(surface: &dyn Surface, kind: SensorKind, presses_m: &[f64], places_m: &[f64]) -> Self {
-        let unit = mixture(surface, kind, &[0.5 * surface.length_m()]);
-        let norm = unit.row(0).dot(&unit.row(0)).sqrt();
+        let l = surface.length_m();
+        let everywhere: Vec<f64> = (0..=STRETCHES).map(|i| l * i as f64 / STRETCHES as f64).collect();
+        let sizes = mixture(surface, kind, &everywhere);
+        let norm = sizes.outer_iter().map(|row| row.dot(&row)).fold(0.0, f64::max).sqrt();
         let presses = mixture(surface, kind, presses_m) / norm;
         let places = mixture(surface, kind, places_m) / norm;
         Self {
@@ -132,18 +136,19 @@ impl Remainders {
 /// A row a position: what each of the mixed sensors would read there.
 fn mixture(surface: &dyn Surface, kind: SensorKind, positions_m: &[f64]) -> Array2<f64> {
     let l = surface.length_m();
-    // Supports carry no row of sensors to mix: a reaction is a straight line and what bends of it, as deflections do.
-    let lines = if kind == SensorKind::Reaction { 2 } else { 0 };
+    // Supports carry no row of sensors to mix: a reaction is a mixture of what all supports take up, and what bends of it,
+    // as deflections do.
+    let supports = if kind == SensorKind::Reaction { surface.force_supports() } else { Vec::new() };
     let mixed = if kind == SensorKind::Reaction { SensorKind::Deflection } else { kind };
     let scale = surface.full_scale(mixed);
     let sensor = |column: usize| Position::along((column as f64 + 0.5) * l / MIXED as f64);
     let functions: Vec<_> = (0..MIXED).map(|c| surface.influence_function(mixed, sensor(c))).collect();
-    Array2::from_shape_fn((positions_m.len(), MIXED + lines), |(row, column)| {
-        let x_m = positions_m[row];
+    let taken: Vec<_> = supports.iter().map(|at| surface.influence_function(kind, *at)).collect();
+    Array2::from_shape_fn((positions_m.len(), MIXED + taken.len()), |(row, column)| {
+        let contact = Position::along(positions_m[row]);
         match column.checked_sub(MIXED) {
-            Some(0) => MIXED as f64,
-            Some(_) => MIXED as f64 * x_m / l,
-            None => functions[column].at(Position::along(x_m)) / scale,
+            Some(support) => MIXED as f64 * taken[support].at(contact),
+            None => functions[column].at(contact) / scale,
         }
     })
 }

@@ -2,10 +2,15 @@
 
 mod beam;
 mod extent;
+mod supported_beam;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use supported_beam::{
+    BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
+    SupportedBeamSpec,
+};
 pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;
@@ -28,6 +33,17 @@ pub trait Surface: Send + Sync {
 
     /// Whether a support at `position` takes up force, so that its reaction can be measured.
     fn is_supported_at(&self, position: Position) -> bool;
+
+    /// Where supports take up force at single places, so that a reaction can be measured there, from left to right.
+    fn force_supports(&self) -> Vec<Position> {
+        Vec::new()
+    }
+
+    /// Whether a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched, because a support holds what it
+    /// measures.
+    fn never_moves(&self, _kind: SensorKind, _sensor: Position) -> bool {
+        false
+    }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
     fn full_scale(&self, kind: SensorKind) -> f64;

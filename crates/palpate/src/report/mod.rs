@@ -51,7 +51,7 @@ mod ticks;
 mod tests;
 
 pub use bench_drawing::{
-    BenchDrawing, BenchDrawingError, BenchPart, BenchSupport, BenchSupportKind, bench_to_svg,
+    BenchDrawing, BenchDrawingError, BenchPart, BenchStep, BenchSupport, BenchSupportKind, bench_to_svg,
 };
 pub use chart::{
     Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,

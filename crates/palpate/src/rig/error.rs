@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
-use crate::mechanics::BeamError;
+use crate::mechanics::{BeamError, SupportedBeamError};
+use crate::sensing::SensorKind;
 use crate::units::{UnitError, format_length_mm};
 
 /// A rig file, or a section of one in a study, that cannot be used.
@@ -83,6 +84,9 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A beam on supports that cannot be computed.
+    #[error(transparent)]
+    SupportedBeam(SupportedBeamError),
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
@@ -102,17 +106,31 @@ pub enum RigProblem {
     },
     /// A reaction sensor where nothing supports the surface.
     #[error(
-        "reaction sensor {number} is at {}, where no support is; the supports are at 0 and {}",
+        "reaction sensor {number} is at {}, where no support takes up force; {}",
         format_length_mm(*x_m),
-        format_length_mm(*length_m)
+        force_takers(supports_m)
     )]
     NoSupport {
         /// Which sensor of its section, from 1.
         number: usize,
         /// Where it is, in metres.
         x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Where supports take up force, in metres.
+        supports_m: Vec<f64>,
+    },
+    /// A sensor that reads 0 wherever the surface is touched.
+    #[error(
+        "{kind} sensor {number} is at {}, where {}: it would read 0 wherever the surface is touched",
+        format_length_mm(*x_m),
+        stillness(*kind)
+    )]
+    NeverMoves {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Where it is, in metres.
+        x_m: f64,
     },
     /// A raw channel on a surface with a model.
     #[error("a raw channel has no model on a beam; only a measured surface has raw channels")]
@@ -160,9 +178,9 @@ pub enum RigProblem {
     #[error("one reading cannot scale both {first} and {second} sensors")]
     MixedKinds {
         /// What some measure.
-        first: crate::sensing::SensorKind,
+        first: SensorKind,
         /// What others measure.
-        second: crate::sensing::SensorKind,
+        second: SensorKind,
     },
     /// A column is given by name in a file without a header.
     #[error(
@@ -189,6 +207,8 @@ impl RigError {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
+            RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
             _ => None,
         }
     }
@@ -213,6 +233,26 @@ impl RigProblem {
     /// This problem, of something that is not there.
     pub(crate) fn nowhere(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
+    }
+}
+
+/// "those that do are at 0 mm and 400 mm".
+fn force_takers(supports_m: &[f64]) -> String {
+    let places: Vec<String> = supports_m.iter().map(|at_m| format_length_mm(*at_m)).collect();
+    match places.as_slice() {
+        [] => "none of the supports does".to_owned(),
+        [only] => format!("the only one that does is at {only}"),
+        [first @ .., last] => format!("those that do are at {} and {last}", first.join(", ")),
+    }
+}
+
+/// Why a sensor of this kind reads nothing.
+fn stillness(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Deflection => "a support holds the surface",
+        SensorKind::Slope => "a support holds the slope",
+        SensorKind::Strain => "nothing bends the surface",
+        SensorKind::Reaction | SensorKind::Raw => "nothing acts",
     }
 }
 

@@ -33,7 +33,34 @@ pub(crate) struct SurfaceSection {
     pub width: Key<RawQuantity>,
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
-    pub supports: Key<String>,
+    pub supports: Key<SupportsKey>,
+    pub sections: Key<Vec<Spanned<BeamSectionKeys>>>,
+}
+
+/// `supports`: a word, or a list
+#[derive(Clone, Debug)]
+pub(crate) enum SupportsKey {
+    Word(String),
+    List(Vec<Spanned<SupportKeys>>),
+}
+
+/// One of `supports`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SupportKeys {
+    pub at: Key<RawQuantity>,
+    pub kind: Key<String>,
+    pub stiffness: Key<RawQuantity>,
+    pub rotational_stiffness: Key<RawQuantity>,
+}
+
+/// One of `sections`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BeamSectionKeys {
+    pub to: Key<RawQuantity>,
+    pub width: Key<RawQuantity>,
+    pub thickness: Key<RawQuantity>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -202,6 +229,34 @@ impl<'de> Deserialize<'de> for SensorsSections {
         }
 
         deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+impl<'de> Deserialize<'de> for SupportsKey {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct WordOrList;
+
+        impl<'de> Visitor<'de> for WordOrList {
+            type Value = SupportsKey;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"simple\", or a list of supports such as { at = \"0 mm\", kind = \"clamped\" }")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<SupportsKey, E> {
+                Ok(SupportsKey::Word(word.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SupportsKey, A::Error> {
+                let mut supports = Vec::new();
+                while let Some(support) = seq.next_element()? {
+                    supports.push(support);
+                }
+                Ok(SupportsKey::List(supports))
+            }
+        }
+
+        deserializer.deserialize_any(WordOrList)
     }
 }
 

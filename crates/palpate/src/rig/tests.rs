@@ -6,6 +6,8 @@ use crate::sensing::Layout;
 use crate::sensing::SensorKind;
 use crate::support::data::recording;
 
+mod supports;
+
 const PAPER: &str = include_str!("../../../../examples/paper.toml");
 const FSI_WATER: &str = include_str!("../../../../examples/fsi-water.toml");
 

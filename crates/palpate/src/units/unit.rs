@@ -23,6 +23,10 @@ pub enum Dimension {
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
+    /// Force per length that a spring gives way by, in N/m.
+    Stiffness,
+    /// Couple per angle that a spring turns by, in N·m/rad.
+    RotationalStiffness,
 }
 
 impl Dimension {
@@ -37,6 +41,8 @@ impl Dimension {
             Self::Strain => "a strain",
             Self::Ratio => "a ratio",
             Self::Density => "a density",
+            Self::Stiffness => "a stiffness",
+            Self::RotationalStiffness => "a rotational stiffness",
         }
     }
 
@@ -97,6 +103,11 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("g/cm3", Dimension::Density, Scale::Power(3)),
     ("kg/m3", Dimension::Density, Scale::Power(0)),
     ("kg/m³", Dimension::Density, Scale::Power(0)),
+    ("N/m", Dimension::Stiffness, Scale::Power(0)),
+    ("kN/m", Dimension::Stiffness, Scale::Power(3)),
+    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
+    ("Nm/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("N·m/rad", Dimension::RotationalStiffness, Scale::Power(0)),
 ];
 
 /// A unit of measure.

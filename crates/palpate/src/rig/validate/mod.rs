@@ -4,6 +4,7 @@ mod columns;
 mod contact;
 mod estimator;
 mod sensors;
+mod supported_beam;
 mod surface;
 
 use crate::bench::Bench;

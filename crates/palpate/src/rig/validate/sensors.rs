@@ -94,7 +94,7 @@ impl Context<'_> {
             (Some(raw), None) => {
                 let count = count("count", raw, 1..=MOST, MOST_BOUND)?;
                 let positions: Vec<_> = even_positions(count, length_m).collect();
-                self.check_supported(kind, &positions, |_| raw.span())?;
+                self.check_places(kind, &positions, |_| raw.span())?;
                 Ok(positions)
             }
             (None, None) => match (self.channel_count, kind) {
@@ -124,27 +124,31 @@ impl Context<'_> {
             return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of 1 to 10000" }
                 .at(listed.span()));
         }
-        self.check_supported(kind, &positions, |i| {
+        self.check_places(kind, &positions, |i| {
             listed.get_ref().get(i).map_or(listed.span(), Spanned::span)
         })?;
         Ok(positions)
     }
 
-    /// A reaction sensor of a modelled surface must sit at a support.
-    fn check_supported(
+    /// Under a modelled surface a reaction sensor must sit at a support, and the others where something moves.
+    fn check_places(
         &self,
         kind: SensorKind,
         positions: &[Position],
         span: impl Fn(usize) -> std::ops::Range<usize>,
     ) -> Result<(), RigError> {
-        let (Some(surface), SensorKind::Reaction) = (self.surface.model(), kind) else { return Ok(()) };
-        let length_m = surface.length_m();
-        match positions.iter().position(|position| !surface.is_supported_at(*position)) {
-            Some(i) => {
-                Err(RigProblem::NoSupport { number: i + 1, x_m: positions[i].x_m, length_m }.at(span(i)))
+        let Some(surface) = self.surface.model() else { return Ok(()) };
+        for (i, position) in positions.iter().enumerate() {
+            let (number, x_m) = (i + 1, position.x_m);
+            if kind == SensorKind::Reaction && !surface.is_supported_at(*position) {
+                let supports_m = surface.force_supports().iter().map(|support| support.x_m).collect();
+                return Err(RigProblem::NoSupport { number, x_m, supports_m }.at(span(i)));
             }
-            None => Ok(()),
+            if surface.never_moves(kind, *position) {
+                return Err(RigProblem::NeverMoves { number, kind, x_m }.at(span(i)));
+            }
         }
+        Ok(())
     }
 
     fn channel(&self, kind: SensorKind) -> Result<ChannelModel, RigError> {

@@ -2,6 +2,7 @@
 
 use toml::Spanned;
 
+use super::supported_beam;
 use crate::mechanics::SurfaceSpec;
 use crate::mechanics::{Beam, Extent};
 use crate::rig::error::{RigError, RigProblem};
@@ -22,6 +23,9 @@ pub(super) fn validate(section: Option<&Spanned<SurfaceSection>>) -> Result<Surf
     let keys = section.get_ref();
     let kind = need("kind", keys.kind.as_ref(), section)?;
     match choice("kind", kind, &[("beam", Kind::Beam), ("measured", Kind::Measured)])? {
+        Kind::Beam if supported_beam::is_described(section.get_ref()) => {
+            supported_beam::validate(section).map(|beam| SurfaceSpec::SupportedBeam(Box::new(beam)))
+        }
         Kind::Beam => beam(section).map(SurfaceSpec::Beam),
         Kind::Measured => measured(section).map(SurfaceSpec::Measured),
     }
@@ -38,9 +42,6 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
         thickness_m: size("thickness", keys.thickness.as_ref(), Dimension::Length)?,
         youngs_modulus_pa: size("youngs_modulus", keys.youngs_modulus.as_ref(), Dimension::Modulus)?,
     };
-    if let Some(supports) = &keys.supports {
-        choice("supports", supports, &[("simple", ())])?;
-    }
     beam.validate().map_err(|error| RigProblem::Beam(error).at(section.span()))?;
     Ok(beam)
 }
@@ -57,12 +58,15 @@ fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     if let Some(supports) = &keys.supports {
         return unused("supports", supports.span());
     }
+    if let Some(sections) = &keys.sections {
+        return unused("sections", sections.span());
+    }
     let length_m = positive("length", need("length", keys.length.as_ref(), section)?, Dimension::Length)?;
     let width_m = keys.width.as_ref().map(|width| positive("width", width, Dimension::Length)).transpose()?;
     Ok(Extent { length_m, width_m })
 }
 
-fn need<'a, T>(
+pub(super) fn need<'a, T>(
     key: &'static str,
     value: Option<&'a Spanned<T>>,
     section: &Spanned<SurfaceSection>,
