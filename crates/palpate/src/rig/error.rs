@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
-use crate::mechanics::BeamError;
+use crate::mechanics::plate::NothingToRead;
+use crate::mechanics::{BeamError, PlateError};
 use crate::units::{UnitError, format_length_mm};
 
 /// A rig file, or a section of one in a study, that cannot be used.
@@ -83,6 +84,17 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A plate that cannot be computed.
+    #[error(transparent)]
+    Plate(PlateError),
+    /// A sensor that reads nothing, wherever the surface is touched.
+    #[error("sensor {number} would read nothing: {reason}")]
+    NothingToRead {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// Why.
+        reason: NothingToRead,
+    },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
@@ -115,7 +127,7 @@ pub enum RigProblem {
         length_m: f64,
     },
     /// A raw channel on a surface with a model.
-    #[error("a raw channel has no model on a beam; only a measured surface has raw channels")]
+    #[error("a raw channel has no model; only a measured surface has raw channels")]
     RawOnModel,
     /// A dead sensor that does not exist.
     #[error("`dead` names sensor {number}; this section has sensors 1 to {count}")]

@@ -3,6 +3,7 @@
 mod columns;
 mod contact;
 mod estimator;
+mod plate;
 mod sensors;
 mod surface;
 
