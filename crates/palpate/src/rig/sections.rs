@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use toml::Spanned;
 
-use super::value::{RawColumn, RawQuantity};
-pub(crate) use supports::{EdgesSection, SupportSection, SupportsSection};
+use super::value::{RawColumn, RawPosition, RawQuantity};
+pub(crate) use supports::{EdgesSection, SupportKeys, SupportsKey};
 
 mod supports;
 
@@ -36,7 +36,7 @@ pub(crate) struct SurfaceSection {
     pub width: Key<RawQuantity>,
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
-    pub supports: Key<SupportsSection>,
+    pub supports: Key<SupportsKey>,
     pub poissons_ratio: Key<f64>,
     pub edges: Key<EdgesSection>,
     pub elements: Key<i64>,
@@ -55,7 +55,8 @@ pub(crate) enum SensorsSections {
 pub(crate) struct SensorsSection {
     pub measure: Key<String>,
     pub count: Key<i64>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub grid: Key<Vec<Spanned<i64>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub noise: Key<RawQuantity>,
     pub resolution: Key<RawQuantity>,
     pub gain_error: Key<RawQuantity>,
@@ -77,9 +78,10 @@ pub(crate) struct ContactSection {
 pub(crate) struct TrainingSection {
     pub arrangement: Key<String>,
     pub count: Key<i64>,
+    pub grid: Key<Vec<Spanned<i64>>>,
     pub middle: Key<i64>,
     pub portion: Key<Vec<Spanned<RawQuantity>>>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
 }

@@ -6,7 +6,7 @@ use super::plate;
 use crate::mechanics::SurfaceSpec;
 use crate::mechanics::{Beam, Extent};
 use crate::rig::error::{RigError, RigProblem};
-use crate::rig::sections::{SupportsSection, SurfaceSection};
+use crate::rig::sections::{SupportsKey, SurfaceSection};
 use crate::rig::value::{RawQuantity, choice, positive};
 use crate::units::Dimension;
 
@@ -45,10 +45,10 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
     refuse_plate_keys(keys, "a beam")?;
     if let Some(supports) = &keys.supports {
         match supports.get_ref() {
-            SupportsSection::Word(word) => {
+            SupportsKey::Word(word) => {
                 choice("supports", &Spanned::new(supports.span(), word.clone()), &[("simple", ())])?;
             }
-            SupportsSection::List(_) => {
+            SupportsKey::List(_) => {
                 let value = "a list".to_owned();
                 let problem =
                     RigProblem::OutOfRange { key: "supports", value, bound: "\"simple\" on a beam" };
