@@ -23,8 +23,10 @@ pub enum Dimension {
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
-    /// Force per displacement, in N/m.
+    /// Force per length that a spring gives way by, in N/m.
     Stiffness,
+    /// Couple per angle that a spring turns by, in N·m/rad.
+    RotationalStiffness,
 }
 
 impl Dimension {
@@ -40,6 +42,7 @@ impl Dimension {
             Self::Ratio => "a ratio",
             Self::Density => "a density",
             Self::Stiffness => "a stiffness",
+            Self::RotationalStiffness => "a rotational stiffness",
         }
     }
 
@@ -101,9 +104,10 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("kg/m3", Dimension::Density, Scale::Power(0)),
     ("kg/m³", Dimension::Density, Scale::Power(0)),
     ("N/m", Dimension::Stiffness, Scale::Power(0)),
-    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
     ("kN/m", Dimension::Stiffness, Scale::Power(3)),
-    ("kN/mm", Dimension::Stiffness, Scale::Power(6)),
+    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
+    ("Nm/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("N·m/rad", Dimension::RotationalStiffness, Scale::Power(0)),
 ];
 
 /// A unit of measure.
