@@ -50,7 +50,7 @@ fn main() {
         solution_s * 1e3
     );
 
-    for elements in [48, 100, 200] {
+    for elements in [48, PlateSpec::DEFAULT_ELEMENTS, 200] {
         compare_orders(elements);
     }
 }
