@@ -2,11 +2,13 @@
 
 mod beam;
 mod extent;
+pub mod plate;
 mod supported_beam;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use plate::{Plate, PlateError};
 pub use supported_beam::{
     BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
     SupportedBeamSpec,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Beam, Extent, SupportedBeam, Surface};
+use super::{Beam, Extent, Plate, SupportedBeam, Surface};
 
 /// The surface that is touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,6 +12,8 @@ pub enum SurfaceSpec {
     Beam(Beam),
     /// A beam on any supports, with any sections.
     SupportedBeam(Box<SupportedBeam>),
+    /// A rectangular plate.
+    Plate(Plate),
     /// A surface without a model, known by recordings only.
     Measured(Extent),
 }
@@ -22,6 +24,7 @@ impl SurfaceSpec {
         match self {
             Self::Beam(beam) => beam.extent(),
             Self::SupportedBeam(beam) => beam.extent(),
+            Self::Plate(plate) => plate.extent(),
             Self::Measured(extent) => *extent,
         }
     }
@@ -31,6 +34,7 @@ impl SurfaceSpec {
         match self {
             Self::Beam(beam) => Some(beam),
             Self::SupportedBeam(beam) => Some(beam.as_ref()),
+            Self::Plate(plate) => Some(plate),
             Self::Measured(_) => None,
         }
     }

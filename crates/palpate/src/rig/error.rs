@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
-use crate::mechanics::{BeamError, SupportedBeamError};
+use crate::contact::Position;
+use crate::mechanics::plate::NothingToRead;
+use crate::mechanics::{BeamError, Extent, PlateError, SupportedBeamError};
 use crate::sensing::SensorKind;
 use crate::units::{UnitError, format_length_mm};
 
@@ -87,36 +89,49 @@ pub enum RigProblem {
     /// A beam on supports that cannot be computed.
     #[error(transparent)]
     SupportedBeam(SupportedBeamError),
+    /// A plate that cannot be computed.
+    #[error(transparent)]
+    Plate(PlateError),
+    /// A sensor that reads nothing, wherever the surface is touched.
+    #[error("sensor {number} would read nothing: {reason}")]
+    NothingToRead {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// Why.
+        reason: NothingToRead,
+    },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
     /// A sensor beside the surface.
     #[error(
-        "sensor {number} is at {}, off the surface; it must be within 0 and {}",
-        format_length_mm(*x_m),
-        format_length_mm(*length_m)
+        "sensor {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
     )]
     SensorOffSurface {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// Where it is, in metres.
-        x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
     },
     /// A reaction sensor where nothing supports the surface.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
-        format_length_mm(*x_m),
-        force_takers(supports_m)
+        extent.place_in_words(*position),
+        force_takers(*extent, supports)
     )]
     NoSupport {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// Where it is, in metres.
-        x_m: f64,
-        /// Where supports take up force, in metres.
-        supports_m: Vec<f64>,
+        /// Where it is.
+        position: Position,
+        /// Where supports take up force.
+        supports: Vec<Position>,
+        /// The surface.
+        extent: Extent,
     },
     /// A sensor that reads 0 wherever the surface is touched.
     #[error(
@@ -132,8 +147,25 @@ pub enum RigProblem {
         /// Where it is, in metres.
         x_m: f64,
     },
+    /// A position with one coordinate on a plane, or with more than one on a line.
+    #[error(
+        "`positions` has {found} where {} is expected",
+        if *plane { "a pair of lengths, along and across," } else { "one length along the surface" }
+    )]
+    Coordinates {
+        /// What is there.
+        found: &'static str,
+        /// Whether the surface has a width.
+        plane: bool,
+    },
+    /// A number of places, on a plane, where it does not say where they are.
+    #[error("[{section}] `count` alone does not say where on a plane they are")]
+    CountOnPlane {
+        /// The section.
+        section: &'static str,
+    },
     /// A raw channel on a surface with a model.
-    #[error("a raw channel has no model on a beam; only a measured surface has raw channels")]
+    #[error("a raw channel has no model; only a measured surface has raw channels")]
     RawOnModel,
     /// A dead sensor that does not exist.
     #[error("`dead` names sensor {number}; this section has sensors 1 to {count}")]
@@ -206,6 +238,12 @@ impl RigError {
             RigProblem::NoForce => {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
+            RigProblem::CountOnPlane { .. } => {
+                Some("say `grid = [3, 3]`, columns and rows, or list pairs in `positions`".to_owned())
+            }
+            RigProblem::Coordinates { plane: true, .. } => {
+                Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
+            }
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
             RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
@@ -237,8 +275,8 @@ impl RigProblem {
 }
 
 /// "those that do are at 0 mm and 400 mm".
-fn force_takers(supports_m: &[f64]) -> String {
-    let places: Vec<String> = supports_m.iter().map(|at_m| format_length_mm(*at_m)).collect();
+fn force_takers(extent: Extent, supports: &[Position]) -> String {
+    let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
     match places.as_slice() {
         [] => "none of the supports does".to_owned(),
         [only] => format!("the only one that does is at {only}"),

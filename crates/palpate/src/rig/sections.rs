@@ -7,7 +7,10 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use toml::Spanned;
 
-use super::value::{RawColumn, RawQuantity};
+use super::value::{RawColumn, RawPosition, RawQuantity};
+pub(crate) use supports::{BeamSectionKeys, EdgesSection, SupportKeys, SupportsKey};
+
+mod supports;
 
 /// A value and its place, if the key is there.
 type Key<T> = Option<Spanned<T>>;
@@ -35,32 +38,9 @@ pub(crate) struct SurfaceSection {
     pub youngs_modulus: Key<RawQuantity>,
     pub supports: Key<SupportsKey>,
     pub sections: Key<Vec<Spanned<BeamSectionKeys>>>,
-}
-
-/// `supports`: a word, or a list
-#[derive(Clone, Debug)]
-pub(crate) enum SupportsKey {
-    Word(String),
-    List(Vec<Spanned<SupportKeys>>),
-}
-
-/// One of `supports`
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SupportKeys {
-    pub at: Key<RawQuantity>,
-    pub kind: Key<String>,
-    pub stiffness: Key<RawQuantity>,
-    pub rotational_stiffness: Key<RawQuantity>,
-}
-
-/// One of `sections`
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct BeamSectionKeys {
-    pub to: Key<RawQuantity>,
-    pub width: Key<RawQuantity>,
-    pub thickness: Key<RawQuantity>,
+    pub poissons_ratio: Key<f64>,
+    pub edges: Key<EdgesSection>,
+    pub elements: Key<i64>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -76,7 +56,8 @@ pub(crate) enum SensorsSections {
 pub(crate) struct SensorsSection {
     pub measure: Key<String>,
     pub count: Key<i64>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub grid: Key<Vec<Spanned<i64>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub noise: Key<RawQuantity>,
     pub resolution: Key<RawQuantity>,
     pub gain_error: Key<RawQuantity>,
@@ -99,9 +80,10 @@ pub(crate) struct ContactSection {
 pub(crate) struct TrainingSection {
     pub arrangement: Key<String>,
     pub count: Key<i64>,
+    pub grid: Key<Vec<Spanned<i64>>>,
     pub middle: Key<i64>,
     pub portion: Key<Vec<Spanned<RawQuantity>>>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
 }
@@ -229,34 +211,6 @@ impl<'de> Deserialize<'de> for SensorsSections {
         }
 
         deserializer.deserialize_any(OneOrMany)
-    }
-}
-
-impl<'de> Deserialize<'de> for SupportsKey {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct WordOrList;
-
-        impl<'de> Visitor<'de> for WordOrList {
-            type Value = SupportsKey;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"simple\", or a list of supports such as { at = \"0 mm\", kind = \"clamped\" }")
-            }
-
-            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<SupportsKey, E> {
-                Ok(SupportsKey::Word(word.to_owned()))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SupportsKey, A::Error> {
-                let mut supports = Vec::new();
-                while let Some(support) = seq.next_element()? {
-                    supports.push(support);
-                }
-                Ok(SupportsKey::List(supports))
-            }
-        }
-
-        deserializer.deserialize_any(WordOrList)
     }
 }
 

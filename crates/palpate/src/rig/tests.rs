@@ -1,3 +1,6 @@
+mod planes;
+mod plates;
+
 use super::*;
 use crate::mechanics::{Beam, Extent, SurfaceSpec};
 use crate::network::{InputScale, NetworkConfig, OutputCoding};

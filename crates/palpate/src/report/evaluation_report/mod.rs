@@ -188,6 +188,7 @@ impl EvaluationReport<'_> {
         let kind = match &self.bench().surface {
             SurfaceSpec::Beam(_) => "beam".to_owned(),
             SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
+            SurfaceSpec::Plate(_) => "plate".to_owned(),
             SurfaceSpec::Measured(_) => "measured, without a model".to_owned(),
         };
         let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));

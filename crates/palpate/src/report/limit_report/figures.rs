@@ -26,7 +26,7 @@ pub(super) fn bench_figure(report: &LimitReport) -> Result<Option<Figure>, Repor
             let words = format!("a beam, {},", beam.spec().supports_in_words());
             (supported_beam_drawing(beam, layout, force_n), words, "as beam theory has it exactly")
         }
-        SurfaceSpec::Measured(_) => return Ok(None),
+        SurfaceSpec::Plate(_) | SurfaceSpec::Measured(_) => return Ok(None),
     };
     let (svg, load) = drawn?;
     let caption = html! {

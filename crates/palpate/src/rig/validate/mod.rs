@@ -3,6 +3,8 @@
 mod columns;
 mod contact;
 mod estimator;
+mod places;
+mod plate;
 mod sensors;
 mod supported_beam;
 mod surface;

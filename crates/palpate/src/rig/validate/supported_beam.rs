@@ -10,7 +10,7 @@ use crate::mechanics::{
 };
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{BeamSectionKeys, SupportKeys, SupportsKey, SurfaceSection};
-use crate::rig::value::{RawQuantity, choice, positive, quantity};
+use crate::rig::value::{RawPosition, RawQuantity, choice, positive, quantity};
 use crate::units::Dimension;
 
 /// Whether a beam's section says more than two simple supports and one section.
@@ -92,7 +92,7 @@ fn support(section: &Spanned<SupportKeys>) -> Result<BeamSupport, RigError> {
     ];
     let keys = section.get_ref();
     let missing = |key| RigProblem::MissingKey { section: "supports", key }.at(section.span());
-    let at_m = quantity("at", keys.at.as_ref().ok_or_else(|| missing("at"))?, Dimension::Length)?;
+    let at_m = along(keys.at.as_ref().ok_or_else(|| missing("at"))?)?;
     let kind = choice("kind", keys.kind.as_ref().ok_or_else(|| missing("kind"))?, &WORDS)?;
     let kind = match kind {
         Kind::Rigid(kind) => {
@@ -119,6 +119,17 @@ fn support(section: &Spanned<SupportKeys>) -> Result<BeamSupport, RigError> {
         }
     };
     Ok(BeamSupport { at_m, kind })
+}
+
+/// A place along the beam.
+fn along(raw: &Spanned<RawPosition>) -> Result<f64, RigError> {
+    match raw.get_ref() {
+        RawPosition::Along(at) => quantity("at", &Spanned::new(raw.span(), at.clone()), Dimension::Length),
+        RawPosition::List(list) => {
+            let (value, bound) = (format!("a list of {}", list.len()), "one length on a beam");
+            Err(RigProblem::OutOfRange { key: "at", value, bound }.at(raw.span()))
+        }
+    }
 }
 
 /// Where the document says what is at fault.

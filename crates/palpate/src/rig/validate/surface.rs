@@ -2,7 +2,7 @@
 
 use toml::Spanned;
 
-use super::supported_beam;
+use super::{plate, supported_beam};
 use crate::mechanics::SurfaceSpec;
 use crate::mechanics::{Beam, Extent};
 use crate::rig::error::{RigError, RigProblem};
@@ -15,6 +15,7 @@ const SECTION: &str = "surface";
 #[derive(Clone, Copy)]
 enum Kind {
     Beam,
+    Plate,
     Measured,
 }
 
@@ -22,11 +23,19 @@ pub(super) fn validate(section: Option<&Spanned<SurfaceSection>>) -> Result<Surf
     let section = section.ok_or_else(|| RigProblem::MissingSection { section: SECTION }.nowhere())?;
     let keys = section.get_ref();
     let kind = need("kind", keys.kind.as_ref(), section)?;
-    match choice("kind", kind, &[("beam", Kind::Beam), ("measured", Kind::Measured)])? {
-        Kind::Beam if supported_beam::is_described(section.get_ref()) => {
+    let kinds = [("beam", Kind::Beam), ("plate", Kind::Plate), ("measured", Kind::Measured)];
+    match choice("kind", kind, &kinds)? {
+        Kind::Beam if supported_beam::is_described(keys) => {
+            refuse_plate_keys(keys, "a beam")?;
             supported_beam::validate(section).map(|beam| SurfaceSpec::SupportedBeam(Box::new(beam)))
         }
         Kind::Beam => beam(section).map(SurfaceSpec::Beam),
+        Kind::Plate => match &keys.sections {
+            Some(sections) => {
+                Err(RigProblem::UnusedKey { key: "sections", with: "a plate" }.at(sections.span()))
+            }
+            None => plate::validate(section).map(SurfaceSpec::Plate),
+        },
         Kind::Measured => measured(section).map(SurfaceSpec::Measured),
     }
 }
@@ -42,6 +51,7 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
         thickness_m: size("thickness", keys.thickness.as_ref(), Dimension::Length)?,
         youngs_modulus_pa: size("youngs_modulus", keys.youngs_modulus.as_ref(), Dimension::Modulus)?,
     };
+    refuse_plate_keys(keys, "a beam")?;
     beam.validate().map_err(|error| RigProblem::Beam(error).at(section.span()))?;
     Ok(beam)
 }
@@ -49,6 +59,7 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
 fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     let keys = section.get_ref();
     let unused = |key, span| Err(RigProblem::UnusedKey { key, with: "a measured surface" }.at(span));
+    refuse_plate_keys(keys, "a measured surface")?;
     if let Some(thickness) = &keys.thickness {
         return unused("thickness", thickness.span());
     }
@@ -64,6 +75,19 @@ fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     let length_m = positive("length", need("length", keys.length.as_ref(), section)?, Dimension::Length)?;
     let width_m = keys.width.as_ref().map(|width| positive("width", width, Dimension::Length)).transpose()?;
     Ok(Extent { length_m, width_m })
+}
+
+/// Only a plate has these.
+fn refuse_plate_keys(keys: &SurfaceSection, with: &'static str) -> Result<(), RigError> {
+    let present = [
+        ("poissons_ratio", keys.poissons_ratio.as_ref().map(Spanned::span)),
+        ("edges", keys.edges.as_ref().map(Spanned::span)),
+        ("elements", keys.elements.as_ref().map(Spanned::span)),
+    ];
+    match present.into_iter().find_map(|(key, span)| Some((key, span?))) {
+        Some((key, span)) => Err(RigProblem::UnusedKey { key, with }.at(span)),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn need<'a, T>(
