@@ -18,7 +18,7 @@ pub(crate) enum SupportsKey {
 
 /// One of `supports`
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a support such as { at = \"0 mm\", kind = \"clamped\" }")]
 pub(crate) struct SupportKeys {
     pub at: Key<RawPosition>,
     pub kind: Key<String>,
@@ -28,7 +28,7 @@ pub(crate) struct SupportKeys {
 
 /// One of `sections` of a beam
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a section such as { to = \"100 mm\", thickness = \"2 mm\" }")]
 pub(crate) struct BeamSectionKeys {
     pub to: Key<RawQuantity>,
     pub width: Key<RawQuantity>,
