@@ -1,7 +1,12 @@
 //! Rules that place the training positions.
 
+mod grid;
+
+pub use grid::{EveryError, all_over, every};
+pub(crate) use grid::{cells, inner_grid};
+
 use crate::contact::Position;
-use crate::units::format_length_mm;
+use crate::mechanics::Extent;
 
 /// Where a surface is pressed to calibrate it.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +22,13 @@ pub enum Arrangement {
         middle: usize,
         /// Start and end of the middle portion as shares of the length; 0 < start < end < 1.
         portion: (f64, f64),
+    },
+    /// In the middles of equal cells of a plane: x_i = (i + ½)·length/columns and y_j = (j + ½)·width/rows.
+    Grid {
+        /// Positions along the length.
+        columns: usize,
+        /// Positions across the width.
+        rows: usize,
     },
     /// These positions.
     Explicit(Vec<Position>),
@@ -73,17 +85,33 @@ pub enum ArrangementError {
     },
     /// A position does not lie on the surface.
     #[error(
-        "training position {number} is at {}, off the surface; it must be within 0 and {}",
-        format_length_mm(*x_m),
-        format_length_mm(*length_m)
+        "training position {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
     )]
     OffSurface {
         /// Which position, from 1.
         number: usize,
-        /// Its distance along the length, in metres.
-        x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A rule along a line, on a surface that has a width as well.
+    #[error(
+        "{count} training positions on a line do not say where they are on a plane; a plane needs a grid"
+    )]
+    LineOnPlane {
+        /// How many positions there are.
+        count: usize,
+    },
+    /// A grid, on a surface without a width.
+    #[error("a grid of {columns} × {rows} training positions needs a plane; this surface is a line")]
+    GridOnLine {
+        /// Positions along the length.
+        columns: usize,
+        /// Positions across the width.
+        rows: usize,
     },
 }
 
@@ -91,19 +119,23 @@ impl Arrangement {
     /// The middle portion that the founding paper uses: 100 to 300 mm of 400 mm.
     pub const PAPER_PORTION: (f64, f64) = (0.25, 0.75);
 
-    /// Lays `count` positions out along a surface of length `length_m` (metres), from left to right; explicit positions
-    /// come in the order in which they were listed.
+    /// Lays `count` positions out: on a line from left to right, on a plane row by row; explicit positions come in the
+    /// order in which they were listed.
     ///
     /// # Errors
     /// [`ArrangementError`], with the value and the bound, where the rule cannot place that many positions.
-    pub fn positions(&self, count: usize, length_m: f64) -> Result<Vec<Position>, ArrangementError> {
+    pub fn positions(&self, count: usize, extent: Extent) -> Result<Vec<Position>, ArrangementError> {
         if count == 0 {
             return Err(ArrangementError::NoPositions);
         }
         match self {
-            Self::Even => Ok((0..count).map(|i| at((i as f64 + 0.5) * length_m / count as f64)).collect()),
-            Self::EdgeDense { middle, portion } => edge_dense(count, *middle, *portion, length_m),
-            Self::Explicit(positions) => explicit(positions, count, length_m),
+            Self::Even | Self::EdgeDense { .. } if extent.is_plane() => {
+                Err(ArrangementError::LineOnPlane { count })
+            }
+            Self::Even => Ok(cells(extent, count, 1)),
+            Self::EdgeDense { middle, portion } => edge_dense(count, *middle, *portion, extent.length_m),
+            Self::Grid { columns, rows } => grid(count, *columns, *rows, extent),
+            Self::Explicit(positions) => explicit(positions, count, extent),
         }
     }
 }
@@ -140,16 +172,30 @@ fn edge_dense(
     Ok(left.chain(centre).chain(right).collect())
 }
 
-fn explicit(positions: &[Position], count: usize, length_m: f64) -> Result<Vec<Position>, ArrangementError> {
+fn grid(
+    count: usize,
+    columns: usize,
+    rows: usize,
+    extent: Extent,
+) -> Result<Vec<Position>, ArrangementError> {
+    if !extent.is_plane() {
+        return Err(ArrangementError::GridOnLine { columns, rows });
+    }
+    let listed = columns.saturating_mul(rows);
+    if listed != count {
+        return Err(ArrangementError::CountDiffers { listed, count });
+    }
+    Ok(cells(extent, columns, rows))
+}
+
+fn explicit(positions: &[Position], count: usize, extent: Extent) -> Result<Vec<Position>, ArrangementError> {
     if positions.len() != count {
         return Err(ArrangementError::CountDiffers { listed: positions.len(), count });
     }
-    for (i, position) in positions.iter().enumerate() {
-        if !(position.x_m >= 0.0 && position.x_m <= length_m) {
-            return Err(ArrangementError::OffSurface { number: i + 1, x_m: position.x_m, length_m });
-        }
+    match positions.iter().position(|position| !extent.contains(*position)) {
+        Some(i) => Err(ArrangementError::OffSurface { number: i + 1, position: positions[i], extent }),
+        None => Ok(positions.to_vec()),
     }
-    Ok(positions.to_vec())
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use crate::mechanics::{Extent, InfluenceFunction, Surface};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
-use crate::units::format_length_mm;
 
 /// Why a rig cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,9 +30,9 @@ pub enum SimulateError {
     Arrangement(#[from] ArrangementError),
     /// A position does not lie on the surface.
     #[error(
-        "position {number} is at {}, off the surface; it must be within 0 and {}",
-        format_length_mm(position.x_m),
-        format_length_mm(extent.length_m)
+        "position {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
     )]
     OffSurface {
         /// Which position, from 1.
@@ -75,7 +74,7 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
 /// [`SimulateError`] when the rig lacks a model, a force or training positions.
 pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
     let training = rig.training.as_ref().ok_or(SimulateError::NoTraining)?;
-    let positions = training.positions(rig.bench.surface.extent().length_m)?;
+    let positions = training.positions(rig.bench.surface.extent())?;
     simulate_at(&rig.pressed_bench(), &positions, training.repeats, seed)
 }
 

@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Only these kinds of estimators; may be repeated
     #[arg(long, value_name = "KIND")]
     only: Vec<String>,
-    /// An error up to this is good enough for the effective length
+    /// An error up to this is good enough for the effective length or area
     #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
     tolerance: f64,
     /// Seed of simulation and fits
@@ -153,7 +153,8 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
                 .help("--data names a recording to compare on")
         })?;
         let calibrations = arguments.calibrations;
-        let how = format!("{calibrations} simulated calibrations, judged at 399 positions each");
+        let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());
+        let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each");
         return Ok(Trials { data: "simulation".to_owned(), how, trials });
     };
     let trials = Trial::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;

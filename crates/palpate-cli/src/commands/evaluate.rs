@@ -5,7 +5,7 @@ use crate::progress::FitWatch;
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, output};
-use palpate::contact::Position;
+use palpate::arrangement::all_over;
 use palpate::estimator::Locator;
 use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
 use palpate::recording::{Provenance, Recording};
@@ -24,7 +24,7 @@ pub struct Arguments {
     /// Folds of the cross-validation
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=10_000))]
     folds: u16,
-    /// An error up to this is good enough for the effective length
+    /// An error up to this is good enough for the effective length or area
     #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
     tolerance: f64,
     /// A portion that is also judged by itself, as in `--portion "60 mm..300 mm"`; may be repeated
@@ -147,11 +147,9 @@ fn simulation_complaint(error: SimulateError) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 
-/// The bench pressed at 399 positions, 1/400 of the length apart: for the paper's beam, every millimetre.
+/// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
-    let length_m = locator.bench.surface.extent().length_m;
-    let positions: Vec<Position> =
-        (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
+    let positions = all_over(locator.bench.surface.extent());
     Ok(simulate_at(&locator.bench, &positions, 1, seed).map_err(simulation_complaint)?)
 }
 

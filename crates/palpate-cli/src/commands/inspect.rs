@@ -5,10 +5,11 @@ use crate::recording_files::read_recording;
 use crate::{input, output};
 use palpate::bench::Bench;
 use palpate::centroid::Weighing;
+use palpate::contact::Position;
 use palpate::estimator::Method;
 use palpate::influence::InfluenceLocator;
 use palpate::influence::measured::{HiddenRole, MeasuredLocator};
-use palpate::mechanics::SurfaceSpec;
+use palpate::mechanics::{Extent, SurfaceSpec};
 use palpate::network::Topology;
 use palpate::rig::{Rig, Training};
 use palpate::sensing::Layout;
@@ -71,27 +72,28 @@ fn bench(bench: &Bench) -> Vec<String> {
     let force = bench.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
     vec![
         format!("surface: {surface}"),
-        format!("sensors: {}", layout(&bench.layout)),
+        format!("sensors: {}", layout(&bench.layout, extent)),
         format!("contact force: {force}"),
     ]
 }
 
-fn layout(layout: &Layout) -> String {
+fn layout(layout: &Layout, extent: Extent) -> String {
     let names: Vec<String> = layout
         .sensors
         .iter()
         .map(|sensor| match sensor.kind {
             palpate::sensing::SensorKind::Raw => sensor.name.clone(),
-            kind => format!("{kind} at {}", format_length_mm(sensor.position.x_m)),
+            kind => format!("{kind} at {}", extent.place_in_words(sensor.position)),
         })
         .collect();
-    format!("{}: {}", layout.len(), names.join(", "))
+    format!("{}: {}", layout.len(), names.join(if extent.is_plane() { "; " } else { ", " }))
 }
 
 fn training_words(training: &Training) -> String {
     use palpate::arrangement::Arrangement;
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
+        Arrangement::Grid { columns, rows } => format!("a grid of {columns} × {rows}"),
         Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
         Arrangement::Explicit(_) => "as listed".to_owned(),
     };
@@ -221,10 +223,18 @@ fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failu
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
     };
-    let (low, high) = range(&mut positions.iter().map(|position| position.x_m));
+    let ends = |of: fn(&Position) -> f64| {
+        let (low, high) = range(&mut positions.iter().map(of));
+        format!("{} to {}", format_length_mm(low), format_length_mm(high))
+    };
+    let across = if bench.surface.extent().is_plane() {
+        format!(" along, {} across", ends(|position| position.y_m))
+    } else {
+        String::new()
+    };
     let mut lines = vec![
         format!("a recording: {} rows at {} positions", recording.rows.len(), positions.len()),
-        format!("positions: {} to {}", format_length_mm(low), format_length_mm(high)),
+        format!("positions: {}{across}", ends(|position| position.x_m)),
     ];
     for (i, (name, kind)) in recording.channels.iter().zip(&recording.kinds).enumerate() {
         let (low, high) = range(&mut recording.rows.iter().map(|row| row.reading[i]));

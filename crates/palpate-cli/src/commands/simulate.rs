@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::contact::Position;
+use palpate::arrangement::{EveryError, every};
 use palpate::recording;
 use palpate::simulate::{simulate, simulate_at};
 use std::path::PathBuf;
@@ -15,16 +15,13 @@ pub struct Arguments {
     /// The recording to write
     #[arg(short, long, value_name = "FILE.csv")]
     out: PathBuf,
-    /// Press every so far instead of at the training positions, as in `--every "1 mm"`
+    /// Press every so far, on a plane both ways, instead of at the training positions, as in `--every "1 mm"`
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     every: Option<f64>,
     /// Seed of noise and faults
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
 }
-
-/// The most positions that `--every` may make.
-const MOST_POSITIONS: f64 = 1e6;
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
@@ -34,7 +31,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
             simulate_at(
                 &rig.pressed_bench(),
-                &inner_positions(rig.bench.surface.extent().length_m, every_m)?,
+                &every(rig.bench.surface.extent(), every_m).map_err(too_many)?,
                 repeats,
                 arguments.seed,
             )
@@ -60,14 +57,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-/// Positions `every_m` apart that lie between the ends of the surface.
-fn inner_positions(length_m: f64, every_m: f64) -> Result<Vec<Position>, Failure> {
-    let count = (length_m / every_m - 1e-6).floor();
-    if !(1.0..=MOST_POSITIONS).contains(&count) {
-        let complaint = Complaint::new(format!(
-            "--every makes {count} positions; there must be at least 1 and at most {MOST_POSITIONS}"
-        ));
-        return Err(complaint.into());
-    }
-    Ok((1..=count as usize).map(|i| Position::along(i as f64 * every_m)).collect())
+fn too_many(EveryError { count, .. }: EveryError) -> Complaint {
+    Complaint::new(format!(
+        "--every makes {count} positions; there must be at least 1 and at most {}",
+        EveryError::MOST
+    ))
 }

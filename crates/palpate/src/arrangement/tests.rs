@@ -1,9 +1,11 @@
 use super::*;
 
-const LENGTH_M: f64 = 0.4;
+/// The founding paper's beam.
+const LINE: Extent = Extent { length_m: 0.4, width_m: None };
+const PLANE: Extent = Extent { length_m: 0.3, width_m: Some(0.2) };
 
 fn millimetres(arrangement: &Arrangement, count: usize) -> Vec<f64> {
-    let positions = arrangement.positions(count, LENGTH_M).unwrap();
+    let positions = arrangement.positions(count, LINE).unwrap();
     positions.iter().map(|position| position.x_m * 1e3).collect()
 }
 
@@ -71,6 +73,54 @@ fn what_cannot_be_laid_out_is_refused_with_value_and_bound() {
         (explicit(0.41), 2),
         (explicit(f64::NAN), 2),
     ];
-    let messages = refusals.map(|(rule, count)| rule.positions(count, LENGTH_M).unwrap_err().to_string());
+    let messages = refusals.map(|(rule, count)| rule.positions(count, LINE).unwrap_err().to_string());
     insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn a_grid_lies_in_the_middles_of_cells() {
+    let grid = Arrangement::Grid { columns: 3, rows: 2 };
+    let positions = grid.positions(6, PLANE).unwrap();
+    let millimetres: Vec<_> = positions.iter().map(|p| [p.x_m, p.y_m].map(|m| (m * 1e3).round())).collect();
+    let expected =
+        [[50.0, 50.0], [150.0, 50.0], [250.0, 50.0], [50.0, 150.0], [150.0, 150.0], [250.0, 150.0]];
+    assert_eq!(millimetres, expected);
+}
+
+#[test]
+fn lines_and_planes_are_not_mixed_up() {
+    let grid = Arrangement::Grid { columns: 3, rows: 2 };
+    let explicit = Arrangement::Explicit(vec![Position { x_m: 0.1, y_m: 0.25 }]);
+    let refusals = [
+        (grid.clone(), 6, LINE),
+        (grid, 7, PLANE),
+        (Arrangement::Even, 6, PLANE),
+        (edge_dense(4), 10, PLANE),
+        (explicit.clone(), 1, PLANE),
+        (explicit, 1, LINE),
+    ];
+    let messages =
+        refusals.map(|(rule, count, extent)| rule.positions(count, extent).unwrap_err().to_string());
+    insta::assert_snapshot!(messages.join("\n"), @r"
+    a grid of 3 × 2 training positions needs a plane; this surface is a line
+    6 training positions are listed, but their count is given as 7
+    6 training positions on a line do not say where they are on a plane; a plane needs a grid
+    10 training positions on a line do not say where they are on a plane; a plane needs a grid
+    training position 1 is at 100 mm, 250 mm, off the surface; it must be within 0 and 300 mm along, 0 and 200 mm across
+    training position 1 is at 100 mm, 250 mm, off the surface; it must be within 0 and 400 mm
+    ");
+}
+
+#[test]
+fn judging_covers_the_surface() {
+    let line = all_over(LINE);
+    assert_eq!((line.len(), line[0], line[398]), (399, Position::along(0.001), Position::along(0.399)));
+    let plane = all_over(PLANE);
+    assert_eq!(plane.len(), 24 * 16);
+    let mean = |of: fn(&Position) -> f64| plane.iter().map(of).sum::<f64>() / plane.len() as f64;
+    assert!((mean(|p| p.x_m) - 0.15).abs() < 1e-12 && (mean(|p| p.y_m) - 0.1).abs() < 1e-12);
+    assert_eq!(every(LINE, 0.1).unwrap().len(), 3);
+    let apart = every(PLANE, 0.05).unwrap();
+    assert_eq!((apart.len(), apart[0]), (15, Position { x_m: 0.05, y_m: 0.05 }));
+    assert!(every(PLANE, 0.25).is_err() && every(PLANE, 1e-5).is_err() && every(PLANE, f64::NAN).is_err());
 }

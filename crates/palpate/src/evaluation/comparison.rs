@@ -1,6 +1,7 @@
 //! Every estimator on the same trials, and the choice of the best.
 
 use super::{CrossValidationError, Evaluation};
+use crate::arrangement::all_over;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::estimator::{EstimatorConfig, FitError, Fitting};
@@ -45,21 +46,20 @@ impl Trial {
         Ok(folds.iter().map(trial).collect())
     }
 
-    /// Simulated calibrations of a rig at its training positions, `count` of them, each judged by one press at each of
-    /// 399 positions 1/400 of the length apart.
+    /// Simulated calibrations of a rig at its training positions, `count` of them, each judged by one press at each
+    /// position of [`all_over`].
     ///
     /// # Errors
     /// [`SimulateError`] when the rig has no model, no force or no training positions.
     pub fn by_simulation(rig: &Rig, count: u64, seed: u64) -> Result<Vec<Self>, SimulateError> {
-        let length_m = rig.bench.surface.extent().length_m;
-        let positions: Vec<Position> =
-            (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
+        let extent = rig.bench.surface.extent();
+        let positions = all_over(extent);
         let bench = rig.pressed_bench();
         let trial = |k: u64| {
             // A calibration and its judgement share the bench's gains and offsets, which a seed's first draws decide.
             let training_positions = rig.training.as_ref().ok_or(SimulateError::NoTraining)?;
             let repeats = training_positions.repeats;
-            let at = training_positions.positions(length_m)?;
+            let at = training_positions.positions(extent)?;
             let pressed: Vec<Position> =
                 at.iter().copied().flat_map(|p| std::iter::repeat_n(p, repeats)).collect();
             let both = simulate_at(&bench, &[pressed.clone(), positions.clone()].concat(), 1, seed + k)?;
@@ -166,26 +166,31 @@ pub fn choose(
     }
 }
 
-/// Share of the length at either end where left and right cannot be told apart at usual noise.
+/// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.
 const ENDS: f64 = 1.0 / 80.0;
 /// Where the limit is larger than this share of the length, an estimator cannot reach it: it is a bound for small errors.
 const LARGE_LIMIT: f64 = 1.0 / 200.0;
 
 /// Mean error over the limit's mean error, for the bench's noise; `None` where there is no limit. Counted are contacts
-/// at least 1/80 of the length from both ends where the limit is at most 1/200 of the length.
+/// at least 1/80 of the length from both ends, on a plane also of the width from both sides, where the limit is at most
+/// 1/200 of the length.
 pub fn limit_ratio(bench: &Bench, evaluation: &Evaluation) -> Option<f64> {
     let limit = Limit::of(bench).ok()?;
     let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let length_m = bench.surface.extent().length_m;
-    let inner = ENDS * length_m - 1e-9..=(1.0 - ENDS) * length_m + 1e-9;
+    let extent = bench.surface.extent();
+    let within =
+        |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
+    let is_inner = |at: Position| {
+        within(at.x_m, extent.length_m) && extent.width_m.is_none_or(|width_m| within(at.y_m, width_m))
+    };
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
         let Some(force_n) = located.force_n.or(bench.force_n) else { continue };
         let bound = limit.at(Contact { position: located.truth, force_n }, force);
-        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= LARGE_LIMIT * length_m) else {
+        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= LARGE_LIMIT * extent.length_m) else {
             continue;
         };
-        if inner.contains(&located.truth.x_m) {
+        if is_inner(located.truth) {
             error_m += located.error_m();
             bound_m += bound.mean_error_m();
         }

@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use crate::contact::Position;
 use crate::mechanics::Extent;
-use crate::units::format_length_mm;
 
 /// A CSV file that cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]
@@ -111,7 +110,7 @@ pub enum CsvProblem {
         text: String,
     },
     /// A contact lies off the surface.
-    #[error("the position {} is off the surface; it must be within {}", Shown(*position, *extent), Bounds(*extent))]
+    #[error("the position {} is off the surface; it must be within {}", extent.place_in_words(*position), extent.bounds_in_words())]
     OffSurface {
         /// Where the contact is said to be.
         position: Position,
@@ -168,30 +167,4 @@ impl fmt::Display for Prefix<'_> {
 fn list(names: &[String]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     quoted.join(", ")
-}
-
-/// A position on a line or on a plane.
-struct Shown(Position, Extent);
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(position, extent) = self;
-        match extent.width_m {
-            None => f.write_str(&format_length_mm(position.x_m)),
-            Some(_) => write!(f, "{}, {}", format_length_mm(position.x_m), format_length_mm(position.y_m)),
-        }
-    }
-}
-
-/// Where positions may be.
-struct Bounds(Extent);
-
-impl fmt::Display for Bounds {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "0 and {}", format_length_mm(self.0.length_m))?;
-        match self.0.width_m {
-            None => Ok(()),
-            Some(width_m) => write!(f, " along, 0 and {} across", format_length_mm(width_m)),
-        }
-    }
 }

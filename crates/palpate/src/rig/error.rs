@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
-use crate::mechanics::BeamError;
-use crate::units::{UnitError, format_length_mm};
+use crate::contact::Position;
+use crate::mechanics::{BeamError, Extent};
+use crate::units::UnitError;
 
 /// A rig file, or a section of one in a study, that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -88,31 +89,48 @@ pub enum RigProblem {
     Arrangement(ArrangementError),
     /// A sensor beside the surface.
     #[error(
-        "sensor {number} is at {}, off the surface; it must be within 0 and {}",
-        format_length_mm(*x_m),
-        format_length_mm(*length_m)
+        "sensor {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
     )]
     SensorOffSurface {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// Where it is, in metres.
-        x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
     },
     /// A reaction sensor where nothing supports the surface.
     #[error(
-        "reaction sensor {number} is at {}, where no support is; the supports are at 0 and {}",
-        format_length_mm(*x_m),
-        format_length_mm(*length_m)
+        "reaction sensor {number} is at {}, where no support is{}",
+        extent.place_in_words(*position),
+        if extent.is_plane() { String::new() } else { format!("; the supports are at {}", extent.bounds_in_words()) }
     )]
     NoSupport {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// Where it is, in metres.
-        x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A position with one coordinate on a plane, or with more than one on a line.
+    #[error(
+        "`positions` has {found} where {} is expected",
+        if *plane { "a pair of lengths, along and across," } else { "one length along the surface" }
+    )]
+    Coordinates {
+        /// What is there.
+        found: &'static str,
+        /// Whether the surface has a width.
+        plane: bool,
+    },
+    /// A number of places, on a plane, where it does not say where they are.
+    #[error("[{section}] `count` alone does not say where on a plane they are")]
+    CountOnPlane {
+        /// The section.
+        section: &'static str,
     },
     /// A raw channel on a surface with a model.
     #[error("a raw channel has no model on a beam; only a measured surface has raw channels")]
@@ -187,6 +205,12 @@ impl RigError {
             RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
             RigProblem::NoForce => {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
+            }
+            RigProblem::CountOnPlane { .. } => {
+                Some("say `grid = [3, 3]`, columns and rows, or list pairs in `positions`".to_owned())
+            }
+            RigProblem::Coordinates { plane: true, .. } => {
+                Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
             }
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             _ => None,

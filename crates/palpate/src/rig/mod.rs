@@ -16,6 +16,7 @@ use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::estimator::EstimatorConfig;
+use crate::mechanics::Extent;
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,12 +43,12 @@ pub struct Training {
 }
 
 impl Training {
-    /// The positions on a surface of length `length_m` (metres), each once.
+    /// The positions on a surface of this `extent`, each once.
     ///
     /// # Errors
-    /// [`ArrangementError`]; never for the length of the rig that this belongs to.
-    pub fn positions(&self, length_m: f64) -> Result<Vec<Position>, ArrangementError> {
-        self.arrangement.positions(self.count, length_m)
+    /// [`ArrangementError`]; never for the surface of the rig that this belongs to.
+    pub fn positions(&self, extent: Extent) -> Result<Vec<Position>, ArrangementError> {
+        self.arrangement.positions(self.count, extent)
     }
 }
 

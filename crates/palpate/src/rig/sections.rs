@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use toml::Spanned;
 
-use super::value::{RawColumn, RawQuantity};
+use super::value::{RawColumn, RawPosition, RawQuantity};
 
 /// A value and its place, if the key is there.
 type Key<T> = Option<Spanned<T>>;
@@ -49,7 +49,8 @@ pub(crate) enum SensorsSections {
 pub(crate) struct SensorsSection {
     pub measure: Key<String>,
     pub count: Key<i64>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub grid: Key<Vec<Spanned<i64>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub noise: Key<RawQuantity>,
     pub resolution: Key<RawQuantity>,
     pub gain_error: Key<RawQuantity>,
@@ -71,9 +72,10 @@ pub(crate) struct ContactSection {
 pub(crate) struct TrainingSection {
     pub arrangement: Key<String>,
     pub count: Key<i64>,
+    pub grid: Key<Vec<Spanned<i64>>>,
     pub middle: Key<i64>,
     pub portion: Key<Vec<Spanned<RawQuantity>>>,
-    pub positions: Key<Vec<Spanned<RawQuantity>>>,
+    pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
 }

@@ -1,3 +1,5 @@
+mod planes;
+
 use super::*;
 use crate::mechanics::{Beam, Extent, SurfaceSpec};
 use crate::network::{InputScale, NetworkConfig, OutputCoding};

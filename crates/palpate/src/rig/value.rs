@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use serde::de::{Deserialize, Deserializer, Visitor};
+use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
 
 use super::error::{RigError, RigProblem};
@@ -14,6 +14,13 @@ use crate::units::{Dimension, Quantity, UnitError};
 pub(crate) enum RawQuantity {
     Text(String),
     Number(f64),
+}
+
+/// A position as written: a length along a line, or a list of lengths on a plane.
+#[derive(Clone, Debug)]
+pub(crate) enum RawPosition {
+    Along(RawQuantity),
+    List(Vec<Spanned<RawQuantity>>),
 }
 
 /// A column as written: its name, or its number.
@@ -158,6 +165,42 @@ impl<'de> Deserialize<'de> for RawQuantity {
         }
 
         deserializer.deserialize_any(TextOrNumber)
+    }
+}
+
+impl<'de> Deserialize<'de> for RawPosition {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct LengthOrList;
+
+        impl<'de> Visitor<'de> for LengthOrList {
+            type Value = RawPosition;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a length such as \"75 mm\", or two of them on a plane")
+            }
+
+            fn visit_str<E>(self, text: &str) -> Result<RawPosition, E> {
+                Ok(RawPosition::Along(RawQuantity::Text(text.to_owned())))
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<RawPosition, E> {
+                Ok(RawPosition::Along(RawQuantity::Number(number as f64)))
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<RawPosition, E> {
+                Ok(RawPosition::Along(RawQuantity::Number(number)))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<RawPosition, A::Error> {
+                let mut lengths = Vec::new();
+                while let Some(length) = seq.next_element()? {
+                    lengths.push(length);
+                }
+                Ok(RawPosition::List(lengths))
+            }
+        }
+
+        deserializer.deserialize_any(LengthOrList)
     }
 }
 

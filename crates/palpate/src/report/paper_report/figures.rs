@@ -93,7 +93,7 @@ impl Paper<'_> {
 
     fn training_points(&self) -> Option<Series> {
         let rig = &self.report.study.study.arms.iter().find(|arm| arm.name == "position-10")?.rig;
-        let positions = rig.training.as_ref()?.positions(self.report.length_m()).ok()?;
+        let positions = rig.training.as_ref()?.positions(rig.bench.surface.extent()).ok()?;
         let points = positions.iter().map(|position| (position.x_m * 1e3, position.x_m * 1e3)).collect();
         let kind = SeriesKind::Points { points, marker: Marker::Circle };
         Some(Series { label: "training positions".to_owned(), colour: 6, kind })

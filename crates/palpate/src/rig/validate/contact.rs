@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use super::places::{grid_sides, place};
 use crate::arrangement::{Arrangement, ArrangementError};
-use crate::contact::Position;
 use crate::mechanics::Extent;
 use crate::rig::Training;
 use crate::rig::error::{RigError, RigProblem};
@@ -26,6 +26,7 @@ pub(super) fn validate_force(section: Option<&Spanned<ContactSection>>) -> Resul
 enum Rule {
     Even,
     EdgeDense,
+    Grid,
     Explicit,
 }
 
@@ -35,31 +36,42 @@ pub(super) fn validate_training(
 ) -> Result<Option<Training>, RigError> {
     let Some(section) = section else { return Ok(None) };
     let keys = section.get_ref();
-    let words = [("even", Rule::Even), ("edge-dense", Rule::EdgeDense), ("explicit", Rule::Explicit)];
+    let words = [
+        ("even", Rule::Even),
+        ("edge-dense", Rule::EdgeDense),
+        ("grid", Rule::Grid),
+        ("explicit", Rule::Explicit),
+    ];
     let rule = match &keys.arrangement {
         Some(arrangement) => choice("arrangement", arrangement, &words)?,
         None if keys.positions.is_some() => Rule::Explicit,
+        None if keys.grid.is_some() => Rule::Grid,
+        None if extent.is_plane() && keys.count.is_none() => return Err(missing("grid", section)),
         None => Rule::Even,
     };
     refuse_unused(keys, rule)?;
     let arrangement = match rule {
         Rule::Even => Arrangement::Even,
         Rule::EdgeDense => edge_dense(section)?,
-        Rule::Explicit => explicit(section)?,
+        Rule::Grid => grid(section, extent)?,
+        Rule::Explicit => explicit(section, extent)?,
     };
     let count = match (&keys.count, &arrangement) {
         (Some(raw), _) => count("count", raw, 1..=MOST, MOST_BOUND)?,
         (None, Arrangement::Explicit(positions)) => positions.len(),
+        (None, Arrangement::Grid { columns, rows }) => columns * rows,
         (None, _) => return Err(missing("count", section)),
     };
     let repeats =
         keys.repeats.as_ref().map_or(Ok(1), |raw| self::count("repeats", raw, 1..=MOST, MOST_BOUND))?;
     let force_n = keys.force.as_ref().map(|force| positive("force", force, Dimension::Force)).transpose()?;
     let training = Training { arrangement, count, repeats, force_n };
-    let laid_out = training.positions(extent.length_m);
-    laid_out.map_err(|error| {
+    training.positions(extent).map_err(|error| {
         let span = culprit(section, &error);
-        RigProblem::Arrangement(error).at(span)
+        match error {
+            ArrangementError::LineOnPlane { .. } => RigProblem::CountOnPlane { section: "training" }.at(span),
+            error => RigProblem::Arrangement(error).at(span),
+        }
     })?;
     Ok(Some(training))
 }
@@ -83,13 +95,18 @@ fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
     let with = match rule {
         Rule::Even => "arrangement = \"even\"",
         Rule::EdgeDense => "arrangement = \"edge-dense\"",
+        Rule::Grid => "arrangement = \"grid\"",
         Rule::Explicit => "arrangement = \"explicit\"",
     };
     let unused = |key, span| Err(RigProblem::UnusedKey { key, with }.at(span));
-    match (rule, &keys.middle, &keys.portion, &keys.positions) {
-        (Rule::Even | Rule::Explicit, Some(middle), _, _) => unused("middle", middle.span()),
-        (Rule::Even | Rule::Explicit, _, Some(portion), _) => unused("portion", portion.span()),
-        (Rule::Even | Rule::EdgeDense, _, _, Some(positions)) => unused("positions", positions.span()),
+    let edge_dense = matches!(rule, Rule::EdgeDense);
+    match (&keys.middle, &keys.portion, &keys.positions, &keys.grid) {
+        (Some(middle), ..) if !edge_dense => unused("middle", middle.span()),
+        (_, Some(portion), ..) if !edge_dense => unused("portion", portion.span()),
+        (_, _, Some(positions), _) if !matches!(rule, Rule::Explicit) => {
+            unused("positions", positions.span())
+        }
+        (.., Some(grid)) if !matches!(rule, Rule::Grid) => unused("grid", grid.span()),
         _ => Ok(()),
     }
 }
@@ -113,15 +130,20 @@ fn edge_dense(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigErro
     Ok(Arrangement::EdgeDense { middle, portion })
 }
 
-fn explicit(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigError> {
+fn grid(section: &Spanned<TrainingSection>, extent: Extent) -> Result<Arrangement, RigError> {
+    let sides = section.get_ref().grid.as_ref().ok_or_else(|| missing("grid", section))?;
+    let [columns, rows] = grid_sides(sides, extent, MOST, "at least 1 and at most 100000 in all")?;
+    Ok(Arrangement::Grid { columns, rows })
+}
+
+fn explicit(section: &Spanned<TrainingSection>, extent: Extent) -> Result<Arrangement, RigError> {
     let positions = section.get_ref().positions.as_ref().ok_or_else(|| missing("positions", section))?;
     if positions.get_ref().is_empty() {
         let value = "a list of 0".to_owned();
         return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of at least 1" }
             .at(positions.span()));
     }
-    let along = positions.get_ref().iter().map(|raw| quantity("positions", raw, Dimension::Length));
-    let positions = along.map(|x_m| x_m.map(Position::along)).collect::<Result<_, _>>()?;
+    let positions = positions.get_ref().iter().map(|raw| place(raw, extent)).collect::<Result<_, _>>()?;
     Ok(Arrangement::Explicit(positions))
 }
 

@@ -3,6 +3,7 @@
 mod columns;
 mod contact;
 mod estimator;
+mod places;
 mod sensors;
 mod surface;
 

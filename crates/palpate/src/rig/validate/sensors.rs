@@ -2,11 +2,15 @@
 
 use toml::Spanned;
 
+use super::places::{grid_sides, place};
+use crate::arrangement::inner_grid;
 use crate::contact::Position;
 use crate::mechanics::SurfaceSpec;
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{RecordingSection, SensorsSection, SensorsSections};
-use crate::rig::value::{RawColumn, RawQuantity, bounded, choice, count, not_negative, quantity};
+use crate::rig::value::{
+    RawColumn, RawPosition, RawQuantity, bounded, choice, count, not_negative, quantity,
+};
 use crate::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
 use crate::units::Dimension;
 
@@ -85,21 +89,33 @@ impl Context<'_> {
     }
 
     fn positions(&self, kind: SensorKind) -> Result<Vec<Position>, RigError> {
-        let length_m = self.surface.extent().length_m;
-        match (&self.section.count, &self.section.positions) {
-            (Some(_), Some(positions)) => {
-                Err(RigProblem::UnusedKey { key: "positions", with: "`count`" }.at(positions.span()))
-            }
-            (None, Some(positions)) => self.explicit(kind, positions),
-            (Some(raw), None) => {
-                let count = count("count", raw, 1..=MOST, MOST_BOUND)?;
-                let positions: Vec<_> = even_positions(count, length_m).collect();
+        let extent = self.surface.extent();
+        let SensorsSection { count: number, grid, positions, .. } = self.section;
+        let unused = |key, with, span| Err(RigProblem::UnusedKey { key, with }.at(span));
+        match (number, grid, positions) {
+            (Some(_), _, Some(positions)) => unused("positions", "`count`", positions.span()),
+            (_, Some(_), Some(positions)) => unused("positions", "`grid`", positions.span()),
+            (Some(count), Some(_), None) => unused("count", "`grid`", count.span()),
+            (None, None, Some(positions)) => self.explicit(kind, positions),
+            (None, Some(raw), None) => {
+                let [columns, rows] = grid_sides(raw, extent, MOST, "at least 1 and at most 10000 in all")?;
+                let positions = inner_grid(extent, columns, rows);
                 self.check_supported(kind, &positions, |_| raw.span())?;
                 Ok(positions)
             }
-            (None, None) => match (self.channel_count, kind) {
-                (Some(count), SensorKind::Raw) => Ok(even_positions(count, length_m).collect()),
-                _ => Err(self.missing("count")),
+            // Where a raw channel is means nothing.
+            (Some(raw), None, None) if extent.is_plane() && kind != SensorKind::Raw => {
+                Err(RigProblem::CountOnPlane { section: SECTION }.at(raw.span()))
+            }
+            (Some(raw), None, None) => {
+                let count = count("count", raw, 1..=MOST, MOST_BOUND)?;
+                let positions: Vec<_> = even_positions(count, extent.length_m).collect();
+                self.check_supported(kind, &positions, |_| raw.span())?;
+                Ok(positions)
+            }
+            (None, None, None) => match (self.channel_count, kind) {
+                (Some(count), SensorKind::Raw) => Ok(even_positions(count, extent.length_m).collect()),
+                _ => Err(self.missing(if extent.is_plane() { "grid" } else { "count" })),
             },
         }
     }
@@ -107,15 +123,15 @@ impl Context<'_> {
     fn explicit(
         &self,
         kind: SensorKind,
-        listed: &Spanned<Vec<Spanned<RawQuantity>>>,
+        listed: &Spanned<Vec<Spanned<RawPosition>>>,
     ) -> Result<Vec<Position>, RigError> {
         let extent = self.surface.extent();
         let mut positions = Vec::new();
         for raw in listed.get_ref() {
-            let position = Position::along(quantity("positions", raw, Dimension::Length)?);
+            let position = place(raw, extent)?;
             if !extent.contains(position) {
-                let (number, x_m, length_m) = (positions.len() + 1, position.x_m, extent.length_m);
-                return Err(RigProblem::SensorOffSurface { number, x_m, length_m }.at(raw.span()));
+                let number = positions.len() + 1;
+                return Err(RigProblem::SensorOffSurface { number, position, extent }.at(raw.span()));
             }
             positions.push(position);
         }
@@ -138,10 +154,10 @@ impl Context<'_> {
         span: impl Fn(usize) -> std::ops::Range<usize>,
     ) -> Result<(), RigError> {
         let (Some(surface), SensorKind::Reaction) = (self.surface.model(), kind) else { return Ok(()) };
-        let length_m = surface.length_m();
+        let extent = surface.extent();
         match positions.iter().position(|position| !surface.is_supported_at(*position)) {
             Some(i) => {
-                Err(RigProblem::NoSupport { number: i + 1, x_m: positions[i].x_m, length_m }.at(span(i)))
+                Err(RigProblem::NoSupport { number: i + 1, position: positions[i], extent }.at(span(i)))
             }
             None => Ok(()),
         }
