@@ -62,6 +62,14 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(beam.thickness_m),
             Quantity { value: beam.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
         ),
+        SurfaceSpec::Plate(plate) => format!(
+            "plate, {} × {} × {}, Young's modulus {}, Poisson's ratio {}",
+            format_length_mm(plate.spec().length_m),
+            format_length_mm(plate.spec().width_m),
+            format_length_mm(plate.spec().thickness_m),
+            Quantity { value: plate.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
+            plate.spec().poissons_ratio
+        ),
         SurfaceSpec::Measured(_) => match extent.width_m {
             Some(width_m) => {
                 format!("measured, {} × {}", format_length_mm(extent.length_m), format_length_mm(width_m))

@@ -2,10 +2,12 @@
 
 mod beam;
 mod extent;
+pub mod plate;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use plate::{Plate, PlateError};
 pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;

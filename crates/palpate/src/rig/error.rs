@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
 use crate::contact::Position;
-use crate::mechanics::{BeamError, Extent};
+use crate::mechanics::plate::NothingToRead;
+use crate::mechanics::{BeamError, Extent, PlateError};
 use crate::units::UnitError;
 
 /// A rig file, or a section of one in a study, that cannot be used.
@@ -84,6 +85,17 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A plate that cannot be computed.
+    #[error(transparent)]
+    Plate(PlateError),
+    /// A sensor that reads nothing, wherever the surface is touched.
+    #[error("sensor {number} would read nothing: {reason}")]
+    NothingToRead {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// Why.
+        reason: NothingToRead,
+    },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
@@ -133,7 +145,7 @@ pub enum RigProblem {
         section: &'static str,
     },
     /// A raw channel on a surface with a model.
-    #[error("a raw channel has no model on a beam; only a measured surface has raw channels")]
+    #[error("a raw channel has no model; only a measured surface has raw channels")]
     RawOnModel,
     /// A dead sensor that does not exist.
     #[error("`dead` names sensor {number}; this section has sensors 1 to {count}")]

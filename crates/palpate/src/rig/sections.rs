@@ -8,6 +8,9 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDes
 use toml::Spanned;
 
 use super::value::{RawColumn, RawPosition, RawQuantity};
+pub(crate) use supports::{EdgesSection, SupportSection, SupportsSection};
+
+mod supports;
 
 /// A value and its place, if the key is there.
 type Key<T> = Option<Spanned<T>>;
@@ -33,7 +36,10 @@ pub(crate) struct SurfaceSection {
     pub width: Key<RawQuantity>,
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
-    pub supports: Key<String>,
+    pub supports: Key<SupportsSection>,
+    pub poissons_ratio: Key<f64>,
+    pub edges: Key<EdgesSection>,
+    pub elements: Key<i64>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`

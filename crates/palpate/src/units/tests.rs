@@ -73,6 +73,7 @@ fn quantities_are_shown_with_a_readable_prefix() {
         (0.002, Dimension::Angle),
         (0.05, Dimension::Ratio),
         (7850.0, Dimension::Density),
+        (5000.0, Dimension::Stiffness),
         (0.7, Dimension::None),
     ];
     let shown = shown.map(|(value, dimension)| Quantity { value, dimension }.to_string());
@@ -88,6 +89,7 @@ fn quantities_are_shown_with_a_readable_prefix() {
         "2 mrad",
         "5 %",
         "7850 kg/m3",
+        "5 N/mm",
         "0.7",
     ];
     assert_eq!(shown, expected);

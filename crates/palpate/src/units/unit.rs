@@ -23,6 +23,8 @@ pub enum Dimension {
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
+    /// Force per displacement, in N/m.
+    Stiffness,
 }
 
 impl Dimension {
@@ -37,6 +39,7 @@ impl Dimension {
             Self::Strain => "a strain",
             Self::Ratio => "a ratio",
             Self::Density => "a density",
+            Self::Stiffness => "a stiffness",
         }
     }
 
@@ -97,6 +100,10 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("g/cm3", Dimension::Density, Scale::Power(3)),
     ("kg/m3", Dimension::Density, Scale::Power(0)),
     ("kg/m³", Dimension::Density, Scale::Power(0)),
+    ("N/m", Dimension::Stiffness, Scale::Power(0)),
+    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
+    ("kN/m", Dimension::Stiffness, Scale::Power(3)),
+    ("kN/mm", Dimension::Stiffness, Scale::Power(6)),
 ];
 
 /// A unit of measure.

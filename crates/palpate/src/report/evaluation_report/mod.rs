@@ -197,6 +197,7 @@ impl EvaluationReport<'_> {
         let extent = self.bench().surface.extent();
         let kind = match self.bench().surface {
             SurfaceSpec::Beam(_) => "beam",
+            SurfaceSpec::Plate(_) => "plate",
             SurfaceSpec::Measured(_) => "measured, without a model",
         };
         let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));

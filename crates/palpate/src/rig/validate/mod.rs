@@ -4,6 +4,7 @@ mod columns;
 mod contact;
 mod estimator;
 mod places;
+mod plate;
 mod sensors;
 mod surface;
 

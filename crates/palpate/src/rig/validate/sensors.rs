@@ -146,13 +146,21 @@ impl Context<'_> {
         Ok(positions)
     }
 
-    /// A reaction sensor of a modelled surface must sit at a support.
+    /// A sensor must have something to read, and a reaction sensor of a modelled surface sit at a support.
     fn check_supported(
         &self,
         kind: SensorKind,
         positions: &[Position],
         span: impl Fn(usize) -> std::ops::Range<usize>,
     ) -> Result<(), RigError> {
+        if let SurfaceSpec::Plate(plate) = self.surface {
+            let nothing = |at: &Position| plate.nothing_to_read(kind, *at);
+            if let Some((i, reason)) =
+                positions.iter().enumerate().find_map(|(i, at)| Some((i, nothing(at)?)))
+            {
+                return Err(RigProblem::NothingToRead { number: i + 1, reason }.at(span(i)));
+            }
+        }
         let (Some(surface), SensorKind::Reaction) = (self.surface.model(), kind) else { return Ok(()) };
         let extent = surface.extent();
         match positions.iter().position(|position| !surface.is_supported_at(*position)) {

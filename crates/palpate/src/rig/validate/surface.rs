@@ -2,10 +2,11 @@
 
 use toml::Spanned;
 
+use super::plate;
 use crate::mechanics::SurfaceSpec;
 use crate::mechanics::{Beam, Extent};
 use crate::rig::error::{RigError, RigProblem};
-use crate::rig::sections::SurfaceSection;
+use crate::rig::sections::{SupportsSection, SurfaceSection};
 use crate::rig::value::{RawQuantity, choice, positive};
 use crate::units::Dimension;
 
@@ -14,6 +15,7 @@ const SECTION: &str = "surface";
 #[derive(Clone, Copy)]
 enum Kind {
     Beam,
+    Plate,
     Measured,
 }
 
@@ -21,8 +23,10 @@ pub(super) fn validate(section: Option<&Spanned<SurfaceSection>>) -> Result<Surf
     let section = section.ok_or_else(|| RigProblem::MissingSection { section: SECTION }.nowhere())?;
     let keys = section.get_ref();
     let kind = need("kind", keys.kind.as_ref(), section)?;
-    match choice("kind", kind, &[("beam", Kind::Beam), ("measured", Kind::Measured)])? {
+    let kinds = [("beam", Kind::Beam), ("plate", Kind::Plate), ("measured", Kind::Measured)];
+    match choice("kind", kind, &kinds)? {
         Kind::Beam => beam(section).map(SurfaceSpec::Beam),
+        Kind::Plate => plate::validate(section).map(SurfaceSpec::Plate),
         Kind::Measured => measured(section).map(SurfaceSpec::Measured),
     }
 }
@@ -38,8 +42,19 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
         thickness_m: size("thickness", keys.thickness.as_ref(), Dimension::Length)?,
         youngs_modulus_pa: size("youngs_modulus", keys.youngs_modulus.as_ref(), Dimension::Modulus)?,
     };
+    refuse_plate_keys(keys, "a beam")?;
     if let Some(supports) = &keys.supports {
-        choice("supports", supports, &[("simple", ())])?;
+        match supports.get_ref() {
+            SupportsSection::Word(word) => {
+                choice("supports", &Spanned::new(supports.span(), word.clone()), &[("simple", ())])?;
+            }
+            SupportsSection::List(_) => {
+                let value = "a list".to_owned();
+                let problem =
+                    RigProblem::OutOfRange { key: "supports", value, bound: "\"simple\" on a beam" };
+                return Err(problem.at(supports.span()));
+            }
+        }
     }
     beam.validate().map_err(|error| RigProblem::Beam(error).at(section.span()))?;
     Ok(beam)
@@ -48,6 +63,7 @@ fn beam(section: &Spanned<SurfaceSection>) -> Result<Beam, RigError> {
 fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     let keys = section.get_ref();
     let unused = |key, span| Err(RigProblem::UnusedKey { key, with: "a measured surface" }.at(span));
+    refuse_plate_keys(keys, "a measured surface")?;
     if let Some(thickness) = &keys.thickness {
         return unused("thickness", thickness.span());
     }
@@ -62,7 +78,20 @@ fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     Ok(Extent { length_m, width_m })
 }
 
-fn need<'a, T>(
+/// Only a plate has these.
+fn refuse_plate_keys(keys: &SurfaceSection, with: &'static str) -> Result<(), RigError> {
+    let present = [
+        ("poissons_ratio", keys.poissons_ratio.as_ref().map(Spanned::span)),
+        ("edges", keys.edges.as_ref().map(Spanned::span)),
+        ("elements", keys.elements.as_ref().map(Spanned::span)),
+    ];
+    match present.into_iter().find_map(|(key, span)| Some((key, span?))) {
+        Some((key, span)) => Err(RigProblem::UnusedKey { key, with }.at(span)),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn need<'a, T>(
     key: &'static str,
     value: Option<&'a Spanned<T>>,
     section: &Spanned<SurfaceSection>,

@@ -1,0 +1,104 @@
+//! The order in which the nodes of a grid are eliminated: nested dissection, after George, *Nested dissection of a regular
+//! finite element mesh* (1973).
+//!
+//! A line of nodes separates a grid into two halves that do not touch. Each half is eliminated first, by the same rule, and
+//! the line last, so that nothing couples the halves.
+
+use std::collections::HashMap;
+
+/// Blocks of at most this many nodes are not divided further.
+const LEAF_NODES: usize = 12;
+
+/// A rectangle of nodes: from inclusive, to exclusive.
+#[derive(Clone, Copy)]
+struct Block {
+    columns: (usize, usize),
+    rows: (usize, usize),
+}
+
+/// Column and row of every node of a grid of `columns` × `rows`, in the order of elimination.
+pub(super) fn nested_dissection(columns: usize, rows: usize) -> Vec<(usize, usize)> {
+    let mut order = Vec::with_capacity(columns * rows);
+    dissect(Block { columns: (0, columns), rows: (0, rows) }, &mut order);
+    order
+}
+
+fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
+    let Block { columns, rows } = block;
+    let (wide, high) = (columns.1 - columns.0, rows.1 - rows.0);
+    if wide * high <= LEAF_NODES {
+        order
+            .extend((rows.0..rows.1).flat_map(|row| (columns.0..columns.1).map(move |column| (column, row))));
+    } else if wide >= high {
+        let line = columns.0 + wide / 2;
+        dissect(Block { columns: (columns.0, line), rows }, order);
+        dissect(Block { columns: (line + 1, columns.1), rows }, order);
+        order.extend((rows.0..rows.1).map(|row| (line, row)));
+    } else {
+        let line = rows.0 + high / 2;
+        dissect(Block { columns, rows: (rows.0, line) }, order);
+        dissect(Block { columns, rows: (line + 1, rows.1) }, order);
+        order.extend((columns.0..columns.1).map(|column| (column, line)));
+    }
+}
+
+/// How many pairs of nodes the factor couples when the grid is eliminated in that order, a node with itself included.
+///
+/// An upper bound: a block's nodes couple with each other and with all nodes that surround it. In floating point, for it is
+/// asked of grids that are too large to be anything but refused.
+pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
+    Couplings::default().of(Surrounded { wide: columns, high: rows, left: 0, right: 0, below: 0, above: 0 })
+}
+
+/// A block's size, and on which sides there are nodes beside it: 1 or 0.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Surrounded {
+    wide: usize,
+    high: usize,
+    left: usize,
+    right: usize,
+    below: usize,
+    above: usize,
+}
+
+impl Surrounded {
+    /// Nodes around the block.
+    fn around(self) -> usize {
+        let Self { wide, high, left, right, below, above } = self;
+        (wide + left + right) * (high + below + above) - wide * high
+    }
+}
+
+/// The couplings of blocks that were counted already; there are few different ones.
+#[derive(Default)]
+struct Couplings(HashMap<Surrounded, f64>);
+
+impl Couplings {
+    fn of(&mut self, block: Surrounded) -> f64 {
+        if let Some(pairs) = self.0.get(&block) {
+            return *pairs;
+        }
+        let Surrounded { wide, high, .. } = block;
+        let pairs = if wide * high <= LEAF_NODES {
+            eliminated(wide * high, block.around())
+        } else if wide >= high {
+            let line = wide / 2;
+            self.of(Surrounded { wide: line, right: 1, ..block })
+                + self.of(Surrounded { wide: wide - line - 1, left: 1, ..block })
+                + eliminated(high, block.around())
+        } else {
+            let line = high / 2;
+            self.of(Surrounded { high: line, above: 1, ..block })
+                + self.of(Surrounded { high: high - line - 1, below: 1, ..block })
+                + eliminated(wide, block.around())
+        };
+        self.0.insert(block, pairs);
+        pairs
+    }
+}
+
+/// Pairs among `nodes` that are eliminated together, and of them with `around` later ones.
+fn eliminated(nodes: usize, around: usize) -> f64 {
+    let (nodes, around) = (nodes as f64, around as f64);
+    nodes * (nodes + 1.0) / 2.0 + nodes * around
+}
