@@ -51,6 +51,8 @@ struct Findings {
     seed: u64,
     length_mm: f64,
     tolerance_mm: f64,
+    #[serde(skip)]
+    is_plane: bool,
     effective_percent: f64,
     errors: Vec<Errors>,
 }
@@ -82,6 +84,16 @@ struct Answers {
 enum Subject {
     Locator(Box<Locator>),
     Rig(Box<Rig>),
+}
+
+impl Answers {
+    fn is_plane(&self) -> bool {
+        let bench = match &self.subject {
+            Subject::Locator(locator) => &locator.bench,
+            Subject::Rig(rig) => &rig.bench,
+        };
+        bench.surface.extent().is_plane()
+    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -187,6 +199,7 @@ fn findings(arguments: &Arguments, answers: &Answers) -> Result<Findings, Failur
         seed: arguments.seed,
         length_mm: evaluation.length_m * 1e3,
         tolerance_mm: arguments.tolerance * 1e3,
+        is_plane: answers.is_plane(),
         effective_percent: evaluation.effective_percent(arguments.tolerance),
         errors: errors.collect::<Result<_, Failure>>()?,
         data,
@@ -227,7 +240,8 @@ fn print(findings: &Findings, arguments: &Arguments) -> Result<(), Failure> {
     let heading = ["error, mm (% of length)", "contacts", "average", "median", "95th percentile", "largest"];
     output::say(table(&heading, rows))?;
     let (share, tolerance) = (findings.effective_percent, findings.tolerance_mm);
-    output::say(format!("\neffective: {share:.1} % of the contacts within {tolerance} mm"))?;
+    let what = if findings.is_plane { "effective area" } else { "effective" };
+    output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
     match &arguments.out {
         Some(out) => output::say(format!("Report: {}", out.join("report.html").display())),
         None => Ok(()),

@@ -176,6 +176,12 @@ fn method(method: &Method) -> Vec<String> {
                 most => format!("up to {most} contacts"),
             }
         )],
+        Method::Influence(InfluenceLocator::Plane(plane)) => vec![format!(
+            "influence functions of {} sensors at {} × {} nodes; one contact at once",
+            plane.table().sensors,
+            plane.table().columns,
+            plane.table().rows
+        )],
         Method::Influence(InfluenceLocator::Measured(measured)) => vec![learnt(measured)],
         Method::NetworkLm(networks) => networks
             .members

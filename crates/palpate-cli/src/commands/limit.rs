@@ -175,11 +175,20 @@ fn limits<'a>(limit: &'a Limit<'a>, bench: &Bench, arguments: &Arguments) -> Res
     })
 }
 
-/// From one end to the other along the middle of the surface; for the paper's beam 1, 20, 50, 100, 200 mm and mirrored.
+/// From one end to the other, for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one
+/// side to the other.
 fn a_few(extent: Extent) -> Vec<Position> {
-    const SHARES: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
-    let y_m = extent.width_m.map_or(0.0, |width_m| 0.5 * width_m);
-    SHARES.map(|share| Position { x_m: share * extent.length_m, y_m }).to_vec()
+    const ON_A_LINE: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
+    const ON_A_PLANE: [f64; 7] = [0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95];
+    let x_m = |share: &f64| share * extent.length_m;
+    let Some(width_m) = extent.width_m else {
+        return ON_A_LINE.iter().map(|share| Position::along(x_m(share))).collect();
+    };
+    let row = |y: &f64| {
+        let y_m = y * width_m;
+        ON_A_PLANE.iter().map(move |x| Position { x_m: x_m(x), y_m })
+    };
+    ON_A_PLANE.iter().flat_map(row).collect()
 }
 
 impl Limits<'_> {
@@ -275,14 +284,11 @@ fn print(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Result<(), Fa
         limits.force_n,
         limits.force.name()
     ))?;
-    let heading = ["limit, mm", "force known", "force unknown", "force itself, N"];
-    let rows = limits.listed.iter().map(|&position| {
-        let [known, unknown] = limits.at(position);
-        let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
-        let force = figure(unknown.and_then(|bound| bound.sd_force_n));
-        vec![place(position, bench.surface.extent()), limit(known), limit(unknown), force]
-    });
-    output::say(table(&heading, rows.chain(summary_rows(limits))))?;
+    if bench.surface.extent().is_plane() {
+        print_plane(limits)?;
+    } else {
+        print_line(limits, bench.surface.extent())?;
+    }
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
@@ -290,6 +296,46 @@ fn print(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Result<(), Fa
         Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
         None => Ok(()),
     }
+}
+
+fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
+    let heading = ["limit, mm", "force known", "force unknown", "force itself, N"];
+    let rows = limits.listed.iter().map(|&position| {
+        let [known, unknown] = limits.at(position);
+        let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
+        let force = figure(unknown.and_then(|bound| bound.sd_force_n));
+        vec![extent.place_in_words(position), limit(known), limit(unknown), force]
+    });
+    output::say(table(&heading, rows.chain(summary_rows(limits))))
+}
+
+/// A row of numbers a row of positions, the uppermost first, and a table for each knowledge of the force; where that would
+/// be too wide, a line a position.
+fn print_plane(limits: &Limits) -> Result<(), Failure> {
+    const MOST_COLUMNS: usize = 12;
+    let mut rows: Vec<&[Position]> = limits.listed.chunk_by(|a, b| a.y_m == b.y_m).collect();
+    rows.reverse();
+    let columns = rows.first().map_or(&[][..], |row| *row);
+    if columns.len() > MOST_COLUMNS {
+        return print_line(limits, limits.known.extent);
+    }
+    for (force, name) in [(Force::Known, "force known"), (Force::Unknown, "force unknown")] {
+        let heading: Vec<String> = std::iter::once(format!("limit, mm, {name}"))
+            .chain(columns.iter().map(|at| format!("x {}", format_length_mm(at.x_m))))
+            .collect();
+        let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
+        let cell = |&position: &Position| {
+            let bound = limits.limit.at(Contact { position, force_n: limits.force_n }, force);
+            figure(bound.map(|bound| bound.sd_position_m * 1e3))
+        };
+        let line = |row: &&[Position]| {
+            let name = row.first().map_or(String::new(), |at| format!("y {}", format_length_mm(at.y_m)));
+            std::iter::once(name).chain(row.iter().map(cell)).collect::<Vec<_>>()
+        };
+        output::say(table(&heading, rows.iter().map(line)) + "\n")?;
+    }
+    let heading = ["limit, mm", "force known", "force unknown", ""];
+    output::say(table(&heading, summary_rows(limits)))
 }
 
 /// Of the whole surface, whatever positions are listed.
@@ -305,13 +351,6 @@ fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
         row("largest", |summary| summary.worst.1),
         row("mean error at the limit", |summary| summary.mean_error_m),
     ]
-}
-
-fn place(position: Position, extent: Extent) -> String {
-    match extent.width_m {
-        Some(_) => format!("{} × {}", format_length_mm(position.x_m), format_length_mm(position.y_m)),
-        None => format_length_mm(position.x_m),
-    }
 }
 
 /// Three decimals, or a whole number where there are many digits before them; a dash for none.

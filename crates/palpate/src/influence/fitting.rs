@@ -1,18 +1,15 @@
-//! From presses to a table of influence functions.
+//! Why a fit fails; and from presses to a table of influence functions along a line.
 
 use super::belief::ForceBelief;
-use super::config::{InfluenceConfig, InfluenceSource};
-use super::hyperparameters::{MOST_PRESSES, most_evident};
+use super::config::InfluenceConfig;
+use super::learning::{Channels, Learnt, learn};
 use super::locator::{BeamLocator, BeamParts};
 use super::measured::MeasuredError;
-use super::posterior::{Posterior, SensorPresses};
-use super::presses::Presses;
-use super::prior::{Mean, Prior, Remainders, Spread};
 use super::table::InfluenceTable;
-use crate::mechanics::Surface;
+use crate::bench::Bench;
+use crate::contact::Position;
 use crate::method::FitTask;
 use crate::numerics::NotPositiveDefinite;
-use crate::sensing::{Layout, SensorKind};
 
 /// Why influence functions cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -26,6 +23,12 @@ pub enum InfluenceFitError {
     /// What only influence functions of a surface with a model can do.
     #[error("the surface is `measured`: {what} needs a surface with mechanics, such as a beam")]
     NotOnMeasured {
+        /// The setting.
+        what: &'static str,
+    },
+    /// What is not done on a plane.
+    #[error("the surface is a plane: {what} works on a line, such as a beam, only")]
+    NotOnPlane {
         /// The setting.
         what: &'static str,
     },
@@ -67,53 +70,35 @@ pub enum InfluenceFitError {
     },
 }
 
-/// Fits the influence functions of a surface with a model; `None` when `keep_going` says no.
+/// Fits the influence functions of a one-dimensional surface with a model; `None` when `keep_going` says no.
 pub(super) fn fit_modelled(
     config: InfluenceConfig,
     task: FitTask,
     keep_going: &mut dyn FnMut() -> bool,
 ) -> Result<Option<BeamLocator>, InfluenceFitError> {
-    let surface = task.bench.surface.model().ok_or(InfluenceFitError::NoModel)?;
-    let layout = &task.bench.layout;
-    check_sensors(layout)?;
-    let presses = Presses::of(task.recording)?;
-    let needed = if config.from == InfluenceSource::Recording { 3 } else { 1 };
-    let found = presses.distinct_positions();
-    if found < needed {
-        return Err(InfluenceFitError::TooFewPositions { needed, found });
-    }
-    let mut parts = BeamParts {
-        table: empty_table(layout.len(), surface.length_m()),
-        offsets: vec![0.0; layout.len()],
-        noise_sd: vec![0.0; layout.len()],
-    };
-    for kind in SensorKind::ALL {
-        let members: Vec<usize> = (0..layout.len()).filter(|s| layout.sensors[*s].kind == kind).collect();
-        if members.is_empty() {
-            continue;
-        }
-        if !keep_going() {
-            return Ok(None);
-        }
-        fill_kind(&mut parts, &members, config.from, surface, layout, &presses)?;
-    }
-    let dead = layout.sensors.iter().map(|sensor| sensor.channel.dead).collect();
-    let force = match (task.bench.force_n, config.force_sd_n) {
+    let sensors = task.bench.layout.len();
+    let mut table = empty_table(sensors, task.bench.surface.extent().length_m);
+    let places = around_nodes(&table);
+    let fill = &mut |s: usize, learnt: &Learnt| fill(&mut table, s, learnt, &places);
+    let Some(channels) = learn(config.from, task, &places, fill, keep_going)? else { return Ok(None) };
+    let Channels { offsets, noise_sd, reference_force_n } = channels;
+    let parts = BeamParts { table, offsets, noise_sd };
+    let force = force_belief(config, task.bench);
+    Ok(Some(BeamLocator::new(parts, dead(task.bench), force, reference_force_n, config.contacts)))
+}
+
+/// What a bench and the settings say of the force.
+pub(super) fn force_belief(config: InfluenceConfig, bench: &Bench) -> ForceBelief {
+    match (bench.force_n, config.force_sd_n) {
         (None, _) => ForceBelief::Unknown,
         (Some(force_n), None) => ForceBelief::Known(force_n),
         (Some(mean_n), Some(sd_n)) => ForceBelief::Normal { mean_n, sd_n },
-    };
-    Ok(Some(BeamLocator::new(parts, dead, force, presses.mean_force_n(), config.contacts)))
+    }
 }
 
-fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
-    if let Some(raw) = layout.sensors.iter().position(|sensor| sensor.kind == SensorKind::Raw) {
-        return Err(InfluenceFitError::RawSensor { sensor: raw + 1 });
-    }
-    if layout.sensors.iter().all(|sensor| sensor.channel.dead) {
-        return Err(InfluenceFitError::AllDead { sensors: layout.len() });
-    }
-    Ok(())
+/// Which channels are dead.
+pub(super) fn dead(bench: &Bench) -> Vec<bool> {
+    bench.layout.sensors.iter().map(|sensor| sensor.channel.dead).collect()
 }
 
 fn empty_table(sensors: usize, length_m: f64) -> InfluenceTable {
@@ -121,76 +106,20 @@ fn empty_table(sensors: usize, length_m: f64) -> InfluenceTable {
     InfluenceTable { sensors, length_m, values: zeros.clone(), slopes: zeros.clone(), variances: zeros }
 }
 
-/// Fits the sensors of one kind, which share their spread, and fills their columns of the table.
-fn fill_kind(
-    parts: &mut BeamParts,
-    members: &[usize],
-    from: InfluenceSource,
-    surface: &dyn Surface,
-    layout: &Layout,
-    presses: &Presses,
-) -> Result<(), InfluenceFitError> {
-    let mean = if from == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
-    let kind = layout.sensors[members[0]].kind;
-    let places = Places::new(&parts.table);
-    let presses_m: Vec<f64> = presses.presses.iter().map(|press| press.x_m).collect();
-    let remainders = Remainders::new(surface, kind, &presses_m, &places.0);
-    let with = |s: usize, kept: &[usize]| {
-        let prior = Prior::new(surface, &layout.sensors[s], mean);
-        SensorPresses::new(prior, presses, s, presses.noise_variance(layout, s), kept, &remainders.presses)
-    };
-    let living: Vec<usize> = members.iter().copied().filter(|s| !layout.sensors[*s].channel.dead).collect();
-    let all: Vec<usize> = (0..presses_m.len()).collect();
-    let thinned: Vec<usize> = all.iter().copied().step_by(all.len().div_ceil(MOST_PRESSES)).collect();
-    let searched: Vec<SensorPresses> = living.iter().map(|s| with(*s, &thinned)).collect();
-    let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
-    let mut spread = most_evident(&searched, mean, surface.length_m(), noise_is_told);
-    if from == InfluenceSource::Mechanics {
-        spread = Spread { noise: spread.noise, ..Spread::NONE };
-    }
-    for s in living {
-        let sensor = with(s, &all);
-        let posterior = sensor
-            .posterior(spread)
-            .map_err(|problem| InfluenceFitError::Singular { sensor: s + 1, problem })?;
-        parts.offsets[s] = posterior.offset();
-        parts.noise_sd[s] = sensor.noise_variance(&spread).sqrt();
-        places.fill(&mut parts.table, s, &posterior, &sensor.prior, &remainders);
-    }
-    for s in members.iter().filter(|s| layout.sensors[**s].channel.dead) {
-        parts.noise_sd[*s] = 1.0;
-    }
-    Ok(())
+/// For each node a little to its left, itself, a little to its right.
+fn around_nodes(table: &InfluenceTable) -> Vec<Position> {
+    let h = 1e-5 * table.length_m;
+    let around = |x_m: f64| [(x_m - h).max(0.0), x_m, (x_m + h).min(table.length_m)];
+    (0..table.nodes()).flat_map(|node| around(table.node_m(node))).map(Position::along).collect()
 }
 
-/// Where a posterior is looked at: for each node, a little to its left, itself, a little to its right, in metres.
-struct Places(Vec<f64>);
-
-impl Places {
-    fn new(table: &InfluenceTable) -> Self {
-        let h = 1e-5 * table.length_m;
-        let around = |x_m: f64| [(x_m - h).max(0.0), x_m, (x_m + h).min(table.length_m)];
-        Self((0..table.nodes()).flat_map(|node| around(table.node_m(node))).collect())
-    }
-
-    /// Fills the column of sensor `s`.
-    fn fill(
-        &self,
-        table: &mut InfluenceTable,
-        s: usize,
-        posterior: &Posterior,
-        prior: &Prior,
-        remainders: &Remainders,
-    ) {
-        for node in 0..table.nodes() {
-            let [left, here, right] = [3 * node, 3 * node + 1, 3 * node + 2];
-            let parts = [left, here, right].map(|place| prior.parts(self.0[place]));
-            let mean = |i: usize| posterior.mean(parts[i], &remainders.places.row(left + i));
-            let at = node * table.sensors + s;
-            table.values[at] = mean(1);
-            table.slopes[at] = (mean(2) - mean(0)) / (self.0[right] - self.0[left]);
-            table.variances[at] =
-                posterior.variance(parts[1], &remainders.places.row(here), remainders.own[here]);
-        }
+/// Fills the column of sensor `s` from its influence around the nodes.
+fn fill(table: &mut InfluenceTable, s: usize, learnt: &Learnt, around: &[Position]) {
+    for node in 0..table.nodes() {
+        let [left, here, right] = [3 * node, 3 * node + 1, 3 * node + 2];
+        let at = node * table.sensors + s;
+        table.values[at] = learnt.mean(here);
+        table.slopes[at] = (learnt.mean(right) - learnt.mean(left)) / (around[right].x_m - around[left].x_m);
+        table.variances[at] = learnt.variance(here);
     }
 }

@@ -8,8 +8,10 @@ mod config;
 mod fitting;
 mod hyperparameters;
 mod lanes;
+mod learning;
 mod locator;
 pub mod measured;
+mod plane;
 mod posterior;
 mod presses;
 mod prior;
@@ -23,6 +25,7 @@ pub use belief::ForceBelief;
 pub use config::{InfluenceConfig, InfluenceSource};
 pub use fitting::InfluenceFitError;
 pub use locator::BeamLocator;
+pub use plane::{PlaneLocator, PlaneScratch, PlaneTable};
 pub use scratch::Scratch;
 pub use table::InfluenceTable;
 
@@ -36,8 +39,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InfluenceLocator {
-    /// Of a surface with a model.
+    /// Of a line with a model.
     Beam(Box<BeamLocator>),
+    /// Of a plane with a model.
+    Plane(Box<PlaneLocator>),
     /// Of a surface without one.
     Measured(Box<MeasuredLocator>),
 }
@@ -55,6 +60,10 @@ impl Fit for InfluenceConfig {
             self.check_measured()?;
             let fitted = MeasuredConfig::default().fit(task, keep_going)?;
             return Ok(fitted.map(|locator| InfluenceLocator::Measured(Box::new(locator))));
+        }
+        if task.bench.surface.extent().is_plane() {
+            let fitted = self.fit_plane(task, keep_going)?;
+            return Ok(fitted.map(|locator| InfluenceLocator::Plane(Box::new(locator))));
         }
         let fitted = self.fit_beam(task, keep_going)?;
         Ok(fitted.map(|locator| InfluenceLocator::Beam(Box::new(locator))))
@@ -75,7 +84,20 @@ impl InfluenceConfig {
         }
     }
 
-    /// Fits the influence functions of a surface with a model; `None` when `keep_going`, asked now and then, says no.
+    /// Fits the influence functions of a plane with a model; `None` when `keep_going`, asked now and then, says no.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError`] when the surface has no model, several contacts are to be told apart, or the recording says
+    /// too little.
+    pub fn fit_plane(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<PlaneLocator>, InfluenceFitError> {
+        plane::fit_plane(*self, task, keep_going)
+    }
+
+    /// Fits the influence functions of a line with a model; `None` when `keep_going`, asked now and then, says no.
     ///
     /// # Errors
     /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
@@ -93,6 +115,7 @@ impl InfluenceLocator {
     pub fn leave_out(&mut self, channel: usize) -> bool {
         match self {
             Self::Beam(beam) => beam.leave_out(channel),
+            Self::Plane(plane) => plane.leave_out(channel),
             Self::Measured(_) => false,
         }
     }
@@ -102,6 +125,7 @@ impl Locate for InfluenceLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self {
             Self::Beam(beam) => beam.locate(reading),
+            Self::Plane(plane) => plane.locate(reading),
             Self::Measured(measured) => measured.locate(reading),
         }
     }
@@ -109,6 +133,7 @@ impl Locate for InfluenceLocator {
     fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
         match self {
             Self::Beam(beam) => beam.check(bench),
+            Self::Plane(plane) => plane.check(bench),
             Self::Measured(measured) => measured.check(bench),
         }
     }

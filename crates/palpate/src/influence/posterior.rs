@@ -45,7 +45,7 @@ impl<'a> SensorPresses<'a> {
     ) -> Self {
         let of = |j: usize| &presses.presses[kept[j]];
         let indices = 0..kept.len();
-        let parts: Vec<Parts> = indices.clone().map(|j| prior.parts(of(j).x_m)).collect();
+        let parts: Vec<Parts> = indices.clone().map(|j| prior.parts(of(j).position)).collect();
         let surprise = |j: usize| of(j).mean[index] - of(j).force_n * prior.mean(parts[j]);
         let mean_force_n = presses.mean_force_n();
         Self {

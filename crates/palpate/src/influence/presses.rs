@@ -1,13 +1,14 @@
 //! A recording as an influence fit sees it: presses at the same place with the same force, averaged.
 
 use super::InfluenceFitError;
+use crate::contact::Position;
 use crate::recording::Recording;
 use crate::sensing::Layout;
 
 /// Presses at one position with one force.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Press {
-    pub x_m: f64,
+    pub position: Position,
     pub force_n: f64,
     /// How many readings were averaged.
     pub count: f64,
@@ -35,13 +36,14 @@ impl Presses {
     /// [`InfluenceFitError::NoForce`] for a row whose force nobody knows, or is not greater than 0.
     pub fn of(recording: &Recording) -> Result<Self, InfluenceFitError> {
         let sensors = recording.channels.len();
-        let mut rows: Vec<(f64, f64, &[f64])> = Vec::with_capacity(recording.rows.len());
+        let mut rows: Vec<(Position, f64, &[f64])> = Vec::with_capacity(recording.rows.len());
         for (i, row) in recording.rows.iter().enumerate() {
             let force_n = row.force_n.filter(|force_n| *force_n > 0.0);
             let force_n = force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?;
-            rows.push((row.position.x_m, force_n, &row.reading));
+            rows.push((row.position, force_n, &row.reading));
         }
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let place = |a: &Position, b: &Position| a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m));
+        rows.sort_by(|a, b| place(&a.0, &b.0).then(a.1.total_cmp(&b.1)));
         let mut presses = Vec::new();
         let (mut scatter, mut freedom) = (vec![0.0; sensors], 0.0);
         for group in rows.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
@@ -52,14 +54,14 @@ impl Presses {
                 *scatter += column(s).map(|value| (value - mean[s]).powi(2)).sum::<f64>();
             }
             freedom += count - 1.0;
-            presses.push(Press { x_m: group[0].0, force_n: group[0].1, count, mean });
+            presses.push(Press { position: group[0].0, force_n: group[0].1, count, mean });
         }
         Ok(Self { presses, scatter, freedom })
     }
 
     /// How many positions there are, whatever the force.
     pub fn distinct_positions(&self) -> usize {
-        self.presses.chunk_by(|a, b| a.x_m == b.x_m).count()
+        self.presses.chunk_by(|a, b| a.position == b.position).count()
     }
 
     /// The mean force, in newtons.
@@ -81,7 +83,6 @@ impl Presses {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Position;
     use crate::recording::{Provenance, Row};
     use crate::sensing::SensorKind;
 
@@ -101,7 +102,8 @@ mod tests {
     fn repeats_are_averaged_and_their_scatter_kept() {
         let rows = [(0.1, 3.0, 1.0), (0.2, 3.0, 5.0), (0.1, 3.0, 3.0), (0.1, 2.0, 9.0)];
         let presses = Presses::of(&recording(&rows)).unwrap();
-        let found: Vec<_> = presses.presses.iter().map(|p| (p.x_m, p.force_n, p.count, p.mean[0])).collect();
+        let found: Vec<_> =
+            presses.presses.iter().map(|p| (p.position.x_m, p.force_n, p.count, p.mean[0])).collect();
         assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
         let mut layout = Layout::even(SensorKind::Deflection, 1, 0.4);
         assert_eq!(presses.noise_variance(&layout, 0), Some(2.0));

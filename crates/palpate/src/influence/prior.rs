@@ -3,8 +3,9 @@
 //! A Gaussian process. Its mean is the mechanics' influence function where the fit starts from mechanics, else 0. Its
 //! covariance is that of a wrong gain, of a sensor that sits beside its place, and of a remainder (see [`Remainders`]).
 
+use crate::arrangement::cells;
 use crate::contact::Position;
-use crate::mechanics::{InfluenceFunction, Surface};
+use crate::mechanics::{Extent, InfluenceFunction, Surface};
 use crate::sensing::{Sensor, SensorKind};
 use ndarray::{Array1, Array2};
 use std::sync::Arc;
@@ -45,42 +46,55 @@ pub(super) struct Prior<'a> {
     /// The largest influence, against which remainders are measured.
     pub full_scale: f64,
     function: Arc<dyn InfluenceFunction + 'a>,
-    /// The functions of sensors a little to the left and to the right, and how far apart they are, in metres; none for a
-    /// sensor that cannot sit beside its place.
-    beside: Option<([Arc<dyn InfluenceFunction + 'a>; 2], f64)>,
+    /// Of a sensor that can sit beside its place, along the surface and, on a plane, across it.
+    beside: [Option<Beside<'a>>; 2],
 }
+
+/// The functions of sensors a little before and behind a sensor, and how far apart they are, in metres.
+type Beside<'a> = ([Arc<dyn InfluenceFunction + 'a>; 2], f64);
 
 /// What mechanics says of one sensor and one contact position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
     /// The influence.
     pub model: f64,
-    /// Its derivative by the sensor's position, per metre.
-    pub shift: f64,
+    /// Its derivatives by the sensor's position along and across, per metre.
+    pub shift: [f64; 2],
 }
 
 impl<'a> Prior<'a> {
     /// The prior of `sensor` under `surface`.
     pub fn new(surface: &'a dyn Surface, sensor: &Sensor, mean: Mean) -> Self {
         let Sensor { kind, position, .. } = *sensor;
-        let function = |x_m| surface.influence_function(kind, Position { x_m, ..position });
-        let l = surface.length_m();
+        let extent = surface.extent();
+        let function = |at: Position| surface.influence_function(kind, at);
+        let beside = |at_m: f64, size_m: f64, moved: &dyn Fn(f64) -> Position| {
+            let (before, behind) = ((at_m - 1e-4 * size_m).max(0.0), (at_m + 1e-4 * size_m).min(size_m));
+            ([function(moved(before)), function(moved(behind))], behind - before)
+        };
         // A reaction sensor is part of its support, and does not sit beside it.
-        let beside = (kind != SensorKind::Reaction).then(|| {
-            let (left, right) = ((position.x_m - 1e-4 * l).max(0.0), (position.x_m + 1e-4 * l).min(l));
-            ([function(left), function(right)], right - left)
-        });
-        Self { mean, full_scale: surface.full_scale(kind), function: function(position.x_m), beside }
+        let moves = kind != SensorKind::Reaction;
+        let along = moves.then(|| beside(position.x_m, extent.length_m, &|x_m| Position { x_m, ..position }));
+        let across = extent
+            .width_m
+            .filter(|_| moves)
+            .map(|width_m| beside(position.y_m, width_m, &|y_m| Position { y_m, ..position }));
+        Self {
+            mean,
+            full_scale: surface.full_scale(kind),
+            function: function(position),
+            beside: [along, across],
+        }
     }
 
     /// The parts at a contact position.
-    pub fn parts(&self, x_m: f64) -> Parts {
-        let contact = Position::along(x_m);
-        let shift = self
-            .beside
-            .as_ref()
-            .map_or(0.0, |([left, right], apart_m)| (right.at(contact) - left.at(contact)) / apart_m);
-        Parts { model: self.function.at(contact), shift }
+    pub fn parts(&self, contact: Position) -> Parts {
+        let shift = |beside: &Option<Beside>| {
+            beside.as_ref().map_or(0.0, |([before, behind], apart_m)| {
+                (behind.at(contact) - before.at(contact)) / apart_m
+            })
+        };
+        Parts { model: self.function.at(contact), shift: [shift(&self.beside[0]), shift(&self.beside[1])] }
     }
 
     /// The mean of the influence.
@@ -91,7 +105,8 @@ impl<'a> Prior<'a> {
     /// Covariance of the influence at a pair of contact positions, whose remainders' covariance is `remainder`.
     pub fn covariance(&self, spread: &Spread, a: Parts, b: Parts, remainder: f64) -> f64 {
         let scale = self.full_scale * spread.remainder;
-        let explained = spread.gain.powi(2) * a.model * b.model + spread.shift_m.powi(2) * a.shift * b.shift;
+        let moved = a.shift[0] * b.shift[0] + a.shift[1] * b.shift[1];
+        let explained = spread.gain.powi(2) * a.model * b.model + spread.shift_m.powi(2) * moved;
         explained + scale * scale * remainder
     }
 }
@@ -99,7 +114,7 @@ impl<'a> Prior<'a> {
 /// Covariances of the remainders of all sensors of one kind, 1 where they are largest.
 ///
 /// A remainder is a random mixture of the influence functions that sensors of the same kind would have elsewhere on
-/// the surface, ∫ I(s, a) dB(s) with B Brownian: it bends as the surface bends, is held where the supports hold it, and
+/// the surface, ∫ I(s, a) dB(s) with B Brownian, on a plane a Brownian sheet: it bends as the surface bends, is held where the supports hold it, and
 /// is as smooth as an influence function is. Its posterior mean is a smoothing spline in the sense of Kimeldorf and
 /// Wahba (J. Math. Anal. Appl. 33, 1971).
 pub(super) struct Remainders {
@@ -111,20 +126,22 @@ pub(super) struct Remainders {
     pub own: Array1<f64>,
 }
 
-/// Sensors whose influence functions are mixed.
+/// Sensors whose influence functions are mixed on a line.
 const MIXED: usize = 40;
-/// Stretches between the places at which the largest remainder is looked for.
+/// The same on a plane, about; more of them along its longer side.
+const MIXED_ON_A_PLANE: f64 = 144.0;
+/// Stretches between the places at which the largest remainder is looked for: along a line, and along each side of a plane.
 const STRETCHES: usize = 64;
+const STRETCHES_OF_A_SIDE: usize = 12;
 
 impl Remainders {
-    /// Of sensors of `kind`, for presses and places along the surface, in metres.
-    pub fn new(surface: &dyn Surface, kind: SensorKind, presses_m: &[f64], places_m: &[f64]) -> Self {
-        let l = surface.length_m();
-        let everywhere: Vec<f64> = (0..=STRETCHES).map(|i| l * i as f64 / STRETCHES as f64).collect();
-        let sizes = mixture(surface, kind, &everywhere);
+    /// Of sensors of `kind`, for presses and places on the surface.
+    pub fn new(surface: &dyn Surface, kind: SensorKind, presses: &[Position], places: &[Position]) -> Self {
+        let mixture = Mixture::new(surface, kind);
+        let sizes = mixture.rows(&everywhere(surface.extent()));
         let norm = sizes.outer_iter().map(|row| row.dot(&row)).fold(0.0, f64::max).sqrt();
-        let presses = mixture(surface, kind, presses_m) / norm;
-        let places = mixture(surface, kind, places_m) / norm;
+        let presses = mixture.rows(presses) / norm;
+        let places = mixture.rows(places) / norm;
         Self {
             own: places.outer_iter().map(|row| row.dot(&row)).collect(),
             places: places.dot(&presses.t()),
@@ -133,22 +150,61 @@ impl Remainders {
     }
 }
 
-/// A row a position: what each of the mixed sensors would read there.
-fn mixture(surface: &dyn Surface, kind: SensorKind, positions_m: &[f64]) -> Array2<f64> {
-    let l = surface.length_m();
-    // Supports carry no row of sensors to mix: a reaction is a mixture of what all supports take up, and what bends of it,
-    // as deflections do.
-    let supports = if kind == SensorKind::Reaction { surface.force_supports() } else { Vec::new() };
-    let mixed = if kind == SensorKind::Reaction { SensorKind::Deflection } else { kind };
-    let scale = surface.full_scale(mixed);
-    let sensor = |column: usize| Position::along((column as f64 + 0.5) * l / MIXED as f64);
-    let functions: Vec<_> = (0..MIXED).map(|c| surface.influence_function(mixed, sensor(c))).collect();
-    let taken: Vec<_> = supports.iter().map(|at| surface.influence_function(kind, *at)).collect();
-    Array2::from_shape_fn((positions_m.len(), MIXED + taken.len()), |(row, column)| {
-        let contact = Position::along(positions_m[row]);
-        match column.checked_sub(MIXED) {
-            Some(support) => MIXED as f64 * taken[support].at(contact),
-            None => functions[column].at(contact) / scale,
+/// The sensors that are mixed.
+struct Mixture<'a> {
+    functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
+    scale: f64,
+    /// What single supports take up, mixed into reactions.
+    taken: Vec<Arc<dyn InfluenceFunction + 'a>>,
+}
+
+impl<'a> Mixture<'a> {
+    fn new(surface: &'a dyn Surface, kind: SensorKind) -> Self {
+        // Supports carry no row of sensors to mix: a reaction is a mixture of what all supports take up, and what bends of it,
+        // as deflections do.
+        let reacts = kind == SensorKind::Reaction;
+        let supports = if reacts { surface.force_supports() } else { Vec::new() };
+        let mixed = if reacts { SensorKind::Deflection } else { kind };
+        let extent = surface.extent();
+        let side = |ratio: f64| (MIXED_ON_A_PLANE * ratio).sqrt().round().clamp(4.0, MIXED as f64) as usize;
+        let (columns, rows) = match extent.width_m {
+            None => (MIXED, 1),
+            Some(width_m) => (side(extent.length_m / width_m), side(width_m / extent.length_m)),
+        };
+        let sensors = cells(extent, columns, rows).into_iter();
+        Self {
+            functions: sensors.map(|sensor| surface.influence_function(mixed, sensor)).collect(),
+            scale: surface.full_scale(mixed),
+            taken: supports.iter().map(|at| surface.influence_function(kind, *at)).collect(),
         }
-    })
+    }
+
+    /// A row a position: what each of the mixed sensors would read there.
+    fn rows(&self, positions: &[Position]) -> Array2<f64> {
+        let count = self.functions.len();
+        Array2::from_shape_fn((positions.len(), count + self.taken.len()), |(row, column)| {
+            let at = positions[row];
+            match column.checked_sub(count) {
+                Some(support) => count as f64 * self.taken[support].at(at),
+                None => self.functions[column].at(at) / self.scale,
+            }
+        })
+    }
+}
+
+/// Places all over a surface, its boundary included.
+fn everywhere(extent: Extent) -> Vec<Position> {
+    let share = |i: usize, stretches: usize| i as f64 / stretches as f64;
+    match extent.width_m {
+        None => (0..=STRETCHES).map(|i| Position::along(extent.length_m * share(i, STRETCHES))).collect(),
+        Some(width_m) => (0..(STRETCHES_OF_A_SIDE + 1).pow(2))
+            .map(|i| {
+                let (row, column) = (i / (STRETCHES_OF_A_SIDE + 1), i % (STRETCHES_OF_A_SIDE + 1));
+                Position {
+                    x_m: extent.length_m * share(column, STRETCHES_OF_A_SIDE),
+                    y_m: width_m * share(row, STRETCHES_OF_A_SIDE),
+                }
+            })
+            .collect(),
+    }
 }

@@ -164,7 +164,9 @@ impl Survey<'_> {
             let pairs: Vec<(Position, Twin)> =
                 inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
             let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-            let ends = [zone.from, zone.to].into_iter().filter_map(twin);
+            // On a plane the ends are corners of a rectangle, which need not be inside.
+            let is_line = zone.from.y_m == 0.0 && zone.to.y_m == 0.0;
+            let ends = [zone.from, zone.to].into_iter().filter(|_| is_line).filter_map(twin);
             let twins =
                 Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
             let (Some(&(at, nearest)), Some(twins)) = (nearest, twins) else { continue };
@@ -334,7 +336,7 @@ impl fmt::Display for LimitWarning {
 }
 
 fn place(position: Position) -> String {
-    Zone { from: position, to: position }.to_string()
+    Zone::at(position).to_string()
 }
 
 /// About two significant digits, and no exponent: "0.087", "3.3", "8300".

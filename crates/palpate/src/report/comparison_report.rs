@@ -5,7 +5,11 @@ use maud::{Markup, html};
 use super::limit_line::{limit_in_words, limit_line};
 use super::numbers::{counted, number};
 use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text};
-use super::{Axis, Chart, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg};
+use super::plane_figures::{ErrorGrid, LIMIT_IN_WORDS};
+use super::{
+    Axis, Chart, HeatPanel, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
+    heat_map_to_svg,
+};
 use crate::bench::Bench;
 use crate::evaluation::{Comparison, Located, limit_ratio, percentage_error, percentile};
 
@@ -33,14 +37,19 @@ pub struct ComparisonReport<'a> {
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
 pub fn comparison_report(report: &ComparisonReport) -> Result<Vec<ReportFile>, ReportError> {
-    let figures = Figures(vec![along_figure(report), share_figure(report)]);
+    let extent = report.bench.surface.extent();
+    let (heading, errors) = match extent.width_m {
+        Some(width_m) => ("Errors over the surface", errors_map(report, width_m)),
+        None => ("Errors along the surface", along_figure(report)),
+    };
+    let figures = Figures(vec![errors, share_figure(report)]);
     let section = |id, heading, body| Section { id, heading, body };
     let page = Page {
         title: report.title.to_owned(),
         opening: report.summary(),
         sections: vec![
             section("table", "The estimators", html! { (report.table(1)) (report.left_out_in_words()) }),
-            section("along", "Errors along the surface", figures.show(1)),
+            section("along", heading, figures.show(1)),
             section("share", "How many readings are how good", figures.show(2)),
         ],
         footer: html! {
@@ -151,6 +160,28 @@ impl ComparisonReport<'_> {
 
 /// Stretches of the surface over which errors are summed up.
 const STRETCHES: usize = 40;
+
+/// Maps that fit beside each other; estimators beyond them are in the table alone.
+const MOST_MAPS: usize = 9;
+
+fn errors_map(report: &ComparisonReport, width_m: f64) -> Figure {
+    let length_m = report.bench.surface.extent().length_m;
+    let grid = ErrorGrid::of(report.comparisons.iter().map(|c| &c.evaluation), length_m, width_m);
+    let shown = &report.comparisons[..report.comparisons.len().min(MOST_MAPS)];
+    let panel = |comparison: &Comparison| HeatPanel {
+        name: comparison.estimator.kind().to_owned(),
+        values: grid.medians_mm(&comparison.evaluation.located),
+    };
+    let panels: Vec<HeatPanel> = shown.iter().map(panel).collect();
+    let map = grid.map(report.bench, "Median error over the surface", panels);
+    let with_limit = map.panels.len() > shown.len();
+    let caption = html! {
+        "Median error of each estimator, from the best mean to the worst, by cells of " (number(grid.cell_m()[0] * 1e3)) " × "
+        (number(grid.cell_m()[1] * 1e3)) " mm, all on one scale. Dots: the sensors. Grey: no contact was tried."
+        @if with_limit { (LIMIT_IN_WORDS) }
+    };
+    Figure { number: 1, alternative: map.title.clone(), svg: heat_map_to_svg(&map), caption }
+}
 
 fn along_figure(report: &ComparisonReport) -> Figure {
     let length_m = report.bench.surface.extent().length_m;

@@ -1,6 +1,7 @@
 //! The report of one locator's errors.
 
 mod figures;
+mod plane;
 
 use maud::{Markup, html};
 
@@ -53,13 +54,17 @@ pub enum Judged<'a> {
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
 pub fn evaluation_report(report: &EvaluationReport) -> Result<Vec<ReportFile>, ReportError> {
-    let figures = Figures(vec![figures::error_figure(report), figures::estimate_figure(report)]);
+    let (heading, errors) = match report.bench().surface.extent().width_m {
+        Some(width_m) => ("Errors over the surface", plane::error_map(report, width_m)),
+        None => ("Errors along the surface", figures::error_figure(report)),
+    };
+    let figures = Figures(vec![errors, figures::estimate_figure(report)]);
     let section = |id, heading, body| Section { id, heading, body };
     let page = Page {
         title: report.title.to_owned(),
         opening: report.summary(),
         sections: vec![
-            section("errors", "Errors along the surface", html! { (figures.show(1)) (figures.show(2)) }),
+            section("errors", heading, html! { (figures.show(1)) (figures.show(2)) }),
             section("table", "Errors in numbers", report.errors_table(1)),
             section("judged", report.judged_heading(), report.facts_table(2)),
         ],
@@ -116,6 +121,11 @@ impl EvaluationReport<'_> {
         }
     }
 
+    /// What the share within the tolerance is of.
+    fn effective(&self) -> &'static str {
+        if self.bench().surface.extent().is_plane() { "area" } else { "length" }
+    }
+
     fn judged_heading(&self) -> &'static str {
         match self.judged {
             Judged::Locator(_) => "The locator",
@@ -138,8 +148,8 @@ impl EvaluationReport<'_> {
         Table {
             number: table,
             caption: html! {
-                "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly along the surface, the \
-                 share within the tolerance is the effective length."
+                "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly over the surface, the \
+                 share within the tolerance is the effective " (self.effective()) "."
             },
             columns,
             rows: rows.collect(),

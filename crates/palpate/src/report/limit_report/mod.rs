@@ -1,11 +1,12 @@
 //! The report of a bench's limit: what physics allows, position by position.
 
 mod figures;
+mod plane;
 
 use maud::{Markup, html};
 
 use super::numbers::{counted, mm, number, stated};
-use super::page::{Figures, Page, Section, Table, numeric, short, text, wide, words};
+use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text, wide, words};
 use super::{ReportError, ReportFile};
 use crate::bench::Bench;
 use crate::contact::Position;
@@ -39,8 +40,7 @@ pub struct LimitReport<'a> {
 /// # Errors
 /// [`ReportError`] when the bench cannot be drawn or a figure does not become a picture.
 pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError> {
-    let figures: Vec<_> =
-        figures::bench_figure(report)?.into_iter().chain([figures::limit_figure(report)]).collect();
+    let figures: Vec<_> = figures::bench_figure(report)?.into_iter().chain([report.limit_figure()]).collect();
     let figures = Figures(figures);
     let section = |id, heading, body| Section { id, heading, body };
     let page = Page {
@@ -50,7 +50,7 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
             section("bench", "The bench", html! { (figures.show(1)) (report.sensor_table(2)) }),
             section(
                 "limit",
-                "The limit along the surface",
+                if report.is_plane() { "The limit over the surface" } else { "The limit along the surface" },
                 html! { (figures.show(2)) (report.limit_table(1)) },
             ),
             section("warnings", "What this bench cannot tell", report.warnings_in_words()),
@@ -62,6 +62,17 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
 }
 
 impl LimitReport<'_> {
+    fn is_plane(&self) -> bool {
+        self.known.extent.is_plane()
+    }
+
+    fn limit_figure(&self) -> Figure {
+        match self.known.extent.width_m {
+            Some(width_m) => plane::limit_map(self, width_m),
+            None => figures::limit_figure(self),
+        }
+    }
+
     /// The curve that holds for this bench.
     fn curve(&self) -> &LimitCurve {
         match self.force {
@@ -74,7 +85,7 @@ impl LimitReport<'_> {
         let length_m = self.known.extent.length_m;
         let percent = |limit_m: f64| number(100.0 * limit_m / length_m);
         let place = |(position, limit_m): (Position, f64)| {
-            format!("{} mm at {} mm", number(limit_m * 1e3), mm(position.x_m))
+            format!("{} mm at {} mm", number(limit_m * 1e3), place_in_words(position, self.known))
         };
         html! {
             div.summary {
@@ -153,7 +164,7 @@ impl LimitReport<'_> {
             vec![
                 text((i + 1).to_string()),
                 text(sensor.kind.name()),
-                text(mm(sensor.position.x_m)),
+                text(place_in_words(sensor.position, self.known)),
                 text(noise_in_words(sensor)),
             ]
         });

@@ -1,0 +1,103 @@
+//! The plate of `examples/plate.toml` from outside: every verb that has two coordinates.
+#![forbid(unsafe_code)]
+
+mod support {
+    pub mod command;
+}
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use support::command::{palpate, run, said};
+use tempfile::TempDir;
+
+const PLATE: &str = include_str!("../../../examples/plate.toml");
+
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), PLATE).unwrap();
+    folder
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&said(&run(folder, &[arguments, &["--json"]].concat()))).unwrap()
+}
+
+/// Names of the files of a report.
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn the_limit_of_the_plate_is_a_table_and_a_map() {
+    let folder = folder();
+    let words = said(&run(folder.path(), &["limit", "rig.toml", "--out", "report"]));
+    insta::assert_snapshot!(words);
+    let expected = ["figure-2.png", "figure-2.svg", "report.html"];
+    assert_eq!(files(&folder.path().join("report")), expected);
+    let found = json(folder.path(), &["limit", "rig.toml", "--every", "50 mm"]);
+    assert_eq!(found["positions"].as_array().unwrap().len(), 25);
+}
+
+#[test]
+fn every_estimator_runs_on_the_plate() {
+    let folder = folder();
+    let all = ["influence", "gaussian-process", "neighbours", "centroid", "network-lm"];
+    let mut arguments = vec!["compare", "rig.toml", "--calibrations", "1", "--out", "report"];
+    all.iter().for_each(|kind| arguments.extend(["--only", *kind]));
+    let found = json(folder.path(), &arguments);
+    assert_eq!(found["readings"], 400);
+    let estimators = found["estimators"].as_array().unwrap();
+    assert_eq!(estimators.len(), all.len(), "{found:#}");
+    let best = &estimators[0];
+    assert_eq!(best["name"], "influence");
+    assert!(best["limit_ratio"].as_f64().unwrap() < 1.2, "{best}");
+    assert!((90.0..=99.0).contains(&best["coverage_95"].as_f64().unwrap()), "{best}");
+    let report = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(all.iter().all(|name| report.contains(name)) && report.contains("Errors over the surface"));
+}
+
+#[test]
+fn a_plate_is_simulated_fitted_located_and_evaluated() {
+    let folder = folder();
+    let path = folder.path();
+    said(&run(path, &["simulate", "rig.toml", "--every", "60 mm", "-o", "presses.csv"]));
+    let recording = fs::read_to_string(path.join("presses.csv")).unwrap();
+    assert_eq!(recording.lines().filter(|line| !line.starts_with('#')).count(), 1 + 16 * 5);
+    said(&run(path, &["fit", "rig.toml", "-o", "plate.locator"]));
+    let inspected = said(&run(path, &["inspect", "plate.locator"]));
+    assert!(inspected.contains("influence functions of 9 sensors at 49 × 49 nodes"), "{inspected}");
+    let rig = said(&run(path, &["inspect", "rig.toml"]));
+    assert!(rig.contains("training positions: 36, a grid of 6 × 6, 5 × each"), "{rig}");
+    assert!(rig.contains("deflection at 75 mm, 75 mm; deflection at 150 mm, 75 mm"), "{rig}");
+
+    let located = said(&palpate(path).args(["locate", "plate.locator", "presses.csv"]).output().unwrap());
+    let mut lines = located.lines();
+    assert_eq!(lines.next(), Some("x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status"));
+    let first: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let [x_mm, y_mm] = [first[0], first[1]].map(|cell| cell.parse::<f64>().unwrap());
+    assert!((x_mm - 60.0).abs() < 5.0 && (y_mm - 60.0).abs() < 5.0 && first[7] == "located", "{first:?}");
+
+    let arguments = ["evaluate", "plate.locator", "--data", "presses.csv", "--out", "report"];
+    let words = said(&run(path, &arguments));
+    assert!(words.contains("effective area: "), "{words}");
+    assert!(files(&path.join("report")).contains(&"figure-1.png".to_owned()));
+    let found = json(path, &arguments);
+    assert!(found["errors"][0]["error_mm"]["mean"].as_f64().unwrap() < 2.5, "{found:#}");
+    let crossed = json(path, &["evaluate", "rig.toml"]);
+    assert_eq!(crossed["errors"][0]["count"], 180);
+}
+
+#[test]
+fn the_papers_network_learns_the_plate_a_little() {
+    let folder = folder();
+    let network = PLATE.replace("kind = \"influence\"", "kind = \"network\"\nmax_epochs = 300");
+    fs::write(folder.path().join("network.toml"), network).unwrap();
+    said(&run(folder.path(), &["fit", "network.toml", "-o", "network.locator"]));
+    let found = json(folder.path(), &["evaluate", "network.locator"]);
+    // Better than the middle of the plate, which is 115 mm off on average.
+    assert!(found["errors"][0]["error_mm"]["mean"].as_f64().unwrap() < 60.0, "{found:#}");
+}

@@ -1,0 +1,66 @@
+//! The influence estimator on the plate of `examples/plate.toml`: a fit of 36 × 5 presses, and an estimate with its
+//! uncertainty; one core, CPU time, medians.
+
+use cpu_time::ThreadTime;
+use palpate::arrangement::every;
+use palpate::bench::Bench;
+use palpate::contact::Contact;
+use palpate::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
+use palpate::method::FitTask;
+use palpate::recording::Recording;
+use palpate::rig::Rig;
+use palpate::simulate::{CleanSensors, simulate};
+
+const ROUNDS: usize = 51;
+
+fn main() {
+    let rig = Rig::from_toml(include_str!("../../../examples/plate.toml")).expect("the rig is sound");
+    let recording = simulate(&rig, 0).expect("the rig can be simulated");
+    let mut times: Vec<f64> = (0..5)
+        .map(|_| {
+            let start = ThreadTime::now();
+            std::hint::black_box(fit(&rig.bench, &recording));
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    println!("fit of 36 × 5 presses: {:.0} ms", median(&mut times) * 1e3);
+    for force_n in [Some(5.0), None] {
+        let bench = Bench { force_n, ..rig.bench.clone() };
+        let locator = fit(&bench, &recording);
+        let known = if force_n.is_some() { "known" } else { "unknown" };
+        println!(
+            "estimate with uncertainty, force {known}: {:.2} µs a reading",
+            microseconds(&locator, &rig)
+        );
+    }
+}
+
+fn fit(bench: &Bench, recording: &Recording) -> PlaneLocator {
+    let fitted = InfluenceConfig::default().fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true);
+    fitted.expect("the presses suit the bench").expect("nobody stops it")
+}
+
+/// Median time of an estimate over readings all over the plate.
+fn microseconds(locator: &PlaneLocator, rig: &Rig) -> f64 {
+    let surface = rig.bench.surface.model().expect("a plate has a model");
+    let sensors = CleanSensors::new(surface, &rig.bench.layout);
+    let positions = every(surface.extent(), 0.01).expect("a centimetre is a fair spacing");
+    let readings: Vec<Vec<f64>> =
+        positions.iter().map(|&position| sensors.reading(Contact { position, force_n: 5.0 })).collect();
+    let mut scratch = PlaneScratch::default();
+    let mut times: Vec<f64> = (0..ROUNDS)
+        .map(|_| {
+            let start = ThreadTime::now();
+            for reading in &readings {
+                std::hint::black_box(locator.locate_with(reading, &mut scratch));
+            }
+            start.elapsed().as_secs_f64() * 1e6 / readings.len() as f64
+        })
+        .collect();
+    median(&mut times)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,230 @@
+//! Where one contact on a plane is: whitened search over the table, then Levenberg's steps.
+//!
+//! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, (x, y) position,
+//! e = d − W·f the residual, w weights 1/(1 + v) with v the calibration's variance of a reading over the noise's,
+//! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
+
+use super::coarse::{Coarse, MOST_VALLEYS, Profile};
+use super::patches::{Lanes, Patches};
+use super::table::PlaneTable;
+use crate::influence::belief::ForceBelief;
+use crate::numerics::chi_squared_bound;
+
+/// A table that is ready to be searched: whitened, and without the channels that are left out.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Search {
+    /// The channels in use.
+    pub live: Vec<usize>,
+    offsets: Vec<f64>,
+    inverse_sd: Vec<f64>,
+    pub patches: Patches,
+    /// Variance of f at every node, in groups of eight channels.
+    variances: Vec<Lanes>,
+    pub coarse: Coarse,
+    pub force: ForceBelief,
+    /// The calibration's mean force, in newtons: its offsets are as uncertain as its influences at this force.
+    reference_force_n: f64,
+    /// Length and width, in metres.
+    pub size_m: [f64; 2],
+    /// What a contact costs, by the criterion that counts contacts (Chen and Chen, Biometrika 95, 2008).
+    pub charge: f64,
+    /// A misfit of one contact is larger than this once in ten thousand readings; infinite where none can be.
+    pub worst_misfit: f64,
+    /// |d|² of noise alone is larger than this once in ten thousand readings.
+    pub worst_noise: f64,
+}
+
+/// Memory for locating readings.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    pub whitened: Vec<f64>,
+    pub profile: Profile,
+}
+
+/// x and y in metres, and the force in newtons.
+pub(super) type Unknowns = [f64; 3];
+
+/// A minimum of the misfit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Minimum {
+    pub at: Unknowns,
+    /// χ² there.
+    pub misfit: f64,
+    /// JᵀwJ there, J the derivatives of W·f by x, y and W.
+    pub information: [[f64; 3]; 3],
+}
+
+/// A minimum this much above the best has a share of e⁻¹² of the probability.
+const NEGLIGIBLE: f64 = 24.0;
+
+impl Search {
+    /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
+    pub fn new(
+        table: &PlaneTable,
+        offsets: &[f64],
+        noise_sd: &[f64],
+        dead: &[bool],
+        force: ForceBelief,
+        reference_force_n: f64,
+    ) -> Self {
+        let live: Vec<usize> = (0..table.sensors).filter(|s| !dead[*s]).collect();
+        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
+        let patches = Patches::new(table, &live, &inverse_sd);
+        let mut variances = vec![[0.0; 8]; table.nodes() * patches.groups];
+        for node in 0..table.nodes() {
+            for (i, (s, inverse)) in live.iter().zip(&inverse_sd).enumerate() {
+                variances[node * patches.groups + i / 8][i % 8] =
+                    table.variances[node * table.sensors + s] * inverse * inverse;
+            }
+        }
+        let coarse = Coarse::new(table, &patches, live.len());
+        let unknowns = 1 + force.unknowns();
+        let channels = live.len();
+        Self {
+            offsets: live.iter().map(|s| offsets[*s]).collect(),
+            charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.nodes() as f64).ln(),
+            worst_misfit: match channels.saturating_sub(unknowns) {
+                0 => f64::INFINITY,
+                freedom => chi_squared_bound(1e-4, freedom),
+            },
+            worst_noise: chi_squared_bound(1e-4, channels),
+            size_m: [table.length_m, table.width_m],
+            live,
+            inverse_sd,
+            patches,
+            variances,
+            coarse,
+            force,
+            reference_force_n,
+        }
+    }
+
+    /// Puts d into the scratch; |d|².
+    pub fn whiten(&self, reading: &[f64], scratch: &mut Scratch) -> f64 {
+        scratch.whitened.clear();
+        let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
+        scratch.whitened.extend(channels.map(|((s, offset), inverse)| (reading[*s] - offset) * inverse));
+        scratch.whitened.iter().map(|d| d * d).sum()
+    }
+
+    /// The minima that matter, best first, of a reading that was whitened to length `square`.
+    pub fn minima(&self, square: f64, scratch: &mut Scratch) -> ([Minimum; MOST_VALLEYS], usize) {
+        self.coarse.scan(&scratch.whitened, square, self.force, &mut scratch.profile);
+        let (valleys, count) = self.coarse.valleys(&scratch.profile);
+        let mut found = [NOWHERE; MOST_VALLEYS];
+        let mut kept = 0;
+        for start_m in &valleys[..count] {
+            let minimum = self.refine(&scratch.whitened, *start_m);
+            match found[..kept].iter().position(|other| self.same(&scratch.whitened, other, &minimum)) {
+                Some(i) if minimum.misfit < found[i].misfit => found[i] = minimum,
+                Some(_) => {}
+                None => {
+                    found[kept] = minimum;
+                    kept += 1;
+                }
+            }
+        }
+        found[..kept].sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+        let matters = |minimum: &&Minimum| minimum.misfit <= found[0].misfit + NEGLIGIBLE;
+        (found, found[..kept].iter().take_while(matters).count().max(1))
+    }
+
+    /// Whether two minima lie in one valley: on the straight way between them the misfit hardly rises.
+    fn same(&self, whitened: &[f64], a: &Minimum, b: &Minimum) -> bool {
+        const STEPS: usize = 8;
+        const RISE: f64 = 1.0;
+        let near = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < 0.1 * self.coarse.spacing_m[k]);
+        near || (1..STEPS).all(|step| {
+            let t = step as f64 / STEPS as f64;
+            let at = |k: usize| a.at[k] + t * (b.at[k] - a.at[k]);
+            let [x_m, y_m] = [at(0), at(1)];
+            self.profiled(whitened, [x_m, y_m]).1 <= a.misfit.max(b.misfit) + RISE
+        })
+    }
+
+    /// The best force at a place, and the misfit with it.
+    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+        let force_n = self.best_force(whitened, [x_m, y_m]);
+        (force_n, self.equations(whitened, [x_m, y_m, force_n], None).misfit)
+    }
+
+    /// The best force at a place, as far as the noise alone is concerned.
+    pub fn best_force(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> f64 {
+        if let ForceBelief::Known(force_n) = self.force {
+            return force_n;
+        }
+        let place = self.patches.place(x_m, y_m);
+        let (mean, precision) = self.force.mean_and_precision();
+        let (mut product, mut norm) = (mean * precision, precision);
+        for (group, d) in whitened.chunks(8).enumerate() {
+            let f = self.patches.values(&place, group).f;
+            product += d.iter().zip(&f).map(|(d, f)| d * f).sum::<f64>();
+            norm += f.iter().map(|f| f * f).sum::<f64>();
+        }
+        if norm > 0.0 { (product / norm).max(0.0) } else { 0.0 }
+    }
+
+    /// The variances of f at the node nearest to a place, as a slice of groups.
+    fn variances_near(&self, [x_m, y_m]: [f64; 2]) -> &[Lanes] {
+        let groups = self.patches.groups;
+        &self.variances[self.patches.nearest(x_m, y_m) * groups..][..groups]
+    }
+
+    /// The normal equations; the calibration's variances are those `near` some place, or where the contact is.
+    pub fn equations(&self, whitened: &[f64], at: Unknowns, near: Option<[f64; 2]>) -> Equations {
+        let [x_m, y_m, force_n] = at;
+        let place = self.patches.place(x_m, y_m);
+        let variances = self.variances_near(near.unwrap_or([x_m, y_m]));
+        let scale = force_n.max(self.reference_force_n).powi(2);
+        let mut sums = [[0.0; 8]; 10];
+        for (group, (chunk, variances)) in whitened.chunks(8).zip(variances).enumerate() {
+            let values = self.patches.values(&place, group);
+            let mut d = [0.0; 8];
+            d[..chunk.len()].copy_from_slice(chunk);
+            for lane in 0..8 {
+                let weight = 1.0 / (1.0 + scale * variances[lane]);
+                let (f, gx, gy) =
+                    (values.f[lane], force_n * values.along[lane], force_n * values.across[lane]);
+                let e = d[lane] - force_n * f;
+                let (we, wx, wy) = (weight * e, weight * gx, weight * gy);
+                let terms = [
+                    we * e,
+                    we * gx,
+                    we * gy,
+                    we * f,
+                    wx * gx,
+                    wx * gy,
+                    wx * f,
+                    wy * gy,
+                    wy * f,
+                    weight * f * f,
+                ];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[lane] += term;
+                }
+            }
+        }
+        let [misfit, ex, ey, ef, xx, xy, xf, yy, yf, ff] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        let mut equations = Equations {
+            misfit,
+            right: [ex, ey, ef],
+            information: [[xx, xy, xf], [xy, yy, yf], [xf, yf, ff]],
+        };
+        if let ForceBelief::Normal { mean_n, sd_n } = self.force {
+            equations.misfit += ((force_n - mean_n) / sd_n).powi(2);
+            equations.right[2] -= (force_n - mean_n) / (sd_n * sd_n);
+            equations.information[2][2] += 1.0 / (sd_n * sd_n);
+        }
+        equations
+    }
+}
+
+/// JᵀwJ and Jᵀwe at some unknowns.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equations {
+    pub misfit: f64,
+    pub right: [f64; 3],
+    pub information: [[f64; 3]; 3],
+}
+
+const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };

@@ -1,0 +1,267 @@
+//! The estimator on the plate of `examples/plate.toml`, against the limit.
+
+use super::*;
+use crate::arrangement::cells;
+use crate::bench::Bench;
+use crate::contact::{Contact, Position};
+use crate::influence::{InfluenceConfig, InfluenceFitError, InfluenceSource};
+use crate::limit::{Force, Limit};
+use crate::mechanics::Extent;
+use crate::method::{FitTask, Locate};
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::sensing::{ChannelErrors, measure};
+use crate::simulate::{CleanSensors, simulate};
+use palpate_core::Status;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const PLATE: &str = include_str!("../../../../../examples/plate.toml");
+
+fn rig() -> Rig {
+    Rig::from_toml(PLATE).unwrap()
+}
+
+fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> PlaneLocator {
+    config.fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
+}
+
+fn sensors(bench: &Bench) -> CleanSensors<'_> {
+    CleanSensors::new(bench.surface.model().unwrap(), &bench.layout)
+}
+
+/// The middles of `side` × `side` cells of the inner 90 % of the area: the rectangle about the same centre with sides √0.9
+/// times as long.
+fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
+    let share = 0.9f64.sqrt();
+    let width_m = extent.width_m.unwrap();
+    let inner = Extent { length_m: share * extent.length_m, width_m: Some(share * width_m) };
+    let margin = |size_m: f64| 0.5 * (1.0 - share) * size_m;
+    let moved =
+        |at: Position| Position { x_m: at.x_m + margin(extent.length_m), y_m: at.y_m + margin(width_m) };
+    cells(inner, side, side).into_iter().map(moved).collect()
+}
+
+/// What is tried, and how often.
+#[derive(Clone, Copy, Debug)]
+struct Trials {
+    from: InfluenceSource,
+    force: Force,
+    calibrations: u64,
+    side: usize,
+}
+
+/// Mean error, the limit's mean error (metres), and the share of 95 % ellipses that hold the contact.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    error_m: f64,
+    limit_m: f64,
+    covered: f64,
+}
+
+/// Positions whose limit is above `most_m` are left out.
+fn found(rig: &Rig, trials: Trials, most_m: f64) -> Found {
+    let Trials { from, force, calibrations, side } = trials;
+    let limit = Limit::of(&rig.bench).unwrap();
+    let clean = sensors(&rig.bench);
+    let mut bench = rig.bench.clone();
+    if force == Force::Unknown {
+        bench.force_n = None;
+    }
+    let (mut error_m, mut limit_m, mut count) = (0.0, 0.0, 0u32);
+    let (mut covered, mut told) = (0u32, 0u32);
+    let places: Vec<_> = inner_positions(rig.bench.surface.extent(), side)
+        .into_iter()
+        .filter_map(|position| {
+            let contact = Contact { position, force_n: 5.0 };
+            let bound = limit.at(contact, force)?;
+            (bound.sd_position_m <= most_m).then(|| (contact, bound.mean_error_m(), clean.reading(contact)))
+        })
+        .collect();
+    for seed in 0..calibrations {
+        let recording = simulate(rig, seed).unwrap();
+        let locator = fit(InfluenceConfig { from, ..InfluenceConfig::default() }, &bench, &recording);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
+        let errors = ChannelErrors::none(&bench.layout);
+        let mut scratch = PlaneScratch::default();
+        for (contact, bound_m, reading) in &places {
+            let reading = measure(&bench.layout, reading, &errors, &mut rng);
+            let estimate = locator.locate_with(&reading, &mut scratch);
+            let Position { x_m, y_m } = estimate.contact.position;
+            let (dx, dy) = (x_m - contact.position.x_m, y_m - contact.position.y_m);
+            error_m += dx.hypot(dy);
+            limit_m += bound_m;
+            count += 1;
+            if let Some(uncertainty) = estimate.contact.uncertainty {
+                let [xx, xy, _, yy, ..] = uncertainty.covariance;
+                let square = dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx;
+                told += 1;
+                covered += u32::from(square <= 5.991_464_547 * (xx * yy - xy * xy));
+            }
+        }
+    }
+    let found = Found {
+        error_m: error_m / f64::from(count),
+        limit_m: limit_m / f64::from(count),
+        covered: f64::from(covered) / f64::from(told.max(1)),
+    };
+    eprintln!(
+        "{trials:?}, limit ≤ {most_m} m: {count} readings, mean error {:.3} mm, {:.3} × limit, {:.1} % of {told} covered",
+        found.error_m * 1e3,
+        found.error_m / found.limit_m,
+        100.0 * found.covered
+    );
+    found
+}
+
+#[test]
+fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
+    let rig = rig();
+    for from in [InfluenceSource::Corrected, InfluenceSource::Mechanics, InfluenceSource::Recording] {
+        for force in [Force::Known, Force::Unknown] {
+            let trials = Trials { from, force, calibrations: 3, side: 20 };
+            for most_m in [f64::INFINITY, 0.01, 0.003] {
+                let Found { error_m, limit_m, covered } = found(&rig, trials, most_m);
+                assert!(error_m <= 1.2 * limit_m || most_m == 0.0, "{trials:?}");
+                assert!((0.93..=0.97).contains(&covered) || most_m == 0.0, "{trials:?}: {covered}");
+            }
+        }
+    }
+}
+
+/// Readings of contacts (x, y in mm and newtons) with the bench's noise.
+fn noisy(bench: &Bench, contacts: &[(f64, f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let clean = sensors(bench);
+    let mut sum = vec![0.0; bench.layout.len()];
+    for &(x_mm, y_mm, force_n) in contacts {
+        let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
+        let reading = clean.reading(Contact { position, force_n });
+        sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
+    }
+    measure(&bench.layout, &sum, &ChannelErrors::none(&bench.layout), rng)
+}
+
+#[test]
+fn no_contact_and_two_contacts_are_no_single_contact() {
+    let rig = rig();
+    let recording = simulate(&rig, 3).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    for force_n in [Some(5.0), None] {
+        let bench = Bench { force_n, ..rig.bench.clone() };
+        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        for _ in 0..50 {
+            let nothing = locator.locate(&noisy(&rig.bench, &[], &mut rng));
+            assert_eq!(nothing.status, Status::NoContact, "{force_n:?}: {nothing:?}");
+            let two = locator.locate(&noisy(&rig.bench, &[(80.0, 90.0, 5.0), (220.0, 200.0, 5.0)], &mut rng));
+            assert_eq!(two.status, Status::OutsideModel, "{force_n:?}: {two:?}");
+            let one = locator.locate(&noisy(&rig.bench, &[(80.0, 90.0, 5.0)], &mut rng));
+            assert_eq!(one.status, Status::Located);
+            assert!((one.contact.force_n.unwrap() - 5.0).abs() < 0.5, "{force_n:?}: {one:?}");
+        }
+    }
+}
+
+#[test]
+fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
+    let text =
+        PLATE.replace("grid = [3, 3]", "positions = [[\"150 mm\", \"150 mm\"], [\"150 mm\", \"75 mm\"]]");
+    let rig = Rig::from_toml(&text).unwrap();
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    for _ in 0..20 {
+        let estimate = locator.locate(&noisy(&rig.bench, &[(60.0, 90.0, 5.0)], &mut rng));
+        assert_eq!(estimate.status, Status::Ambiguous, "{estimate:?}");
+        let all = estimate.modes.as_slice().iter().map(|mode| mode.contact).chain([estimate.contact]);
+        let xs: Vec<f64> = all.map(|contact| contact.position.x_m).collect();
+        assert!(xs.iter().any(|x_m| *x_m < 0.15) && xs.iter().any(|x_m| *x_m > 0.15), "{xs:?}");
+        let total: f64 = estimate.modes.as_slice().iter().map(|mode| mode.probability).sum();
+        assert!(total < 1.0, "{estimate:?}");
+    }
+}
+
+#[test]
+fn a_dead_channel_is_left_out_and_the_last_is_kept() {
+    let rig = rig();
+    let mut locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    assert!(locator.leave_out(4));
+    let mut reading = noisy(&rig.bench, &[(100.0, 170.0, 5.0)], &mut rng);
+    reading[4] = 0.0;
+    let estimate = locator.locate(&reading);
+    assert_eq!(estimate.status, Status::Located);
+    assert!(estimate.contact.position.distance_m(Position { x_m: 0.1, y_m: 0.17 }) < 5e-3, "{estimate:?}");
+    assert!((0..9).filter(|channel| locator.leave_out(*channel)).count() == 8);
+}
+
+#[test]
+fn faults_that_a_calibration_shows_are_corrected() {
+    let text =
+        PLATE.replace("noise = \"5 um\"", "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"20 um\"");
+    let mut rig = Rig::from_toml(&text).unwrap();
+    let told = rig.bench.clone();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
+    for sensor in &mut rig.bench.layout.sensors {
+        sensor.position.x_m += 1e-3 * rng.random_range(-1.0..=1.0);
+        sensor.position.y_m += 1e-3 * rng.random_range(-1.0..=1.0);
+    }
+    let limit = Limit::of(&told).unwrap();
+    let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
+    let clean = sensors(&rig.bench);
+    let mut recording = simulate(&rig, 0).unwrap();
+    for row in &mut recording.rows {
+        let reading = clean.reading(Contact { position: row.position, force_n: 5.0 });
+        row.reading = measure(&rig.bench.layout, &reading, &errors, &mut rng);
+    }
+    let locator = fit(InfluenceConfig::default(), &told, &recording);
+    let (mut error_m, mut limit_m) = (0.0, 0.0);
+    for position in inner_positions(told.surface.extent(), 12) {
+        let contact = Contact { position, force_n: 5.0 };
+        let Some(bound) = limit.at(contact, Force::Known).filter(|bound| bound.sd_position_m < 5e-3) else {
+            continue;
+        };
+        for _ in 0..5 {
+            let reading = measure(&rig.bench.layout, &clean.reading(contact), &errors, &mut rng);
+            error_m += locator.locate(&reading).contact.position.distance_m(position);
+            limit_m += bound.mean_error_m();
+        }
+    }
+    eprintln!("gains, offsets and places off: {:.3} × limit", error_m / limit_m);
+    assert!(error_m < 1.3 * limit_m, "{:.3} × limit", error_m / limit_m);
+}
+
+#[test]
+fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
+    let rig = rig();
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let json = serde_json::to_string(&locator).unwrap();
+    assert_eq!(serde_json::from_str::<PlaneLocator>(&json).unwrap(), locator);
+    let replaced = [
+        ("\"columns\":49", "\"columns\":48"),
+        ("\"sensors\":9", "\"sensors\":8"),
+        ("\"width_m\":0.3", "\"width_m\":-0.3"),
+        ("{\"known\":5.0}", "{\"known\":-5.0}"),
+    ];
+    for (good, bad) in replaced {
+        assert!(json.contains(good), "{good}");
+        assert!(serde_json::from_str::<PlaneLocator>(&json.replace(good, bad)).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn what_a_plane_cannot_do_is_refused_in_words() {
+    let rig = rig();
+    let mut recording = simulate(&rig, 1).unwrap();
+    let refuse = |config: InfluenceConfig, recording: &Recording| {
+        let task = FitTask { bench: &rig.bench, recording, seed: 0 };
+        config.fit_plane(task, &mut || true).unwrap_err()
+    };
+    let several = refuse(InfluenceConfig { contacts: 2, ..InfluenceConfig::default() }, &recording);
+    assert_eq!(
+        several.to_string(),
+        "the surface is a plane: telling several contacts apart works on a line, such as a beam, only"
+    );
+    recording.rows.truncate(25);
+    let from = InfluenceSource::Recording;
+    let few = refuse(InfluenceConfig { from, ..InfluenceConfig::default() }, &recording);
+    assert_eq!(few, InfluenceFitError::TooFewPositions { needed: 6, found: 5 });
+}
