@@ -2,10 +2,13 @@
 
 mod beam;
 mod extent;
+pub mod modal;
+mod motion;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use motion::Motion;
 pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;
