@@ -1,5 +1,7 @@
 //! Recordings made by a rig's model instead of its bench.
 
+mod moving;
+
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -14,6 +16,8 @@ use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
 use crate::units::format_length_mm;
 
+pub use moving::simulate_moving;
+
 /// Why a rig cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
@@ -26,6 +30,9 @@ pub enum SimulateError {
     /// The rig does not say where to press.
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
+    /// The rig does not say how a contact moves.
+    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    NoMotion,
     /// The rig's training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
 use crate::mechanics::BeamError;
+use crate::mechanics::modal::ModalBeamError;
 use crate::units::{UnitError, format_length_mm};
 
 /// A rig file, or a section of one in a study, that cannot be used.
@@ -83,6 +84,31 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A beam whose motion cannot be computed.
+    #[error(transparent)]
+    ModalBeam(ModalBeamError),
+    /// A moving contact that leaves the surface.
+    #[error(
+        "`{key}` is at {}, off the surface; it must be within 0 and {}",
+        format_length_mm(*x_m),
+        format_length_mm(*length_m)
+    )]
+    MotionOffSurface {
+        /// The key.
+        key: &'static str,
+        /// Where it is, in metres.
+        x_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// A moving contact that is read too often to be held.
+    #[error("the motion takes {readings} readings; at most {most} can be held")]
+    TooManyReadings {
+        /// Its duration times the rate.
+        readings: f64,
+        /// The most it can be.
+        most: f64,
+    },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),

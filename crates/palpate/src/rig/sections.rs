@@ -22,6 +22,7 @@ pub(crate) struct RigSections {
     pub training: Key<TrainingSection>,
     pub estimator: Key<EstimatorSection>,
     pub recording: Key<RecordingSection>,
+    pub motion: Key<MotionSection>,
 }
 
 /// `[surface]`
@@ -33,6 +34,7 @@ pub(crate) struct SurfaceSection {
     pub width: Key<RawQuantity>,
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
+    pub density: Key<RawQuantity>,
     pub supports: Key<String>,
 }
 
@@ -76,6 +78,21 @@ pub(crate) struct TrainingSection {
     pub positions: Key<Vec<Spanned<RawQuantity>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
+}
+
+/// `[motion]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MotionSection {
+    pub from: Key<RawQuantity>,
+    pub to: Key<RawQuantity>,
+    pub speed: Key<RawQuantity>,
+    pub turn: Key<RawQuantity>,
+    pub passes: Key<i64>,
+    pub lifted: Key<RawQuantity>,
+    pub touch: Key<RawQuantity>,
+    pub rate: Key<RawQuantity>,
+    pub damping: Key<RawQuantity>,
 }
 
 /// `[estimator]`

@@ -12,7 +12,7 @@ use super::{Dimension, Unit};
 /// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³; a ratio of 5 % is 0.05).
+    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, m/s, s, Hz; a ratio of 5 % is 0.05).
     pub value: f64,
     /// What it measures.
     pub dimension: Dimension,
@@ -75,8 +75,8 @@ struct Symbols(Option<Dimension>);
 
 impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
-        let all = [Length, Force, Modulus, Angle, Strain, Ratio, Density];
+        use Dimension::{Angle, Density, Force, Frequency, Length, Modulus, Ratio, Speed, Strain, Time};
+        let all = [Length, Force, Modulus, Angle, Strain, Ratio, Density, Speed, Time, Frequency];
         let units =
             all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
         for (i, unit) in units.enumerate() {

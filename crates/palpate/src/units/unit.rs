@@ -23,6 +23,12 @@ pub enum Dimension {
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
+    /// Length per time, in m/s.
+    Speed,
+    /// Time, in seconds.
+    Time,
+    /// How often a second, in hertz.
+    Frequency,
 }
 
 impl Dimension {
@@ -37,6 +43,9 @@ impl Dimension {
             Self::Strain => "a strain",
             Self::Ratio => "a ratio",
             Self::Density => "a density",
+            Self::Speed => "a speed",
+            Self::Time => "a time",
+            Self::Frequency => "a frequency",
         }
     }
 
@@ -97,6 +106,15 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("g/cm3", Dimension::Density, Scale::Power(3)),
     ("kg/m3", Dimension::Density, Scale::Power(0)),
     ("kg/m³", Dimension::Density, Scale::Power(0)),
+    ("mm/s", Dimension::Speed, Scale::Power(-3)),
+    ("m/s", Dimension::Speed, Scale::Power(0)),
+    ("us", Dimension::Time, Scale::Power(-6)),
+    ("µs", Dimension::Time, Scale::Power(-6)),
+    ("μs", Dimension::Time, Scale::Power(-6)),
+    ("ms", Dimension::Time, Scale::Power(-3)),
+    ("s", Dimension::Time, Scale::Power(0)),
+    ("Hz", Dimension::Frequency, Scale::Power(0)),
+    ("kHz", Dimension::Frequency, Scale::Power(3)),
 ];
 
 /// A unit of measure.
