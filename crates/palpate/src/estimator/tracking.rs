@@ -36,10 +36,9 @@ impl Locator {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
                 Ok(Tracking { likelihood: BeamLikelihood::new(beam) })
             }
-            method => Err(NotTrackable {
-                kind: self.kind(),
-                measured: matches!(method, Method::Influence(_)),
-            }),
+            method => {
+                Err(NotTrackable { kind: self.kind(), measured: matches!(method, Method::Influence(_)) })
+            }
         }
     }
 }

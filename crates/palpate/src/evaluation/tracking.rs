@@ -41,7 +41,8 @@ impl TrackErrors {
             let alone = &track.alone.contact;
             errors.readings += 1;
             errors.single_m += (alone.position.x_m - x_m).abs();
-            errors.single_covered += alone.uncertainty.map_or(0.0, |uncertainty| within(uncertainty.x_95_m, x_m));
+            errors.single_covered +=
+                alone.uncertainty.map_or(0.0, |uncertainty| within(uncertainty.x_95_m, x_m));
             if let Some(tracked) = track.tracked {
                 errors.tracked += 1;
                 errors.track_m += (tracked.x_m - x_m).abs();
@@ -142,7 +143,12 @@ pub fn sweep_speeds(
         let truths: Vec<Contact> = recording.recording.rows.iter().filter_map(|row| row.contact()).collect();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
         let errors = TrackErrors::of(&filtered, &truths).zip(TrackErrors::of(&smoothed, &truths));
-        sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors { ratio, speed_m_per_s, filtered, smoothed }));
+        sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
+            ratio,
+            speed_m_per_s,
+            filtered,
+            smoothed,
+        }));
     }
     Ok(sweep)
 }

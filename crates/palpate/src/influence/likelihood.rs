@@ -33,8 +33,10 @@ impl BeamLikelihood {
             live.iter().map(|s| (parts.offsets[*s], 1.0 / parts.noise_sd[*s])).collect();
         let whitened = |values: &[f64], power: i32| -> Vec<f64> {
             let rows = values.chunks_exact(parts.table.sensors);
-            rows.flat_map(|row| live.iter().zip(&scaling).map(|(s, (_, inverse))| row[*s] * inverse.powi(power)))
-                .collect()
+            rows.flat_map(|row| {
+                live.iter().zip(&scaling).map(|(s, (_, inverse))| row[*s] * inverse.powi(power))
+            })
+            .collect()
         };
         let table = InfluenceTable {
             sensors: live.len(),
@@ -72,7 +74,11 @@ impl Likelihood for BeamLikelihood {
         let variances = self.table.variances_near(x_m);
         let scale = force_n.max(self.locator.reference_force_n()).powi(2);
         let cell = self.table.cell(x_m);
-        let node = if x_m - self.table.node_m(cell.node) > 0.5 * self.table.spacing_m() { cell.node + 1 } else { cell.node };
+        let node = if x_m - self.table.node_m(cell.node) > 0.5 * self.table.spacing_m() {
+            cell.node + 1
+        } else {
+            cell.node
+        };
         let curvatures = &self.curvatures[node * self.table.sensors..];
         let mut fit = ContactFit::default();
         let mut uncertain = 0.0;

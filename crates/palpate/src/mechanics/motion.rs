@@ -121,8 +121,12 @@ mod tests {
         let x = |time_s: f64| touching.contact_at(time_s, 1.0).position.x_m;
         for i in 1..(touching.duration_s() / h) as i32 {
             let t = h * f64::from(i);
-            let (speed, acceleration) = ((x(t + h) - x(t - h)) / (2.0 * h), (x(t + h) - 2.0 * x(t) + x(t - h)) / (h * h));
-            assert!(speed.abs() <= 0.5 + 1e-9 && acceleration.abs() <= most + 0.05, "{t}: {speed} {acceleration}");
+            let (speed, acceleration) =
+                ((x(t + h) - x(t - h)) / (2.0 * h), (x(t + h) - 2.0 * x(t) + x(t - h)) / (h * h));
+            assert!(
+                speed.abs() <= 0.5 + 1e-9 && acceleration.abs() <= most + 0.05,
+                "{t}: {speed} {acceleration}"
+            );
         }
     }
 }

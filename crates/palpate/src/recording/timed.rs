@@ -31,7 +31,12 @@ pub struct TimedRecording {
 ///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, mut out: impl Write) -> io::Result<()> {
+pub fn write_timed(
+    timed: &TimedRecording,
+    extent: Extent,
+    comment: &str,
+    mut out: impl Write,
+) -> io::Result<()> {
     let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
     let timed_record = |time: String, rest: Vec<String>| std::iter::once(time).chain(rest);
     writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
@@ -129,8 +134,7 @@ impl Found {
         let columns = schema.columns;
         let named = columns.header == Header::Present;
         let time = Column::Name(TIME.to_owned());
-        let time =
-            if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
+        let time = if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
         let contact = if named { ContactFields::find(head, columns).ok() } else { None };
         let channels = ChannelFields::find(head, columns)?;
         Ok(Self { time, contact, channels, width: head.width() })

@@ -86,7 +86,11 @@ impl TrackReport<'_> {
         let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
         let alone = |track: &Track| (track.time_s, track.alone.contact.position.x_m * 1e3);
         series.push(Series {
-            label: if stride > 1 { format!("single readings, every {stride}th") } else { "single readings".to_owned() },
+            label: if stride > 1 {
+                format!("single readings, every {stride}th")
+            } else {
+                "single readings".to_owned()
+            },
             colour: 4,
             kind: SeriesKind::Points {
                 points: self.tracks.iter().step_by(stride).map(alone).collect(),
@@ -98,8 +102,13 @@ impl TrackReport<'_> {
             BandPoint { x: track.time_s, low: ends.0 * 1e3, high: ends.1 * 1e3 }
         };
         let points = self.tracks.iter().map(band).collect();
-        series.push(Series { label: "95 % of the track".to_owned(), colour: 0, kind: SeriesKind::Band { points } });
-        let line = |track: &Track| (track.time_s, track.tracked.map_or(f64::NAN, |tracked| tracked.x_m * 1e3));
+        series.push(Series {
+            label: "95 % of the track".to_owned(),
+            colour: 0,
+            kind: SeriesKind::Band { points },
+        });
+        let line =
+            |track: &Track| (track.time_s, track.tracked.map_or(f64::NAN, |tracked| tracked.x_m * 1e3));
         let kind = SeriesKind::Line { points: self.tracks.iter().map(line).collect(), stroke: Stroke::Solid };
         series.push(Series { label: format!("track, {}", self.how), colour: 0, kind });
         if !self.truths.is_empty() {
@@ -126,7 +135,11 @@ impl TrackReport<'_> {
     fn sweep_figure(&self) -> Figure {
         let line = |label: &str, colour, error: fn(&SpeedErrors) -> f64| {
             let points = self.sweep.iter().map(|speed| (speed.ratio, error(speed) * 1e3)).collect();
-            Series { label: label.to_owned(), colour, kind: SeriesKind::Line { points, stroke: Stroke::Solid } }
+            Series {
+                label: label.to_owned(),
+                colour,
+                kind: SeriesKind::Line { points, stroke: Stroke::Solid },
+            }
         };
         let chart = Chart {
             title: "Errors against the contact's speed".to_owned(),
@@ -159,7 +172,14 @@ impl TrackReport<'_> {
                 percent(errors.single_covered),
             ]
         };
-        let columns = ["readings", "average error, mm", "of single readings, mm", "ratio", "covered, %", "of single readings, %"];
+        let columns = [
+            "readings",
+            "average error, mm",
+            "of single readings, mm",
+            "ratio",
+            "covered, %",
+            "of single readings, %",
+        ];
         Table {
             number: 1,
             caption: html! { "Errors while something touched; covered: how often the 95 % interval held the contact." },
@@ -184,7 +204,14 @@ impl TrackReport<'_> {
                 percent(smoothed.track_covered),
             ]
         };
-        let columns = ["speed, m/s", "single, mm", "filter, mm", "smoother, mm", "filter covers, %", "smoother covers, %"];
+        let columns = [
+            "speed, m/s",
+            "single, mm",
+            "filter, mm",
+            "smoother, mm",
+            "filter covers, %",
+            "smoother covers, %",
+        ];
         Table {
             number: 2,
             caption: html! { "Average errors against the speed over the critical speed." },

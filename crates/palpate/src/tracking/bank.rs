@@ -99,14 +99,16 @@ impl Bank {
 
     /// `None` where the reading is too improbable for numbers.
     fn updated_about(&self, fit: &ContactFit, about: [f64; 2], inertia_s2: f64) -> Option<(Self, f64)> {
-        let results: [(Gaussian, f64); MOTIONS] = self.members.map(|member| member.updated(fit, about, inertia_s2));
+        let results: [(Gaussian, f64); MOTIONS] =
+            self.members.map(|member| member.updated(fit, about, inertia_s2));
         let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return None;
         }
         let weights: [f64; MOTIONS] = std::array::from_fn(|i| self.shares[i] * (results[i].1 - best).exp());
         let sum: f64 = weights.iter().sum();
-        let after = Self { shares: weights.map(|weight| weight / sum), members: results.map(|(member, _)| member) };
+        let after =
+            Self { shares: weights.map(|weight| weight / sum), members: results.map(|(member, _)| member) };
         (sum > 0.0).then(|| (after, best + sum.ln()))
     }
 

@@ -34,7 +34,7 @@ impl Default for TrackerConfig {
         Self {
             accelerations_m_per_s2: [0.03, 0.6, 12.0],
             acceleration_s: 0.1,
-            motion_s: 0.2,
+            motion_s: 1.0,
             speed_sd_m_per_s: 0.5,
             force_drift: 0.1,
             changes_per_s: 1.0,

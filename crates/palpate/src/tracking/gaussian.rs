@@ -73,7 +73,8 @@ impl Motion {
         let mut mixed = motions[0];
         for i in 0..STATES {
             for j in 0..STATES {
-                mixed.noise[i][j] = shares.iter().zip(motions).map(|(share, motion)| share * motion.noise[i][j]).sum();
+                mixed.noise[i][j] =
+                    shares.iter().zip(motions).map(|(share, motion)| share * motion.noise[i][j]).sum();
             }
         }
         mixed
@@ -137,8 +138,8 @@ impl Gaussian {
         for i in 0..STATES {
             for j in 0..=i {
                 let (left, right) = (before[i], before[j]);
-                let fall = left[0] * (g00 * right[0] + g01 * right[1])
-                    + left[1] * (g01 * right[0] + g11 * right[1]);
+                let fall =
+                    left[0] * (g00 * right[0] + g01 * right[1]) + left[1] * (g01 * right[0] + g11 * right[1]);
                 after.covariance[i][j] -= fall;
                 after.covariance[j][i] = after.covariance[i][j];
             }
@@ -241,7 +242,8 @@ mod tests {
 
     #[test]
     fn a_reading_of_the_position_alone_is_the_textbook_s_kalman_filter() {
-        let fit = ContactFit { misfit: 4.0, pull: [2e3, 0.0], information: [1e6, 0.0, 0.0], calibration_m2: 0.0 };
+        let fit =
+            ContactFit { misfit: 4.0, pull: [2e3, 0.0], information: [1e6, 0.0, 0.0], calibration_m2: 0.0 };
         // One measurement z of x with variance 1e-6, (z − 0.2)² / 1e-6 = 4: z = 0.202.
         let (after, evidence) = BELIEF.updated(&fit, [0.2, 3.0], 0.0);
         let (innovation, spread) = (2e-3, 5e-6);
@@ -260,7 +262,9 @@ mod tests {
         let moved = |delta: [f64; 2]| {
             let [a, b, c] = information;
             let by = [a * delta[0] + b * delta[1], b * delta[0] + c * delta[1]];
-            let misfit = misfit - 2.0 * (pull[0] * delta[0] + pull[1] * delta[1]) + delta[0] * by[0] + delta[1] * by[1];
+            let misfit = misfit - 2.0 * (pull[0] * delta[0] + pull[1] * delta[1])
+                + delta[0] * by[0]
+                + delta[1] * by[1];
             ContactFit { misfit, pull: [pull[0] - by[0], pull[1] - by[1]], information, calibration_m2: 0.0 }
         };
         let (here, one) = BELIEF.updated(&moved([0.0; 2]), [0.2, 3.0], 1e-4);

@@ -98,7 +98,11 @@ fn part(
     covariance[W][W] = tilt * tilt * variance_m2 + across;
     (covariance[X][W], covariance[W][X]) = (tilt * variance_m2, tilt * variance_m2);
     let room_m = width_m.unwrap_or((2.0 * PI * variance_m2).sqrt()) / length_m;
-    let room_n = if known.is_some() { 1.0 } else { (2.0 * PI * across).sqrt() / (FORCES * force_n.max(f64::MIN_POSITIVE)) };
+    let room_n = if known.is_some() {
+        1.0
+    } else {
+        (2.0 * PI * across).sqrt() / (FORCES * force_n.max(f64::MIN_POSITIVE))
+    };
     let evidence = -0.5 * fit.misfit + (room_m * room_n).min(1.0).ln();
     (evidence, Gaussian { mean: [x_m, 0.0, 0.0, force_n], covariance }, fit)
 }

@@ -211,7 +211,11 @@ impl<'a> Tracker<'a> {
             .collect();
         let all: f64 = beliefs.iter().map(|(weight, ..)| weight).sum();
         let below = |x_m: f64| -> f64 {
-            beliefs.iter().map(|(weight, mean, sd)| weight * normal_distribution((x_m - mean) / sd)).sum::<f64>() / all
+            beliefs
+                .iter()
+                .map(|(weight, mean, sd)| weight * normal_distribution((x_m - mean) / sd))
+                .sum::<f64>()
+                / all
         };
         let quantile = |share: f64| {
             let (mut low, mut high) = (0.0, self.likelihood.length_m());

@@ -46,9 +46,6 @@ impl Oscillator {
         let a = from / square - 2.0 * self.zeta * b / self.omega;
         let (place, speed) = (state.place - a, state.speed - b);
         let [[pp, ps], [sp, ss]] = self.free;
-        State {
-            place: a + b * self.step_s + pp * place + ps * speed,
-            speed: b + sp * place + ss * speed,
-        }
+        State { place: a + b * self.step_s + pp * place + ps * speed, speed: b + sp * place + ss * speed }
     }
 }

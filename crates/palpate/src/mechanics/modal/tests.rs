@@ -39,7 +39,12 @@ fn fryba(beam: &ModalBeam, speed: f64, x_m: f64, t: f64, force_n: f64) -> f64 {
 #[test]
 fn the_papers_beam_swings_at_17_hertz_and_is_critical_at_14_metres_a_second() {
     let beam = paper(0.01);
-    let told = format!("{:.2} {:.2} {:.3}", beam.frequency_hz(1), beam.frequency_hz(2), beam.critical_speed_m_per_s());
+    let told = format!(
+        "{:.2} {:.2} {:.3}",
+        beam.frequency_hz(1),
+        beam.frequency_hz(2),
+        beam.critical_speed_m_per_s()
+    );
     assert_eq!(told, "17.17 68.66 13.733");
 }
 
