@@ -127,7 +127,7 @@ impl Stream<'_> {
         while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
             match parser.parse_line(&line) {
                 Ok(None) => {}
-                Ok(Some(reading)) => self.follow(reading, &mut out)?,
+                Ok(Some(reading)) => self.follow(&reading, &mut out)?,
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => self.skip(&error),
             }
@@ -166,7 +166,7 @@ impl Stream<'_> {
         Ok(read > 0)
     }
 
-    fn follow(&mut self, reading: TimedReading, out: &mut impl Write) -> Result<(), Failure> {
+    fn follow(&mut self, reading: &TimedReading, out: &mut impl Write) -> Result<(), Failure> {
         let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
         let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
         self.times += 1;

@@ -145,8 +145,8 @@ impl Gaussian {
             }
         }
         let left = with_seen(&after.covariance);
-        for i in 0..STATES {
-            after.mean[i] += left[i][0] * pull[0] + left[i][1] * pull[1];
+        for (mean, left) in after.mean.iter_mut().zip(&left) {
+            *mean += left[0] * pull[0] + left[1] * pull[1];
         }
         let [lx, lm, lw] = of_seen(&left);
         let explained = pull[0] * (lx * pull[0] + 2.0 * lm * pull[1]) + pull[1] * lw * pull[1];
@@ -180,24 +180,27 @@ impl Gaussian {
         let gain: Matrix =
             std::array::from_fn(|i| solve(&expected.covariance, std::array::from_fn(|j| carried[j][i])));
         let mut before = *self;
+        let news: Vector = std::array::from_fn(|k| later.mean[k] - expected.mean[k]);
+        let change: Matrix = std::array::from_fn(|k| {
+            std::array::from_fn(|l| later.covariance[k][l] - expected.covariance[k][l])
+        });
         for i in 0..STATES {
-            for k in 0..STATES {
-                before.mean[i] += gain[i][k] * (later.mean[k] - expected.mean[k]);
-            }
-            for j in 0..STATES {
-                for k in 0..STATES {
-                    for l in 0..STATES {
-                        let change = later.covariance[k][l] - expected.covariance[k][l];
-                        before.covariance[i][j] += gain[i][k] * change * gain[j][l];
-                    }
-                }
+            before.mean[i] += dot(&gain[i], &news);
+            let through: Vector =
+                std::array::from_fn(|l| (0..STATES).map(|k| gain[i][k] * change[k][l]).sum());
+            for (value, gain) in before.covariance[i].iter_mut().zip(&gain) {
+                *value += dot(&through, gain);
             }
         }
         before
     }
 }
 
-/// P⁻¹·b by Cholesky's elimination, scaled to a diagonal of ones; 0 for what has no variance, as a known force.
+fn dot(a: &Vector, b: &Vector) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// P⁻¹·b by Gauss's elimination, scaled to a diagonal of ones; 0 for what has no variance, as a known force.
 fn solve(p: &Matrix, b: Vector) -> Vector {
     let scale: Vector = std::array::from_fn(|i| p[i][i].max(0.0).sqrt());
     let over = |value: f64, scale: f64| if scale > 0.0 { value / scale } else { 0.0 };
@@ -206,17 +209,15 @@ fn solve(p: &Matrix, b: Vector) -> Vector {
     let mut y: Vector = std::array::from_fn(|i| over(b[i], scale[i]));
     for i in 0..STATES {
         if a[i][i] <= 1e-14 {
+            a[i] = [0.0; STATES];
+            a.iter_mut().for_each(|row| row[i] = 0.0);
             (a[i][i], y[i]) = (1.0, 0.0);
-            for j in i + 1..STATES {
-                (a[i][j], a[j][i]) = (0.0, 0.0);
-            }
         }
-        for r in i + 1..STATES {
-            let factor = a[r][i] / a[i][i];
-            for c in i..STATES {
-                a[r][c] -= factor * a[i][c];
-            }
-            y[r] -= factor * y[i];
+        let (pivot, right) = (a[i], y[i]);
+        for (row, y) in a.iter_mut().zip(&mut y).skip(i + 1) {
+            let factor = row[i] / pivot[i];
+            row.iter_mut().zip(&pivot).skip(i).for_each(|(value, above)| *value -= factor * above);
+            *y -= factor * right;
         }
     }
     for i in (0..STATES).rev() {

@@ -112,8 +112,8 @@ impl<'a> Tracker<'a> {
 
     fn duration(&self, time_s: f64) -> Result<Option<f64>, TrackError> {
         match self.time_s {
-            Some(before_s) if !(time_s > before_s) => Err(TrackError::Time { time_s, before_s }),
-            Some(before_s) => Ok(Some(time_s - before_s)),
+            Some(before_s) if time_s > before_s => Ok(Some(time_s - before_s)),
+            Some(before_s) => Err(TrackError::Time { time_s, before_s }),
             None => Ok(None),
         }
     }
@@ -168,7 +168,8 @@ impl<'a> Tracker<'a> {
         let mut kept: Vec<(Hypothesis, Gaussian)> = Vec::with_capacity(MOST_HYPOTHESES);
         let best = self.hypotheses.first().map_or(f64::NEG_INFINITY, |first| first.weight);
         for hypothesis in self.hypotheses.drain(..) {
-            if !(hypothesis.weight > best - NEGLIGIBLE) || kept.len() == MOST_HYPOTHESES {
+            let probable = hypothesis.weight > best - NEGLIGIBLE;
+            if !probable || kept.len() == MOST_HYPOTHESES {
                 break;
             }
             let belief = hypothesis.bank.mixed();

@@ -46,7 +46,7 @@ pub(super) fn validate(
     let motion = motion(section, beam.beam.length_m)?;
     let rate_hz = positive("rate", need("rate", keys.rate.as_ref(), section)?, Dimension::Frequency)?;
     let readings = motion.duration_s() * rate_hz;
-    if !(readings <= MOST_READINGS) {
+    if readings > MOST_READINGS || !readings.is_finite() {
         return Err(RigProblem::TooManyReadings { readings, most: MOST_READINGS }.at(section.span()));
     }
     Ok(Some(MotionRig { motion, beam, rate_hz }))
