@@ -73,6 +73,15 @@ pub fn force(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A frequency in hertz, from a command line argument.
+pub fn frequency(text: &str) -> Result<f64, String> {
+    match Quantity::parse_as(text, Dimension::Frequency) {
+        Ok(frequency_hz) if frequency_hz > 0.0 => Ok(frequency_hz),
+        Ok(_) => Err(format!("`{text}` must be greater than 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
 /// A quantity greater than 0 in whatever unit, from a command line argument.
 pub fn quantity(text: &str) -> Result<Quantity, String> {
     match text.parse::<Quantity>() {

@@ -23,6 +23,7 @@ pub mod rig;
 pub mod sensing;
 pub mod simulate;
 pub mod study;
+pub mod tracking;
 pub mod units;
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! What every method can do: be fitted to a recording, and locate.
 
 mod held_out;
+mod likelihood;
 
 pub use held_out::HeldOutSpread;
+pub use likelihood::{ContactFit, Likelihood};
 
 use crate::bench::Bench;
 use crate::recording::Recording;

@@ -1,5 +1,7 @@
 //! Recordings made by a rig's model instead of its bench.
 
+mod moving;
+
 use std::sync::Arc;
 
 use rand::{Rng, RngExt, SeedableRng};
@@ -13,6 +15,8 @@ use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
 
+pub use moving::simulate_moving;
+
 /// Why a rig cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
@@ -25,6 +29,9 @@ pub enum SimulateError {
     /// The rig does not say where to press.
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
+    /// The rig does not say how a contact moves.
+    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    NoMotion,
     /// The rig's training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),

@@ -9,3 +9,4 @@ pub mod limit;
 pub mod locate;
 pub mod simulate;
 pub mod study;
+pub mod track;

@@ -67,6 +67,16 @@ impl BeamLocator {
         &self.search
     }
 
+    /// What fitting found, and which channels are left out.
+    pub(super) fn parts(&self) -> (&BeamParts, &[bool]) {
+        (&self.stored.parts, &self.stored.dead)
+    }
+
+    /// Mean force of the calibration, in newtons.
+    pub(super) fn reference_force_n(&self) -> f64 {
+        self.stored.reference_force_n
+    }
+
     /// What is known of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force

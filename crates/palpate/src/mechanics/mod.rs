@@ -2,12 +2,15 @@
 
 mod beam;
 mod extent;
+pub mod modal;
+mod motion;
 pub mod plate;
 mod supported_beam;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use motion::Motion;
 pub use plate::{Plate, PlateError};
 pub use supported_beam::{
     BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,

@@ -49,6 +49,7 @@ mod study_parts;
 mod study_report;
 mod text;
 mod ticks;
+mod track_report;
 
 #[cfg(test)]
 mod tests;
@@ -68,3 +69,4 @@ pub use paper_report::paper_report;
 pub use png::{PngError, svg_to_png};
 pub use report_file::{ReportError, ReportFile};
 pub use study_report::{StudyReport, study_report};
+pub use track_report::{TrackReport, track_report};

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
 use crate::contact::Position;
+use crate::mechanics::modal::ModalBeamError;
 use crate::mechanics::plate::NothingToRead;
 use crate::mechanics::{BeamError, Extent, PlateError, SupportedBeamError};
 use crate::sensing::SensorKind;
@@ -99,6 +100,31 @@ pub enum RigProblem {
         number: usize,
         /// Why.
         reason: NothingToRead,
+    },
+    /// A beam whose motion cannot be computed.
+    #[error(transparent)]
+    ModalBeam(ModalBeamError),
+    /// A moving contact that leaves the surface.
+    #[error(
+        "`{key}` is at {}, off the surface; it must be within 0 and {}",
+        format_length_mm(*x_m),
+        format_length_mm(*length_m)
+    )]
+    MotionOffSurface {
+        /// The key.
+        key: &'static str,
+        /// Where it is, in metres.
+        x_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// A moving contact that is read too often to be held.
+    #[error("the motion takes {readings} readings; at most {most} can be held")]
+    TooManyReadings {
+        /// Its duration times the rate.
+        readings: f64,
+        /// The most it can be.
+        most: f64,
     },
     /// Training positions that cannot be laid out.
     #[error(transparent)]

@@ -25,6 +25,7 @@ pub(crate) struct RigSections {
     pub training: Key<TrainingSection>,
     pub estimator: Key<EstimatorSection>,
     pub recording: Key<RecordingSection>,
+    pub motion: Key<MotionSection>,
 }
 
 /// `[surface]`
@@ -41,6 +42,7 @@ pub(crate) struct SurfaceSection {
     pub poissons_ratio: Key<f64>,
     pub edges: Key<EdgesSection>,
     pub elements: Key<i64>,
+    pub density: Key<RawQuantity>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -86,6 +88,21 @@ pub(crate) struct TrainingSection {
     pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
+}
+
+/// `[motion]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MotionSection {
+    pub from: Key<RawQuantity>,
+    pub to: Key<RawQuantity>,
+    pub speed: Key<RawQuantity>,
+    pub turn: Key<RawQuantity>,
+    pub passes: Key<i64>,
+    pub lifted: Key<RawQuantity>,
+    pub touch: Key<RawQuantity>,
+    pub rate: Key<RawQuantity>,
+    pub damping: Key<RawQuantity>,
 }
 
 /// `[estimator]`

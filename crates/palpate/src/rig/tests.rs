@@ -316,6 +316,7 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
             training: arm.training.clone(),
             estimator: arm.estimator.clone(),
             recording: None,
+            motion: None,
         })
     });
     let rigs: Vec<Result<Rig, RigError>> = rigs.collect();

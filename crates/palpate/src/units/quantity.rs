@@ -12,7 +12,7 @@ use super::{Dimension, Unit};
 /// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad; a ratio of 5 % is 0.05).
+    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
     pub value: f64,
     /// What it measures.
     pub dimension: Dimension,
@@ -76,8 +76,21 @@ struct Symbols(Option<Dimension>);
 impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
-        use Dimension::{RotationalStiffness, Stiffness};
-        let all = [Length, Force, Modulus, Angle, Strain, Ratio, Density, Stiffness, RotationalStiffness];
+        use Dimension::{Frequency, RotationalStiffness, Speed, Stiffness, Time};
+        let all = [
+            Length,
+            Force,
+            Modulus,
+            Angle,
+            Strain,
+            Ratio,
+            Density,
+            Stiffness,
+            RotationalStiffness,
+            Speed,
+            Time,
+            Frequency,
+        ];
         let units =
             all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
         for (i, unit) in units.enumerate() {

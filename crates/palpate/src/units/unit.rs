@@ -27,6 +27,12 @@ pub enum Dimension {
     Stiffness,
     /// Couple per angle that a spring turns by, in N·m/rad.
     RotationalStiffness,
+    /// Length per time, in m/s.
+    Speed,
+    /// Time, in seconds.
+    Time,
+    /// How often a second, in hertz.
+    Frequency,
 }
 
 impl Dimension {
@@ -43,6 +49,9 @@ impl Dimension {
             Self::Density => "a density",
             Self::Stiffness => "a stiffness",
             Self::RotationalStiffness => "a rotational stiffness",
+            Self::Speed => "a speed",
+            Self::Time => "a time",
+            Self::Frequency => "a frequency",
         }
     }
 
@@ -108,6 +117,15 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("N/mm", Dimension::Stiffness, Scale::Power(3)),
     ("Nm/rad", Dimension::RotationalStiffness, Scale::Power(0)),
     ("N·m/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("mm/s", Dimension::Speed, Scale::Power(-3)),
+    ("m/s", Dimension::Speed, Scale::Power(0)),
+    ("us", Dimension::Time, Scale::Power(-6)),
+    ("µs", Dimension::Time, Scale::Power(-6)),
+    ("μs", Dimension::Time, Scale::Power(-6)),
+    ("ms", Dimension::Time, Scale::Power(-3)),
+    ("s", Dimension::Time, Scale::Power(0)),
+    ("Hz", Dimension::Frequency, Scale::Power(0)),
+    ("kHz", Dimension::Frequency, Scale::Power(3)),
 ];
 
 /// A unit of measure.

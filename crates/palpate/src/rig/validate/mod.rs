@@ -3,6 +3,7 @@
 mod columns;
 mod contact;
 mod estimator;
+mod motion;
 mod places;
 mod plate;
 mod sensors;
@@ -41,5 +42,6 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout, force_n)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
-    Ok(Rig { bench, training, estimator })
+    let motion = motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface)?;
+    Ok(Rig { bench, training, estimator, motion })
 }

@@ -66,6 +66,9 @@ fn measured(section: &Spanned<SurfaceSection>) -> Result<Extent, RigError> {
     if let Some(modulus) = &keys.youngs_modulus {
         return unused("youngs_modulus", modulus.span());
     }
+    if let Some(density) = &keys.density {
+        return unused("density", density.span());
+    }
     if let Some(supports) = &keys.supports {
         return unused("supports", supports.span());
     }
