@@ -2,10 +2,12 @@
 
 mod beam;
 mod extent;
+mod load;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use load::{UniformLoad, midpoints};
 pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;

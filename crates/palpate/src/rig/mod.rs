@@ -16,6 +16,7 @@ use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::estimator::EstimatorConfig;
+use crate::mechanics::UniformLoad;
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +27,8 @@ pub struct Rig {
     pub training: Option<Training>,
     /// The method that locates.
     pub estimator: EstimatorConfig,
+    /// Loads for a load profile to be simulated from.
+    pub loads: Vec<UniformLoad>,
 }
 
 /// The training positions of a rig.

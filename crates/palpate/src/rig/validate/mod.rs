@@ -3,6 +3,7 @@
 mod columns;
 mod contact;
 mod estimator;
+mod load;
 mod sensors;
 mod surface;
 
@@ -36,7 +37,8 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
         }
     }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout, force_n)?;
+    let loads = load::validate(sections.load.as_deref(), surface.extent())?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
-    Ok(Rig { bench, training, estimator })
+    Ok(Rig { bench, training, estimator, loads })
 }
