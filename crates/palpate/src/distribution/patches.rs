@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::Cells;
 use super::profile::{CentreOfPressure, centre_of, interval_95, sd_of_sum};
 use crate::contact::Position;
+use crate::mechanics::{Extent, UniformLoad};
 use crate::numerics::normal_quantile;
 
 /// A patch is where the load is above this share of its highest density.
@@ -35,6 +36,19 @@ impl Patch {
     pub fn force_95_n(&self) -> (f64, f64) {
         let (low, high) = interval_95(self.force_n, self.force_sd_n);
         (low.max(0.0), high)
+    }
+
+    /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
+    pub fn as_load(&self, extent: Extent) -> UniformLoad {
+        let Position { x_m, y_m } = self.centre.position;
+        let side = |centre: f64, (from, to): (f64, f64), size: f64| {
+            let half = (0.5 * (to - from)).min(centre).min(size - centre).max(0.0);
+            (centre - half, centre + half)
+        };
+        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m);
+        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m.unwrap_or(0.0));
+        let corner = |x_m, y_m| Position { x_m, y_m };
+        UniformLoad { from: corner(left, low), to: corner(right, high), force_n: self.force_n }
     }
 }
 

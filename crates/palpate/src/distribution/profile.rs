@@ -9,6 +9,7 @@ use super::resolution::Resolution;
 use super::smoothness::{Mixture, Problem};
 use super::{Cells, LoadSensors};
 use crate::contact::Position;
+use crate::method::ReadingError;
 use crate::numerics::chi_squared_bound;
 
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
@@ -99,7 +100,11 @@ impl<'a> Profiler<'a> {
     }
 
     /// The load that a reading tells: one finite value a channel, in SI units.
-    pub fn profile(&self, reading: &[f64]) -> LoadProfile {
+    ///
+    /// # Errors
+    /// [`ReadingError`] for another number of channels or a value that is not finite.
+    pub fn profile(&self, reading: &[f64]) -> Result<LoadProfile, ReadingError> {
+        ReadingError::check(reading, self.sensors.channels.len())?;
         let channels = self.sensors.channels.iter().zip(reading);
         let whitened = channels.filter_map(|(channel, value)| {
             let channel = channel.as_ref()?;
@@ -108,10 +113,10 @@ impl<'a> Profiler<'a> {
         let y: Array1<f64> = whitened.collect();
         let silent = y.dot(&y) <= self.worst_misfit;
         let mixture = if silent { None } else { self.problem.solve(&y) };
-        match mixture {
+        Ok(match mixture {
             Some(mixture) => self.loaded(&y, &mixture),
             None => self.unloaded(&y, if silent { Status::NoContact } else { Status::OutsideModel }),
-        }
+        })
     }
 
     /// What this layout resolves at the smoothness of a profile; `None` for a profile without load.

@@ -6,6 +6,7 @@ use super::lanes;
 use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
+use super::table_function::FittedInfluence;
 use crate::bench::Bench;
 use crate::method::{Locate, LocatorFault};
 use palpate_core::Estimate;
@@ -65,6 +66,13 @@ impl BeamLocator {
     #[cfg(test)]
     pub(super) fn search(&self) -> &Search {
         &self.search
+    }
+
+    /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
+    pub fn channels(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
+        let BeamParts { table, offsets, noise_sd } = &self.stored.parts;
+        let channel = move |i: usize| (!self.stored.dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i]));
+        (0..table.sensors).map(channel)
     }
 
     /// What is known of the force.

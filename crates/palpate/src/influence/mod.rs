@@ -18,6 +18,7 @@ mod scratch;
 mod search;
 mod several;
 mod table;
+mod table_function;
 
 pub use belief::ForceBelief;
 pub use config::{InfluenceConfig, InfluenceSource};
@@ -25,6 +26,7 @@ pub use fitting::InfluenceFitError;
 pub use locator::BeamLocator;
 pub use scratch::Scratch;
 pub use table::InfluenceTable;
+pub use table_function::FittedInfluence;
 
 use crate::bench::Bench;
 use crate::method::{Fit, FitTask, Locate, LocatorFault};

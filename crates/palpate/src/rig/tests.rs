@@ -311,6 +311,7 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
             training: arm.training.clone(),
             estimator: arm.estimator.clone(),
             recording: None,
+            load: None,
         })
     });
     let rigs: Vec<Result<Rig, RigError>> = rigs.collect();

@@ -33,7 +33,7 @@ fn load(section: &Spanned<LoadSection>, extent: Extent) -> Result<UniformLoad, R
         Ok(load)
     } else {
         let length_m = extent.length_m;
-        Err(RigProblem::LoadStretch { from_m, to_m, length_m }.at(from.span().start..to.span().end))
+        Err(RigProblem::LoadStretch { from_m, to_m, length_m }.at(from.span()))
     }
 }
 
