@@ -7,5 +7,6 @@ pub mod fit;
 pub mod inspect;
 pub mod limit;
 pub mod locate;
+pub mod profile;
 pub mod simulate;
 pub mod study;

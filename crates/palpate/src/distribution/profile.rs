@@ -205,6 +205,11 @@ impl CentreOfPressure {
     pub fn x_95_m(&self) -> (f64, f64) {
         interval_95(self.position.x_m, self.sd_x_m)
     }
+
+    /// The ends of the 95 % interval along y, in metres.
+    pub fn y_95_m(&self) -> (f64, f64) {
+        interval_95(self.position.y_m, self.sd_y_m)
+    }
 }
 
 /// The ends of a normal 95 % interval.

@@ -32,6 +32,15 @@ impl Resolution {
     }
 }
 
+impl Resolution {
+    /// The median of the kernels' widths, in metres.
+    pub fn median_width_m(&self) -> f64 {
+        let mut widths = self.widths_m.clone();
+        widths.sort_by(f64::total_cmp);
+        widths.get(widths.len() / 2).copied().unwrap_or(0.0)
+    }
+}
+
 /// Width of a kernel at half of its height.
 fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
     let Some(top) = (0..kernel.len()).max_by(|a, b| kernel[*a].total_cmp(&kernel[*b])) else { return 0.0 };
