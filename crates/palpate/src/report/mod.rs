@@ -30,6 +30,7 @@ mod canvas;
 mod chart;
 mod chart_svg;
 mod comparison_report;
+mod dead_areas_report;
 mod evaluation_report;
 mod geometry;
 mod layout;
@@ -59,6 +60,7 @@ pub use chart::{
 };
 pub use chart_svg::chart_to_svg;
 pub use comparison_report::{ComparisonReport, comparison_report};
+pub use dead_areas_report::dead_areas_report;
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
 pub use limit_report::{LimitReport, limit_report};
 pub use paper_report::paper_report;
