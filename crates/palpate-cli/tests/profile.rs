@@ -12,7 +12,8 @@ use tempfile::TempDir;
 
 const EXAMPLE: &str = include_str!("../../../examples/load-profile.toml");
 /// The same bench, for presses at points.
-const PRESSED: &str = "\n[training]\ncount = 20\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\n";
+const PRESSED: &str =
+    "\n[training]\ncount = 20\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\n";
 
 fn folder(rig: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -27,7 +28,8 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn the_example_tells_both_pads() {
     let folder = folder(EXAMPLE);
-    let json = said(&run(folder.path(), &["profile", "rig.toml", "--json", "--seed", "1", "--report", "page.html"]));
+    let json =
+        said(&run(folder.path(), &["profile", "rig.toml", "--json", "--seed", "1", "--report", "page.html"]));
     let found: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(found["status"], "located");
     assert!((number(&found["total_n"]["value"]) / 4.0 - 1.0).abs() < 0.02, "{json}");

@@ -89,7 +89,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
     let help = match error {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
-        LoadSensorsError::SingularNoise { .. } => "add `noise = \"5 um\"` to [sensors], in the unit of the readings",
+        LoadSensorsError::SingularNoise { .. } => {
+            "add `noise = \"5 um\"` to [sensors], in the unit of the readings"
+        }
         LoadSensorsError::AllDead { .. } => "take sensors out of `dead` in [sensors]",
     };
     Complaint::new(format!("{}: {error}", path.display())).help(help)
@@ -110,7 +112,8 @@ impl Printer<'_> {
         let loads = self.subject.loads();
         if loads.is_empty() {
             let path = self.arguments.subject.display();
-            let complaint = Complaint::new(format!("{path} has no [[load]] to simulate, and no readings are given"));
+            let complaint =
+                Complaint::new(format!("{path} has no [[load]] to simulate, and no readings are given"));
             let help = "name a file of readings, or add [[load]] with `from`, `to` and `force` to the rig";
             return Err(complaint.help(help).into());
         }
@@ -216,7 +219,9 @@ fn print(findings: &Findings) -> Result<(), Failure> {
     output::say(format!("total force         {}", interval(&findings.total_n, "N")))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(width_mm) = findings.resolution_mm {
-        output::say(format!("resolution          {width_mm:.0} mm, the median width of the averaging kernels"))?;
+        output::say(format!(
+            "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
+        ))?;
     }
     let heading = ["patch", "stretch, mm", "centre, mm", "limit", "force, N", "limit"];
     let limit = |limit: Option<f64>| limit.map_or_else(|| "–".to_owned(), |limit| format!("{limit:.3}"));

@@ -107,7 +107,8 @@ fn two_patches_are_told_at_their_limits() {
     assert!(tally.within_3_limits * 100 >= 92 * readings, "{tally:?}");
     assert!(tally.centre_squares < 1.4 * 1.4 * 2.0 * tally.two as f64, "{tally:?}");
     // Intervals that say 95 %.
-    let shares = [tally.centres_covered, tally.forces_covered, 2 * tally.total_covered, 2 * tally.pressure_covered];
+    let shares =
+        [tally.centres_covered, tally.forces_covered, 2 * tally.total_covered, 2 * tally.pressure_covered];
     assert!(shares.iter().all(|covered| covered * 100 >= 85 * 2 * tally.two), "{tally:?}");
 }
 

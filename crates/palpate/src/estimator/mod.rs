@@ -7,13 +7,14 @@ mod locator;
 mod locator_file;
 mod settings;
 
-pub use config::EstimatorConfig;
 pub use crate::distribution::{
-    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution, patch_limits,
+    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution,
+    patch_limits,
 };
+pub use crate::method::ReadingError;
+pub use config::EstimatorConfig;
 pub use fitting::{FitError, Fitting, LocatorQueue};
 pub use load_sensors::bench_load_sensors;
-pub use crate::method::ReadingError;
 pub use locator::{LeaveOutError, Locator, LocatorProvenance, Method};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};

@@ -71,7 +71,8 @@ impl BeamLocator {
     /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
     pub fn channels(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
         let BeamParts { table, offsets, noise_sd } = &self.stored.parts;
-        let channel = move |i: usize| (!self.stored.dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i]));
+        let channel =
+            move |i: usize| (!self.stored.dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i]));
         (0..table.sensors).map(channel)
     }
 

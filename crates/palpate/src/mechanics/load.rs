@@ -52,7 +52,8 @@ impl UniformLoad {
 
 /// The middles of `counts` equal parts along x and along y of the rectangle between two corners, row by row.
 pub fn midpoints(from: Position, to: Position, counts: [usize; 2]) -> Vec<Position> {
-    let at = |low: f64, high: f64, i: usize, count: usize| low + (high - low) * (i as f64 + 0.5) / count as f64;
+    let at =
+        |low: f64, high: f64, i: usize, count: usize| low + (high - low) * (i as f64 + 0.5) / count as f64;
     let [along, across] = counts;
     let point = |j, i| Position { x_m: at(from.x_m, to.x_m, i, along), y_m: at(from.y_m, to.y_m, j, across) };
     (0..across).flat_map(|j| (0..along).map(move |i| point(j, i))).collect()

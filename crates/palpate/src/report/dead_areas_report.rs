@@ -11,7 +11,10 @@ use crate::study::dead_areas::{DeadAreaFindings, DeadAreaRow, DeadAreas};
 ///
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
-pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Result<Vec<ReportFile>, ReportError> {
+pub fn dead_areas_report(
+    study: &DeadAreas,
+    findings: &DeadAreaFindings,
+) -> Result<Vec<ReportFile>, ReportError> {
     let report = DeadAreasReport { study, findings };
     let mut figures = vec![report.effective_figure(1)];
     let drawn = study.counts.iter().enumerate().map(|(i, count)| report.folded_figure(i + 2, *count));
@@ -23,8 +26,16 @@ pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Resu
         title: "Dead areas between sensors".to_owned(),
         opening: report.summary(),
         sections: vec![
-            section("counts", "How much is located, by the number of sensors", html! { (figures.show(1)) (report.effective_table(1)) }),
-            section("between", "Errors between sensors", html! { @for i in &folded { (figures.show(*i)) } (report.folded_table(2)) }),
+            section(
+                "counts",
+                "How much is located, by the number of sensors",
+                html! { (figures.show(1)) (report.effective_table(1)) },
+            ),
+            section(
+                "between",
+                "Errors between sensors",
+                html! { @for i in &folded { (figures.show(*i)) } (report.folded_table(2)) },
+            ),
             section("how", "How it was done", report.how()),
         ],
         footer: html! { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) ", seed " (study.seed) "." } },
@@ -75,7 +86,8 @@ impl DeadAreasReport<'_> {
     fn effective_figure(&self, number: usize) -> Figure {
         let line = |(i, arm): (usize, (&str, &'static str))| {
             let counts = self.study.counts.iter();
-            let points = counts.filter_map(|count| Some((*count as f64, self.row(arm, *count)?.effective_percent)));
+            let points =
+                counts.filter_map(|count| Some((*count as f64, self.row(arm, *count)?.effective_percent)));
             series(i, arm, points.collect())
         };
         let counts: Vec<f64> = self.study.counts.iter().map(|count| *count as f64).collect();

@@ -82,7 +82,12 @@ impl Findings {
         let limit = |i: usize| limits.and_then(|limits| limits.get(i));
         let patch = |(i, patch): (usize, &Patch)| PatchFound {
             stretch_mm: [patch.from.x_m * 1e3, patch.to.x_m * 1e3],
-            centre_x_mm: Interval::new(patch.centre.position.x_m, patch.centre.sd_x_m, patch.centre.x_95_m(), 1e3),
+            centre_x_mm: Interval::new(
+                patch.centre.position.x_m,
+                patch.centre.sd_x_m,
+                patch.centre.x_95_m(),
+                1e3,
+            ),
             force_n: Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0),
             limit_x_mm: limit(i).map(|limit| limit.sd_x_m * 1e3),
             limit_force_n: limit(i).map(|limit| limit.sd_force_n),

@@ -44,8 +44,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn print(findings: &DeadAreaFindings, out: &Path) -> Result<(), Failure> {
-    let heading =
-        ["sensing", "estimator", "sensors", "effective, %", "over sensors, mm", "between, mm", "dead between, %"];
+    let heading = [
+        "sensing",
+        "estimator",
+        "sensors",
+        "effective, %",
+        "over sensors, mm",
+        "between, mm",
+        "dead between, %",
+    ];
     let rows = findings.rows.iter().map(|row| {
         vec![
             row.sensing.clone(),

@@ -6,9 +6,7 @@ use super::ProfileReport;
 use crate::estimator::{LoadProfile, Resolution};
 use crate::report::numbers::mm;
 use crate::report::page::Figure;
-use crate::report::{
-    Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, Stroke, chart_to_svg,
-};
+use crate::report::{Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, Stroke, chart_to_svg};
 
 /// Places whose averaging kernels are drawn, as shares of the length.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
@@ -42,7 +40,11 @@ fn profile_figure(report: &ProfileReport) -> Figure {
     let high = along(profile, |cell| profile.density(cell).1.1 * per_mm);
     let band = low.iter().zip(&high).map(|((x, low), (_, high))| BandPoint { x: *x, low: *low, high: *high });
     let mut series = vec![
-        Series { label: "95 % interval".to_owned(), colour: 0, kind: SeriesKind::Band { points: band.collect() } },
+        Series {
+            label: "95 % interval".to_owned(),
+            colour: 0,
+            kind: SeriesKind::Band { points: band.collect() },
+        },
         line("load", 0, along(profile, |cell| profile.density(cell).0 * per_mm), Stroke::Solid),
     ];
     if !report.truth.is_empty() {
@@ -97,12 +99,19 @@ fn width_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
             Series {
                 label: "sensors".to_owned(),
                 colour: 2,
-                kind: SeriesKind::Points { points: sensors.map(|x| (x, 0.02 * most)).collect(), marker: Marker::Triangle },
+                kind: SeriesKind::Points {
+                    points: sensors.map(|x| (x, 0.02 * most)).collect(),
+                    marker: Marker::Triangle,
+                },
             },
         ],
         ..Chart::default()
     };
-    figure(2, &chart, html! { "Over how much of the surface the profile is a mean, at the smoothness of this reading." })
+    figure(
+        2,
+        &chart,
+        html! { "Over how much of the surface the profile is a mean, at the smoothness of this reading." },
+    )
 }
 
 fn kernel_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
@@ -152,7 +161,11 @@ fn residual_figure(report: &ProfileReport) -> Figure {
         height_px: 340,
         ..Chart::default()
     };
-    figure(4, &chart, html! { "Reading less what the sensor would read of the profile, over the standard deviation of its noise." })
+    figure(
+        4,
+        &chart,
+        html! { "Reading less what the sensor would read of the profile, over the standard deviation of its noise." },
+    )
 }
 
 fn line(label: &str, colour: usize, points: Vec<(f64, f64)>, stroke: Stroke) -> Series {

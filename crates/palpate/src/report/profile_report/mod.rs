@@ -43,7 +43,11 @@ pub fn profile_report(report: &ProfileReport) -> Result<Vec<ReportFile>, ReportE
         sections: vec![
             section("profile", "The load", html! { (figures.show(1)) (report.patch_table(1)) }),
             section("resolution", "What this layout resolves", html! { (figures.show(2)) (figures.show(3)) }),
-            section("readings", "Readings and what is left of them", html! { (figures.show(4)) (report.reading_table(2)) }),
+            section(
+                "readings",
+                "Readings and what is left of them",
+                html! { (figures.show(4)) (report.reading_table(2)) },
+            ),
             section("meaning", "What the profile means", meaning()),
         ],
         footer: html! { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) "." } },
@@ -76,7 +80,9 @@ impl ProfileReport<'_> {
         let row = |(i, patch): (usize, &Patch)| {
             let limit = self.limits.and_then(|limits| limits.get(i));
             let cell = |value: Option<f64>| text(number(value.unwrap_or(f64::NAN)));
-            let span = |(low, high): (f64, f64), unit: f64| text(format!("{}–{}", number(low * unit), number(high * unit)));
+            let span = |(low, high): (f64, f64), unit: f64| {
+                text(format!("{}–{}", number(low * unit), number(high * unit)))
+            };
             vec![
                 text((i + 1).to_string()),
                 text(format!("{}–{}", mm(patch.from.x_m), mm(patch.to.x_m))),

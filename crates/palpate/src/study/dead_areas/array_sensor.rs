@@ -87,7 +87,8 @@ impl ArraySensor {
         let length_m = self.rig.bench.surface.extent().length_m;
         let pressed: Vec<Position> =
             self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
-        let judged: Vec<Position> = (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
+        let judged: Vec<Position> =
+            (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&pressed, seed, &mut rng);
@@ -103,7 +104,12 @@ impl ArraySensor {
                 let off = position.distance_m(sensor.position) / self.spread_m;
                 (-0.5 * off * off).exp() + self.noise_sd * rng.sample::<f64, _>(StandardNormal)
             });
-            Row { position: *position, force_n: self.rig.bench.force_n, hidden: None, reading: reading.collect() }
+            Row {
+                position: *position,
+                force_n: self.rig.bench.force_n,
+                hidden: None,
+                reading: reading.collect(),
+            }
         };
         let rows: Vec<Row> = positions.iter().map(row).collect();
         let source = "simulation of an array sensor".to_owned();

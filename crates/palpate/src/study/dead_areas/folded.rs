@@ -43,7 +43,8 @@ impl FoldedErrors {
             .filter_map(|located| Some((pitches_off(&places, located)?, located.error_m())))
             .collect();
         let mean_within = |from: f64, to: f64| {
-            let errors = folded.iter().filter(|(pitches, _)| (from..=to).contains(pitches)).map(|(_, error)| error);
+            let errors =
+                folded.iter().filter(|(pitches, _)| (from..=to).contains(pitches)).map(|(_, error)| error);
             let (sum, count) = errors.fold((0.0, 0), |(sum, count), error| (sum + error, count + 1));
             (sum / f64::from(count), count as usize)
         };

@@ -76,7 +76,10 @@ impl DeadAreas {
     ///
     /// # Errors
     /// [`SimulateError`] for a rig without a model, a force or training positions.
-    pub fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<DeadAreaFindings>, SimulateError> {
+    pub fn run(
+        &self,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<DeadAreaFindings>, SimulateError> {
         let mut findings = DeadAreaFindings { rows: Vec::new(), left_out: Vec::new() };
         for &count in &self.counts {
             let rig = self.with_sensors(count);

@@ -1,8 +1,8 @@
 //! Dead areas are there for an array's centroid where its sensors see too little, and not for the influence estimator.
 
 use super::*;
-use crate::evaluation::{Evaluation, Located};
 use crate::contact::Position;
+use crate::evaluation::{Evaluation, Located};
 use crate::sensing::SensorKind;
 
 fn study(counts: &[usize]) -> DeadAreaFindings {
@@ -22,8 +22,10 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
     let found = study(&[4, 16]);
     let row = |sensing: &str, estimator: &str, sensors: usize| {
         let mut rows = found.rows.iter();
-        rows.find(|row| row.sensing.starts_with(sensing) && row.estimator == estimator && row.sensors == sensors)
-            .unwrap()
+        rows.find(|row| {
+            row.sensing.starts_with(sensing) && row.estimator == estimator && row.sensors == sensors
+        })
+        .unwrap()
     };
     // Few sensors under one surface, interpreted well: no dead area; more of them change nothing.
     for sensors in [4, 16] {
@@ -38,7 +40,22 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
     assert!(sparse.folded.dead_percent > 60.0, "{sparse:?}");
     let dense = row("array, spread 10 mm", "centroid", 16);
     assert!(dense.folded.dead_percent < 0.5 * sparse.folded.dead_percent, "{dense:?}");
-    println!("{:#?}", found.rows.iter().map(|r| (&r.sensing, r.estimator, r.sensors, r.effective_percent, r.folded.at_sensors_m*1e3, r.folded.between_m*1e3, r.folded.dead_percent)).collect::<Vec<_>>());
+    println!(
+        "{:#?}",
+        found
+            .rows
+            .iter()
+            .map(|r| (
+                &r.sensing,
+                r.estimator,
+                r.sensors,
+                r.effective_percent,
+                r.folded.at_sensors_m * 1e3,
+                r.folded.between_m * 1e3,
+                r.folded.dead_percent
+            ))
+            .collect::<Vec<_>>()
+    );
     println!("{:?}", found.left_out);
 }
 
