@@ -96,12 +96,12 @@ impl Cells {
             let place = |k: isize| self.cell_at([start[0] + k * step[0], start[1] + k * step[1]]);
             [(place(-1), 1.0), (place(0), -2.0), (place(1), 1.0)]
         };
-        for [i, j] in self.from_beyond_the_edge() {
+        for [i, j] in self.cells_and_rim() {
             add_square(&mut roughness, &bend([i, j], [1, 0]), 1.0);
         }
         if self.extent.width_m.is_some() {
             let ratio = along / across;
-            for [i, j] in self.from_beyond_the_edge() {
+            for [i, j] in self.cells_and_rim() {
                 add_square(&mut roughness, &bend([i, j], [0, 1]), ratio.powi(4));
                 let corner = |a, b, sign| (self.cell_at([i + a, j + b]), sign);
                 let twist = [corner(0, 0, 1.0), corner(1, 0, -1.0), corner(0, 1, -1.0), corner(1, 1, 1.0)];
@@ -112,7 +112,7 @@ impl Cells {
     }
 
     /// All cells with a rim of one cell around them.
-    fn from_beyond_the_edge(&self) -> impl Iterator<Item = [isize; 2]> {
+    fn cells_and_rim(&self) -> impl Iterator<Item = [isize; 2]> {
         let (columns, rows) = (self.columns as isize, self.rows as isize);
         (-1..=rows).flat_map(move |j| (-1..=columns).map(move |i| [i, j]))
     }

@@ -25,8 +25,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         without: Vec::new(),
         seed: 0,
     };
-    let rounds = study.rig.estimator.most_rounds() * study.calibrations * COUNTS.len() as u64;
-    let mut watch = FitWatch::new(rounds);
+    let mut watch = FitWatch::new(study.most_rounds());
     let findings = study.run(&mut || watch.keep_going()).map_err(Complaint::new)?;
     drop(watch);
     let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());

@@ -83,9 +83,8 @@ impl DeadAreas {
         let mut findings = DeadAreaFindings { rows: Vec::new(), left_out: Vec::new() };
         for &count in &self.counts {
             let rig = self.with_sensors(count);
-            let rows = rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
             let trials = Trial::by_simulation(&rig, self.calibrations, self.seed)?;
-            for estimator in self.estimators(&rig, rows) {
+            for estimator in self.estimators(&rig) {
                 if !self.judge("distributive", &rig, &estimator, &trials, &mut findings, keep_going) {
                     return Ok(None);
                 }
@@ -102,6 +101,15 @@ impl DeadAreas {
         Ok(Some(findings))
     }
 
+    /// The most often that [`DeadAreas::run`] asks whether to go on while it fits.
+    pub fn most_rounds(&self) -> u64 {
+        let rounds = |count: &usize| {
+            let estimators = self.estimators(&self.with_sensors(*count));
+            estimators.iter().map(EstimatorConfig::most_rounds).sum::<u64>()
+        };
+        self.calibrations * self.counts.iter().map(rounds).sum::<u64>()
+    }
+
     /// The rig with so many sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
@@ -113,7 +121,8 @@ impl DeadAreas {
         rig
     }
 
-    fn estimators(&self, rig: &Rig, rows: usize) -> Vec<EstimatorConfig> {
+    fn estimators(&self, rig: &Rig) -> Vec<EstimatorConfig> {
+        let rows = rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
         let mut estimators = contenders(rig, rows);
         estimators.retain(|estimator| !self.without.contains(&estimator.kind()));
         for estimator in &mut estimators {

@@ -40,23 +40,6 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
     assert!(sparse.folded.dead_percent > 60.0, "{sparse:?}");
     let dense = row("array, spread 10 mm", "centroid", 16);
     assert!(dense.folded.dead_percent < 0.5 * sparse.folded.dead_percent, "{dense:?}");
-    println!(
-        "{:#?}",
-        found
-            .rows
-            .iter()
-            .map(|r| (
-                &r.sensing,
-                r.estimator,
-                r.sensors,
-                r.effective_percent,
-                r.folded.at_sensors_m * 1e3,
-                r.folded.between_m * 1e3,
-                r.folded.dead_percent
-            ))
-            .collect::<Vec<_>>()
-    );
-    println!("{:?}", found.left_out);
 }
 
 #[test]
