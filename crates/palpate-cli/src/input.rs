@@ -33,8 +33,12 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// A rig, from its file.
 pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
-    let text = read_text(path)?;
-    Rig::from_toml(&text).map_err(|error| rig_complaint(error, path, &text))
+    parse_rig(path, &read_text(path)?)
+}
+
+/// A rig, from its file's text.
+pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
+    Rig::from_toml(text).map_err(|error| rig_complaint(error, path, text))
 }
 
 /// A study, from its file's text.

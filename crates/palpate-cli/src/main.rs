@@ -34,6 +34,7 @@ enum Command {
     Compare(commands::compare::Arguments),
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
+    Profile(commands::profile::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
+        Command::Profile(arguments) => commands::profile::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -10,7 +10,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::arrangement::ArrangementError;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::mechanics::{Extent, InfluenceFunction, Surface};
+use crate::mechanics::{Extent, InfluenceFunction, Surface, UniformLoad};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
@@ -67,6 +67,14 @@ impl<'a> CleanSensors<'a> {
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
         self.functions.iter().map(|function| contact.force_n * function.at(contact.position)).collect()
     }
+
+    /// What the sensors would read without any fault under all of `loads` at once, in the SI unit of each sensor.
+    pub fn reading_of_loads(&self, loads: &[UniformLoad]) -> Vec<f64> {
+        let of = |function: &Arc<dyn InfluenceFunction + 'a>| {
+            loads.iter().map(|load| load.force_n * load.mean(&**function)).sum()
+        };
+        self.functions.iter().map(of).collect()
+    }
 }
 
 /// What the sensors of `layout` would read without any fault when `contact` touches `surface`; for more than one contact
@@ -120,6 +128,29 @@ pub fn simulate_at(
     let source = "simulation".to_owned();
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
     Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
+}
+
+/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
+/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading.
+///
+/// The same seed gives the same readings.
+///
+/// # Errors
+/// [`SimulateError::NoModel`] for a measured surface.
+pub fn simulate_loads(
+    bench: &Bench,
+    loads: &[UniformLoad],
+    repeats: usize,
+    seed: u64,
+) -> Result<Vec<Vec<f64>>, SimulateError> {
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut places = rng.clone();
+    places.jump();
+    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
+    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let clean = sensors.reading_of_loads(loads);
+    Ok((0..repeats).map(|_| measure(&bench.layout, &clean, &errors, &mut rng)).collect())
 }
 
 /// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the

@@ -3,6 +3,7 @@
 use super::estimate_line;
 use crate::failure::{Complaint, Failure};
 use crate::{input, interrupt, output};
+use palpate::bench::Bench;
 use palpate::estimator::Locator;
 use palpate::recording::{Column, Columns, Header, ReadingParser};
 use std::fs::File;
@@ -34,23 +35,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let left_out = locator.leave_out(channel.wrapping_sub(1));
         left_out.map_err(|error| Complaint::new(format!("--dead {channel}: {error}")))?;
     }
-    let stdin = Path::new("-");
-    let path = arguments.readings.as_deref().unwrap_or(stdin);
-    let (name, source): (String, Box<dyn BufRead>) = if path == stdin {
+    let (name, source) = open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
+    let mut stream = Stream { locator: &locator, name, json: arguments.json, lost: 0, line: 0 };
+    stream.run(source, &columns(&locator.bench, arguments.no_header))
+}
+
+/// Opens readings, `-` being stdin, and says what they are called.
+pub fn open(path: &Path) -> Result<(String, Box<dyn BufRead>), Failure> {
+    if path == Path::new("-") {
         if std::io::stdin().is_terminal() {
             eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
         }
-        ("stdin".to_owned(), Box::new(std::io::stdin().lock()))
-    } else {
-        let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
-        (path.display().to_string(), Box::new(BufReader::new(file)))
-    };
-    let mut stream = Stream { locator: &locator, name, json: arguments.json, lost: 0, line: 0 };
-    stream.run(source, &columns(&locator, arguments.no_header))
+        return Ok(("stdin".to_owned(), Box::new(std::io::stdin().lock())));
+    }
+    let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
+    Ok((path.display().to_string(), Box::new(BufReader::new(file))))
 }
 
-fn columns(locator: &Locator, no_header: bool) -> Columns {
-    let mut columns = locator.bench.recording_columns();
+/// Which columns of readings are the channels.
+pub fn columns(bench: &Bench, no_header: bool) -> Columns {
+    let mut columns = bench.recording_columns();
     if no_header {
         columns.header = Header::Absent;
         for (i, channel) in columns.channels.iter_mut().enumerate() {

@@ -5,7 +5,7 @@ use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
-use crate::method::{Locate, LocatorFault};
+use crate::method::{Locate, LocatorFault, ReadingError};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
@@ -71,27 +71,6 @@ impl Method {
     }
 }
 
-/// A reading that no estimate can be made of.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum ReadingError {
-    /// Another number of channels.
-    #[error("the reading has {found} channels; the locator has {needed}")]
-    Channels {
-        /// Channels of the locator.
-        needed: usize,
-        /// Channels of the reading.
-        found: usize,
-    },
-    /// A value that is no number.
-    #[error("channel {channel} reads {value}; it must be a finite number")]
-    NotFinite {
-        /// Which channel, from 1.
-        channel: usize,
-        /// Its value.
-        value: f64,
-    },
-}
-
 /// A channel that cannot be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
@@ -120,13 +99,7 @@ impl Locator {
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        let (needed, found) = (self.bench.layout.len(), reading.len());
-        if needed != found {
-            return Err(ReadingError::Channels { needed, found });
-        }
-        if let Some(i) = reading.iter().position(|value| !value.is_finite()) {
-            return Err(ReadingError::NotFinite { channel: i + 1, value: reading[i] });
-        }
+        ReadingError::check(reading, self.bench.layout.len())?;
         Ok(self.method.locate().locate(reading))
     }
 

@@ -6,6 +6,7 @@ use super::lanes;
 use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
+use super::table_function::FittedInfluence;
 use crate::bench::Bench;
 use crate::method::{Locate, LocatorFault};
 use palpate_core::Estimate;
@@ -75,6 +76,14 @@ impl BeamLocator {
     /// Mean force of the calibration, in newtons.
     pub(super) fn reference_force_n(&self) -> f64 {
         self.stored.reference_force_n
+    }
+
+    /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
+    pub fn channels(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
+        let BeamParts { table, offsets, noise_sd } = &self.stored.parts;
+        let channel =
+            move |i: usize| (!self.stored.dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i]));
+        (0..table.sensors).map(channel)
     }
 
     /// What is known of the force.

@@ -21,6 +21,7 @@ mod scratch;
 mod search;
 mod several;
 mod table;
+mod table_function;
 
 pub use belief::ForceBelief;
 pub use config::{InfluenceConfig, InfluenceSource};
@@ -30,6 +31,7 @@ pub use locator::BeamLocator;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable};
 pub use scratch::Scratch;
 pub use table::InfluenceTable;
+pub use table_function::FittedInfluence;
 
 use crate::bench::Bench;
 use crate::method::{Fit, FitTask, Locate, LocatorFault};

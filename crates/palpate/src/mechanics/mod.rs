@@ -2,6 +2,7 @@
 
 mod beam;
 mod extent;
+mod load;
 pub mod modal;
 mod motion;
 pub mod plate;
@@ -10,6 +11,7 @@ mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use extent::Extent;
+pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
 pub use plate::{Plate, PlateError};
 pub use supported_beam::{

@@ -143,6 +143,24 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
+    /// A load that is not a stretch of the surface.
+    #[error(
+        "the load goes from {} to {}; it must go from left to right, within 0 and {}",
+        format_length_mm(*from_m),
+        format_length_mm(*to_m),
+        format_length_mm(*length_m)
+    )]
+    LoadStretch {
+        /// Where it begins, in metres.
+        from_m: f64,
+        /// Where it ends, in metres.
+        to_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// A load on a plane.
+    #[error("[[load]] describes a stretch of a line; this surface has a width too")]
+    LoadOnPlane,
     /// A reaction sensor where nothing supports the surface.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",

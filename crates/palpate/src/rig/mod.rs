@@ -17,7 +17,7 @@ use crate::bench::Bench;
 use crate::contact::Position;
 use crate::estimator::EstimatorConfig;
 use crate::mechanics::modal::ModalBeam;
-use crate::mechanics::{Extent, Motion};
+use crate::mechanics::{Extent, Motion, UniformLoad};
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,8 @@ pub struct Rig {
     pub training: Option<Training>,
     /// The method that locates.
     pub estimator: EstimatorConfig,
+    /// Loads for a load profile to be simulated from.
+    pub loads: Vec<UniformLoad>,
     /// How a contact moves, and what moves with it, where the rig says.
     pub motion: Option<MotionRig>,
 }

@@ -26,6 +26,7 @@ pub(crate) struct RigSections {
     pub estimator: Key<EstimatorSection>,
     pub recording: Key<RecordingSection>,
     pub motion: Key<MotionSection>,
+    pub load: Option<Vec<Spanned<LoadSection>>>,
 }
 
 /// `[surface]`
@@ -73,6 +74,15 @@ pub(crate) struct SensorsSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactSection {
+    pub force: Key<RawQuantity>,
+}
+
+/// One `[[load]]`: a force spread over part of the surface
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LoadSection {
+    pub from: Key<RawQuantity>,
+    pub to: Key<RawQuantity>,
     pub force: Key<RawQuantity>,
 }
 

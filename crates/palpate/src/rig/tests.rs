@@ -230,6 +230,22 @@ fn a_bad_recording_section_is_refused_with_a_caret() {
 }
 
 #[test]
+fn a_bad_load_is_refused_with_a_caret() {
+    let loaded = format!("{BENCH}[[load]]\nfrom = \"130 mm\"\nto = \"150 mm\"\nforce = \"2 N\"\n");
+    let shown = refused(
+        &loaded,
+        &[
+            ("from = \"130 mm\"\n", ""),
+            ("to = \"150 mm\"", "to = \"130 mm\""),
+            ("to = \"150 mm\"", "to = \"450 mm\""),
+            ("force = \"2 N\"", "force = \"0 N\""),
+            ("force = \"2 N\"", "force = \"2 N\"\npressure = 1"),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+}
+
+#[test]
 fn every_key_can_be_said() {
     let text = r#"
         [surface]
@@ -280,6 +296,10 @@ fn every_key_can_be_said() {
         channel_unit = ["um", "um", "um", "N", "N"]
         force = 7
         force_unit = "mN"
+        [[load]]
+        from = "130 mm"
+        to = "15 cm"
+        force = "2 N"
     "#;
     insta::assert_debug_snapshot!(Rig::from_toml(text).unwrap());
 }
@@ -317,6 +337,7 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
             estimator: arm.estimator.clone(),
             recording: None,
             motion: None,
+            load: None,
         })
     });
     let rigs: Vec<Result<Rig, RigError>> = rigs.collect();

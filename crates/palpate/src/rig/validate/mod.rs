@@ -3,6 +3,7 @@
 mod columns;
 mod contact;
 mod estimator;
+mod load;
 mod motion;
 mod places;
 mod plate;
@@ -40,8 +41,9 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
         }
     }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout, force_n)?;
+    let loads = load::validate(sections.load.as_deref(), surface.extent())?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
     let motion = motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface)?;
-    Ok(Rig { bench, training, estimator, motion })
+    Ok(Rig { bench, training, estimator, loads, motion })
 }
