@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::arrangement::ArrangementError;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::mechanics::{Extent, InfluenceFunction, Surface};
+use crate::mechanics::{Extent, ResponseFunction, Surface};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
@@ -45,21 +45,21 @@ pub enum SimulateError {
     },
 }
 
-/// The sensors of a layout under a surface with a model, each with its influence function.
+/// The sensors of a layout under a surface with a model, each with its response function.
 pub struct CleanSensors<'a> {
-    functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
+    functions: Vec<Arc<dyn ResponseFunction + 'a>>,
 }
 
 impl<'a> CleanSensors<'a> {
-    /// The influence functions of all sensors of `layout`.
+    /// The response functions of all sensors of `layout`.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
-        let function = |sensor: &Sensor| surface.influence_function(sensor.kind, sensor.position);
+        let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
         Self { functions: layout.sensors.iter().map(function).collect() }
     }
 
-    /// What the sensors would read without any fault at `contact`: force times influence, in the SI unit of each sensor.
+    /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
-        self.functions.iter().map(|function| contact.force_n * function.at(contact.position)).collect()
+        self.functions.iter().map(|function| function.at(contact)).collect()
     }
 }
 

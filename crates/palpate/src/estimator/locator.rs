@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
+use crate::digit::DigitLocator;
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
 use crate::method::{Locate, LocatorFault};
@@ -50,6 +51,8 @@ pub enum Method {
     GaussianProcess(GaussianProcessLocator),
     /// The beam's own equations.
     ClosedForm(ClosedFormLocator),
+    /// The bending finger's own equations.
+    Digit(DigitLocator),
     /// Nearest neighbours.
     Neighbours(NeighboursLocator),
     /// The calibrated centroid.
@@ -65,6 +68,7 @@ impl Method {
             Self::Influence(influence) => influence,
             Self::GaussianProcess(process) => process,
             Self::ClosedForm(form) => form,
+            Self::Digit(digit) => digit,
             Self::Neighbours(neighbours) => neighbours,
             Self::Centroid(centroid) => centroid,
         }
@@ -157,6 +161,11 @@ impl Locator {
                     return Err(LeaveOutError::NoneLeft);
                 }
             }
+            Method::Digit(digit) => {
+                if !digit.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
         self.bench.layout.sensors[channel].channel.dead = true;
@@ -171,6 +180,7 @@ impl Locator {
             Method::Influence(_) => "influence",
             Method::GaussianProcess(_) => "gaussian-process",
             Method::ClosedForm(_) => "closed-form",
+            Method::Digit(_) => "digit",
             Method::Neighbours(_) => "neighbours",
             Method::Centroid(_) => "centroid",
         }

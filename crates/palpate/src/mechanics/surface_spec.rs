@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Beam, Extent, Surface};
+use super::{Beam, Digit, Extent, Surface};
 
 /// The surface that is touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -10,6 +10,8 @@ use super::{Beam, Extent, Surface};
 pub enum SurfaceSpec {
     /// A simply supported beam.
     Beam(Beam),
+    /// A flexible cantilever finger.
+    Digit(Digit),
     /// A surface without a model, known by recordings only.
     Measured(Extent),
 }
@@ -19,6 +21,7 @@ impl SurfaceSpec {
     pub fn extent(&self) -> Extent {
         match self {
             Self::Beam(beam) => beam.extent(),
+            Self::Digit(digit) => digit.extent(),
             Self::Measured(extent) => *extent,
         }
     }
@@ -27,6 +30,7 @@ impl SurfaceSpec {
     pub fn model(&self) -> Option<&dyn Surface> {
         match self {
             Self::Beam(beam) => Some(beam),
+            Self::Digit(digit) => Some(digit),
             Self::Measured(_) => None,
         }
     }

@@ -3,9 +3,11 @@
 mod cholesky;
 mod distributions;
 mod eigen;
+mod elliptic;
 mod random_order;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{chi_squared_bound, normal_distribution, normal_quantile};
 pub use eigen::symmetric_eigen;
+pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use random_order::random_order;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
-use crate::mechanics::BeamError;
+use crate::mechanics::{BeamError, DigitError};
 use crate::units::{UnitError, format_length_mm};
 
 /// A rig file, or a section of one in a study, that cannot be used.
@@ -83,6 +83,27 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A digit that cannot be computed.
+    #[error(transparent)]
+    Digit(DigitError),
+    /// A sensor on a digit that is no strain gauge.
+    #[error("a digit is read by strain gauges; `measure` is `{kind}`")]
+    NotAGauge {
+        /// What it measures.
+        kind: crate::sensing::SensorKind,
+    },
+    /// A force that bends a digit further than its model goes.
+    #[error(
+        "`force` is {value}; with a contact at the tip this digit bears at most {:.3} N, a load F·l²/(E·I) of {}",
+        most_n,
+        crate::mechanics::Digit::MOST_LOAD
+    )]
+    TooMuchForce {
+        /// The force, as written.
+        value: String,
+        /// The largest, in newtons.
+        most_n: f64,
+    },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),
@@ -188,6 +209,7 @@ impl RigError {
             RigProblem::NoForce => {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
+            RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             _ => None,
         }

@@ -34,6 +34,7 @@ pub(crate) struct SurfaceSection {
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
     pub supports: Key<String>,
+    pub direction: Key<String>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -99,6 +100,7 @@ pub(crate) struct EstimatorSection {
     pub from: Key<String>,
     pub contacts: Key<i64>,
     pub force_sd: Key<RawQuantity>,
+    pub theory: Key<String>,
 }
 
 impl EstimatorSection {
@@ -123,6 +125,7 @@ impl EstimatorSection {
             place("from", &self.from),
             place("contacts", &self.contacts),
             place("force_sd", &self.force_sd),
+            place("theory", &self.theory),
         ];
         keys.into_iter().flatten().collect()
     }
@@ -147,6 +150,7 @@ impl EstimatorSection {
             from: self.from.or(base.from),
             contacts: self.contacts.or(base.contacts),
             force_sd: self.force_sd.or(base.force_sd),
+            theory: self.theory.or(base.theory),
         }
     }
 }

@@ -187,6 +187,7 @@ impl EvaluationReport<'_> {
         let extent = self.bench().surface.extent();
         let kind = match self.bench().surface {
             SurfaceSpec::Beam(_) => "beam",
+            SurfaceSpec::Digit(_) => "flexible digit",
             SurfaceSpec::Measured(_) => "measured, without a model",
         };
         let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));

@@ -29,6 +29,7 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     if let (Some(training), None, true) = (&sections.training, pressed_n, simulated) {
         return Err(RigProblem::NoForce.at(training.span()));
     }
+    contact::check_forces(sections, &surface, force_n, training.as_ref())?;
     if let (Some(section), Some(training)) = (&sections.training, &training) {
         let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());
         if values > MOST_VALUES {
