@@ -65,14 +65,15 @@ impl DigitLocator {
         self.layout.sensors.iter().position(|sensor| !sensor.channel.dead && clean(noise_sd(sensor)))
     }
 
-    fn estimate(&self, posterior: &Posterior, freedom: usize) -> Estimate {
+    fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
+        let explained = posterior.keep_explanations(chi_squared_bound(RARE, freedom.max(1)));
         let Some(best) = posterior.pieces.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
         let length_m = self.digit.length_m;
         let ends = [0.025, 0.975].map(|share| posterior.quantile_m(share, length_m));
         let mut estimate = Estimate::of_contact(contact(best, ends), Status::Located);
-        if best.chi_squared > chi_squared_bound(RARE, freedom.max(1)) {
+        if !explained {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
@@ -125,7 +126,7 @@ impl Locate for DigitLocator {
         let likelihood =
             Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
         let unknowns = 1 + usize::from(self.force_n.is_none());
-        self.estimate(&Posterior::new(&likelihood), gauges.len().saturating_sub(unknowns))
+        self.estimate(Posterior::new(&likelihood), gauges.len().saturating_sub(unknowns))
     }
 
     fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {

@@ -12,7 +12,8 @@ const HOPELESS: f64 = 60.0;
 /// Points of a curve of contacts that explain a reading alike.
 const CURVE_POINTS: usize = 96;
 
-/// The posterior of position and force, flat before the reading.
+/// The posterior of position and force. Before the reading it is flat over the position and over the logarithm of the force:
+/// a contact anywhere, and of any order of magnitude.
 pub(super) struct Posterior {
     /// Most probable first.
     pub pieces: Vec<Piece>,
@@ -61,13 +62,29 @@ impl Posterior {
                 pieces.push(piece);
             }
         }
-        let most = pieces.iter().map(|piece| piece.log_weight).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = pieces.iter().map(|piece| (piece.log_weight - most).exp()).sum();
-        for piece in &mut pieces {
+        pieces.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        let mut posterior = Self { pieces };
+        posterior.normalise();
+        posterior
+    }
+
+    /// Drops pieces whose best contact leaves an |r|² of more than `most`, unless all do; says whether any is left that does not.
+    pub fn keep_explanations(&mut self, most: f64) -> bool {
+        let explains = |piece: &Piece| piece.chi_squared <= most;
+        let any = self.pieces.iter().any(explains);
+        if any {
+            self.pieces.retain(explains);
+            self.normalise();
+        }
+        any
+    }
+
+    fn normalise(&mut self) {
+        let most = self.pieces.iter().map(|piece| piece.log_weight).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = self.pieces.iter().map(|piece| (piece.log_weight - most).exp()).sum();
+        for piece in &mut self.pieces {
             piece.probability = (piece.log_weight - most).exp() / total;
         }
-        pieces.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        Self { pieces }
     }
 
     /// The position below which the contact lies with probability `share`, by bisection.
@@ -128,7 +145,10 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let [xx, xf, ff] = covariance;
     let (centre_m, sd_m) = (best.position_m + along_m, xx.sqrt());
     let mass = normal_mass((stretch.from_m - centre_m) / sd_m, (stretch.to_m - centre_m) / sd_m);
-    let volume = if known { (TAU * xx).sqrt() } else { TAU * (xx * ff - xf * xf).max(0.0).sqrt() };
+    let volume = match likelihood.force_n {
+        Some(_) => (TAU * xx).sqrt(),
+        None => TAU * (xx * ff - xf * xf).max(0.0).sqrt() / best.force_n,
+    };
     let gained = sums.score[0] * along_m + sums.score[1] * harder_n;
     let (log_weight, spread) = if mass > 0.0 {
         let spread = Spread::Normal { centre_m, sd_m, from_m: stretch.from_m, to_m: stretch.to_m };
@@ -147,7 +167,7 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
 }
 
 /// The piece of a stretch that one gauge alone sees, for an unknown force: at every position some force explains the moment.
-/// A position weighs as much as its force is uncertain.
+/// A position weighs as much as the logarithm of its force is uncertain.
 fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let width_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
     let mut points = Vec::with_capacity(CURVE_POINTS);
@@ -159,7 +179,8 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
         let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: force_there_n });
         force_n = guess.force_n;
         let variance = 1.0 / sums.information[2];
-        let log_weight = -0.5 * sums.chi_squared + 0.5 * (TAU * variance).ln() + width_m.ln();
+        let volume = (TAU * variance).sqrt() / guess.force_n * width_m;
+        let log_weight = -0.5 * sums.chi_squared + volume.ln();
         points.push((guess, sums.chi_squared, variance, log_weight));
     }
     points.reverse();

@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidConfig;
 use crate::closed_form::ClosedFormConfig;
-use crate::digit::DigitConfig;
+use crate::digit::{DigitConfig, DigitTheory};
 use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::InfluenceConfig;
 use crate::mechanics::SurfaceSpec;
@@ -67,6 +67,9 @@ impl EstimatorConfig {
         ]);
         contenders
     }
+
+    /// A digit's estimator by the linear theory of bending, to be compared with.
+    pub const LINEAR_DIGIT: Self = Self::Digit(DigitConfig { theory: DigitTheory::Linear });
 
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {

@@ -3,7 +3,7 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
-use crate::digit::DigitLocator;
+use crate::digit::{DigitLocator, DigitShape};
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
 use crate::method::{Locate, LocatorFault};
@@ -132,6 +132,14 @@ impl Locator {
             return Err(ReadingError::NotFinite { channel: i + 1, value: reading[i] });
         }
         Ok(self.method.locate().locate(reading))
+    }
+
+    /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
+    pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
+        match &self.method {
+            Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
+            _ => None,
+        }
     }
 
     /// Checks what a file may have got wrong.

@@ -30,6 +30,7 @@ mod canvas;
 mod chart;
 mod chart_svg;
 mod comparison_report;
+mod digit_figures;
 mod evaluation_report;
 mod geometry;
 mod layout;

@@ -6,6 +6,7 @@ use super::LimitReport;
 use crate::limit::{Bound, LimitCurve, LimitWarning};
 use crate::mechanics::SurfaceSpec;
 use crate::report::beam_drawing::beam_drawing;
+use crate::report::digit_figures::{force_limit_figure, linear_theory_figures, shapes_figure};
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
@@ -17,7 +18,13 @@ const LOGARITHMIC_FROM: f64 = 10.0;
 const MOST_LENGTHS: f64 = 10.0;
 
 pub(super) fn bench_figure(report: &LimitReport) -> Result<Option<Figure>, ReportError> {
-    let SurfaceSpec::Beam(beam) = &report.bench.surface else { return Ok(None) };
+    let beam = match &report.bench.surface {
+        SurfaceSpec::Beam(beam) => beam,
+        SurfaceSpec::Digit(digit) => {
+            return Ok(Some(shapes_figure(digit, &report.bench.layout, report.known.force_n)));
+        }
+        SurfaceSpec::Measured(_) => return Ok(None),
+    };
     let (svg, load) = beam_drawing(beam, &report.bench.layout, report.known.force_n)?;
     let caption = html! {
         "The bench: a beam on two wedges and " (counted(report.bench.layout.len(), "sensor", "sensors")) ", with "
@@ -55,6 +62,14 @@ pub(super) fn limit_figure(report: &LimitReport) -> Figure {
         }
     };
     Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+}
+
+/// What only a digit has: the limit of the force, and how far the linear theory goes.
+pub(super) fn digit_figures(report: &LimitReport) -> Vec<Figure> {
+    let SurfaceSpec::Digit(digit) = &report.bench.surface else { return Vec::new() };
+    let mut figures = vec![force_limit_figure(report.unknown, 3)];
+    figures.extend(linear_theory_figures(report.bench, report.limit, digit, 4));
+    figures
 }
 
 fn values(series: &[Series]) -> impl Iterator<Item = f64> + '_ {
