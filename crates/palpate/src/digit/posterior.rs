@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::gauges::{Stretch, stretches};
 use super::likelihood::{Guess, Likelihood};
-use super::refine::{refine, refine_force, start};
+use super::refine::{refine_force, search};
 use crate::numerics::normal_distribution;
 
 /// Pieces whose |r|² is larger than the least by this have no weight: e⁻³⁰.
@@ -139,7 +139,7 @@ fn normal_mass(low: f64, high: f64) -> f64 {
 /// may lie beyond the stretch. By Laplace's method its weight is the volume beneath, as far as it is on the stretch.
 fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let known = likelihood.force_n.is_some();
-    let (best, sums) = refine(likelihood, stretch, start(likelihood, stretch));
+    let (best, sums) = search(likelihood, stretch);
     let covariance = sums.covariance(known)?;
     let [along_m, harder_n] = sums.step(known)?;
     let [xx, xf, ff] = covariance;
@@ -169,53 +169,66 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
 /// The piece of a stretch that one gauge alone sees, for an unknown force: at every position some force explains the moment.
 /// A position weighs as much as the logarithm of its force is uncertain.
 fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
-    let width_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
-    let mut points = Vec::with_capacity(CURVE_POINTS);
-    // From the far end, where the force is small, each force begins the search for the next.
-    let mut force_n = likelihood.linear_force_n(stretch.to_m, stretch);
-    for i in (0..CURVE_POINTS).rev() {
-        let position_m = stretch.from_m + (i as f64 + 0.5) * width_m;
-        let force_there_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
-        let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: force_there_n });
-        force_n = guess.force_n;
-        let variance = 1.0 / sums.information[2];
-        let volume = (TAU * variance).sqrt() / guess.force_n * width_m;
-        let log_weight = -0.5 * sums.chi_squared + volume.ln();
-        points.push((guess, sums.chi_squared, variance, log_weight));
-    }
-    points.reverse();
-    let most = points.iter().map(|point| point.3).fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = points.iter().map(|point| (point.3 - most).exp()).collect();
-    let total: f64 = weights.iter().sum();
+    let points = curve_points(likelihood, stretch);
+    let most = points.iter().map(|point| point.log_weight).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = points.iter().map(|point| (point.log_weight - most).exp()).sum();
     if !total.is_finite() {
         return None;
     }
-    let mean = |of: &dyn Fn(&(Guess, f64, f64, f64)) -> f64| {
-        points.iter().zip(&weights).map(|(point, weight)| weight / total * of(point)).sum::<f64>()
-    };
-    let (mean_m, mean_n) = (mean(&|point| point.0.position_m), mean(&|point| point.0.force_n));
-    let (off_m, off_n) = (|p: &Guess| p.position_m - mean_m, |p: &Guess| p.force_n - mean_n);
-    let covariance = [
-        mean(&|point| off_m(&point.0).powi(2)) + width_m * width_m / 12.0,
-        mean(&|point| off_m(&point.0) * off_n(&point.0)),
-        mean(&|point| off_n(&point.0).powi(2) + point.2),
-    ];
-    let mut up_to = 0.0;
-    let shares: Vec<f64> = weights
+    let weight = |point: &CurvePoint| (point.log_weight - most).exp() / total;
+    let shares: Vec<f64> = points
         .iter()
-        .map(|weight| {
-            up_to += weight / total;
-            up_to
+        .scan(0.0, |up_to, point| {
+            *up_to += weight(point);
+            Some(*up_to)
         })
         .collect();
-    let median = shares.iter().position(|share| *share >= 0.5)?;
-    let (best, chi_squared, ..) = points[median];
+    let median = &points[shares.iter().position(|share| *share >= 0.5)?];
+    let mean =
+        |of: &dyn Fn(&CurvePoint) -> f64| points.iter().map(|point| weight(point) * of(point)).sum::<f64>();
+    let (mean_m, mean_n) = (mean(&|point| point.guess.position_m), mean(&|point| point.guess.force_n));
+    let off_m = |point: &CurvePoint| point.guess.position_m - mean_m;
+    let off_n = |point: &CurvePoint| point.guess.force_n - mean_n;
+    let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
     Some(Piece {
-        best,
-        chi_squared,
-        covariance,
+        best: median.guess,
+        chi_squared: median.chi_squared,
+        covariance: [
+            mean(&|point| off_m(point).powi(2)) + step_m * step_m / 12.0,
+            mean(&|point| off_m(point) * off_n(point)),
+            mean(&|point| off_n(point).powi(2) + point.force_variance),
+        ],
         probability: 0.0,
         log_weight: most + total.ln(),
         spread: Spread::Curve { from_m: stretch.from_m, to_m: stretch.to_m, shares },
     })
+}
+
+/// A contact of a curve, which stands for its step of the way along the stretch.
+struct CurvePoint {
+    guess: Guess,
+    chi_squared: f64,
+    /// Of the force, at this position.
+    force_variance: f64,
+    log_weight: f64,
+}
+
+/// The best force at each position, from clamp to tip. The search begins at the far end, where the force is small, and each force
+/// begins the search for the next.
+fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
+    let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
+    let mut force_n = likelihood.linear_force_n(stretch.to_m, stretch);
+    let mut point = |i: usize| {
+        let position_m = stretch.from_m + (i as f64 + 0.5) * step_m;
+        let start_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
+        let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: start_n });
+        force_n = guess.force_n;
+        let force_variance = 1.0 / sums.information[2];
+        let volume = (TAU * force_variance).sqrt() / guess.force_n * step_m;
+        let log_weight = -0.5 * sums.chi_squared + volume.ln();
+        CurvePoint { guess, chi_squared: sums.chi_squared, force_variance, log_weight }
+    };
+    let mut points: Vec<CurvePoint> = (0..CURVE_POINTS).rev().map(&mut point).collect();
+    points.reverse();
+    points
 }

@@ -4,9 +4,9 @@ use super::gauges::Stretch;
 use super::likelihood::{Guess, Likelihood, Sums};
 
 /// Where on a stretch the search starts, as shares of it.
-const START_SHARES: [f64; 3] = [0.15, 0.5, 0.85];
+const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
 /// What the linear theory's force is multiplied by at a start: a finger that bends far has shorter levers.
-const START_FORCES: [f64; 4] = [1.0, 1.4, 2.0, 4.0];
+const START_FORCES: [f64; 6] = [1.0, 1.4, 2.0, 3.0, 5.0, 8.0];
 /// Steps that are tried; from a start five to ten reach the last digits.
 const MOST_STEPS: usize = 60;
 /// A step of this share of its parameter is the last one.
@@ -14,25 +14,28 @@ const LAST_STEP: f64 = 1e-10;
 /// A step that is halved more often than this gains nothing.
 const MOST_HALVINGS: usize = 30;
 
-/// The best of the starts on a stretch.
-pub(super) fn start(likelihood: &Likelihood, stretch: Stretch) -> Guess {
-    let width_m = stretch.to_m - stretch.from_m;
-    let positions = START_SHARES.iter().map(|share| stretch.from_m + share * width_m);
-    let guesses = positions.flat_map(|position_m| {
-        let linear_n = likelihood.linear_force_n(position_m, stretch);
-        let forces: Vec<f64> = match likelihood.force_n {
-            Some(force_n) => vec![force_n],
-            None => START_FORCES.iter().map(|factor| factor * linear_n).collect(),
-        };
-        forces.into_iter().map(move |force_n| within(likelihood, Guess { position_m, force_n }, stretch))
+/// The best contact on a stretch: the lowest of the minima that are reached from the best force at each start.
+pub(super) fn search(likelihood: &Likelihood, stretch: Stretch) -> (Guess, Sums) {
+    let reached = START_SHARES.map(|share| {
+        let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
+        refine(likelihood, stretch, start(likelihood, stretch, position_m))
     });
-    let tried = guesses.map(|guess| (likelihood.at(guess, stretch).chi_squared, guess));
-    let middle = Guess { position_m: stretch.from_m + 0.5 * width_m, force_n: 0.0 };
-    tried.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(middle, |(_, guess)| guess)
+    let [first, rest @ ..] = reached;
+    rest.into_iter()
+        .fold(first, |best, next| if next.1.chi_squared < best.1.chi_squared { next } else { best })
+}
+
+/// The best of a few forces at a position.
+fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
+    let linear_n = likelihood.linear_force_n(position_m, stretch);
+    let guess = |factor: f64| within(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
+    let chi_squared = |guess: Guess| likelihood.at(guess, stretch).chi_squared;
+    let better = |best: Guess, next: Guess| if chi_squared(next) < chi_squared(best) { next } else { best };
+    START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
 }
 
 /// Goes from a guess to the nearest minimum of |r|² on the stretch.
-pub(super) fn refine(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
+fn refine(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
     let mut best = (start, likelihood.at(start, stretch));
     for _ in 0..MOST_STEPS {
         let step = step(likelihood, stretch, best);

@@ -118,7 +118,9 @@ fn beyond_the_second_gauge_position_force_and_shape_are_at_their_limits() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn clean_readings_are_located_to_many_digits(x in 0.021..0.12f64, load in 0.05..9.5f64, vertical: bool) {
+    fn clean_readings_are_located_to_many_digits(x in 0.021..0.12f64, load in 0.05..7.0f64, vertical: bool) {
+        // Within the noise of a gauge both of its sides explain a reading.
+        prop_assume!([0.04, 0.06, 0.08].iter().all(|gauge_m| (x - gauge_m).abs() > 5e-4));
         let direction = if vertical { "direction = \"vertical\"" } else { "direction = \"normal\"" };
         let bench = rig(&[("direction = \"normal\"", direction)]).bench;
         let force_n = load * digit(&bench).bending_stiffness() / (x * x);
@@ -293,5 +295,5 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
         bound_m += limit.at(contact, Force::Unknown).unwrap().mean_error_m();
     }
     println!("influence functions at 0.3 N: {:.3} × limit", error_m / bound_m);
-    assert!(error_m < 1.2 * bound_m, "{} {}", error_m, bound_m);
+    assert!(error_m < 1.2 * bound_m, "{error_m} {bound_m}");
 }

@@ -147,7 +147,7 @@ impl Elastica {
     /// the clamp.
     pub fn point(&self, at_m: f64) -> [f64; 2] {
         let bent_m = at_m.min(self.contact_m);
-        let ([x0, y0], [x1, y1]) = (self.from_contact(0.0), self.from_contact(bent_m));
+        let ([x0, y0], [x1, y1]) = (self.way_to_contact(0.0), self.way_to_contact(bent_m));
         let (sine, cosine) = self.angle(self.contact_m).sin_cos();
         let straight_m = at_m - bent_m;
         [x0 - x1 + straight_m * cosine, -self.sign * (y0 - y1) - straight_m * sine]
@@ -155,7 +155,7 @@ impl Elastica {
 
     /// The vector from σ to the contact, along the straight finger and downward: with S = ∫ sin ω = ψ′/q and
     /// C = ∫ cos ω = (2·(ℰ − m·sn·cd) − u)/√q over the way between them, (S·cos α + C·sin α, S·sin α − C·cos α).
-    fn from_contact(&self, at_m: f64) -> [f64; 2] {
+    fn way_to_contact(&self, at_m: f64) -> [f64; 2] {
         if self.q == 0.0 {
             return [self.contact_m - at_m, 0.0];
         }
@@ -190,8 +190,8 @@ struct Turn {
 }
 
 impl Turn {
-    /// Inverts the load by Newton's method. The load is convex in w and at least 2·w and so the first guess lies above the root,
-    /// and all that follow do.
+    /// Inverts the load by Newton's method. The load is convex in w, at least 2·w and at least (w − 1)², so the first guess
+    /// lies above the root, and so do all that follow.
     fn of_load(load: f64) -> Self {
         let mut turn = Self { w: (0.5 * load).min(load.sqrt() + 1.0).min(MOST_TURN), by_load: 0.5 };
         for _ in 0..MOST_STEPS {
