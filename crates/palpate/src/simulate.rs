@@ -10,7 +10,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::arrangement::ArrangementError;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::mechanics::{Extent, InfluenceFunction, Surface, UniformLoad};
+use crate::mechanics::{Extent, ResponseFunction, Surface, UniformLoad};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
@@ -51,29 +51,21 @@ pub enum SimulateError {
     },
 }
 
-/// The sensors of a layout under a surface with a model, each with its influence function.
+/// The sensors of a layout under a surface with a model, each with its response function.
 pub struct CleanSensors<'a> {
-    functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
+    functions: Vec<Arc<dyn ResponseFunction + 'a>>,
 }
 
 impl<'a> CleanSensors<'a> {
-    /// The influence functions of all sensors of `layout`.
+    /// The response functions of all sensors of `layout`.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
-        let function = |sensor: &Sensor| surface.influence_function(sensor.kind, sensor.position);
+        let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
         Self { functions: layout.sensors.iter().map(function).collect() }
     }
 
-    /// What the sensors would read without any fault at `contact`: force times influence, in the SI unit of each sensor.
+    /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
-        self.functions.iter().map(|function| contact.force_n * function.at(contact.position)).collect()
-    }
-
-    /// What the sensors would read without any fault under all of `loads` at once, in the SI unit of each sensor.
-    pub fn reading_of_loads(&self, loads: &[UniformLoad]) -> Vec<f64> {
-        let of = |function: &Arc<dyn InfluenceFunction + 'a>| {
-            loads.iter().map(|load| load.force_n * load.mean(&**function)).sum()
-        };
-        self.functions.iter().map(of).collect()
+        self.functions.iter().map(|function| function.at(contact)).collect()
     }
 }
 
@@ -147,10 +139,20 @@ pub fn simulate_loads(
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut places = rng.clone();
     places.jump();
-    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
+    let placed = displaced(&bench.layout, surface.extent(), &mut places);
     let errors = ChannelErrors::draw(&bench.layout, &mut rng);
-    let clean = sensors.reading_of_loads(loads);
+    let clean = clean_reading_of_loads(surface, &placed, loads);
     Ok((0..repeats).map(|_| measure(&bench.layout, &clean, &errors, &mut rng)).collect())
+}
+
+/// What the sensors of `layout` would read without any fault under all of `loads` at once, by superposition, in the SI unit of
+/// each sensor.
+fn clean_reading_of_loads(surface: &dyn Surface, layout: &Layout, loads: &[UniformLoad]) -> Vec<f64> {
+    let reading = |sensor: &Sensor| {
+        let function = surface.influence_function(sensor.kind, sensor.position);
+        loads.iter().map(|load| load.force_n * load.mean(&*function)).sum()
+    };
+    layout.sensors.iter().map(reading).collect()
 }
 
 /// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the

@@ -77,6 +77,15 @@ fn bench(bench: &Bench) -> Vec<String> {
             Quantity { value: plate.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
             plate.spec().poissons_ratio
         ),
+        SurfaceSpec::Digit(digit) => format!(
+            "flexible digit, {} × {} × {}, Young's modulus {}, contact forces {}; E·I/l² is {:.3} N",
+            format_length_mm(digit.length_m),
+            format_length_mm(digit.width_m),
+            format_length_mm(digit.thickness_m),
+            Quantity { value: digit.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
+            digit.direction.name(),
+            digit.characteristic_force_n()
+        ),
         SurfaceSpec::Measured(_) => match extent.width_m {
             Some(width_m) => {
                 format!("measured, {} × {}", format_length_mm(extent.length_m), format_length_mm(width_m))
@@ -204,6 +213,7 @@ fn method(method: &Method) -> Vec<String> {
             gaussian.process.log_evidence()
         )],
         Method::ClosedForm(_) => vec!["the beam's own equations; nothing was learnt".to_owned()],
+        Method::Digit(_) => vec!["the bending finger's own equations; nothing was learnt".to_owned()],
         Method::Neighbours(neighbours) => {
             vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
         }

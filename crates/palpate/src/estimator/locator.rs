@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
+use crate::digit::{DigitLocator, DigitShape};
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
 use crate::method::{Locate, LocatorFault, ReadingError};
@@ -50,6 +51,8 @@ pub enum Method {
     GaussianProcess(GaussianProcessLocator),
     /// The beam's own equations.
     ClosedForm(ClosedFormLocator),
+    /// The bending finger's own equations.
+    Digit(DigitLocator),
     /// Nearest neighbours.
     Neighbours(NeighboursLocator),
     /// The calibrated centroid.
@@ -65,6 +68,7 @@ impl Method {
             Self::Influence(influence) => influence,
             Self::GaussianProcess(process) => process,
             Self::ClosedForm(form) => form,
+            Self::Digit(digit) => digit,
             Self::Neighbours(neighbours) => neighbours,
             Self::Centroid(centroid) => centroid,
         }
@@ -103,6 +107,14 @@ impl Locator {
         Ok(self.method.locate().locate(reading))
     }
 
+    /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
+    pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
+        match &self.method {
+            Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
+            _ => None,
+        }
+    }
+
     /// Checks what a file may have got wrong.
     ///
     /// # Errors
@@ -130,6 +142,11 @@ impl Locator {
                     return Err(LeaveOutError::NoneLeft);
                 }
             }
+            Method::Digit(digit) => {
+                if !digit.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
         self.bench.layout.sensors[channel].channel.dead = true;
@@ -144,6 +161,7 @@ impl Locator {
             Method::Influence(_) => "influence",
             Method::GaussianProcess(_) => "gaussian-process",
             Method::ClosedForm(_) => "closed-form",
+            Method::Digit(_) => "digit",
             Method::Neighbours(_) => "neighbours",
             Method::Centroid(_) => "centroid",
         }

@@ -1,19 +1,25 @@
 //! What a sensor reads when a unit force acts somewhere on the surface; nothing of recordings or estimators.
 
 mod beam;
+mod digit;
+mod elastica;
 mod extent;
 mod load;
 pub mod modal;
 mod motion;
 pub mod plate;
+mod response;
 mod supported_beam;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
+pub use digit::{Digit, DigitError};
+pub use elastica::{Elastica, ForceDirection};
 pub use extent::Extent;
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
 pub use plate::{Plate, PlateError};
+pub use response::{Proportional, ResponseFunction, ResponseGradient};
 pub use supported_beam::{
     BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
     SupportedBeamSpec,
@@ -32,6 +38,11 @@ pub trait Surface: Send + Sync {
     /// The influence function of a sensor of this `kind` at `sensor`, which must be on the surface. On a surface that is
     /// solved by elements this is one solution, so ask once and keep the answer.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
+
+    /// What a sensor reads under any force, its influence times the force unless the surface bends too far for that.
+    fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
+        Arc::new(Proportional(self.influence_function(kind, sensor)))
+    }
 
     /// One value of an influence function, where no other of the same sensor is wanted.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {

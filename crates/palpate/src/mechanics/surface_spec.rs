@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Beam, Extent, Plate, SupportedBeam, Surface};
+use super::{Beam, Digit, Extent, Plate, SupportedBeam, Surface};
 
 /// The surface that is touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,6 +14,8 @@ pub enum SurfaceSpec {
     SupportedBeam(Box<SupportedBeam>),
     /// A rectangular plate.
     Plate(Plate),
+    /// A flexible cantilever finger.
+    Digit(Digit),
     /// A surface without a model, known by recordings only.
     Measured(Extent),
 }
@@ -25,6 +27,7 @@ impl SurfaceSpec {
             Self::Beam(beam) => beam.extent(),
             Self::SupportedBeam(beam) => beam.extent(),
             Self::Plate(plate) => plate.extent(),
+            Self::Digit(digit) => digit.extent(),
             Self::Measured(extent) => *extent,
         }
     }
@@ -35,6 +38,7 @@ impl SurfaceSpec {
             Self::Beam(beam) => Some(beam),
             Self::SupportedBeam(beam) => Some(beam.as_ref()),
             Self::Plate(plate) => Some(plate),
+            Self::Digit(digit) => Some(digit),
             Self::Measured(_) => None,
         }
     }

@@ -32,6 +32,7 @@ mod chart_svg;
 mod colour_map;
 mod comparison_report;
 mod dead_areas_report;
+mod digit_figures;
 mod evaluation_report;
 mod geometry;
 mod heat_map;

@@ -6,7 +6,7 @@ use crate::arrangement::ArrangementError;
 use crate::contact::Position;
 use crate::mechanics::modal::ModalBeamError;
 use crate::mechanics::plate::NothingToRead;
-use crate::mechanics::{BeamError, Extent, PlateError, SupportedBeamError};
+use crate::mechanics::{BeamError, DigitError, Extent, PlateError, SupportedBeamError};
 use crate::sensing::SensorKind;
 use crate::units::{UnitError, format_length_mm};
 
@@ -125,6 +125,27 @@ pub enum RigProblem {
         readings: f64,
         /// The most it can be.
         most: f64,
+    },
+    /// A digit that cannot be computed.
+    #[error(transparent)]
+    Digit(DigitError),
+    /// A sensor on a digit that is no strain gauge.
+    #[error("a digit is read by strain gauges; `measure` is `{kind}`")]
+    NotAGauge {
+        /// What it measures.
+        kind: crate::sensing::SensorKind,
+    },
+    /// A force that bends a digit further than its model goes.
+    #[error(
+        "`force` is {value}; with a contact at the tip this digit bears at most {:.3} N, a load F·l²/(E·I) of {}",
+        most_n,
+        crate::mechanics::Digit::MOST_LOAD
+    )]
+    TooMuchForce {
+        /// The force, as written.
+        value: String,
+        /// The largest, in newtons.
+        most_n: f64,
     },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
@@ -288,6 +309,7 @@ impl RigError {
             RigProblem::Coordinates { plane: true, .. } => {
                 Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
             }
+            RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
             RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),

@@ -44,6 +44,7 @@ pub(crate) struct SurfaceSection {
     pub edges: Key<EdgesSection>,
     pub elements: Key<i64>,
     pub density: Key<RawQuantity>,
+    pub direction: Key<String>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -135,6 +136,7 @@ pub(crate) struct EstimatorSection {
     pub from: Key<String>,
     pub contacts: Key<i64>,
     pub force_sd: Key<RawQuantity>,
+    pub theory: Key<String>,
 }
 
 impl EstimatorSection {
@@ -159,6 +161,7 @@ impl EstimatorSection {
             place("from", &self.from),
             place("contacts", &self.contacts),
             place("force_sd", &self.force_sd),
+            place("theory", &self.theory),
         ];
         keys.into_iter().flatten().collect()
     }
@@ -183,6 +186,7 @@ impl EstimatorSection {
             from: self.from.or(base.from),
             contacts: self.contacts.or(base.contacts),
             force_sd: self.force_sd.or(base.force_sd),
+            theory: self.theory.or(base.theory),
         }
     }
 }

@@ -199,6 +199,7 @@ impl EvaluationReport<'_> {
             SurfaceSpec::Beam(_) => "beam".to_owned(),
             SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
             SurfaceSpec::Plate(_) => "plate".to_owned(),
+            SurfaceSpec::Digit(_) => "flexible digit".to_owned(),
             SurfaceSpec::Measured(_) => "measured, without a model".to_owned(),
         };
         let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));

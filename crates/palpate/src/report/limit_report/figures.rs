@@ -6,6 +6,7 @@ use super::LimitReport;
 use crate::limit::{Bound, LimitCurve, LimitWarning};
 use crate::mechanics::SurfaceSpec;
 use crate::report::beam_drawing::{beam_drawing, supported_beam_drawing};
+use crate::report::digit_figures::{force_limit_figure, linear_theory_figures, shapes_figure};
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
@@ -26,6 +27,7 @@ pub(super) fn bench_figure(report: &LimitReport) -> Result<Option<Figure>, Repor
             let words = format!("a beam, {},", beam.spec().supports_in_words());
             (supported_beam_drawing(beam, layout, force_n), words, "as beam theory has it exactly")
         }
+        SurfaceSpec::Digit(digit) => return Ok(Some(shapes_figure(digit, layout, force_n))),
         SurfaceSpec::Plate(_) | SurfaceSpec::Measured(_) => return Ok(None),
     };
     let (svg, load) = drawn?;
@@ -65,6 +67,14 @@ pub(super) fn limit_figure(report: &LimitReport) -> Figure {
         }
     };
     Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+}
+
+/// What only a digit has: the limit of the force, and how far the linear theory goes.
+pub(super) fn digit_figures(report: &LimitReport) -> Vec<Figure> {
+    let SurfaceSpec::Digit(digit) = &report.bench.surface else { return Vec::new() };
+    let mut figures = vec![force_limit_figure(report.unknown, 3)];
+    figures.extend(linear_theory_figures(report.bench, report.limit, digit, 4));
+    figures
 }
 
 fn values(series: &[Series]) -> impl Iterator<Item = f64> + '_ {

@@ -3,7 +3,7 @@
 use toml::Spanned;
 
 use crate::contact::Position;
-use crate::mechanics::{Extent, UniformLoad};
+use crate::mechanics::{Extent, SurfaceSpec, UniformLoad};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::LoadSection;
 use crate::rig::value::{RawQuantity, positive, quantity};
@@ -13,9 +13,14 @@ const SECTION: &str = "load";
 
 pub(super) fn validate(
     sections: Option<&[Spanned<LoadSection>]>,
-    extent: Extent,
+    surface: &SurfaceSpec,
 ) -> Result<Vec<UniformLoad>, RigError> {
-    sections.unwrap_or_default().iter().map(|section| load(section, extent)).collect()
+    let sections = sections.unwrap_or_default();
+    if let (SurfaceSpec::Digit(_), Some(section)) = (surface, sections.first()) {
+        let with = "a digit, whose readings under several loads do not add up";
+        return Err(RigProblem::UnusedKey { key: "load", with }.at(section.span()));
+    }
+    sections.iter().map(|section| load(section, surface.extent())).collect()
 }
 
 fn load(section: &Spanned<LoadSection>, extent: Extent) -> Result<UniformLoad, RigError> {

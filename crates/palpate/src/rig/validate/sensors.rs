@@ -72,6 +72,9 @@ impl Context<'_> {
     fn append(&self, sensors: &mut Vec<Sensor>) -> Result<(), RigError> {
         let measure = self.section.measure.as_ref().ok_or_else(|| self.missing("measure"))?;
         let kind = choice("measure", measure, &SensorKind::ALL.map(|kind| (kind.name(), kind)))?;
+        if kind != SensorKind::Strain && matches!(self.surface, SurfaceSpec::Digit(_)) {
+            return Err(RigProblem::NotAGauge { kind }.at(measure.span()));
+        }
         if kind == SensorKind::Raw && self.surface.model().is_some() {
             return Err(RigProblem::RawOnModel.at(measure.span()));
         }
