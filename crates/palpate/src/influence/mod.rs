@@ -2,6 +2,7 @@
 //! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
 
 mod answer;
+mod batch;
 mod belief;
 mod coarse;
 mod config;
