@@ -17,6 +17,9 @@ pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
 /// Nodes are searched eight side by side.
 const BLOCKS: usize = COARSE.div_ceil(8);
 
+/// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
+const END: f64 = 1e-2;
+
 /// Valleys that may matter; more never compete in practice.
 pub(super) const MOST_MINIMA: usize = 4;
 
@@ -58,10 +61,12 @@ impl Profile {
             let value = self.misfits[node + 1];
             let mut rank = count;
             while rank > 0 && value < self.misfits[lowest[rank - 1] + 1] {
+                if rank < MOST_MINIMA {
+                    lowest[rank] = lowest[rank - 1];
+                }
                 rank -= 1;
             }
             if rank < MOST_MINIMA {
-                lowest[rank..].rotate_right(1);
                 lowest[rank] = node;
                 count = (count + 1).min(MOST_MINIMA);
             }
@@ -201,20 +206,22 @@ impl Coarse {
         let (mean, precision) = self.force.mean_and_precision();
         let product = |node: usize| profile.products.as_flattened()[node];
         let (p, n) = (product(node), self.norms[node]);
-        for (other, sign) in [(node + 1, 1.0), (node.wrapping_sub(1), -1.0)] {
-            let Some(other_n) = self.norms.get(other) else { continue };
-            let other_p = product(other);
-            let cross = self.chords[other.max(node)].cross;
-            let (here, there) = (p * other_n - other_p * cross, other_p * n - p * cross);
-            if here > 0.0 && there >= 0.0 {
-                let whole = here + there;
-                let pull = (here * p + there * other_p) + mean * precision * whole;
-                let norm = here * here * n + 2.0 * here * there * cross + there * there * other_n;
-                let force_n = pull * whole / (norm + precision * whole * whole);
-                return (sign * there / whole, force_n);
-            }
+        let to_right = profile.misfits[node + 2] < profile.misfits[node];
+        let (other, sign) = if to_right { (node + 1, 1.0) } else { (node.wrapping_sub(1), -1.0) };
+        let Some(other_n) = self.norms.get(other) else { return (0.0, 0.0) };
+        let other_p = product(other);
+        let cross = self.chords[other.max(node)].cross;
+        let (mut here, mut there) = (p * other_n - other_p * cross, other_p * n - p * cross);
+        if precision == 0.0 && n < END * other_n {
+            (here, there) = (0.75, 0.25);
+        } else if here <= 0.0 || there <= 0.0 {
+            (here, there) = (1.0, 0.0);
         }
-        (0.0, (p + mean * precision).max(0.0) * self.inverse_norms.as_flattened()[node])
+        let whole = here + there;
+        let pull = (here * p + there * other_p) + mean * precision * whole;
+        let norm = here * here * n + 2.0 * here * there * cross + there * there * other_n;
+        let force_n = (pull * whole).max(0.0) / (norm + precision * whole * whole).max(f64::MIN_POSITIVE);
+        (sign * there / whole, force_n)
     }
 }
 

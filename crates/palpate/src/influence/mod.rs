@@ -4,6 +4,7 @@
 mod answer;
 mod batch;
 mod belief;
+mod bend;
 mod coarse;
 mod config;
 mod fitting;

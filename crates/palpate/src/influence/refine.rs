@@ -4,6 +4,7 @@
 //! Symbols as in [`super::search`]. `V` holds eight channels of a reading, `N` a number each of one or eight readings.
 
 use super::belief::ForceBelief;
+use super::bend::{Bend, Step};
 use super::lanes::{Abreast, Eight, Number};
 use super::search::{Minimum, Search};
 use super::table::Cell;
@@ -16,36 +17,69 @@ impl Search {
     pub fn refine<V: Eight, N: Abreast<V>>(
         &self,
         whitened: &[[f64; 8]],
-        (mut x_m, mut force_n): (N, N),
+        start: (N, N),
         steps: usize,
     ) -> (Minimum<N>, u8) {
         let n = N::splat;
-        let (length, reach) = (n(self.table.length_m), n(2.0 * self.spacing.h_m));
+        let ([low, high], reach) = (self.ends_m, n(2.0 * self.spacing.h_m));
         let least = n((1e-9 * self.table.length_m).powi(2));
+        let (mut x_m, mut force_n) = start;
+        let mut way = Way { x_m, force_n, misfit: n(f64::INFINITY), pace: n(1.0) };
         let mut minimum = Minimum::nowhere();
         let mut arrived = 0;
-        for step in 0..steps {
-            let sums = self.sums::<V, N>(whitened, self.spacing.cell(x_m), force_n);
+        for taken in 1..=steps {
+            let cell = self.spacing.cell(x_m);
+            let sums = self.sums::<V, N>(whitened, cell, force_n);
             let normal = Normal::new(&sums, force_n, self.force);
             let step_m = normal.step_m.max(n(0.0) - reach).min(reach);
-            let next_m = (x_m + step_m).max(n(0.0)).min(length);
+            let next_m = (x_m + step_m).max(n(low)).min(n(high));
             let moved = next_m - x_m;
-            let next_n = (force_n + normal.step_n(moved)).max(n(0.0));
-            let misfit = normal.misfit(moved, next_n - force_n);
-            let here = Minimum { x_m: next_m, force_n: next_n, misfit, covariance: normal.covariance };
-            // The error that a step leaves is of the order of its square, so the last step, of a fiftieth of a
-            // standard deviation, is taken on trust.
-            let square = moved * moved;
-            let small = square.at_most(n(4e-4) * normal.covariance[0]) | square.at_most(least);
-            let now = if step + 1 == steps { N::ALL } else { small };
+            let here = Minimum {
+                x_m: next_m,
+                force_n: normal.force_after(moved),
+                misfit: normal.misfit_after(moved),
+                covariance: normal.covariance,
+            };
+            let step = normal.step(moved, &here);
+            let allowed = self.bend::<V, N>(cell.node).allows(&step, self.weights_grown(force_n));
+            let small = (allowed | step.square.at_most(least)) & self.weighs_alike(force_n, normal.force_n);
+            let now = if taken == steps { N::ALL } else { small };
             minimum = here.or(now & !arrived, minimum);
             arrived |= small;
             if arrived == N::ALL {
                 break;
             }
-            (x_m, force_n) = (here.x_m, here.force_n);
+            (x_m, force_n) = way.on((x_m, force_n), &normal, moved);
         }
         (minimum, arrived)
+    }
+
+    /// How the influences bend in the cell after a node.
+    #[inline(always)]
+    fn bend<V: Eight, N: Abreast<V>>(&self, node: N) -> Bend<N> {
+        let (mut kappa_square, mut lambda_square) = (N::each(0.0), N::each(0.0));
+        let bends = kappa_square.as_mut().iter_mut().zip(lambda_square.as_mut());
+        for ((kappa_square, lambda_square), node) in bends.zip(node.lanes().as_ref()) {
+            let bend = &self.bends[*node as u32 as usize];
+            (*kappa_square, *lambda_square) = (bend.kappa_square, bend.lambda_square);
+        }
+        Bend { kappa_square: N::of(&kappa_square), lambda_square: N::of(&lambda_square) }
+    }
+
+    /// Whether the calibration's variance counts alike, to a twentieth, for two forces.
+    #[inline(always)]
+    fn weighs_alike<N: Number>(&self, a_n: N, b_n: N) -> u8 {
+        let (a, b) = (self.weights_grown(a_n), self.weights_grown(b_n));
+        a.max(b).at_most(N::splat(1.05) * a.min(b))
+    }
+
+    /// How much more than in the weights the calibration's variance counts.
+    #[inline(always)]
+    fn weights_grown<N: Number>(&self, force_n: N) -> N {
+        match self.force {
+            ForceBelief::Known(_) => N::splat(1.0),
+            _ => self.grown(force_n),
+        }
     }
 
     /// The sums of the normal equations at a place; of those about the force only where it is not known.
@@ -97,6 +131,30 @@ impl Search {
             ef = ef + we * f;
         }
         [square, gg, eg, ff, fg, ef]
+    }
+}
+
+/// The lowest misfit so far, where it was, and how much of a step is taken.
+struct Way<N> {
+    x_m: N,
+    force_n: N,
+    misfit: N,
+    pace: N,
+}
+
+impl<N: Number> Way<N> {
+    /// The next place and force to try after a place, where the best step of the position is `step_m`: where the misfit
+    /// has risen, half way back, and steps are shorter from then on.
+    #[inline(always)]
+    fn on(&mut self, (x_m, force_n): (N, N), normal: &Normal<N>, step_m: N) -> (N, N) {
+        let (half, fell) = (N::splat(0.5), normal.misfit.at_most(self.misfit));
+        let back = (half * (self.x_m + x_m), half * (self.force_n + force_n));
+        self.pace = self.pace.or(fell, half * self.pace);
+        self.x_m = x_m.or(fell, self.x_m);
+        self.force_n = normal.force_n.or(fell, self.force_n);
+        self.misfit = normal.misfit.or(fell, self.misfit);
+        let part_m = self.pace * step_m;
+        ((x_m + part_m).or(fell, back.0), normal.force_after(part_m).or(fell, back.1))
     }
 }
 
@@ -168,79 +226,95 @@ struct Sums<N> {
     eg: N,
 }
 
-/// The normal equations of position and force.
+/// The normal equations of the position, the force being known or the best there.
 struct Normal<N> {
-    /// χ² where they were drawn up.
-    square: N,
-    /// Information about position and force: aa, aW, WW.
-    information: [N; 3],
-    /// Half of how χ² falls along the position and along the force.
-    fall: [N; 2],
+    force_n: N,
+    /// χ².
+    misfit: N,
+    /// Half of how χ² falls along the position, and its curvature.
+    fall: N,
+    curvature: N,
     /// Cramér–Rao: variance of position, covariance, variance of force; infinite where nothing is told.
     covariance: [N; 3],
     /// The best step of the position.
     step_m: N,
-    /// One over WW; 0 where the force takes no step.
-    inverse_ww: N,
+    /// c, and W²·|f|²; 0 where the force is known.
+    along_f: N,
+    signal: N,
 }
 
 impl<N: Number> Normal<N> {
     #[inline(always)]
     fn new(sums: &Sums<N>, force_n: N, belief: ForceBelief) -> Self {
         match belief {
-            ForceBelief::Known(_) => Self::of_position(sums, force_n),
-            _ => Self::of_both(sums, force_n, belief),
+            ForceBelief::Known(_) => Self::at_known_force(sums, force_n),
+            _ => Self::at_best_force(sums, force_n, belief),
         }
     }
 
     #[inline(always)]
-    fn of_position(sums: &Sums<N>, force_n: N) -> Self {
+    fn at_known_force(sums: &Sums<N>, force_n: N) -> Self {
         let zero = N::splat(0.0);
-        let (aa, along) = (force_n * force_n * sums.gg, force_n * sums.eg);
-        let variance = N::splat(1.0) / aa;
+        let (curvature, fall) = (force_n * force_n * sums.gg, force_n * sums.eg);
+        let variance = N::splat(1.0) / curvature;
         Self {
-            square: sums.square,
-            information: [aa, zero, zero],
-            fall: [along, zero],
+            force_n,
+            misfit: sums.square,
+            fall,
+            curvature,
             covariance: [variance, zero, zero],
-            step_m: zero.or(aa.at_most(zero), along * variance),
-            inverse_ww: zero,
+            step_m: zero.or(curvature.at_most(zero), fall * variance),
+            along_f: zero,
+            signal: zero,
         }
     }
 
+    /// The sums were taken with some force; as the residual is linear in it, they tell the best, and what they are there.
     #[inline(always)]
-    fn of_both(sums: &Sums<N>, force_n: N, belief: ForceBelief) -> Self {
+    fn at_best_force(sums: &Sums<N>, some_n: N, belief: ForceBelief) -> Self {
         let (zero, one, infinity) = (N::splat(0.0), N::splat(1.0), N::splat(f64::INFINITY));
         let (mean, precision) = belief.mean_and_precision();
-        let (off, precision) = (force_n - N::splat(mean), N::splat(precision));
-        let (along, pull) = (force_n * sums.eg, sums.ef - precision * off);
-        let (aa, aw, ww) = (force_n * force_n * sums.gg, force_n * sums.fg, sums.ff + precision);
-        let determinant = aa * ww - aw * aw;
-        let untold = determinant.at_most(N::splat(1e-14) * aa * ww);
-        let inverse = one / determinant;
-        let (xx, xw, wforce) = (ww * inverse, zero - aw * inverse, aa * inverse);
+        let (off, precision) = (some_n - N::splat(mean), N::splat(precision));
+        let (pull, ww) = (sums.ef - precision * off, sums.ff + precision);
+        let inverse_ww = zero.or(ww.at_most(zero), one / ww);
+        let force_n = (some_n + pull * inverse_ww).max(zero);
+        let change = force_n - some_n;
+        let misfit = sums.square + precision * off * off - change * (N::splat(2.0) * pull - ww * change);
+        // Information about the position, about both, and about the position when the force is not known.
+        let (aa, aw) = (force_n * force_n * sums.gg, force_n * sums.fg);
+        let along_w = aw * inverse_ww;
+        let curvature = aa - aw * along_w;
+        let untold = curvature.at_most(N::splat(1e-14) * aa);
+        let (fall, xx) = (force_n * (sums.eg - change * sums.fg), one / curvature);
+        let (xw, wforce) = (zero - along_w * xx, inverse_ww + along_w * along_w * xx);
         Self {
-            square: sums.square + precision * off * off,
-            information: [aa, aw, ww],
-            fall: [along, pull],
+            force_n,
+            misfit,
+            fall,
+            curvature,
             covariance: [infinity.or(untold, xx), zero.or(untold, xw), infinity.or(untold, wforce)],
-            step_m: zero.or(untold, along * xx + pull * xw),
-            inverse_ww: zero.or(untold, one / ww),
+            step_m: zero.or(untold, fall * xx),
+            along_f: sums.fg * inverse_ww,
+            signal: force_n * force_n * sums.ff,
         }
     }
 
-    /// The best step of the force when the position takes a step.
+    /// The best force after a step: |f| has then grown by 1 + c·m.
     #[inline(always)]
-    fn step_n(&self, step_m: N) -> N {
-        (self.fall[1] - self.information[1] * step_m) * self.inverse_ww
+    fn force_after(&self, step_m: N) -> N {
+        self.force_n / (N::splat(1.0) + self.along_f * step_m).max(N::splat(0.25))
     }
 
     /// χ² after a step.
     #[inline(always)]
-    fn misfit(&self, step_m: N, step_n: N) -> N {
-        let ([aa, aw, ww], [along, pull]) = (self.information, self.fall);
-        let two = N::splat(2.0);
-        let by_position = step_m * (two * (along - aw * step_n) - aa * step_m);
-        self.square - by_position - step_n * (two * pull - ww * step_n)
+    fn misfit_after(&self, step_m: N) -> N {
+        self.misfit - step_m * (N::splat(2.0) * self.fall - self.curvature * step_m)
+    }
+
+    /// What tells whether a step to `to` may be the last.
+    #[inline(always)]
+    fn step(&self, step_m: N, to: &Minimum<N>) -> Step<N> {
+        let variance = self.covariance[0];
+        Step { square: step_m * step_m, variance, misfit: to.misfit, signal: self.signal }
     }
 }

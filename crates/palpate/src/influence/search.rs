@@ -3,10 +3,15 @@
 //! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, a position,
 //! χ²(a, W) = |d − W·f(a)|² (+ the force's own misfit where it is believed to be near a value), S channels in use.
 //!
-//! What it costs: the search takes S·40 multiply-adds, eight side by side; the refinement reads two nodes a step. Valleys
-//! that cannot compete are not refined where the force is known.
+//! What it costs: the scan takes S·40 multiply-adds, eight side by side, and reads S·40 influences; a step reads two nodes
+//! of the table and one of the weights. Neither bounds a single reading, whose steps wait for each other: sums, valleys, a
+//! place, sums, a division, the next place, a root. So the search saves links of that chain: the force starts from the
+//! scan's products and is solved for with the place's own sums, nearly always one or two steps are enough ([`super::bend`]
+//! knows when), and valleys that cannot compete are not refined where the force is known. Batches run eight chains side
+//! by side ([`super::batch`]).
 
 use super::belief::ForceBelief;
+use super::bend::{Bend, bends};
 use super::coarse::{Coarse, MOST_MINIMA, Profile, Start};
 use super::lanes::{Eight, Number};
 use super::scratch::Scratch;
@@ -31,7 +36,11 @@ pub(super) struct Search {
     /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's at the known force or the
     /// calibration's, in groups of eight channels.
     pub weights: Vec<[f64; 8]>,
+    /// How the influences bend in every cell.
+    pub bends: Vec<Bend>,
     coarse: Coarse,
+    /// Where places end: at the surface's ends, or a little before.
+    pub ends_m: [f64; 2],
     pub force: ForceBelief,
     /// The calibration's mean force, in newtons: its offsets are as uncertain as its influences at this force.
     reference_force_n: f64,
@@ -57,8 +66,11 @@ pub(super) struct Minimum<N = f64> {
 
 /// A minimum this much above the best has a share of e⁻¹² of the probability.
 pub(super) const NEGLIGIBLE: f64 = 24.0;
-/// Steps to a minimum, of which two are the rule.
-const MOST_STEPS: usize = 16;
+/// Forces beyond so many times the calibration's are taken for no less certain: an immense force next to a support, of
+/// which the calibration says nothing, would else explain every reading.
+const MOST_GROWTH: f64 = 10.0;
+/// Steps to a minimum, of which one or two are the rule.
+const MOST_STEPS: usize = 32;
 
 impl Search {
     /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
@@ -84,7 +96,9 @@ impl Search {
             scaling: pair(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),
             spacing: table.spacing(),
             rows: pair(grouped(&table.values, live.len(), 0.0), grouped(&table.slopes, live.len(), 0.0)),
+            ends_m: ends_m(&table, force),
             coarse: Coarse::new(&table, &weights, force),
+            bends: bends(&table, &weights, force),
             weights,
             charge: charge(force.unknowns(), live.len()),
             worst_misfit: worst_misfit(live.len().saturating_sub(force.unknowns())),
@@ -105,13 +119,14 @@ impl Search {
 
     /// What the table's variances are multiplied by for a contact of a force.
     pub fn variance_scale(&self, force_n: f64) -> f64 {
-        force_n.max(self.reference_force_n).powi(2)
+        self.grown(force_n) * self.reference_force_n * self.reference_force_n
     }
 
     /// How much larger than in calibration the table's variances count for a contact of a force.
     #[inline(always)]
     pub fn grown<N: Number>(&self, force_n: N) -> N {
-        let ratio = (force_n * N::splat(self.inverse_reference)).max(N::splat(1.0));
+        let ratio =
+            (force_n * N::splat(self.inverse_reference)).max(N::splat(1.0)).min(N::splat(MOST_GROWTH));
         ratio * ratio
     }
 
@@ -212,6 +227,18 @@ fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
     let mut raw = [0.0; 8];
     raw.iter_mut().zip(channels).for_each(|(raw, s)| *raw = reading[*s]);
     raw
+}
+
+/// Where places end. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
+/// support like an infinite one, so a tenth of a spacing is kept.
+fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
+    let last = table.nodes() - 1;
+    let square = |node: usize| table.at_node(node).iter().map(|f| f * f).sum::<f64>();
+    let kept = |end: usize, next: usize| match force {
+        ForceBelief::Unknown if square(end) < 1e-2 * square(next) => 0.1 * table.spacing_m(),
+        _ => 0.0,
+    };
+    [kept(0, 1), table.length_m - kept(last, last - 1)]
 }
 
 /// The channels `live` of a table, over their noise.

@@ -57,12 +57,7 @@ impl Spacing {
         let (two_t3, three_t2) = (n(2.0) * t3, n(3.0) * t2);
         Cell {
             node,
-            value: [
-                two_t3 - three_t2 + n(1.0),
-                three_t2 - two_t3,
-                h * (t3 - n(2.0) * t2 + t),
-                h * (t3 - t2),
-            ],
+            value: [two_t3 - three_t2 + n(1.0), three_t2 - two_t3, h * (t3 - n(2.0) * t2 + t), h * (t3 - t2)],
             slope: [n(0.0) - bump, bump, three_t2 - n(4.0) * t + n(1.0), three_t2 - n(2.0) * t],
         }
     }

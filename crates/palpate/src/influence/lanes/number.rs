@@ -32,6 +32,7 @@ pub(in crate::influence) trait Abreast<V: Copy>: Number {
 
     fn each<T: Copy>(value: T) -> Self::Each<T>;
     fn lanes(self) -> Self::Each<f64>;
+    fn of(lanes: &Self::Each<f64>) -> Self;
     /// The sums over channels of each reading's K vectors.
     fn sums<const K: usize>(vectors: &Self::Each<[V; K]>) -> [Self; K];
 }
@@ -76,6 +77,10 @@ impl<V: Eight> Abreast<V> for f64 {
         [self]
     }
     #[inline(always)]
+    fn of(lanes: &[f64; 1]) -> f64 {
+        lanes[0]
+    }
+    #[inline(always)]
     fn sums<const K: usize>(vectors: &[[V; K]; 1]) -> [f64; K] {
         let mut sums = [0.0; K];
         for k in 0..K {
@@ -98,6 +103,10 @@ impl<V: Eight> Abreast<V> for V {
         let mut lanes = [0.0; 8];
         self.store(&mut lanes);
         lanes
+    }
+    #[inline(always)]
+    fn of(lanes: &[f64; 8]) -> Self {
+        V::load(lanes)
     }
     #[inline(always)]
     fn sums<const K: usize>(vectors: &[[V; K]; 8]) -> [V; K] {
