@@ -1,6 +1,7 @@
 //! A fitted influence locator of a surface with a model.
 
-use super::answer::{Rows, locate_one, locate_several};
+use super::answer::{locate_one, locate_several};
+use super::batch::Rows;
 use super::belief::ForceBelief;
 use super::lanes;
 use super::scratch::Scratch;

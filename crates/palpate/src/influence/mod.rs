@@ -2,7 +2,9 @@
 //! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
 
 mod answer;
+mod batch;
 mod belief;
+mod bend;
 mod coarse;
 mod config;
 mod fitting;

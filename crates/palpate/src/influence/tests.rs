@@ -1,4 +1,5 @@
 mod batch;
+mod reference;
 
 use super::*;
 use crate::bench::Bench;
