@@ -34,7 +34,7 @@ use solved::Solved;
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
 ///
 /// What was computed is no part of the plate: it is neither compared nor written to files. It stays in memory as long as a
-/// clone lives: some 10 MB for the default mesh, 300 MB for 200 × 200 elements.
+/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(try_from = "PlateSpec", into = "PlateSpec")]
 pub struct Plate {
