@@ -43,10 +43,9 @@ fn the_example_is_located_with_its_shape_and_judged() {
     assert_eq!(last["status"], "located");
     let shape = last["shape"].as_array().unwrap();
     assert_eq!(shape.len(), 25);
-    // By the exact elastica the tip is 77.9 mm along and 79.8 mm below.
     let tip = &shape[24];
     assert!(
-        (number(&tip["x_mm"]) - TIP_MM.0).abs() < 0.1 && (number(&tip["y_mm"]) - TIP_MM.1).abs() < 0.1,
+        (number(&tip["x_mm"]) - TIP_MM.0).abs() < 0.05 && (number(&tip["y_mm"]) - TIP_MM.1).abs() < 0.05,
         "{tip}"
     );
     assert!(number(&tip["sd_mm"]) < 0.05 && number(&tip["sd_mm"]) > 0.001, "{tip}");
@@ -61,8 +60,8 @@ fn the_example_is_located_with_its_shape_and_judged() {
     insta::assert_snapshot!(said_of(&["inspect", "digit.toml"]));
 }
 
-/// Where the tip is when 4 N push at 117.5 mm.
-const TIP_MM: (f64, f64) = (77.9, -79.8);
+/// Where the tip is when 4 N push at 117.5 mm, by Runge–Kutta steps of the elastica's equation.
+const TIP_MM: (f64, f64) = (74.64, -82.86);
 
 #[test]
 fn the_limit_and_its_report_know_the_bent_finger() {
@@ -74,7 +73,6 @@ fn the_limit_and_its_report_know_the_bent_finger() {
     let positions = found["positions"].as_array().unwrap();
     let at = |i: usize, key: &str| positions[i][key].as_f64().unwrap();
     assert_eq!(at(2, "x_mm").round(), 90.0);
-    println!("{found:#}");
     assert!((at(2, "unknown_force_mm") - 0.03).abs() < 0.02 && at(2, "force_sd_n") < 0.005);
     // Between the first gauges one gauge sees the contact, which blinds this bench for an unknown force.
     assert_eq!(found["warnings"][0]["kind"], "blind");
@@ -96,7 +94,6 @@ fn the_digit_estimator_is_compared_and_the_shape_is_its_own() {
     );
     let estimators = found["estimators"].as_array().unwrap();
     assert_eq!(estimators[0]["name"], "digit");
-    println!("{found:#}");
     let ratio = estimators[0]["limit_ratio"].as_f64().unwrap();
     assert!((0.8..1.2).contains(&ratio), "{ratio}");
 

@@ -16,6 +16,8 @@ use crate::simulate::{CleanSensors, simulate_at};
 
 /// Where the drawn contacts are, as shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];
+/// Where the linear theory is judged, as shares of the length: clear of the tip, which an estimate cannot pass.
+const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
 /// Points of a drawn finger.
 const SHAPE_STEPS: u32 = 120;
 /// Forces of a curve, from a hundredth of the largest load to all of it.
@@ -124,7 +126,7 @@ pub(super) fn linear_theory_figures(
             let points = forces().map(|force_n| (force_n, of(contact(share, force_n))[i])).collect();
             Series { label, colour, kind: SeriesKind::Line { points, stroke } }
         };
-        let lines = DRAWN_CONTACTS.into_iter().enumerate().flat_map(|(colour, share)| {
+        let lines = JUDGED_CONTACTS.into_iter().enumerate().flat_map(|(colour, share)| {
             let place = mm(share * digit.length_m);
             [
                 line(format!("touched at {place} mm"), colour, Stroke::Solid, &errors, share),
