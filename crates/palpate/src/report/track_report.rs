@@ -32,8 +32,10 @@ pub struct TrackReport<'a> {
     pub sweep: &'a [SpeedErrors],
 }
 
-/// More points than this hide each other, so that of single estimates only every so many is drawn.
-const MOST_POINTS: usize = 600;
+/// More points than this hide the track, so that of single estimates only every so many is drawn.
+const MOST_POINTS: usize = 60;
+/// More points of a line than this cannot be told apart.
+const MOST_OF_LINE: usize = 2000;
 
 /// Reports a track: `report.html`, one self-contained page, and its figures as SVG and PNG files.
 ///
@@ -41,6 +43,9 @@ const MOST_POINTS: usize = 600;
 /// [`ReportError`] when a figure does not become a picture.
 pub fn track_report(report: &TrackReport) -> Result<Vec<ReportFile>, ReportError> {
     let mut figures = vec![report.track_figure()];
+    if !report.truths.is_empty() {
+        figures.push(report.errors_figure());
+    }
     if !report.sweep.is_empty() {
         figures.push(report.sweep_figure());
     }
@@ -48,10 +53,11 @@ pub fn track_report(report: &TrackReport) -> Result<Vec<ReportFile>, ReportError
     let section = |id, heading, body| Section { id, heading, body };
     let mut sections = vec![section("track", "The track", figures.show(1))];
     if !report.errors.is_empty() {
-        sections.push(section("errors", "Errors", report.errors_table()));
+        let body = html! { (figures.show(2)) (report.errors_table()) };
+        sections.push(section("errors", "Errors", body));
     }
     if !report.sweep.is_empty() {
-        let body = html! { (figures.show(2)) (report.sweep_table()) };
+        let body = html! { (figures.show(3)) (report.sweep_table()) };
         sections.push(section("speed", "Errors against the speed", body));
     }
     let page = Page {
@@ -132,6 +138,42 @@ impl TrackReport<'_> {
         Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
     }
 
+    /// What is drawn less the true position, in mm, against the time.
+    fn errors_figure(&self) -> Figure {
+        let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
+        let touched = || {
+            let pairs = self.tracks.iter().zip(self.truths).step_by(stride);
+            pairs.filter(|(_, truth)| truth.force_n > 0.0)
+        };
+        let away =
+            |x_m: Option<f64>, truth: &Contact| x_m.map_or(f64::NAN, |x_m| (x_m - truth.position.x_m) * 1e3);
+        let line = |label: &str, colour, x_m: fn(&Track) -> Option<f64>| {
+            let points = touched().map(|(track, truth)| (track.time_s, away(x_m(track), truth))).collect();
+            let kind = SeriesKind::Line { points, stroke: Stroke::Solid };
+            Series { label: label.to_owned(), colour, kind }
+        };
+        let band = touched().map(|(track, truth)| {
+            let end = |x_m: f64| away(Some(x_m), truth);
+            let ends = track.tracked.map_or((f64::NAN, f64::NAN), |tracked| tracked.x_95_m);
+            BandPoint { x: track.time_s, low: end(ends.0), high: end(ends.1) }
+        });
+        let band = SeriesKind::Band { points: band.collect() };
+        let chart = Chart {
+            title: "How far readings and track are off".to_owned(),
+            x: Axis::linear("time, s"),
+            y: Axis::linear("position less the true one, mm"),
+            series: vec![
+                line("single readings", 4, |track| Some(track.alone.contact.position.x_m)),
+                Series { label: "95 % of the track".to_owned(), colour: 1, kind: band },
+                line("track", 1, |track| track.tracked.map(|tracked| tracked.x_m)),
+            ],
+            height_px: 480,
+            ..Chart::default()
+        };
+        let caption = html! { "Errors over time, while something touched." };
+        Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+    }
+
     fn sweep_figure(&self) -> Figure {
         let line = |label: &str, colour, error: fn(&SpeedErrors) -> f64| {
             let points = self.sweep.iter().map(|speed| (speed.ratio, error(speed) * 1e3)).collect();
@@ -156,7 +198,7 @@ impl TrackReport<'_> {
             "The same motion at other speeds, simulated with the beam's inertia and damping. The influence functions are those of a \
              beam in balance: the faster the contact, the less that holds."
         };
-        Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+        Figure { number: 3, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
     }
 
     fn errors_table(&self) -> Markup {
