@@ -74,11 +74,9 @@ impl Likelihood for BeamLikelihood {
         let variances = self.table.variances_near(x_m);
         let scale = force_n.max(self.locator.reference_force_n()).powi(2);
         let cell = self.table.cell(x_m);
-        let node = if x_m - self.table.node_m(cell.node) > 0.5 * self.table.spacing_m() {
-            cell.node + 1
-        } else {
-            cell.node
-        };
+        let left = cell.node as usize;
+        let nearer_right = x_m - self.table.node_m(left) > 0.5 * self.table.spacing_m();
+        let node = left + usize::from(nearer_right);
         let curvatures = &self.curvatures[node * self.table.sensors..];
         let mut fit = ContactFit::default();
         let mut uncertain = 0.0;
