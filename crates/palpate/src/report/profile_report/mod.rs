@@ -67,7 +67,7 @@ impl ProfileReport<'_> {
                         li { "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (number(low)) "–" (number(high)) " N." }
                         li {
                             "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
-                            (number(centre.x_95_m().0 * 1e3)) "–" (number(centre.x_95_m().1 * 1e3)) " mm."
+                            (tenths(centre.x_95_m().0 * 1e3)) "–" (tenths(centre.x_95_m().1 * 1e3)) " mm."
                         }
                         li { a href="#table-1" { (counted(profile.patches.len(), "patch", "patches")) } "." }
                     }
@@ -80,17 +80,15 @@ impl ProfileReport<'_> {
         let row = |(i, patch): (usize, &Patch)| {
             let limit = self.limits.and_then(|limits| limits.get(i));
             let cell = |value: Option<f64>| text(number(value.unwrap_or(f64::NAN)));
-            let span = |(low, high): (f64, f64), unit: f64| {
-                text(format!("{}–{}", number(low * unit), number(high * unit)))
-            };
+            let ((low_m, high_m), (low_n, high_n)) = (patch.centre.x_95_m(), patch.force_95_n());
             vec![
                 text((i + 1).to_string()),
                 text(format!("{}–{}", mm(patch.from.x_m), mm(patch.to.x_m))),
-                cell(Some(patch.centre.position.x_m * 1e3)),
-                span(patch.centre.x_95_m(), 1e3),
+                text(tenths(patch.centre.position.x_m * 1e3)),
+                text(format!("{}–{}", tenths(low_m * 1e3), tenths(high_m * 1e3))),
                 cell(limit.map(|limit| limit.sd_x_m * 1e3)),
                 cell(Some(patch.force_n)),
-                span(patch.force_95_n(), 1.0),
+                text(format!("{}–{}", number(low_n), number(high_n))),
                 cell(limit.map(|limit| limit.sd_force_n)),
             ]
         };
@@ -147,6 +145,11 @@ impl ProfileReport<'_> {
         }
         .markup()
     }
+}
+
+/// A place in millimetres to a tenth.
+fn tenths(place_mm: f64) -> String {
+    format!("{place_mm:.1}")
 }
 
 fn status_in_words(profile: &LoadProfile) -> Markup {
