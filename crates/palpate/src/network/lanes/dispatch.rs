@@ -192,7 +192,7 @@ pub(crate) fn forward_lanes(set: InstructionSet, batch: &Batch<f32>, outputs: &m
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
         InstructionSet::Avx2 => unsafe { forward_fma(batch, outputs) },
-        _ => forward::run::<Array<f32, 8, false>, 8>(batch, outputs),
+        _ => forward::run::<Array<f32, 8, false>, 8, 10>(batch, outputs),
     }
 }
 
@@ -201,7 +201,7 @@ pub(crate) fn forward_lanes(set: InstructionSet, batch: &Batch<f32>, outputs: &m
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,fma")]
 unsafe fn forward_avx512(batch: &Batch<f32>, outputs: &mut [f32]) {
-    forward::run::<super::avx512::F32x16, 16>(batch, outputs);
+    forward::run::<super::avx512::F32x16, 16, 8>(batch, outputs);
 }
 
 /// # Safety
@@ -209,5 +209,5 @@ unsafe fn forward_avx512(batch: &Batch<f32>, outputs: &mut [f32]) {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 unsafe fn forward_fma(batch: &Batch<f32>, outputs: &mut [f32]) {
-    forward::run::<super::avx2::F32x8, 8>(batch, outputs);
+    forward::run::<super::avx2::F32x8, 8, 8>(batch, outputs);
 }
