@@ -3,8 +3,9 @@
 //! A node's G sums are taken together and activated while they are in registers, so that in every layer, whatever its width, G chains of
 //! multiply-adds run side by side and none is waited for.
 //!
-//! What bounds it: the two vector units. Of their slots in the paper's shape, for N readings, 90 are multiply-adds, 150 the eleven
-//! logistic functions, and 24 turn readings into columns; the divider is busy for a third of that time.
+//! What bounds it: the two vector units. Of their slots in the paper's shape, for N readings, 90 are multiply-adds, 150 the eleven logistic
+//! functions, and 24 turn readings into columns. AVX-512 needs about twice these slots' time; without the divisions, which wait for all
+//! that comes before them, it would need an eighth less.
 
 use super::logistic::activate_block;
 use super::{Lanes, Real};

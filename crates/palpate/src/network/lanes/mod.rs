@@ -15,16 +15,20 @@ mod kernel;
 mod logistic;
 mod order;
 mod portable;
+mod single;
 
+#[cfg(test)]
+pub(super) use dispatch::forward_one_portable;
 pub use dispatch::{InstructionSet, Precision};
-pub(super) use dispatch::{forward_lanes, train_lanes, train_scalar};
+pub(super) use dispatch::{forward_lanes, forward_one, train_lanes, train_scalar};
 pub(super) use forward::Batch;
 pub(super) use logistic::{activate, derivative};
 pub(super) use order::{OrderDrawer, Streams};
+pub(super) use single::Layer;
 
 /// The number in one lane.
 pub(crate) trait Real: Copy + PartialOrd + Send + Sync + 'static {
-    /// Adding then subtracting it rounds to a whole number, whose low bits then lie lowest in the sum: 1.5·2^mantissa.
+    /// Adding then subtracting it rounds to a whole number n; the sum's low bits are then the exponent of 2^n: 1.5·2^mantissa + bias.
     const ROUNDER: Self;
     /// Coefficients of the minimax polynomial of 2^r on |r| ≤ ½ (Remez, relative error), lowest first.
     const EXP2: &'static [Self];
