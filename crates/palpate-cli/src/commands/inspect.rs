@@ -165,6 +165,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
 fn method(method: &Method) -> Vec<String> {
     match method {
         Method::Network(network) => {
+            let network = network.parts();
             let outcome = network.outcome;
             vec![
                 format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()),

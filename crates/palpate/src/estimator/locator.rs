@@ -170,7 +170,7 @@ impl Locator {
     /// The weights of a network; nothing for another method.
     pub fn weights(&self) -> &[f64] {
         match &self.method {
-            Method::Network(network) => &network.weights,
+            Method::Network(network) => &network.parts().weights,
             _ => &[],
         }
     }
@@ -178,7 +178,7 @@ impl Locator {
     /// How its training ended, where it was trained by epochs.
     pub fn training_outcome(&self) -> Option<TrainingOutcome> {
         match &self.method {
-            Method::Network(network) => Some(network.outcome),
+            Method::Network(network) => Some(network.parts().outcome),
             _ => None,
         }
     }
