@@ -52,7 +52,7 @@ impl Patch {
     }
 }
 
-/// A patch in the making: cells above the share, none in a hill that stays below it, and all cells with its flanks.
+/// A patch in the making: cells above the share, and all cells with its flanks.
 struct Part {
     core: Vec<usize>,
     all: Vec<usize>,
@@ -61,14 +61,14 @@ struct Part {
 /// The patches of a profile, along x.
 ///
 /// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
-/// valley to the next. A patch whose force does not stand out of its own uncertainty, or a hill that stays below the share, becomes
-/// a part of the patch beside it, or, where there is none, is none.
+/// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
+/// where there is none, is none.
 pub(super) fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
     let least_ratio = normal_quantile(1.0 - CHANCE);
     let stands_out = |part: &Part| {
         let (force, sd) = force_of(&part.all, forces_n, covariance);
-        !part.core.is_empty() && force > least_ratio * sd
+        force > least_ratio * sd
     };
     while let Some(weak) = weakest(&parts, |part| !stands_out(part), forces_n) {
         let part = parts.swap_remove(weak);
@@ -103,7 +103,7 @@ fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
     cores
 }
 
-/// Gives each part the cells that lie downhill from it, the highest first; a cell higher than all around it begins a hill of its own.
+/// Gives each part the cells that lie downhill from it, the highest first.
 fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     let mut owner = vec![None; cells.len()];
     for (number, core) in cores.iter().enumerate() {
@@ -116,12 +116,10 @@ fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     for cell in flanks {
         let uphill = cells.neighbours(cell).filter(|beside| owner[*beside].is_some());
         let uphill = uphill.max_by(|a, b| forces_n[*a].total_cmp(&forces_n[*b]));
-        let number = uphill.and_then(|beside| owner[beside]).unwrap_or(parts.len());
-        if number == parts.len() {
-            parts.push(Part { core: Vec::new(), all: Vec::new() });
+        if let Some(number) = uphill.and_then(|beside| owner[beside]) {
+            owner[cell] = Some(number);
+            parts[number].all.push(cell);
         }
-        owner[cell] = Some(number);
-        parts[number].all.push(cell);
     }
     parts
 }
