@@ -71,7 +71,7 @@ fn jumps(beam: &SupportedBeam, contact_m: f64) -> Vec<(f64, f64, f64)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
 
     #[test]
     fn deflections_are_reciprocal(beam in any_beam(), x in 0.0..=1.0, a in 0.0..=1.0) {
