@@ -12,8 +12,7 @@ use tempfile::TempDir;
 
 const EXAMPLE: &str = include_str!("../../../examples/load-profile.toml");
 /// The same bench, for presses at points.
-const PRESSED: &str =
-    "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nfrom = \"mechanics\"\n";
+const PRESSED: &str = "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nfrom = \"mechanics\"\n";
 
 fn folder(rig: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
