@@ -49,6 +49,27 @@ fn the_example_tells_both_pads() {
 }
 
 #[test]
+fn the_pressure_on_a_plate_is_a_map() {
+    let folder = folder(include_str!("../../../examples/pressure-map.toml"));
+    let told = said(&run(folder.path(), &["profile", "rig.toml"]));
+    assert!(told.contains("across") && told.contains("centre y, mm"), "{told}");
+    let json = said(&run(folder.path(), &["profile", "rig.toml", "--json", "--report", "page.html"]));
+    let found: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(found["status"], "located");
+    assert!((number(&found["total_n"]["value"]) / 10.0 - 1.0).abs() < 0.02, "{}", found["total_n"]);
+    let (patches, loads) = (found["patches"].as_array().unwrap(), found["loads"].as_array().unwrap());
+    assert_eq!(patches.len(), 2);
+    for (patch, load) in patches.iter().zip(loads) {
+        for (centre, limit) in [("centre_x_mm", "limit_x_mm"), ("centre_y_mm", "limit_y_mm")] {
+            let off_mm = number(&patch[centre]["value"]) - number(&load[centre]);
+            assert!(off_mm.abs() < 3.0 * number(&load[limit]), "{centre}: off by {off_mm} mm");
+        }
+    }
+    let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.contains("kPa") && page.contains("simulated") && page.contains("figure-4"));
+}
+
+#[test]
 fn people_get_a_table() {
     insta::assert_snapshot!(said(&run(folder(EXAMPLE).path(), &["profile", "rig.toml"])));
 }

@@ -1,12 +1,12 @@
 //! `palpate profile`: how force is spread over the surface, reading by reading.
 
 mod findings;
+mod tables;
 
 use crate::commands::locate::{columns, open};
 use crate::failure::{Complaint, Failure};
-use crate::table::table;
 use crate::{input, interrupt, output};
-use findings::{Findings, Interval, TrueLoad};
+use findings::Findings;
 use palpate::bench::Bench;
 use palpate::estimator::{
     LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, bench_load_sensors, patch_limits,
@@ -171,7 +171,7 @@ impl Printer<'_> {
             let json = serde_json::to_string(&findings).map_err(Complaint::new)?;
             return output::say(json);
         }
-        print(&findings)?;
+        tables::print(&findings)?;
         match (self.told, &self.arguments.report) {
             (1, Some(path)) => output::say(format!("\nReport: {}", path.display())),
             _ => Ok(()),
@@ -200,57 +200,4 @@ impl Printer<'_> {
         let page = files.iter().find(|file| file.name.ends_with(".html"));
         page.map_or(Ok(()), |page| output::write_file(path, &page.bytes))
     }
-}
-
-fn print(findings: &Findings) -> Result<(), Failure> {
-    let interval = |value: &Interval, unit: &str| {
-        format!("{:.3} {unit} ({:.3} to {:.3})", value.value, value.low, value.high)
-    };
-    let heading = match findings.line {
-        Some(line) => format!("line {line}: {}", findings.status),
-        None => format!("simulated: {}", findings.status),
-    };
-    output::say(heading)?;
-    output::say(format!(
-        "misfit {:.1}; noise seldom makes more than {:.1}",
-        findings.misfit, findings.worst_misfit
-    ))?;
-    let Some(centre) = &findings.centre_x_mm else { return Ok(()) };
-    output::say(format!("total force         {}", interval(&findings.total_n, "N")))?;
-    output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
-    if let Some(width_mm) = findings.resolution_mm {
-        output::say(format!(
-            "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
-        ))?;
-    }
-    let heading = ["patch", "stretch, mm", "centre, mm", "limit", "force, N", "limit"];
-    let limit = |limit: Option<f64>| limit.map_or_else(|| "–".to_owned(), |limit| format!("{limit:.3}"));
-    let cell = |value: &Interval| format!("{:.3} ({:.3} to {:.3})", value.value, value.low, value.high);
-    let rows = findings.patches.iter().enumerate().map(|(i, patch)| {
-        let [from, to] = patch.stretch_mm;
-        vec![
-            (i + 1).to_string(),
-            format!("{from:.0}–{to:.0}"),
-            cell(&patch.centre_x_mm),
-            limit(patch.limit_x_mm),
-            cell(&patch.force_n),
-            limit(patch.limit_force_n),
-        ]
-    });
-    output::say(format!("\n{}", table(&heading, rows)))?;
-    if findings.loads.is_empty() {
-        return Ok(());
-    }
-    let rows = findings.loads.iter().enumerate().map(|(i, load): (usize, &TrueLoad)| {
-        vec![
-            (i + 1).to_string(),
-            format!("{:.0}–{:.0}", load.stretch_mm[0], load.stretch_mm[1]),
-            format!("{:.3}", load.centre_x_mm),
-            limit(load.limit_x_mm),
-            format!("{:.3}", load.force_n),
-            limit(load.limit_force_n),
-        ]
-    });
-    let heading = ["true load", "stretch, mm", "centre, mm", "limit", "force, N", "limit"];
-    output::say(format!("\n{}", table(&heading, rows)))
 }

@@ -11,6 +11,7 @@
 //! of an unknown one; the rest into whitening and writing estimates.
 
 use super::answer::{conclude, locate_into};
+use super::coarse::Profile;
 use super::lanes::{Abreast, Eight};
 use super::scratch::{ForEight, Scratch};
 use super::search::{Minimum, NEGLIGIBLE, Search};
@@ -53,19 +54,17 @@ fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, es
     let groups = search.groups();
     scratch.eight.resize(groups);
     let ForEight { whitened, profiles } = &mut scratch.eight;
-    let [mut squares, mut places_m, mut forces_n, mut floors] = [[0.0; 8]; 4];
+    let ([mut squares, mut floors], mut nodes) = ([[0.0; 8]; 2], [0; 8]);
     let readings = rows.readings.chunks_exact(rows.channels);
     for (i, (reading, profile)) in readings.clone().zip(&mut *profiles).enumerate() {
         let whitened = &mut whitened[i * groups..][..groups];
         squares[i] = search.whiten::<V>(reading, whitened);
         let lowest = search.lowest_valley::<V>(squares[i], whitened, profile);
-        floors[i] = f64::NEG_INFINITY;
-        if let Some((start, floor)) = lowest {
-            (places_m[i], forces_n[i], floors[i]) = (start.x_m, start.force_n, floor);
-        }
+        (nodes[i], floors[i]) = lowest.unwrap_or((0, f64::NEG_INFINITY));
     }
-    let start = (V::load(&places_m), V::load(&forces_n));
-    let (minima, arrived) = search.refine::<V, V>(whitened, start, MOST_STEPS);
+    let each: [&Profile; 8] = std::array::from_fn(|i| &profiles[i]);
+    let start = search.coarse.start::<V, V>(&each, &nodes);
+    let (minima, arrived) = search.refine::<V, V>(whitened, (start.x_m, start.force_n), MOST_STEPS);
     let minima = one_by_one(&minima);
     let mut hard = !arrived;
     for i in 0..8 {

@@ -5,7 +5,8 @@
 //! its chord is known beforehand, so a valley's lowest misfit is bounded from below without going there.
 
 use super::belief::ForceBelief;
-use super::lanes::Eight;
+use super::lanes::{Abreast, Eight};
+use super::rays::Rays;
 use super::table::InfluenceTable;
 
 /// The search looks at every so many nodes; misfits between them are smooth.
@@ -16,9 +17,6 @@ pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
 
 /// Nodes are searched eight side by side.
 const BLOCKS: usize = COARSE.div_ceil(8);
-
-/// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
-const END: f64 = 1e-2;
 
 /// Valleys that may matter; more never compete in practice.
 pub(super) const MOST_MINIMA: usize = 4;
@@ -110,13 +108,13 @@ struct Chord {
 /// Beyond an end: no way leads there.
 const BEYOND: Chord = Chord { cross: 0.0, square: 0.0, half_inverse: 1.0, sag: 0.0, least_weight: 1.0 };
 
-/// Where to start in a valley.
+/// Where to start in a valley of one or eight readings.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Start {
-    pub x_m: f64,
-    pub force_n: f64,
+pub(super) struct Start<N = f64> {
+    pub x_m: N,
+    pub force_n: N,
     /// A misfit below which the valley does not go.
-    pub floor: f64,
+    pub floor: N,
 }
 
 impl Coarse {
@@ -177,15 +175,30 @@ impl Coarse {
         }
     }
 
-    /// Where to start in the valley at `node`.
+    /// Where to start in a valley of each reading, `nodes` being their lowest places.
     #[inline(always)]
-    pub fn start(&self, profile: &Profile, node: usize) -> Start {
+    pub fn start<V: Eight, N: Abreast<V>>(
+        &self,
+        profiles: &N::Each<&Profile>,
+        nodes: &N::Each<usize>,
+    ) -> Start<N> {
+        let valleys = profiles.as_ref().iter().zip(nodes.as_ref());
+        let (mut places, mut floors) = (N::each(0.0), N::each(f64::NEG_INFINITY));
         if let ForceBelief::Known(force_n) = self.force {
-            let (t, floor) = self.along_chords(profile, node);
-            return Start { x_m: (node as f64 + t) * self.h_m, force_n, floor };
+            let lanes = places.as_mut().iter_mut().zip(floors.as_mut());
+            for ((place, floor), (profile, node)) in lanes.zip(valleys) {
+                let (t, least) = self.along_chords(profile, *node);
+                (*place, *floor) = ((*node as f64 + t) * self.h_m, least);
+            }
+            return Start { x_m: N::of(&places), force_n: N::splat(force_n), floor: N::of(&floors) };
         }
-        let (t, force_n) = self.between_rays(profile, node);
-        Start { x_m: (node as f64 + t) * self.h_m, force_n, floor: f64::NEG_INFINITY }
+        let mut rays = N::each(Rays::default());
+        for ((rays, place), (profile, node)) in rays.as_mut().iter_mut().zip(places.as_mut()).zip(valleys) {
+            (*rays, *place) = (self.rays(profile, *node), *node as f64);
+        }
+        let (t, force_n) = Rays::abreast::<V, N>(&rays).mix(self.force);
+        let x_m = (N::of(&places) + t) * N::splat(self.h_m);
+        Start { x_m, force_n, floor: N::of(&floors) }
     }
 
     /// How far from `node`, in coarse nodes, a chord comes closest to d, and the least misfit that its curve may have.
@@ -199,29 +212,24 @@ impl Coarse {
         (t, left.floor(left_square).min(right.floor(right_square)))
     }
 
-    /// How far from `node`, in coarse nodes, two neighbours' influences mix to what is closest to d with any force, and
-    /// the best force of that mixture.
+    /// The two rays between which a reading's direction lies, at the valley at `node`.
     #[inline(always)]
-    fn between_rays(&self, profile: &Profile, node: usize) -> (f64, f64) {
-        let (mean, precision) = self.force.mean_and_precision();
+    fn rays(&self, profile: &Profile, node: usize) -> Rays<f64> {
         let product = |node: usize| profile.products.as_flattened()[node];
-        let (p, n) = (product(node), self.norms[node]);
         let to_right = profile.misfits[node + 2] < profile.misfits[node];
-        let (other, sign) = if to_right { (node + 1, 1.0) } else { (node.wrapping_sub(1), -1.0) };
-        let Some(other_n) = self.norms.get(other) else { return (0.0, 0.0) };
-        let other_p = product(other);
-        let cross = self.chords[other.max(node)].cross;
-        let (mut here, mut there) = (p * other_n - other_p * cross, other_p * n - p * cross);
-        if precision == 0.0 && n < END * other_n {
-            (here, there) = (0.75, 0.25);
-        } else if here <= 0.0 || there <= 0.0 {
-            (here, there) = (1.0, 0.0);
+        let (other, towards) = if to_right { (node + 1, 1.0) } else { (node.wrapping_sub(1), -1.0) };
+        let (product, norm) = (product(node), self.norms[node]);
+        match self.norms.get(other) {
+            Some(other_norm) => Rays {
+                product,
+                norm,
+                other_product: profile.products.as_flattened()[other],
+                other_norm: *other_norm,
+                cross: self.chords[other.max(node)].cross,
+                towards,
+            },
+            None => Rays { product, norm, ..Rays::default() },
         }
-        let whole = here + there;
-        let pull = (here * p + there * other_p) + mean * precision * whole;
-        let norm = here * here * n + 2.0 * here * there * cross + there * there * other_n;
-        let force_n = (pull * whole).max(0.0) / (norm + precision * whole * whole).max(f64::MIN_POSITIVE);
-        (sign * there / whole, force_n)
     }
 }
 

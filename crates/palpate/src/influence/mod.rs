@@ -18,6 +18,7 @@ mod plane;
 mod posterior;
 mod presses;
 mod prior;
+mod rays;
 mod refine;
 mod scratch;
 mod search;

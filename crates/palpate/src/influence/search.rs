@@ -12,7 +12,7 @@
 
 use super::belief::ForceBelief;
 use super::bend::{Bend, bends};
-use super::coarse::{Coarse, MOST_MINIMA, Profile, Start};
+use super::coarse::{Coarse, MOST_MINIMA, Profile};
 use super::lanes::{Eight, Number};
 use super::scratch::Scratch;
 use super::several::charge;
@@ -38,7 +38,7 @@ pub(super) struct Search {
     pub weights: Vec<[f64; 8]>,
     /// How the influences bend in every cell.
     pub bends: Vec<Bend>,
-    coarse: Coarse,
+    pub coarse: Coarse,
     /// Where places end: at the surface's ends, or a little before.
     pub ends_m: [f64; 2],
     pub force: ForceBelief,
@@ -151,20 +151,20 @@ impl Search {
         square.sum()
     }
 
-    /// Where to start in the lowest valley of a reading that was whitened to length `square`, and below which misfit no
-    /// other valley goes; `None` where there is no valley.
+    /// The lowest valley of a reading that was whitened to length `square`, and below which misfit no other valley goes;
+    /// `None` where there is no valley.
     #[inline(always)]
     pub fn lowest_valley<V: Eight>(
         &self,
         square: f64,
         whitened: &[[f64; 8]],
         profile: &mut Profile,
-    ) -> Option<(Start, f64)> {
+    ) -> Option<(usize, f64)> {
         self.coarse.scan::<V>(square, whitened, profile);
         let (valleys, count) = profile.valleys::<V>();
         let (lowest, others) = valleys[..count].split_first()?;
-        let floor = others.iter().map(|node| self.coarse.start(profile, *node).floor);
-        Some((self.coarse.start(profile, *lowest), floor.fold(f64::INFINITY, f64::min)))
+        let floor = others.iter().map(|node| self.coarse.start::<V, f64>(&[&*profile], &[*node]).floor);
+        Some((*lowest, floor.fold(f64::INFINITY, f64::min)))
     }
 
     /// The minima that matter, best first, of a reading that was whitened to length `square`.
@@ -176,7 +176,7 @@ impl Search {
         let mut found = [Minimum::<f64>::nowhere(); MOST_MINIMA];
         let (mut count, mut best) = (0, f64::INFINITY);
         for node in &valleys[..valleys_count] {
-            let start = self.coarse.start(&scratch.profile, *node);
+            let start = self.coarse.start::<V, f64>(&[&scratch.profile], &[*node]);
             if start.floor > best + NEGLIGIBLE {
                 continue;
             }

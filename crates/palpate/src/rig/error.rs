@@ -164,24 +164,22 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
-    /// A load that is not a stretch of the surface.
+    /// A load that is not a stretch of the surface, or not a rectangle of it.
     #[error(
-        "the load goes from {} to {}; it must go from left to right, within 0 and {}",
-        format_length_mm(*from_m),
-        format_length_mm(*to_m),
-        format_length_mm(*length_m)
+        "the load goes from {} to {}; it must go from left to right{}, within {}",
+        extent.place_in_words(*from),
+        extent.place_in_words(*to),
+        if extent.is_plane() { " and upward" } else { "" },
+        extent.bounds_in_words()
     )]
     LoadStretch {
-        /// Where it begins, in metres.
-        from_m: f64,
-        /// Where it ends, in metres.
-        to_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
+        /// Its left end, or lower left corner, as given.
+        from: Position,
+        /// Its right end, or upper right corner, as given.
+        to: Position,
+        /// The surface.
+        extent: Extent,
     },
-    /// A load on a plane.
-    #[error("[[load]] describes a stretch of a line; this surface has a width too")]
-    LoadOnPlane,
     /// A reaction sensor where nothing supports the surface.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
@@ -214,10 +212,12 @@ pub enum RigProblem {
     },
     /// A position with one coordinate on a plane, or with more than one on a line.
     #[error(
-        "`positions` has {found} where {} is expected",
+        "`{key}` has {found} where {} is expected",
         if *plane { "a pair of lengths, along and across," } else { "one length along the surface" }
     )]
     Coordinates {
+        /// Where it stands.
+        key: &'static str,
         /// What is there.
         found: &'static str,
         /// Whether the surface has a width.

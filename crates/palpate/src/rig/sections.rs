@@ -82,8 +82,8 @@ pub(crate) struct ContactSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LoadSection {
-    pub from: Key<RawQuantity>,
-    pub to: Key<RawQuantity>,
+    pub from: Key<RawPosition>,
+    pub to: Key<RawPosition>,
     pub force: Key<RawQuantity>,
 }
 

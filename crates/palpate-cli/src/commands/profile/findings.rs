@@ -38,6 +38,9 @@ pub struct Interval {
 pub struct PatchFound {
     pub stretch_mm: [f64; 2],
     pub centre_x_mm: Interval,
+    /// What a plane has besides.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub across: Option<Across<Interval>>,
     pub force_n: Interval,
     /// Least standard deviations for evenly loaded patches of this number and these sizes.
     pub limit_x_mm: Option<f64>,
@@ -48,9 +51,19 @@ pub struct PatchFound {
 pub struct TrueLoad {
     pub stretch_mm: [f64; 2],
     pub centre_x_mm: f64,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub across: Option<Across<f64>>,
     pub force_n: f64,
     pub limit_x_mm: Option<f64>,
     pub limit_force_n: Option<f64>,
+}
+
+/// A patch or a load across the width of a plane.
+#[derive(serde::Serialize)]
+pub struct Across<T> {
+    pub stretch_y_mm: [f64; 2],
+    pub centre_y_mm: T,
+    pub limit_y_mm: Option<f64>,
 }
 
 /// A cell of the surface with its density, in N/mm on a line and N/mm² on a plane.
@@ -88,6 +101,16 @@ impl Findings {
                 patch.centre.x_95_m(),
                 1e3,
             ),
+            across: plane.then(|| Across {
+                stretch_y_mm: [patch.from.y_m * 1e3, patch.to.y_m * 1e3],
+                centre_y_mm: Interval::new(
+                    patch.centre.position.y_m,
+                    patch.centre.sd_y_m,
+                    patch.centre.y_95_m(),
+                    1e3,
+                ),
+                limit_y_mm: limit(i).map(|limit| limit.sd_y_m * 1e3),
+            }),
             force_n: Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0),
             limit_x_mm: limit(i).map(|limit| limit.sd_x_m * 1e3),
             limit_force_n: limit(i).map(|limit| limit.sd_force_n),
@@ -98,6 +121,11 @@ impl Findings {
             TrueLoad {
                 stretch_mm: [load.from.x_m * 1e3, load.to.x_m * 1e3],
                 centre_x_mm: load.centre().x_m * 1e3,
+                across: plane.then(|| Across {
+                    stretch_y_mm: [load.from.y_m * 1e3, load.to.y_m * 1e3],
+                    centre_y_mm: load.centre().y_m * 1e3,
+                    limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
+                }),
                 force_n: load.force_n,
                 limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
                 limit_force_n: limit.map(|limit| limit.sd_force_n),

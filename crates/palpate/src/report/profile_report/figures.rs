@@ -1,5 +1,7 @@
 //! The profile, what the layout resolves, and the residuals.
 
+mod plane;
+
 use maud::html;
 
 use super::ProfileReport;
@@ -12,6 +14,9 @@ use crate::report::{Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, St
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 
 pub(super) fn figures(report: &ProfileReport) -> Vec<Figure> {
+    if report.profile.cells.extent.is_plane() {
+        return plane::figures(report);
+    }
     let mut figures = vec![profile_figure(report)];
     if let Some(resolution) = report.resolution {
         figures.push(width_figure(report, resolution));
@@ -21,21 +26,15 @@ pub(super) fn figures(report: &ProfileReport) -> Vec<Figure> {
     figures
 }
 
-/// Positions of columns of cells in mm, each with some figure of its cells added up across the width.
+/// Positions of the cells of a line in mm, each with some figure of the cell.
 fn along(profile: &LoadProfile, of: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
     let cells = profile.cells;
-    let column = |i: usize| {
-        let sum = (0..cells.rows).map(|j| of(j * cells.columns + i)).sum();
-        (cells.centre(i).x_m * 1e3, sum)
-    };
-    (0..cells.columns).map(column).collect()
+    (0..cells.len()).map(|cell| (cells.centre(cell).x_m * 1e3, of(cell))).collect()
 }
 
 fn profile_figure(report: &ProfileReport) -> Figure {
     let profile = report.profile;
-    let across_m = profile.cells.sides_m()[1];
-    // N/m is N/m, and N/m² times a cell's width adds up to it; people read N/mm.
-    let per_mm = 1e-3 * if profile.cells.extent.width_m.is_some() { across_m } else { 1.0 };
+    let per_mm = 1e-3;
     let low = along(profile, |cell| profile.density(cell).1.0 * per_mm);
     let high = along(profile, |cell| profile.density(cell).1.1 * per_mm);
     let band = low.iter().zip(&high).map(|((x, low), (_, high))| BandPoint { x: *x, low: *low, high: *high });
@@ -86,8 +85,7 @@ fn truth(report: &ProfileReport) -> Vec<(f64, f64)> {
 }
 
 fn width_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
-    let rows = resolution.cells.rows as f64;
-    let points = along(report.profile, |cell| resolution.widths_m[cell] * 1e3 / rows);
+    let points = along(report.profile, |cell| resolution.widths_m[cell] * 1e3);
     let sensors = report.layout.sensors.iter().map(|sensor| sensor.position.x_m * 1e3);
     let most = points.iter().fold(0.0, |most: f64, point| most.max(point.1));
     let chart = Chart {
@@ -116,12 +114,11 @@ fn width_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
 
 fn kernel_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
     let cells = resolution.cells;
-    let middle = cells.rows / 2 * cells.columns;
     let kernel = |(colour, share): (usize, &f64)| {
-        let column = ((share * cells.columns as f64) as usize).min(cells.columns - 1);
-        let row = resolution.kernels.row(middle + column);
+        let of = ((share * cells.columns as f64) as usize).min(cells.columns - 1);
+        let row = resolution.kernels.row(of);
         let points = along(report.profile, |cell| row[cell]);
-        line(&format!("of {} mm", mm(cells.centre(column).x_m)), colour, points, Stroke::Solid)
+        line(&format!("of {} mm", mm(cells.centre(of).x_m)), colour, points, Stroke::Solid)
     };
     let chart = Chart {
         title: "Averaging kernels".to_owned(),
@@ -136,13 +133,16 @@ fn kernel_figure(report: &ProfileReport, resolution: &Resolution) -> Figure {
     figure(3, &chart, caption)
 }
 
+/// The residuals: along a line by place, on a plane by number.
 fn residual_figure(report: &ProfileReport) -> Figure {
+    let plane = report.profile.cells.extent.is_plane();
     let mut kinds: Vec<_> = report.layout.kinds();
     kinds.dedup();
     let of_kind = |(colour, kind): (usize, &crate::sensing::SensorKind)| {
         let sensors = report.layout.sensors.iter().enumerate().filter(|(_, sensor)| sensor.kind == *kind);
         let points = sensors.filter_map(|(i, sensor)| {
-            Some((sensor.position.x_m * 1e3, report.profile.residuals.get(i).copied().flatten()?))
+            let at = if plane { (i + 1) as f64 } else { sensor.position.x_m * 1e3 };
+            Some((at, report.profile.residuals.get(i).copied().flatten()?))
         });
         let marker = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Cross][colour % 4];
         Series {
@@ -154,7 +154,11 @@ fn residual_figure(report: &ProfileReport) -> Figure {
     let line_at = |y: f64, label: &str| Mark::HorizontalLine { y, label: label.to_owned() };
     let chart = Chart {
         title: "What the profile leaves of the reading".to_owned(),
-        x: surface_axis(report.profile, "sensor position, mm"),
+        x: if plane {
+            Axis::linear("sensor").from_to(0.0, report.layout.len() as f64 + 1.0)
+        } else {
+            surface_axis(report.profile, "sensor position, mm")
+        },
         y: Axis::linear("residual, standard deviations of the noise"),
         series: kinds.iter().enumerate().map(of_kind).collect(),
         marks: vec![line_at(2.0, "two standard deviations"), line_at(-2.0, "")],

@@ -67,7 +67,12 @@ impl ProfileReport<'_> {
                         li { "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (number(low)) "–" (number(high)) " N." }
                         li {
                             "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
-                            (tenths(centre.x_95_m().0 * 1e3)) "–" (tenths(centre.x_95_m().1 * 1e3)) " mm."
+                            (stretch(centre.x_95_m())) " mm"
+                            @if self.is_plane() {
+                                "; across at " b { (number(centre.position.y_m * 1e3)) " mm" } ", 95 % interval "
+                                (stretch(centre.y_95_m())) " mm"
+                            }
+                            "."
                         }
                         li { a href="#table-1" { (counted(profile.patches.len(), "patch", "patches")) } "." }
                     }
@@ -76,38 +81,55 @@ impl ProfileReport<'_> {
         }
     }
 
+    fn is_plane(&self) -> bool {
+        self.profile.cells.extent.is_plane()
+    }
+
     fn patch_table(&self, table: usize) -> Markup {
         let row = |(i, patch): (usize, &Patch)| {
             let limit = self.limits.and_then(|limits| limits.get(i));
             let cell = |value: Option<f64>| text(number(value.unwrap_or(f64::NAN)));
-            let ((low_m, high_m), (low_n, high_n)) = (patch.centre.x_95_m(), patch.force_95_n());
-            vec![
+            let centre = &patch.centre;
+            let (low_n, high_n) = patch.force_95_n();
+            let mut row = vec![
                 text((i + 1).to_string()),
                 text(format!("{}–{}", mm(patch.from.x_m), mm(patch.to.x_m))),
-                text(tenths(patch.centre.position.x_m * 1e3)),
-                text(format!("{}–{}", tenths(low_m * 1e3), tenths(high_m * 1e3))),
+                text(tenths(centre.position.x_m * 1e3)),
+                text(stretch(centre.x_95_m())),
                 cell(limit.map(|limit| limit.sd_x_m * 1e3)),
+            ];
+            if self.is_plane() {
+                row.extend([
+                    text(format!("{}–{}", mm(patch.from.y_m), mm(patch.to.y_m))),
+                    text(tenths(centre.position.y_m * 1e3)),
+                    text(stretch(centre.y_95_m())),
+                    cell(limit.map(|limit| limit.sd_y_m * 1e3)),
+                ]);
+            }
+            row.extend([
                 cell(Some(patch.force_n)),
                 text(format!("{}–{}", number(low_n), number(high_n))),
                 cell(limit.map(|limit| limit.sd_force_n)),
-            ]
+            ]);
+            row
         };
+        let along =
+            |stretch, centre| [numeric(stretch), numeric(centre), numeric("95 %, mm"), numeric("limit, mm")];
+        let mut columns = vec![short("patch")];
+        if self.is_plane() {
+            columns.extend(along("along, mm", "centre x, mm"));
+            columns.extend(along("across, mm", "centre y, mm"));
+        } else {
+            columns.extend(along("stretch, mm", "centre, mm"));
+        }
+        columns.extend([numeric("force, N"), numeric("95 %, N"), numeric("limit, N")]);
         Table {
             number: table,
             caption: html! {
-                "The patches: connected stretches where the load is above a tenth of its highest density, and their limits, the least \
+                "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
                  standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have."
             },
-            columns: vec![
-                short("patch"),
-                short("stretch, mm"),
-                numeric("centre, mm"),
-                numeric("95 % interval, mm"),
-                numeric("limit, mm"),
-                numeric("force, N"),
-                numeric("95 % interval, N"),
-                numeric("limit, N"),
-            ],
+            columns,
             rows: self.profile.patches.iter().enumerate().map(row).collect(),
         }
         .markup()
@@ -122,7 +144,11 @@ impl ProfileReport<'_> {
             vec![
                 text((i + 1).to_string()),
                 text(format!("{}, {}", sensor.kind.name(), unit.symbol())),
-                text(mm(sensor.position.x_m)),
+                text(if self.is_plane() {
+                    format!("{}, {}", mm(sensor.position.x_m), mm(sensor.position.y_m))
+                } else {
+                    mm(sensor.position.x_m)
+                }),
                 shown(self.reading.get(i).copied()),
                 shown(self.profile.fitted.get(i).copied().flatten()),
                 text(number(self.profile.residuals.get(i).copied().flatten().unwrap_or(f64::NAN))),
@@ -145,6 +171,11 @@ impl ProfileReport<'_> {
         }
         .markup()
     }
+}
+
+/// A stretch given in metres, in millimetres to a tenth.
+fn stretch((from_m, to_m): (f64, f64)) -> String {
+    format!("{}–{}", tenths(from_m * 1e3), tenths(to_m * 1e3))
 }
 
 /// A place in millimetres to a tenth.

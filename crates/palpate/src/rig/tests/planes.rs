@@ -91,3 +91,24 @@ fn lines_and_planes_that_are_mixed_up_are_refused_with_a_caret() {
     );
     insta::assert_snapshot!(format!("{on_a_plane}\n\n{on_a_line}"));
 }
+
+#[test]
+fn a_load_on_a_plane_is_a_rectangle() {
+    let load = "[[load]]\nfrom = [\"70 mm\", \"80 mm\"]\nto = [\"110 mm\", \"120 mm\"]\nforce = \"4 N\"\n";
+    let loaded = format!("{PLANE}{load}");
+    let loads = Rig::from_toml(&loaded).unwrap().loads;
+    assert_eq!(millimetres([loads[0].from, loads[0].to]), [[70.0, 80.0], [110.0, 120.0]]);
+    assert_eq!((loads.len(), loads[0].force_n), (1, 4.0));
+    insta::assert_snapshot!(refused(
+        &loaded,
+        &[
+            ("from = [\"70 mm\", \"80 mm\"]", "from = \"70 mm\""),
+            ("to = [\"110 mm\", \"120 mm\"]", "to = [\"110 mm\"]"),
+            ("to = [\"110 mm\", \"120 mm\"]", "to = [\"110 mm\", \"70 mm\"]"),
+            ("to = [\"110 mm\", \"120 mm\"]", "to = [\"110 mm\", \"220 mm\"]"),
+        ],
+    ));
+    let on_a_line =
+        "[surface]\nkind = \"measured\"\nlength = \"300 mm\"\n[sensors]\nmeasure = \"raw\"\ncount = 3\n";
+    insta::assert_snapshot!(refused(&format!("{on_a_line}{load}"), &[("", "")]));
+}

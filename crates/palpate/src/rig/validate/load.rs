@@ -2,11 +2,11 @@
 
 use toml::Spanned;
 
-use crate::contact::Position;
+use super::places::place;
 use crate::mechanics::{Extent, SurfaceSpec, UniformLoad};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::LoadSection;
-use crate::rig::value::{RawQuantity, positive, quantity};
+use crate::rig::value::positive;
 use crate::units::Dimension;
 
 const SECTION: &str = "load";
@@ -24,28 +24,23 @@ pub(super) fn validate(
 }
 
 fn load(section: &Spanned<LoadSection>, extent: Extent) -> Result<UniformLoad, RigError> {
-    if extent.width_m.is_some() {
-        return Err(RigProblem::LoadOnPlane.at(section.span()));
-    }
     let keys = section.get_ref();
-    let from = need("from", keys.from.as_ref(), section)?;
-    let to = need("to", keys.to.as_ref(), section)?;
-    let from_m = quantity("from", from, Dimension::Length)?;
-    let to_m = quantity("to", to, Dimension::Length)?;
+    let written = need("from", keys.from.as_ref(), section)?;
+    let from = place("from", written, extent)?;
+    let to = place("to", need("to", keys.to.as_ref(), section)?, extent)?;
     let force_n = positive("force", need("force", keys.force.as_ref(), section)?, Dimension::Force)?;
-    let load = UniformLoad { from: Position::along(from_m), to: Position::along(to_m), force_n };
-    if from_m < to_m && extent.contains(load.from) && extent.contains(load.to) {
-        Ok(load)
+    let rises = from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m);
+    if rises && extent.contains(from) && extent.contains(to) {
+        Ok(UniformLoad { from, to, force_n })
     } else {
-        let length_m = extent.length_m;
-        Err(RigProblem::LoadStretch { from_m, to_m, length_m }.at(from.span()))
+        Err(RigProblem::LoadStretch { from, to, extent }.at(written.span()))
     }
 }
 
-fn need<'a>(
+fn need<'a, T>(
     key: &'static str,
-    value: Option<&'a Spanned<RawQuantity>>,
+    value: Option<&'a Spanned<T>>,
     section: &Spanned<LoadSection>,
-) -> Result<&'a Spanned<RawQuantity>, RigError> {
+) -> Result<&'a Spanned<T>, RigError> {
     value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(section.span()))
 }
