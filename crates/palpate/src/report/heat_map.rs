@@ -168,13 +168,14 @@ impl Layout {
             colour: INK,
             ..label(&name, (plot.left, plot.top - 11.0), Anchor::Start)
         });
-        // The maps of the lowest row say what the axes are.
+        // The maps of the lowest row name the axis beneath them.
         let last_row = self.plots.len().div_ceil(self.columns) - 1;
         let lowest = self.plots.get(last_row * self.columns).is_some_and(|first| first.top == plot.top);
         if lowest {
             let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 4.0);
-            labels.push(label("x, mm (upward: y, mm)", at, Anchor::Middle));
+            labels.push(label("x, mm", at, Anchor::Middle));
         }
+        labels.push(label("y, mm", (plot.left - 7.0, plot.top - 11.0), Anchor::End));
         labels
     }
 
@@ -201,9 +202,9 @@ impl Layout {
                 colour: QUIET_INK,
             });
         }
-        let at = (right + BAR_LABELS, top - 11.0);
-        let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + GAP + GUTTER);
-        canvas.text(&Label { text, at, anchor: Anchor::End, size: NAME_SIZE, colour: INK });
+        let at = (left, top - 11.0);
+        let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + MARGIN);
+        canvas.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
     }
 }
 

@@ -1,6 +1,5 @@
 //! From minima of the misfit to an estimate that owns up to what it does not know.
 
-use super::coarse::MOST_VALLEYS;
 use super::modes::Mode;
 use super::search::{Scratch, Search};
 use crate::contact::Position;
@@ -18,12 +17,8 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
     let square = search.whiten(reading, scratch);
     let (minima, count) = search.minima(square, scratch);
     let (minima, best) = (&minima[..count], minima[0]);
-    let mut modes = [Mode::default(); MOST_VALLEYS];
-    for (i, mode) in modes[..count].iter_mut().enumerate() {
-        *mode = search.mode(&scratch.whitened, minima, i);
-    }
-    let modes = &mut modes[..count];
-    share(modes);
+    let (modes, count) = search.modes(&scratch.whitened, minima, &scratch.profile);
+    let modes = &modes[..count];
     if square <= best.misfit + search.charge && square <= search.worst_noise {
         return Estimate::of_position(position(&modes[0]), Status::NoContact);
     }
@@ -37,22 +32,6 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
         estimate.status = Status::OutsideModel;
     }
     estimate
-}
-
-/// Weights become shares, the most probable mode first.
-fn share(modes: &mut [Mode]) {
-    let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
-    let alone = if sum > 0.0 { 0.0 } else { 1.0 };
-    for (i, mode) in modes.iter_mut().enumerate() {
-        mode.weight = if sum > 0.0 {
-            mode.weight / sum
-        } else if i == 0 {
-            alone
-        } else {
-            0.0
-        };
-    }
-    modes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
 }
 
 /// The covariance about the first mode whose 95 % ellipse holds 95 % of the probability: that of the mode where it is
