@@ -33,8 +33,12 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// A rig, from its file.
 pub fn read_rig(path: &Path) -> Result<Rig, Failure> {
-    let text = read_text(path)?;
-    Rig::from_toml(&text).map_err(|error| rig_complaint(error, path, &text))
+    parse_rig(path, &read_text(path)?)
+}
+
+/// A rig, from its file's text.
+pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
+    Rig::from_toml(text).map_err(|error| rig_complaint(error, path, text))
 }
 
 /// A study, from its file's text.
@@ -68,6 +72,15 @@ pub fn length(text: &str) -> Result<f64, String> {
 pub fn force(text: &str) -> Result<f64, String> {
     match Quantity::parse_as(text, Dimension::Force) {
         Ok(force_n) if force_n > 0.0 => Ok(force_n),
+        Ok(_) => Err(format!("`{text}` must be greater than 0")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// A frequency in hertz, from a command line argument.
+pub fn frequency(text: &str) -> Result<f64, String> {
+    match Quantity::parse_as(text, Dimension::Frequency) {
+        Ok(frequency_hz) if frequency_hz > 0.0 => Ok(frequency_hz),
         Ok(_) => Err(format!("`{text}` must be greater than 0")),
         Err(error) => Err(error.to_string()),
     }

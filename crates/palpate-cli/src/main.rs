@@ -30,9 +30,11 @@ enum Command {
     Fit(commands::fit::Arguments),
     Evaluate(commands::evaluate::Arguments),
     Locate(commands::locate::Arguments),
+    Track(commands::track::Arguments),
     Compare(commands::compare::Arguments),
     Limit(commands::limit::Arguments),
     Inspect(commands::inspect::Arguments),
+    Profile(commands::profile::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -44,9 +46,11 @@ fn main() -> ExitCode {
         Command::Fit(arguments) => commands::fit::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),
         Command::Locate(arguments) => commands::locate::run(&arguments),
+        Command::Track(arguments) => commands::track::run(&arguments),
         Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Limit(arguments) => commands::limit::run(&arguments),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
+        Command::Profile(arguments) => commands::profile::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

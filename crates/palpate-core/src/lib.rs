@@ -8,7 +8,7 @@ mod contact;
 mod estimate;
 mod network;
 
-pub use activation::Activation;
+pub use activation::{Activation, Logistic};
 pub use contact::{Contact, Position};
 pub use estimate::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 pub use network::{BufferMismatch, Network};

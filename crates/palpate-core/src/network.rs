@@ -86,8 +86,10 @@ fn dot(weights: &[f64], inputs: &[f64]) -> f64 {
             sums[k] += w[k] * x[k];
         }
     }
-    let rest: f64 = last_weights.iter().zip(last_inputs).map(|(w, x)| w * x).sum();
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+    for ((sum, w), x) in sums.iter_mut().zip(last_weights).zip(last_inputs) {
+        *sum += w * x;
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
 fn check(needed: usize, found: usize) -> Result<(), BufferMismatch> {

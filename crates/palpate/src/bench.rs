@@ -51,7 +51,8 @@ impl Bench {
         recording::read_pair(readings, contacts, &self.schema(&self.recording_columns()))
     }
 
-    fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
+    /// What a file must agree with to be a recording of this bench, by columns such as [`Bench::recording_columns`].
+    pub fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
         let extent = self.surface.extent();
         Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }
     }

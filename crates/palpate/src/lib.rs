@@ -5,6 +5,8 @@ pub mod bench;
 pub mod centroid;
 pub mod closed_form;
 pub mod contact;
+pub mod digit;
+pub mod distribution;
 pub mod estimator;
 pub mod evaluation;
 pub mod features;
@@ -23,6 +25,7 @@ pub mod rig;
 pub mod sensing;
 pub mod simulate;
 pub mod study;
+pub mod tracking;
 pub mod units;
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! What every method can do: be fitted to a recording, and locate.
 
 mod held_out;
+mod likelihood;
 
 pub use held_out::HeldOutSpread;
+pub use likelihood::{ContactFit, Likelihood};
 
 use crate::bench::Bench;
 use crate::recording::Recording;
@@ -47,6 +49,44 @@ pub trait Locate {
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
     fn check(&self, bench: &Bench) -> Result<(), LocatorFault>;
+}
+
+/// A reading that nothing can be told from.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ReadingError {
+    /// Another number of channels.
+    #[error("the reading has {found} channels; the locator has {needed}")]
+    Channels {
+        /// Channels of the locator.
+        needed: usize,
+        /// Channels of the reading.
+        found: usize,
+    },
+    /// A value that is no number.
+    #[error("channel {channel} reads {value}; it must be a finite number")]
+    NotFinite {
+        /// Which channel, from 1.
+        channel: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl ReadingError {
+    /// Checks that a reading has `needed` values, all finite.
+    ///
+    /// # Errors
+    /// [`ReadingError`], naming the first that is not.
+    pub fn check(reading: &[f64], needed: usize) -> Result<(), Self> {
+        let found = reading.len();
+        if needed != found {
+            return Err(Self::Channels { needed, found });
+        }
+        match reading.iter().position(|value| !value.is_finite()) {
+            Some(i) => Err(Self::NotFinite { channel: i + 1, value: reading[i] }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// A locator whose numbers do not fit together.

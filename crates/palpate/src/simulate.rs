@@ -1,17 +1,21 @@
 //! Recordings made by a rig's model instead of its bench.
 
+mod moving;
+
 use std::sync::Arc;
 
-use rand::SeedableRng;
+use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::ArrangementError;
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::mechanics::{Extent, InfluenceFunction, Surface};
+use crate::mechanics::{Extent, ResponseFunction, Surface, UniformLoad};
 use crate::recording::{Provenance, Recording, Row};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Layout, Sensor, measure};
+
+pub use moving::simulate_moving;
 
 /// Why a rig cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,6 +29,9 @@ pub enum SimulateError {
     /// The rig does not say where to press.
     #[error("a simulation needs training positions; the rig has no [training]")]
     NoTraining,
+    /// The rig does not say how a contact moves.
+    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    NoMotion,
     /// The rig's training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
@@ -44,21 +51,21 @@ pub enum SimulateError {
     },
 }
 
-/// The sensors of a layout under a surface with a model, each with its influence function.
+/// The sensors of a layout under a surface with a model, each with its response function.
 pub struct CleanSensors<'a> {
-    functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
+    functions: Vec<Arc<dyn ResponseFunction + 'a>>,
 }
 
 impl<'a> CleanSensors<'a> {
-    /// The influence functions of all sensors of `layout`.
+    /// The response functions of all sensors of `layout`.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
-        let function = |sensor: &Sensor| surface.influence_function(sensor.kind, sensor.position);
+        let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
         Self { functions: layout.sensors.iter().map(function).collect() }
     }
 
-    /// What the sensors would read without any fault at `contact`: force times influence, in the SI unit of each sensor.
+    /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
-        self.functions.iter().map(|function| contact.force_n * function.at(contact.position)).collect()
+        self.functions.iter().map(|function| function.at(contact)).collect()
     }
 }
 
@@ -79,7 +86,7 @@ pub fn simulate(rig: &Rig, seed: u64) -> Result<Recording, SimulateError> {
 }
 
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
-/// faulty channels report. Gains and offsets are drawn once for the recording, noise for each reading.
+/// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
 ///
 /// The same seed gives the same recording.
 ///
@@ -94,7 +101,10 @@ pub fn simulate_at(
     let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
     let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let sensors = CleanSensors::new(surface, &bench.layout);
+    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
+    let mut places = rng.clone();
+    places.jump();
+    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
     let errors = ChannelErrors::draw(&bench.layout, &mut rng);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
@@ -110,6 +120,56 @@ pub fn simulate_at(
     let source = "simulation".to_owned();
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
     Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
+}
+
+/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
+/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading.
+///
+/// The same seed gives the same readings.
+///
+/// # Errors
+/// [`SimulateError::NoModel`] for a measured surface.
+pub fn simulate_loads(
+    bench: &Bench,
+    loads: &[UniformLoad],
+    repeats: usize,
+    seed: u64,
+) -> Result<Vec<Vec<f64>>, SimulateError> {
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut places = rng.clone();
+    places.jump();
+    let placed = displaced(&bench.layout, surface.extent(), &mut places);
+    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let clean = clean_reading_of_loads(surface, &placed, loads);
+    Ok((0..repeats).map(|_| measure(&bench.layout, &clean, &errors, &mut rng)).collect())
+}
+
+/// What the sensors of `layout` would read without any fault under all of `loads` at once, by superposition, in the SI unit of
+/// each sensor.
+fn clean_reading_of_loads(surface: &dyn Surface, layout: &Layout, loads: &[UniformLoad]) -> Vec<f64> {
+    let reading = |sensor: &Sensor| {
+        let function = surface.influence_function(sensor.kind, sensor.position);
+        loads.iter().map(|load| load.force_n * load.mean(&*function)).sum()
+    };
+    layout.sensors.iter().map(reading).collect()
+}
+
+/// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
+/// surface's edge. A perfectly placed sensor stays where it is.
+pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
+    let mut placed = layout.clone();
+    for sensor in &mut placed.sensors {
+        let error_m = sensor.channel.position_error_m;
+        let mut beside =
+            |at_m: f64, size_m: f64| (at_m + error_m * rng.random_range(-1.0..=1.0)).clamp(0.0, size_m);
+        if error_m > 0.0 {
+            let Position { x_m, y_m } = sensor.position;
+            let y_m = extent.width_m.map_or(y_m, |width_m| beside(y_m, width_m));
+            sensor.position = Position { x_m: beside(x_m, extent.length_m), y_m };
+        }
+    }
+    placed
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::used_paths::used_paths;
 const SOURCE: &str = "crates/palpate/src/";
 
 /// Top to bottom: a module may use those above it.
-const ORDER: [&str; 28] = [
+const ORDER: [&str; 29] = [
     "units",
     "numerics",
     "regression",
@@ -24,6 +24,7 @@ const ORDER: [&str; 28] = [
     "influence",
     "gaussian_process",
     "closed_form",
+    "digit",
     "neighbours",
     "centroid",
     "tracking",
@@ -40,11 +41,12 @@ const ORDER: [&str; 28] = [
 ];
 
 /// The ways to interpret readings. The estimator knows them; they do not know each other.
-const METHODS: [&str; 8] = [
+const METHODS: [&str; 9] = [
     "network",
     "influence",
     "gaussian_process",
     "closed_form",
+    "digit",
     "neighbours",
     "centroid",
     "tracking",

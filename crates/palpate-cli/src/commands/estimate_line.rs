@@ -1,6 +1,7 @@
 //! An estimate as a line of CSV or JSON.
 
 use crate::failure::{Complaint, Failure};
+use palpate::digit::DigitShape;
 use palpate::estimator::{ContactEstimate, Estimate};
 
 /// The columns of [`csv`]. What a locator does not estimate stays empty.
@@ -41,6 +42,17 @@ struct JsonEstimate {
     modes: Vec<JsonMode>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     further: Vec<JsonContact>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shape: Option<Vec<JsonShapePoint>>,
+}
+
+/// A point of the bent finger's centre line: how far along it, where, and how sure.
+#[derive(serde::Serialize)]
+struct JsonShapePoint {
+    at_mm: f64,
+    x_mm: f64,
+    y_mm: f64,
+    sd_mm: f64,
 }
 
 #[derive(serde::Serialize)]
@@ -67,8 +79,13 @@ struct JsonContact {
     sd_force_n: Option<f64>,
 }
 
-/// A line of JSON: all that the locator says of the reading in line `line` of its source.
-pub fn json(estimate: &Estimate, line: u64, plane: bool) -> Result<String, Failure> {
+/// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
+pub fn json(
+    estimate: &Estimate,
+    line: u64,
+    plane: bool,
+    shape: Option<&DigitShape>,
+) -> Result<String, Failure> {
     let mode = |mode: &palpate::estimator::Mode| JsonMode {
         contact: json_contact(&mode.contact, plane),
         probability: mode.probability,
@@ -79,8 +96,19 @@ pub fn json(estimate: &Estimate, line: u64, plane: bool) -> Result<String, Failu
         status: estimate.status.name(),
         modes: estimate.modes.as_slice().iter().map(mode).collect(),
         further: estimate.further.as_slice().iter().map(|further| json_contact(further, plane)).collect(),
+        shape: shape.map(json_shape),
     };
     serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+}
+
+fn json_shape(shape: &DigitShape) -> Vec<JsonShapePoint> {
+    let point = |point: &palpate::digit::ShapePoint| JsonShapePoint {
+        at_mm: point.at_m * 1e3,
+        x_mm: point.x_m * 1e3,
+        y_mm: point.y_m * 1e3,
+        sd_mm: point.sd_m * 1e3,
+    };
+    shape.points.iter().map(point).collect()
 }
 
 fn json_contact(contact: &ContactEstimate, plane: bool) -> JsonContact {

@@ -62,6 +62,13 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(beam.thickness_m),
             Quantity { value: beam.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
         ),
+        SurfaceSpec::SupportedBeam(beam) => format!(
+            "beam, {} long, {}; section {}; Young's modulus {}",
+            format_length_mm(extent.length_m),
+            beam.spec().supports_in_words(),
+            beam.spec().sections_in_words(),
+            Quantity { value: beam.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
+        ),
         SurfaceSpec::Plate(plate) => format!(
             "plate, {} × {} × {}, Young's modulus {}, Poisson's ratio {}",
             format_length_mm(plate.spec().length_m),
@@ -69,6 +76,15 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(plate.spec().thickness_m),
             Quantity { value: plate.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
             plate.spec().poissons_ratio
+        ),
+        SurfaceSpec::Digit(digit) => format!(
+            "flexible digit, {} × {} × {}, Young's modulus {}, contact forces {}; E·I/l² is {:.3} N",
+            format_length_mm(digit.length_m),
+            format_length_mm(digit.width_m),
+            format_length_mm(digit.thickness_m),
+            Quantity { value: digit.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
+            digit.direction.name(),
+            digit.characteristic_force_n()
         ),
         SurfaceSpec::Measured(_) => match extent.width_m {
             Some(width_m) => {
@@ -149,6 +165,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
 fn method(method: &Method) -> Vec<String> {
     match method {
         Method::Network(network) => {
+            let network = network.parts();
             let outcome = network.outcome;
             vec![
                 format!("network: {} ({} weights)", shape(&network.topology), network.weights.len()),
@@ -197,6 +214,7 @@ fn method(method: &Method) -> Vec<String> {
             gaussian.process.log_evidence()
         )],
         Method::ClosedForm(_) => vec!["the beam's own equations; nothing was learnt".to_owned()],
+        Method::Digit(_) => vec!["the bending finger's own equations; nothing was learnt".to_owned()],
         Method::Neighbours(neighbours) => {
             vec![format!("the {} nearest of {} presses", neighbours.count, neighbours.rows.len())]
         }

@@ -3,6 +3,7 @@
 use super::estimate_line;
 use crate::failure::{Complaint, Failure};
 use crate::{input, interrupt, output};
+use palpate::bench::Bench;
 use palpate::estimator::Locator;
 use palpate::recording::{Column, Columns, Header, ReadingParser};
 use std::fs::File;
@@ -25,6 +26,9 @@ pub struct Arguments {
     /// Print one JSON object a line instead of CSV
     #[arg(long)]
     json: bool,
+    /// Add the shape of a flexible digit to every estimate, at so many points from clamp to tip
+    #[arg(long, value_name = "POINTS", requires = "json", value_parser = clap::value_parser!(u16).range(2..=10_000))]
+    shape: Option<u16>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -34,23 +38,31 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let left_out = locator.leave_out(channel.wrapping_sub(1));
         left_out.map_err(|error| Complaint::new(format!("--dead {channel}: {error}")))?;
     }
-    let stdin = Path::new("-");
-    let path = arguments.readings.as_deref().unwrap_or(stdin);
-    let (name, source): (String, Box<dyn BufRead>) = if path == stdin {
+    if arguments.shape.is_some() && locator.kind() != "digit" {
+        let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());
+        return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
+    }
+    let (name, source) = open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
+    let mut stream =
+        Stream { locator: &locator, name, json: arguments.json, shape: arguments.shape, lost: 0, line: 0 };
+    stream.run(source, &columns(&locator.bench, arguments.no_header))
+}
+
+/// Opens readings, `-` being stdin, and says what they are called.
+pub fn open(path: &Path) -> Result<(String, Box<dyn BufRead>), Failure> {
+    if path == Path::new("-") {
         if std::io::stdin().is_terminal() {
             eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
         }
-        ("stdin".to_owned(), Box::new(std::io::stdin().lock()))
-    } else {
-        let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
-        (path.display().to_string(), Box::new(BufReader::new(file)))
-    };
-    let mut stream = Stream { locator: &locator, name, json: arguments.json, lost: 0, line: 0 };
-    stream.run(source, &columns(&locator, arguments.no_header))
+        return Ok(("stdin".to_owned(), Box::new(std::io::stdin().lock())));
+    }
+    let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
+    Ok((path.display().to_string(), Box::new(BufReader::new(file))))
 }
 
-fn columns(locator: &Locator, no_header: bool) -> Columns {
-    let mut columns = locator.bench.recording_columns();
+/// Which columns of readings are the channels.
+pub fn columns(bench: &Bench, no_header: bool) -> Columns {
+    let mut columns = bench.recording_columns();
     if no_header {
         columns.header = Header::Absent;
         for (i, channel) in columns.channels.iter_mut().enumerate() {
@@ -64,6 +76,8 @@ struct Stream<'a> {
     locator: &'a Locator,
     name: String,
     json: bool,
+    /// Points of the shape, where it is asked for.
+    shape: Option<u16>,
     /// Rows that gave no estimate.
     lost: u64,
     line: u64,
@@ -108,7 +122,9 @@ impl Stream<'_> {
         match self.locator.locate(reading) {
             Ok(estimate) => {
                 let line = if self.json {
-                    estimate_line::json(&estimate, self.line, self.is_plane())?
+                    let shape =
+                        self.shape.and_then(|points| self.locator.shape(&estimate, usize::from(points) - 1));
+                    estimate_line::json(&estimate, self.line, self.is_plane(), shape.as_ref())?
                 } else {
                     estimate_line::csv(&estimate, self.is_plane())
                 };

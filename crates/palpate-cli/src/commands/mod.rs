@@ -7,5 +7,7 @@ pub mod fit;
 pub mod inspect;
 pub mod limit;
 pub mod locate;
+pub mod profile;
 pub mod simulate;
 pub mod study;
+pub mod track;

@@ -4,7 +4,9 @@ use crate::failure::{Complaint, Failure};
 use crate::{input, output};
 use palpate::arrangement::{EveryError, every};
 use palpate::recording;
-use palpate::simulate::{simulate, simulate_at};
+use palpate::rig::Rig;
+use palpate::simulate::{simulate, simulate_at, simulate_moving};
+use palpate::units::format_count;
 use std::path::PathBuf;
 
 /// Make a recording from the model, with the sensors' noise and faults.
@@ -18,6 +20,9 @@ pub struct Arguments {
     /// Press every so far, on a plane both ways, instead of at the training positions, as in `--every "1 mm"`
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     every: Option<f64>,
+    /// Move the contact as the rig's [motion] says, over a beam that swings, and write the time of each reading
+    #[arg(long, conflicts_with = "every")]
+    moving: bool,
     /// Seed of noise and faults
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -25,6 +30,9 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
+    if arguments.moving {
+        return move_contact(arguments, &rig);
+    }
     let recording = match arguments.every {
         None => simulate(&rig, arguments.seed),
         Some(every_m) => {
@@ -40,13 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording =
         recording.map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
     let mut csv = Vec::new();
-    let comment = format!(
-        "palpate {}, simulated from {}, seed {}",
-        env!("CARGO_PKG_VERSION"),
-        arguments.rig.display(),
-        arguments.seed
-    );
-    recording::write(&recording, rig.bench.surface.extent(), &comment, &mut csv)
+    recording::write(&recording, rig.bench.surface.extent(), &comment(arguments), &mut csv)
         .map_err(|error| output::cannot("write", &arguments.out, &error))?;
     output::write_file(&arguments.out, &csv)?;
     output::say(format!(
@@ -55,6 +57,36 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         recording.channels.len(),
         arguments.out.display()
     ))
+}
+
+fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
+    let timed = simulate_moving(rig, arguments.seed)
+        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
+    let mut csv = Vec::new();
+    recording::write_timed(&timed, rig.bench.surface.extent(), &comment(arguments), &mut csv)
+        .map_err(|error| output::cannot("write", &arguments.out, &error))?;
+    output::write_file(&arguments.out, &csv)?;
+    let rows = format_count(timed.recording.rows.len() as u64);
+    let seconds = timed.times_s.last().copied().unwrap_or(0.0);
+    let mut told = format!("{rows} rows in {seconds:.3} s: {}", arguments.out.display());
+    if let Some(moving) = &rig.motion {
+        told += &format!(
+            "\nfirst natural frequency {:.2} Hz, critical speed {:.2} m/s",
+            moving.beam.frequency_hz(1),
+            moving.beam.critical_speed_m_per_s()
+        );
+    }
+    output::say(told)
+}
+
+/// Where a recording comes from.
+fn comment(arguments: &Arguments) -> String {
+    format!(
+        "palpate {}, simulated from {}, seed {}",
+        env!("CARGO_PKG_VERSION"),
+        arguments.rig.display(),
+        arguments.seed
+    )
 }
 
 fn too_many(EveryError { count, .. }: EveryError) -> Complaint {

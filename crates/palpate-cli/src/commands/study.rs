@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 mod checkpoint;
+mod dead_areas;
 mod watch;
 
 use checkpoint::CheckpointFile;
@@ -23,7 +24,7 @@ use watch::Watch;
 /// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// A study file, or `paper`
+    /// A study file, `paper`, or `dead-areas`: what lies between sensors
     study: PathBuf,
     /// Networks that each arm trains [default: what the study says]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
@@ -59,6 +60,9 @@ struct ResultsFile<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.study == Path::new(dead_areas::NAME) {
+        return dead_areas::run(arguments);
+    }
     let is_paper = arguments.study == Path::new("paper");
     let study = if is_paper {
         input::parse_study("studies/paper.toml", STUDY_TOML)?

@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidConfig;
 use crate::closed_form::ClosedFormConfig;
+use crate::digit::{DigitConfig, DigitTheory};
 use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::InfluenceConfig;
 use crate::mechanics::SurfaceSpec;
@@ -22,6 +23,8 @@ pub enum EstimatorConfig {
     GaussianProcess(GaussianProcessConfig),
     /// The beam's own equations (`kind = "closed-form"`).
     ClosedForm(ClosedFormConfig),
+    /// The bending finger's own equations (`kind = "digit"`).
+    Digit(DigitConfig),
     /// Nearest neighbours (`kind = "neighbours"`).
     Neighbours(NeighboursConfig),
     /// The calibrated centroid of array sensors (`kind = "centroid"`).
@@ -38,6 +41,7 @@ impl EstimatorConfig {
         "influence",
         "gaussian-process",
         "closed-form",
+        "digit",
         "neighbours",
         "centroid",
         "auto",
@@ -52,6 +56,9 @@ impl EstimatorConfig {
         if matches!(bench.surface, SurfaceSpec::Beam(_)) {
             contenders.push(Self::ClosedForm(ClosedFormConfig));
         }
+        if matches!(bench.surface, SurfaceSpec::Digit(_)) {
+            contenders.insert(0, Self::Digit(DigitConfig::default()));
+        }
         contenders.extend([
             Self::Neighbours(NeighboursConfig::default()),
             Self::Centroid(CentroidConfig),
@@ -61,10 +68,13 @@ impl EstimatorConfig {
         contenders
     }
 
+    /// A digit's estimator by the linear theory of bending, to be compared with.
+    pub const LINEAR_DIGIT: Self = Self::Digit(DigitConfig { theory: DigitTheory::Linear });
+
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {
         match self {
-            Self::ClosedForm(_) => 1,
+            Self::ClosedForm(_) | Self::Digit(_) => 1,
             _ => 2,
         }
     }
@@ -85,6 +95,7 @@ impl EstimatorConfig {
             Self::Influence(_) => "influence",
             Self::GaussianProcess(_) => "gaussian-process",
             Self::ClosedForm(_) => "closed-form",
+            Self::Digit(_) => "digit",
             Self::Neighbours(_) => "neighbours",
             Self::Centroid(_) => "centroid",
             Self::Auto => "auto",

@@ -4,6 +4,7 @@ use super::{EstimatorConfig, Locator, LocatorProvenance, Method};
 use crate::bench::Bench;
 use crate::centroid::CentroidFitError;
 use crate::closed_form::ClosedFormFitError;
+use crate::digit::DigitFitError;
 use crate::gaussian_process::GaussianProcessError;
 use crate::influence::InfluenceFitError;
 use crate::method::{Fit, FitTask};
@@ -40,6 +41,9 @@ pub enum FitError {
     /// What the closed form has to say.
     #[error(transparent)]
     ClosedForm(#[from] ClosedFormFitError),
+    /// What the digit's estimator has to say.
+    #[error(transparent)]
+    Digit(#[from] DigitFitError),
     /// What the nearest neighbours have to say.
     #[error(transparent)]
     Neighbours(#[from] NeighboursFitError),
@@ -173,6 +177,7 @@ fn fit_method(
             config.fit(task, keep_going)?.map(Method::GaussianProcess)
         }
         EstimatorConfig::ClosedForm(config) => config.fit(task, keep_going)?.map(Method::ClosedForm),
+        EstimatorConfig::Digit(config) => config.fit(task, keep_going)?.map(Method::Digit),
         EstimatorConfig::Neighbours(config) => config.fit(task, keep_going)?.map(Method::Neighbours),
         EstimatorConfig::Centroid(config) => config.fit(task, keep_going)?.map(Method::Centroid),
         EstimatorConfig::Auto => return Err(FitError::Undecided),

@@ -3,9 +3,10 @@
 use crate::bench::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
+use crate::digit::{DigitLocator, DigitShape};
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
-use crate::method::{Locate, LocatorFault};
+use crate::method::{Locate, LocatorFault, ReadingError};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
@@ -50,6 +51,8 @@ pub enum Method {
     GaussianProcess(GaussianProcessLocator),
     /// The beam's own equations.
     ClosedForm(ClosedFormLocator),
+    /// The bending finger's own equations.
+    Digit(DigitLocator),
     /// Nearest neighbours.
     Neighbours(NeighboursLocator),
     /// The calibrated centroid.
@@ -65,31 +68,11 @@ impl Method {
             Self::Influence(influence) => influence,
             Self::GaussianProcess(process) => process,
             Self::ClosedForm(form) => form,
+            Self::Digit(digit) => digit,
             Self::Neighbours(neighbours) => neighbours,
             Self::Centroid(centroid) => centroid,
         }
     }
-}
-
-/// A reading that no estimate can be made of.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum ReadingError {
-    /// Another number of channels.
-    #[error("the reading has {found} channels; the locator has {needed}")]
-    Channels {
-        /// Channels of the locator.
-        needed: usize,
-        /// Channels of the reading.
-        found: usize,
-    },
-    /// A value that is no number.
-    #[error("channel {channel} reads {value}; it must be a finite number")]
-    NotFinite {
-        /// Which channel, from 1.
-        channel: usize,
-        /// Its value.
-        value: f64,
-    },
 }
 
 /// A channel that cannot be left out.
@@ -120,14 +103,16 @@ impl Locator {
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        let (needed, found) = (self.bench.layout.len(), reading.len());
-        if needed != found {
-            return Err(ReadingError::Channels { needed, found });
-        }
-        if let Some(i) = reading.iter().position(|value| !value.is_finite()) {
-            return Err(ReadingError::NotFinite { channel: i + 1, value: reading[i] });
-        }
+        ReadingError::check(reading, self.bench.layout.len())?;
         Ok(self.method.locate().locate(reading))
+    }
+
+    /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
+    pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
+        match &self.method {
+            Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
+            _ => None,
+        }
     }
 
     /// Checks what a file may have got wrong.
@@ -157,6 +142,11 @@ impl Locator {
                     return Err(LeaveOutError::NoneLeft);
                 }
             }
+            Method::Digit(digit) => {
+                if !digit.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
         self.bench.layout.sensors[channel].channel.dead = true;
@@ -171,6 +161,7 @@ impl Locator {
             Method::Influence(_) => "influence",
             Method::GaussianProcess(_) => "gaussian-process",
             Method::ClosedForm(_) => "closed-form",
+            Method::Digit(_) => "digit",
             Method::Neighbours(_) => "neighbours",
             Method::Centroid(_) => "centroid",
         }
@@ -179,7 +170,7 @@ impl Locator {
     /// The weights of a network; nothing for another method.
     pub fn weights(&self) -> &[f64] {
         match &self.method {
-            Method::Network(network) => &network.weights,
+            Method::Network(network) => &network.parts().weights,
             _ => &[],
         }
     }
@@ -187,7 +178,7 @@ impl Locator {
     /// How its training ended, where it was trained by epochs.
     pub fn training_outcome(&self) -> Option<TrainingOutcome> {
         match &self.method {
-            Method::Network(network) => Some(network.outcome),
+            Method::Network(network) => Some(network.parts().outcome),
             _ => None,
         }
     }

@@ -1,6 +1,7 @@
 //! An estimator's settings in words, so that a report can list those of any method.
 
 use super::EstimatorConfig;
+use crate::digit::{DigitConfig, DigitTheory};
 use crate::influence::{InfluenceConfig, InfluenceSource};
 use crate::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
@@ -25,6 +26,7 @@ impl EstimatorConfig {
         match self {
             Self::Network(config) => network(config),
             Self::Influence(config) => influence(*config),
+            Self::Digit(config) => digit(*config),
             Self::NetworkLm(config) => levenberg_marquardt(config),
             Self::Neighbours(config) => vec![Setting {
                 key: "most_neighbours",
@@ -35,6 +37,14 @@ impl EstimatorConfig {
             Self::GaussianProcess(_) | Self::ClosedForm(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
         }
     }
+}
+
+fn digit(config: DigitConfig) -> Vec<Setting> {
+    let theory = match config.theory {
+        DigitTheory::Exact => "exact: the finger bends as far as the force bends it",
+        DigitTheory::Linear => "linear: strain is force times lever",
+    };
+    vec![Setting { key: "theory", name: "theory of bending", value: theory.to_owned() }]
 }
 
 fn levenberg_marquardt(config: &LevenbergMarquardtConfig) -> Vec<Setting> {

@@ -1,6 +1,7 @@
 //! From minima of the misfit to an estimate that owns up to what it does not know.
 
-use super::coarse::MOST_MINIMA;
+use super::batch::Rows;
+use super::coarse::{COARSE, MOST_MINIMA, Profile};
 use super::lanes::{self, Array, Eight};
 use super::scratch::Scratch;
 use super::search::{Minimum, Search, worst_misfit};
@@ -16,13 +17,6 @@ const MOST_SPACINGS: f64 = 1.5;
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// Readings one after the other, of so many channels each.
-#[derive(Clone, Copy)]
-pub(super) struct Rows<'a> {
-    pub readings: &'a [f64],
-    pub channels: usize,
-}
-
 /// An estimate of nothing, to be written over.
 pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
 
@@ -34,25 +28,29 @@ pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch
     estimate
 }
 
-/// Writes the estimate of one contact for each row.
-#[inline(always)]
-pub(super) fn locate_each<V: Eight>(
-    search: &Search,
-    rows: Rows,
-    scratch: &mut Scratch,
-    estimates: &mut [Estimate],
-) {
-    for (reading, estimate) in rows.readings.chunks_exact(rows.channels.max(1)).zip(estimates) {
-        locate_into::<V>(search, reading, scratch, estimate);
-    }
-}
-
 /// Writes the estimate of one contact, and of a used estimate no more than what is read.
 #[inline(always)]
-fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
-    let square = search.whiten::<V>(reading, &mut scratch.whitened);
+pub(super) fn locate_into<V: Eight>(
+    search: &Search,
+    reading: &[f64],
+    scratch: &mut Scratch,
+    estimate: &mut Estimate,
+) {
+    let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
     let (minima, count) = search.minima::<V>(square, scratch);
-    let best = minima[0];
+    conclude(search, square, &minima[..count], &scratch.profile, estimate);
+}
+
+/// Writes the estimate from the minima of a reading that was whitened to length `square`.
+#[inline(always)]
+pub(super) fn conclude(
+    search: &Search,
+    square: f64,
+    minima: &[Minimum],
+    profile: &Profile,
+    estimate: &mut Estimate,
+) {
+    let best = &minima[0];
     estimate.modes.clear();
     estimate.further.clear();
     if is_no_contact(search, square, best.misfit) {
@@ -63,12 +61,13 @@ fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch
     }
     let sd_m = best.covariance[0].sqrt();
     let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
-    if count == 1 && clear && sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite() {
+    let narrow = sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite();
+    if minima.len() == 1 && clear && narrow {
         let half_m = NORMAL_95 * sd_m;
-        estimate.contact = contact(search, &best, (best.x_m - half_m, best.x_m + half_m));
+        estimate.contact = contact(search, best, (best.x_m - half_m, best.x_m + half_m));
         estimate.status = Status::Located;
     } else {
-        weigh(search, &minima[..count], scratch.profile.misfits(), estimate);
+        weigh(search, minima, profile.misfits(), estimate);
     }
     if best.misfit > search.worst_misfit {
         estimate.status = Status::OutsideModel;
@@ -77,7 +76,7 @@ fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch
 
 /// Writes the estimate from minima that compete, or one that is wide or near an end.
 #[cold]
-fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64], estimate: &mut Estimate) {
+fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
     let shares = shares(minima, search.table.length_m);
     let x_95_m = interval(search, minima, &shares, misfits);
     estimate.contact = contact(search, &minima[0], x_95_m);
@@ -175,7 +174,7 @@ fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
 }
 
 /// The 95 % interval of the position over all minima.
-fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64]) -> (f64, f64) {
+fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64; COARSE]) -> (f64, f64) {
     let length_m = search.table.length_m;
     let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > MOST_SPACINGS * search.spacing.h_m;
     if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
@@ -209,20 +208,27 @@ fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
 
 /// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
 /// is flat in the position and in the size of the signal.
-fn interval_of_profile(misfits: &[f64], length_m: f64) -> (f64, f64) {
-    let nodes = misfits.len();
+fn interval_of_profile(misfits: &[f64; COARSE], length_m: f64) -> (f64, f64) {
+    /// A density of less than e⁻⁵⁰ of the highest adds nothing.
+    const NOTHING_THERE: f64 = 100.0;
     let best = misfits.iter().copied().fold(f64::INFINITY, f64::min);
-    let density: Vec<f64> = misfits.iter().map(|misfit| (0.5 * (best - misfit)).exp()).collect();
-    let mut cumulative = vec![0.0; nodes];
-    for node in 1..nodes {
-        cumulative[node] = cumulative[node - 1] + 0.5 * (density[node - 1] + density[node]);
+    let density = |misfit: f64| {
+        let above = misfit - best;
+        if above < NOTHING_THERE { (-0.5 * above).exp() } else { 0.0 }
+    };
+    let mut cumulative = [0.0; COARSE];
+    let mut left = density(misfits[0]);
+    for node in 1..COARSE {
+        let right = density(misfits[node]);
+        cumulative[node] = cumulative[node - 1] + 0.5 * (left + right);
+        left = right;
     }
-    let all = cumulative[nodes - 1];
+    let all = cumulative[COARSE - 1];
     let quantile = |share: f64| {
-        let after = cumulative.partition_point(|c| *c < share * all).clamp(1, nodes - 1);
+        let after = cumulative.partition_point(|c| *c < share * all).clamp(1, COARSE - 1);
         let (low, high) = (cumulative[after - 1], cumulative[after]);
         let part = if high > low { (share * all - low) / (high - low) } else { 0.0 };
-        (after as f64 - 1.0 + part) * length_m / (nodes - 1) as f64
+        (after as f64 - 1.0 + part) * length_m / (COARSE - 1) as f64
     };
     (quantile(0.025), quantile(0.975))
 }

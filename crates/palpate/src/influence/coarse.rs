@@ -17,6 +17,9 @@ pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
 /// Nodes are searched eight side by side.
 const BLOCKS: usize = COARSE.div_ceil(8);
 
+/// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
+const END: f64 = 1e-2;
+
 /// Valleys that may matter; more never compete in practice.
 pub(super) const MOST_MINIMA: usize = 4;
 
@@ -37,8 +40,8 @@ impl Default for Profile {
 
 impl Profile {
     /// The misfit at every coarse node.
-    pub fn misfits(&self) -> &[f64] {
-        &self.misfits[1..=COARSE]
+    pub fn misfits(&self) -> &[f64; COARSE] {
+        self.misfits[1..].first_chunk().expect("there are at least so many")
     }
 
     /// The lowest valleys and how many, lowest first: nodes no higher than both neighbours.
@@ -58,10 +61,12 @@ impl Profile {
             let value = self.misfits[node + 1];
             let mut rank = count;
             while rank > 0 && value < self.misfits[lowest[rank - 1] + 1] {
+                if rank < MOST_MINIMA {
+                    lowest[rank] = lowest[rank - 1];
+                }
                 rank -= 1;
             }
             if rank < MOST_MINIMA {
-                lowest[rank..].rotate_right(1);
                 lowest[rank] = node;
                 count = (count + 1).min(MOST_MINIMA);
             }
@@ -105,6 +110,15 @@ struct Chord {
 /// Beyond an end: no way leads there.
 const BEYOND: Chord = Chord { cross: 0.0, square: 0.0, half_inverse: 1.0, sag: 0.0, least_weight: 1.0 };
 
+/// Where to start in a valley.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    pub x_m: f64,
+    pub force_n: f64,
+    /// A misfit below which the valley does not go.
+    pub floor: f64,
+}
+
 impl Coarse {
     /// Of a whitened table; `weights` of every cell's channels, padded to groups of eight.
     pub fn new(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Self {
@@ -141,7 +155,7 @@ impl Coarse {
             for i in 0..8 {
                 let d = V::splat(d[i]);
                 for b in 0..BLOCKS {
-                    products[b] = products[b].add(d.mul(V::load(&channels[i][b])));
+                    products[b] = products[b] + d * V::load(&channels[i][b]);
                 }
             }
         }
@@ -149,28 +163,29 @@ impl Coarse {
         if let ForceBelief::Known(force_n) = self.force {
             let (square, twice) = (V::splat(square), V::splat(2.0 * force_n));
             for b in 0..BLOCKS {
-                square.add(V::load(&self.own[b]).sub(twice.mul(products[b]))).store(&mut misfits[b]);
+                (square + (V::load(&self.own[b]) - twice * products[b])).store(&mut misfits[b]);
             }
             return;
         }
         let (mean, precision) = self.force.mean_and_precision();
         let constant = V::splat(square + mean * mean * precision);
         for b in 0..BLOCKS {
-            let pull = products[b].add(V::splat(mean * precision)).max(V::splat(0.0));
-            let explained = pull.mul(pull).mul(V::load(&self.inverse_norms[b]));
-            constant.sub(explained).add(V::load(&self.own[b])).store(&mut misfits[b]);
+            let pull = (products[b] + V::splat(mean * precision)).max(V::splat(0.0));
+            let explained = pull * pull * V::load(&self.inverse_norms[b]);
+            (constant - explained + V::load(&self.own[b])).store(&mut misfits[b]);
             products[b].store(&mut profile.products[b]);
         }
     }
 
-    /// Where to start in the valley at `node`, and a misfit below which it does not go.
+    /// Where to start in the valley at `node`.
     #[inline(always)]
-    pub fn start(&self, profile: &Profile, node: usize) -> (f64, f64) {
-        let (t, floor) = match self.force {
-            ForceBelief::Known(_) => self.along_chords(profile, node),
-            _ => (self.between_rays(profile, node), f64::NEG_INFINITY),
-        };
-        ((node as f64 + t) * self.h_m, floor)
+    pub fn start(&self, profile: &Profile, node: usize) -> Start {
+        if let ForceBelief::Known(force_n) = self.force {
+            let (t, floor) = self.along_chords(profile, node);
+            return Start { x_m: (node as f64 + t) * self.h_m, force_n, floor };
+        }
+        let (t, force_n) = self.between_rays(profile, node);
+        Start { x_m: (node as f64 + t) * self.h_m, force_n, floor: f64::NEG_INFINITY }
     }
 
     /// How far from `node`, in coarse nodes, a chord comes closest to d, and the least misfit that its curve may have.
@@ -184,20 +199,29 @@ impl Coarse {
         (t, left.floor(left_square).min(right.floor(right_square)))
     }
 
-    /// How far from `node`, in coarse nodes, two neighbours' influences mix to what is closest to d with any force.
+    /// How far from `node`, in coarse nodes, two neighbours' influences mix to what is closest to d with any force, and
+    /// the best force of that mixture.
     #[inline(always)]
-    fn between_rays(&self, profile: &Profile, node: usize) -> f64 {
+    fn between_rays(&self, profile: &Profile, node: usize) -> (f64, f64) {
+        let (mean, precision) = self.force.mean_and_precision();
         let product = |node: usize| profile.products.as_flattened()[node];
         let (p, n) = (product(node), self.norms[node]);
-        for (other, sign) in [(node + 1, 1.0), (node.wrapping_sub(1), -1.0)] {
-            let Some(other_n) = self.norms.get(other) else { continue };
-            let cross = self.chords[other.max(node)].cross;
-            let (here, there) = (p * other_n - product(other) * cross, product(other) * n - p * cross);
-            if here > 0.0 && there >= 0.0 {
-                return sign * there / (here + there);
-            }
+        let to_right = profile.misfits[node + 2] < profile.misfits[node];
+        let (other, sign) = if to_right { (node + 1, 1.0) } else { (node.wrapping_sub(1), -1.0) };
+        let Some(other_n) = self.norms.get(other) else { return (0.0, 0.0) };
+        let other_p = product(other);
+        let cross = self.chords[other.max(node)].cross;
+        let (mut here, mut there) = (p * other_n - other_p * cross, other_p * n - p * cross);
+        if precision == 0.0 && n < END * other_n {
+            (here, there) = (0.75, 0.25);
+        } else if here <= 0.0 || there <= 0.0 {
+            (here, there) = (1.0, 0.0);
         }
-        0.0
+        let whole = here + there;
+        let pull = (here * p + there * other_p) + mean * precision * whole;
+        let norm = here * here * n + 2.0 * here * there * cross + there * there * other_n;
+        let force_n = (pull * whole).max(0.0) / (norm + precision * whole * whole).max(f64::MIN_POSITIVE);
+        (sign * there / whole, force_n)
     }
 }
 

@@ -1,11 +1,13 @@
 //! A fitted influence locator of a surface with a model.
 
-use super::answer::{Rows, locate_one, locate_several};
+use super::answer::{locate_one, locate_several};
+use super::batch::Rows;
 use super::belief::ForceBelief;
 use super::lanes;
 use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
+use super::table_function::FittedInfluence;
 use crate::bench::Bench;
 use crate::method::{Locate, LocatorFault};
 use palpate_core::Estimate;
@@ -65,6 +67,24 @@ impl BeamLocator {
     #[cfg(test)]
     pub(super) fn search(&self) -> &Search {
         &self.search
+    }
+
+    /// What fitting found, and which channels are left out.
+    pub(super) fn parts(&self) -> (&BeamParts, &[bool]) {
+        (&self.stored.parts, &self.stored.dead)
+    }
+
+    /// Mean force of the calibration, in newtons.
+    pub(super) fn reference_force_n(&self) -> f64 {
+        self.stored.reference_force_n
+    }
+
+    /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
+    pub fn channels(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
+        let BeamParts { table, offsets, noise_sd } = &self.stored.parts;
+        let channel =
+            move |i: usize| (!self.stored.dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i]));
+        (0..table.sensors).map(channel)
     }
 
     /// What is known of the force.

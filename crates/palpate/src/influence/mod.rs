@@ -2,13 +2,16 @@
 //! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
 
 mod answer;
+mod batch;
 mod belief;
+mod bend;
 mod coarse;
 mod config;
 mod fitting;
 mod hyperparameters;
 mod lanes;
 mod learning;
+mod likelihood;
 mod locator;
 pub mod measured;
 mod plane;
@@ -20,14 +23,17 @@ mod scratch;
 mod search;
 mod several;
 mod table;
+mod table_function;
 
 pub use belief::ForceBelief;
 pub use config::{InfluenceConfig, InfluenceSource};
 pub use fitting::InfluenceFitError;
+pub use likelihood::BeamLikelihood;
 pub use locator::BeamLocator;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable};
 pub use scratch::Scratch;
 pub use table::InfluenceTable;
+pub use table_function::FittedInfluence;
 
 use crate::bench::Bench;
 use crate::method::{Fit, FitTask, Locate, LocatorFault};

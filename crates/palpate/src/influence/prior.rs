@@ -17,7 +17,7 @@ pub(super) struct Spread {
     pub gain: f64,
     /// Of the sensor's position, in metres; 0 where the mean is 0.
     pub shift_m: f64,
-    /// Of the remainder in the middle of the surface, relative to full scale.
+    /// Of the remainder where it is largest, relative to full scale.
     pub remainder: f64,
     /// Of the reading's offset, relative to the full-scale reading at the mean force.
     pub offset: f64,
@@ -111,7 +111,7 @@ impl<'a> Prior<'a> {
     }
 }
 
-/// Covariances of the remainders of all sensors of one kind, 1 in the middle of the surface.
+/// Covariances of the remainders of all sensors of one kind, 1 where they are largest.
 ///
 /// A remainder is a random mixture of the influence functions that sensors of the same kind would have elsewhere on
 /// the surface, ∫ I(s, a) dB(s) with B Brownian, on a plane a Brownian sheet: it bends as the surface bends, is held where the supports hold it, and
@@ -130,13 +130,16 @@ pub(super) struct Remainders {
 const MIXED: usize = 40;
 /// The same on a plane, about; more of them along its longer side.
 const MIXED_ON_A_PLANE: f64 = 144.0;
+/// Stretches between the places at which the largest remainder is looked for: along a line, and along each side of a plane.
+const STRETCHES: usize = 64;
+const STRETCHES_OF_A_SIDE: usize = 12;
 
 impl Remainders {
     /// Of sensors of `kind`, for presses and places on the surface.
     pub fn new(surface: &dyn Surface, kind: SensorKind, presses: &[Position], places: &[Position]) -> Self {
         let mixture = Mixture::new(surface, kind);
-        let unit = mixture.rows(&cells(surface.extent(), 1, 1));
-        let norm = unit.row(0).dot(&unit.row(0)).sqrt();
+        let sizes = mixture.rows(&everywhere(surface.extent()));
+        let norm = sizes.outer_iter().map(|row| row.dot(&row)).fold(0.0, f64::max).sqrt();
         let presses = mixture.rows(presses) / norm;
         let places = mixture.rows(places) / norm;
         Self {
@@ -151,16 +154,17 @@ impl Remainders {
 struct Mixture<'a> {
     functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
     scale: f64,
-    extent: Extent,
-    /// Whether straight lines, on a plane planes, are mixed in.
-    with_lines: bool,
+    /// What single supports take up, mixed into reactions.
+    taken: Vec<Arc<dyn InfluenceFunction + 'a>>,
 }
 
 impl<'a> Mixture<'a> {
     fn new(surface: &'a dyn Surface, kind: SensorKind) -> Self {
-        // Supports carry no row of sensors to mix: a reaction is a straight line and what bends of it, as deflections do.
-        let with_lines = kind == SensorKind::Reaction;
-        let mixed = if with_lines { SensorKind::Deflection } else { kind };
+        // Supports carry no row of sensors to mix: a reaction is a mixture of what all supports take up, and what bends of it,
+        // as deflections do.
+        let reacts = kind == SensorKind::Reaction;
+        let supports = if reacts { surface.force_supports() } else { Vec::new() };
+        let mixed = if reacts { SensorKind::Deflection } else { kind };
         let extent = surface.extent();
         let side = |ratio: f64| (MIXED_ON_A_PLANE * ratio).sqrt().round().clamp(4.0, MIXED as f64) as usize;
         let (columns, rows) = match extent.width_m {
@@ -168,26 +172,39 @@ impl<'a> Mixture<'a> {
             Some(width_m) => (side(extent.length_m / width_m), side(width_m / extent.length_m)),
         };
         let sensors = cells(extent, columns, rows).into_iter();
-        let functions = sensors.map(|sensor| surface.influence_function(mixed, sensor)).collect();
-        Self { functions, scale: surface.full_scale(mixed), extent, with_lines }
+        Self {
+            functions: sensors.map(|sensor| surface.influence_function(mixed, sensor)).collect(),
+            scale: surface.full_scale(mixed),
+            taken: supports.iter().map(|at| surface.influence_function(kind, *at)).collect(),
+        }
     }
 
     /// A row a position: what each of the mixed sensors would read there.
     fn rows(&self, positions: &[Position]) -> Array2<f64> {
         let count = self.functions.len();
-        let lines = match (self.with_lines, self.extent.width_m) {
-            (false, _) => 0,
-            (true, None) => 2,
-            (true, Some(_)) => 3,
-        };
-        Array2::from_shape_fn((positions.len(), count + lines), |(row, column)| {
+        Array2::from_shape_fn((positions.len(), count + self.taken.len()), |(row, column)| {
             let at = positions[row];
             match column.checked_sub(count) {
+                Some(support) => count as f64 * self.taken[support].at(at),
                 None => self.functions[column].at(at) / self.scale,
-                Some(0) => count as f64,
-                Some(1) => count as f64 * at.x_m / self.extent.length_m,
-                Some(_) => count as f64 * at.y_m / self.extent.width_m.unwrap_or(1.0),
             }
         })
+    }
+}
+
+/// Places all over a surface, its boundary included.
+fn everywhere(extent: Extent) -> Vec<Position> {
+    let share = |i: usize, stretches: usize| i as f64 / stretches as f64;
+    match extent.width_m {
+        None => (0..=STRETCHES).map(|i| Position::along(extent.length_m * share(i, STRETCHES))).collect(),
+        Some(width_m) => (0..(STRETCHES_OF_A_SIDE + 1).pow(2))
+            .map(|i| {
+                let (row, column) = (i / (STRETCHES_OF_A_SIDE + 1), i % (STRETCHES_OF_A_SIDE + 1));
+                Position {
+                    x_m: extent.length_m * share(column, STRETCHES_OF_A_SIDE),
+                    y_m: width_m * share(row, STRETCHES_OF_A_SIDE),
+                }
+            })
+            .collect(),
     }
 }

@@ -7,6 +7,23 @@ use super::coarse::Profile;
 pub struct Scratch {
     pub(super) whitened: Whitened,
     pub(super) profile: Profile,
+    pub(super) eight: ForEight,
+}
+
+/// The same for eight readings, one after the other; empty until there is a batch.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ForEight {
+    pub whitened: Vec<[f64; 8]>,
+    pub profiles: Vec<Profile>,
+}
+
+impl ForEight {
+    /// Room for so many groups of channels in each reading.
+    #[inline(always)]
+    pub fn resize(&mut self, groups: usize) {
+        self.whitened.resize(8 * groups, [0.0; 8]);
+        self.profiles.resize_with(8, Profile::default);
+    }
 }
 
 /// d, in groups of eight channels, padded with zeros.

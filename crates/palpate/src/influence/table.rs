@@ -1,5 +1,6 @@
 //! Influence functions as a table: values and slopes at evenly spaced nodes, cubic between them.
 
+use super::lanes::Number;
 use serde::{Deserialize, Serialize};
 
 /// What every sensor reads per newton, with its uncertainty, as a function of the contact's position along the surface.
@@ -21,15 +22,15 @@ pub struct InfluenceTable {
     pub variances: Vec<f64>,
 }
 
-/// A place between two nodes.
+/// A place between two nodes, or several side by side.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cell {
+pub(super) struct Cell<N> {
     /// The node to the left.
-    pub node: usize,
+    pub node: N,
     /// Weights of left value, right value, left slope, right slope in the function.
-    pub value: [f64; 4],
+    pub value: [N; 4],
     /// The same for the function's derivative.
-    pub slope: [f64; 4],
+    pub slope: [N; 4],
 }
 
 /// Evenly spaced nodes.
@@ -45,17 +46,19 @@ pub(super) struct Spacing {
 impl Spacing {
     /// The cell that holds `x_m`, which is held to the surface.
     #[inline(always)]
-    pub fn cell(&self, x_m: f64) -> Cell {
-        let (h, inverse_h) = (self.h_m, self.inverse_h);
-        let place = (x_m * inverse_h).clamp(0.0, self.last as f64);
-        let node = (place as u32 as usize).min(self.last - 1);
-        let t = place - node as f64;
+    pub fn cell<N: Number>(&self, x_m: N) -> Cell<N> {
+        let n = N::splat;
+        let (h, inverse_h) = (n(self.h_m), n(self.inverse_h));
+        let place = (x_m * inverse_h).max(n(0.0)).min(n(self.last as f64));
+        let node = place.truncate().min(n((self.last - 1) as f64));
+        let t = place - node;
         let (t2, t3) = (t * t, t * t * t);
-        let bump = 6.0 * (t - t2) * inverse_h;
+        let bump = n(6.0) * (t - t2) * inverse_h;
+        let (two_t3, three_t2) = (n(2.0) * t3, n(3.0) * t2);
         Cell {
             node,
-            value: [2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, h * (t3 - 2.0 * t2 + t), h * (t3 - t2)],
-            slope: [-bump, bump, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t],
+            value: [two_t3 - three_t2 + n(1.0), three_t2 - two_t3, h * (t3 - n(2.0) * t2 + t), h * (t3 - t2)],
+            slope: [n(0.0) - bump, bump, three_t2 - n(4.0) * t + n(1.0), three_t2 - n(2.0) * t],
         }
     }
 }
@@ -91,15 +94,16 @@ impl InfluenceTable {
     }
 
     /// The cell that holds `x_m`, which is held to the surface.
-    pub(super) fn cell(&self, x_m: f64) -> Cell {
+    pub(super) fn cell(&self, x_m: f64) -> Cell<f64> {
         self.spacing().cell(x_m)
     }
 
     /// Calls `each` with sensor, value and slope, for every sensor at a place.
     #[inline]
-    pub(super) fn for_each(&self, cell: Cell, mut each: impl FnMut(usize, f64, f64)) {
+    pub(super) fn for_each(&self, cell: Cell<f64>, mut each: impl FnMut(usize, f64, f64)) {
         let s = self.sensors;
-        let (left, right) = (cell.node * s, (cell.node + 1) * s);
+        let left = cell.node as usize * s;
+        let right = left + s;
         let (v0, v1) = (&self.values[left..right], &self.values[right..right + s]);
         let (d0, d1) = (&self.slopes[left..right], &self.slopes[right..right + s]);
         for i in 0..s {

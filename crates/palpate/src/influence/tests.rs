@@ -1,4 +1,5 @@
 mod batch;
+mod reference;
 
 use super::*;
 use crate::bench::Bench;
@@ -9,10 +10,10 @@ use crate::numerics::Cholesky;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, measure};
-use crate::simulate::{clean_reading, simulate};
+use crate::simulate::{clean_reading, displaced, simulate};
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Status};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const SOURCES: [InfluenceSource; 2] = [InfluenceSource::Recording, InfluenceSource::Corrected];
@@ -85,8 +86,6 @@ fn clean_presses_locate_to_a_thousandth_of_a_percent() {
 struct Faults {
     /// Keys of a rig's sensors.
     keys: &'static str,
-    /// Every sensor sits up to this far from where the rig says.
-    moved_m: f64,
     dead: Option<usize>,
 }
 
@@ -102,9 +101,7 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
             rig = Rig::from_toml(&text.replace("noise = \"5 um\"", faults.keys)).unwrap();
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
-        for sensor in &mut rig.bench.layout.sensors {
-            sensor.position.x_m += faults.moved_m * rng.random_range(-1.0..=1.0);
-        }
+        rig.bench.layout = displaced(&rig.bench.layout, rig.bench.surface.extent(), &mut rng);
         let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
         let mut recording = simulate(&rig, seed).unwrap();
         for row in &mut recording.rows {
@@ -157,8 +154,9 @@ fn noisy_presses_locate_at_the_limit_and_intervals_hold_what_they_say() {
 
 #[test]
 fn unknown_gains_offsets_and_places_cost_little() {
-    let keys = "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"20 um\"";
-    let faults = Faults { keys, moved_m: 0.5e-3, dead: None };
+    let keys =
+        "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"20 um\"\nposition_error = \"0.5 mm\"";
+    let faults = Faults { keys, dead: None };
     for from in SOURCES {
         for force_known in [true, false] {
             let (ratio, coverage) = ratio_and_coverage(from, force_known, faults);

@@ -49,6 +49,24 @@ impl Grid {
         Self { positions: (1..=rows).flat_map(row).collect(), columns }
     }
 
+    /// On a line, with these positions among the others where they lie between its ends; on a plane as it is.
+    pub fn with(mut self, others: &[Position]) -> Self {
+        let rows = self.positions.len() / self.columns.max(1);
+        let slack_m = 1e-6 * self.pitch_m();
+        let new = |other: &Position| self.positions.iter().all(|at| (at.x_m - other.x_m).abs() > slack_m);
+        let (Some(first), Some(last), true) = (self.positions.first(), self.positions.last(), rows == 1)
+        else {
+            return self;
+        };
+        let inside = first.x_m..last.x_m;
+        let added: Vec<Position> =
+            others.iter().copied().filter(|other| inside.contains(&other.x_m) && new(other)).collect();
+        self.positions.extend(added);
+        self.positions.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        self.columns = self.positions.len();
+        self
+    }
+
     /// The positions next to position `i`, diagonals included.
     pub fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         let rows = self.positions.len() / self.columns;

@@ -1,9 +1,10 @@
 //! The limit: the Cramér–Rao bound of contact position and force for a surface, its layout and its noise.
 //!
-//! Sensor i reads y_i(a, W) = W·f_i(a) plus independent Gaussian noise of variance σ_i² + q_i²/12, where a is the contact
-//! position, W its force, f_i the sensor's influence function, σ_i its noise and q_i its resolution (quantisation as noise
+//! Sensor i reads y_i(a, W) plus independent Gaussian noise of variance σ_i² + q_i²/12, where a is the contact
+//! position, W its force, y_i the sensor's response function (W·f_i(a), with f_i its influence function, on a surface that
+//! bends little), σ_i its noise and q_i its resolution (quantisation as noise
 //! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). For a known force on a line the bound is
-//! 1/√(Σ_i (W·f_i′(a)/σ_i)²); an unknown force is estimated along and costs part of that information.
+//! 1/√(Σ_i (∂y_i/∂a/σ_i)²); an unknown force is estimated along and costs part of that information.
 //!
 //! Left out: dead channels, and those that are saturated at the contact. Not counted: gain and offset errors, which
 //! calibration removes. The bound is one of unbiased estimators and small errors; where it nears the size of the surface it
@@ -28,7 +29,7 @@ use std::sync::Arc;
 
 use crate::bench::Bench;
 use crate::contact::Contact;
-use crate::mechanics::{InfluenceFunction, Surface};
+use crate::mechanics::{ResponseFunction, ResponseGradient, Surface};
 use crate::sensing::{Layout, SensorKind};
 
 /// What is known of the contact force.
@@ -62,7 +63,7 @@ pub struct Limit<'a> {
 #[derive(Clone)]
 struct Channel<'a> {
     kind: SensorKind,
-    influence: Arc<dyn InfluenceFunction + 'a>,
+    response: Arc<dyn ResponseFunction + 'a>,
     /// √(σ² + q²/12).
     sd: f64,
     range: Option<(f64, f64)>,
@@ -86,8 +87,8 @@ impl<'a> Limit<'a> {
                     resolution,
                 });
             }
-            let influence = surface.influence_function(sensor.kind, sensor.position);
-            Ok(Channel { kind: sensor.kind, influence, sd, range: sensor.channel.range })
+            let response = surface.response_function(sensor.kind, sensor.position);
+            Ok(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
         });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         if channels.is_empty() {
@@ -150,24 +151,22 @@ impl<'a> Limit<'a> {
 
     /// What a sensor reads without noise, held at the ends of its range.
     fn clean(channel: &Channel, contact: Contact) -> f64 {
-        let value = contact.force_n * channel.influence.at(contact.position);
+        let value = channel.response.at(contact);
         channel.range.map_or(value, |(low, high)| value.max(low).min(high))
     }
 
     /// Derivatives of the whitened readings; those of saturated channels are 0.
     fn derivatives(&self, contact: Contact) -> Columns {
-        let Contact { position, force_n } = contact;
         let mut columns = Columns::default();
         let mut across = Vec::new();
-        for Channel { influence, sd, range, .. } in &self.channels {
-            let [along_x, along_y] = influence.gradient(position);
-            let influence = influence.at(position);
-            let reading = force_n * influence;
+        for Channel { response, sd, range, .. } in &self.channels {
+            let reading = response.at(contact);
+            let ResponseGradient { position: [along_x, along_y], force } = response.gradient(contact);
             let free = range.is_none_or(|(low, high)| low < reading && reading < high);
             let weight = if free { 1.0 / sd } else { 0.0 };
-            columns.force.push(weight * influence);
-            columns.along.push(weight * force_n * along_x);
-            across.push(weight * force_n * along_y);
+            columns.force.push(weight * force);
+            columns.along.push(weight * along_x);
+            across.push(weight * along_y);
         }
         columns.across = self.surface.extent().width_m.is_some().then_some(across);
         columns

@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
 use crate::contact::Position;
-use crate::mechanics::{Beam, Extent};
+use crate::mechanics::{Beam, Extent, InfluenceFunction};
 use crate::rig::Rig;
 
 /// The founding paper's beam.

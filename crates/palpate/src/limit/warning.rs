@@ -19,6 +19,10 @@ pub const AMBIGUOUS_DISTANCE: f64 = 4.653;
 pub const FAINT_SIGNAL: f64 = 5.0;
 /// Readings that differ by fewer standard deviations than this are the same.
 const SAME: f64 = 0.05;
+/// A touch that stands out by fewer standard deviations than this does not show at all.
+const NOTHING: f64 = 1e-6;
+/// A reaction that changes by less than this share of the force over the whole length does not change.
+const SAME_REACTION: f64 = 1e-6;
 
 /// Something that a bench cannot tell, whatever the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +69,8 @@ pub enum LimitWarning {
         signal_to_noise: f64,
         /// The contact force, in newtons.
         force_n: f64,
+        /// Whether there are supports without a reaction sensor at work.
+        reactions_would_help: bool,
     },
 }
 
@@ -75,7 +81,9 @@ pub enum LimitWarning {
 /// [`LimitError::Force`] for a force that is not positive and finite.
 pub fn limit_warnings(limit: &Limit, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
-    let survey = Survey { limit, force_n, force, grid: Grid::over(limit.surface.extent()) };
+    // A support that stands between the positions of the grid could be missed: next to it little may be told.
+    let grid = Grid::over(limit.surface.extent()).with(&limit.surface.force_supports());
+    let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
     warnings.extend(survey.mirrors());
     warnings.extend(survey.faint());
@@ -118,7 +126,7 @@ impl Survey<'_> {
                 sd_m: self.sd_m(at, self.force),
                 bound_m,
                 known_force_sd_m: known.filter(|sd_m| *sd_m <= bound_m),
-                reactions_would_help: self.lacks_reactions(),
+                reactions_would_help: self.lacks_reactions() && self.reactions_tell(at),
             })
         };
         found.into_iter().filter_map(warning).collect()
@@ -127,6 +135,18 @@ impl Survey<'_> {
     fn lacks_reactions(&self) -> bool {
         let reacts = |channel: &super::Channel| channel.kind == SensorKind::Reaction;
         self.limit.surface.full_scale(SensorKind::Reaction) > 0.0 && !self.limit.channels.iter().any(reacts)
+    }
+
+    /// Whether some support's reaction changes with a contact's position, or tells a force that is not known. That of a clamp
+    /// which alone holds the surface is the force, wherever that acts.
+    fn reactions_tell(&self, at: Position) -> bool {
+        let Limit { surface, .. } = self.limit;
+        let supports = surface.force_supports();
+        let changes = |support: &Position| {
+            let [along, across] = surface.influence_function(SensorKind::Reaction, *support).gradient(at);
+            along.hypot(across) * surface.length_m() > SAME_REACTION
+        };
+        self.force == Force::Unknown || supports.is_empty() || supports.iter().any(changes)
     }
 
     /// Each pair of zones once, however it was found.
@@ -170,7 +190,14 @@ impl Survey<'_> {
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
             let at = inside.into_iter().min_by(|a, b| self.signal(*a).total_cmp(&self.signal(*b)))?;
             let signal_to_noise = self.signal(at);
-            Some(LimitWarning::Faint { zone, at, signal_to_noise, force_n: self.force_n })
+            let reactions_would_help = self.lacks_reactions();
+            Some(LimitWarning::Faint {
+                zone,
+                at,
+                signal_to_noise,
+                force_n: self.force_n,
+                reactions_would_help,
+            })
         };
         found.into_iter().filter_map(warning).collect()
     }
@@ -237,6 +264,15 @@ impl LimitWarning {
             Self::Mirror { distance, .. } => {
                 format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
             }
+            // Over a rigid support nothing moves, however quiet the sensors are and however hard the touch.
+            Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NOTHING => {
+                let sensor = if *reactions_would_help {
+                    "reaction sensors at the supports"
+                } else {
+                    "a sensor that notices a contact there"
+                };
+                format!("{sensor}; less noise or a harder touch does not help")
+            }
             Self::Faint { signal_to_noise, .. } => {
                 let factor = bound / signal_to_noise;
                 format!("{}, a harder touch, or a sensor that is nearer", less_noise(factor))
@@ -288,7 +324,7 @@ impl fmt::Display for LimitWarning {
                      other with a probability of up to {mistaken} %"
                 )
             }
-            Self::Faint { zone, at, signal_to_noise, force_n } => write!(
+            Self::Faint { zone, at, signal_to_noise, force_n, .. } => write!(
                 f,
                 "faint at {zone}: {force_n} N at {} stand out of the noise by {} standard deviations, fewer than \
                  {FAINT_SIGNAL}",

@@ -184,6 +184,15 @@ impl Surface for Beam {
         [0.0, l].iter().any(|support_m| (position.x_m - support_m).abs() <= 1e-9 * l)
     }
 
+    fn force_supports(&self) -> Vec<Position> {
+        [0.0, self.length_m].map(Position::along).to_vec()
+    }
+
+    /// Supports hold the deflection, and leave nothing to bend.
+    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
+        matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor)
+    }
+
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;
     /// strain t·l/(8·E·I) at mid-span; reaction 1 under the force.
     fn full_scale(&self, kind: SensorKind) -> f64 {

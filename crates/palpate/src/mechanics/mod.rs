@@ -1,13 +1,29 @@
 //! What a sensor reads when a unit force acts somewhere on the surface; nothing of recordings or estimators.
 
 mod beam;
+mod digit;
+mod elastica;
 mod extent;
+mod load;
+pub mod modal;
+mod motion;
 pub mod plate;
+mod response;
+mod supported_beam;
 mod surface_spec;
 
 pub use beam::{Beam, BeamError};
+pub use digit::{Digit, DigitError};
+pub use elastica::{Elastica, ForceDirection};
 pub use extent::Extent;
+pub use load::{UniformLoad, midpoints};
+pub use motion::Motion;
 pub use plate::{Plate, PlateError};
+pub use response::{Proportional, ResponseFunction, ResponseGradient};
+pub use supported_beam::{
+    BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
+    SupportedBeamSpec,
+};
 pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;
@@ -23,6 +39,11 @@ pub trait Surface: Send + Sync {
     /// solved by elements this is one solution, so ask once and keep the answer.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
 
+    /// What a sensor reads under any force, its influence times the force unless the surface bends too far for that.
+    fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
+        Arc::new(Proportional(self.influence_function(kind, sensor)))
+    }
+
     /// One value of an influence function, where no other of the same sensor is wanted.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
         self.influence_function(kind, sensor).at(contact)
@@ -30,6 +51,17 @@ pub trait Surface: Send + Sync {
 
     /// Whether a support at `position` takes up force, so that its reaction can be measured.
     fn is_supported_at(&self, position: Position) -> bool;
+
+    /// Where supports take up force at single places, so that a reaction can be measured there, from left to right.
+    fn force_supports(&self) -> Vec<Position> {
+        Vec::new()
+    }
+
+    /// Whether a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched, because a support holds what it
+    /// measures.
+    fn never_moves(&self, _kind: SensorKind, _sensor: Position) -> bool {
+        false
+    }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
     fn full_scale(&self, kind: SensorKind) -> f64;

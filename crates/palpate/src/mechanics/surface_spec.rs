@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Beam, Extent, Plate, Surface};
+use super::{Beam, Digit, Extent, Plate, SupportedBeam, Surface};
 
 /// The surface that is touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -10,8 +10,12 @@ use super::{Beam, Extent, Plate, Surface};
 pub enum SurfaceSpec {
     /// A simply supported beam.
     Beam(Beam),
+    /// A beam on any supports, with any sections.
+    SupportedBeam(Box<SupportedBeam>),
     /// A rectangular plate.
     Plate(Plate),
+    /// A flexible cantilever finger.
+    Digit(Digit),
     /// A surface without a model, known by recordings only.
     Measured(Extent),
 }
@@ -21,7 +25,9 @@ impl SurfaceSpec {
     pub fn extent(&self) -> Extent {
         match self {
             Self::Beam(beam) => beam.extent(),
+            Self::SupportedBeam(beam) => beam.extent(),
             Self::Plate(plate) => plate.extent(),
+            Self::Digit(digit) => digit.extent(),
             Self::Measured(extent) => *extent,
         }
     }
@@ -30,7 +36,9 @@ impl SurfaceSpec {
     pub fn model(&self) -> Option<&dyn Surface> {
         match self {
             Self::Beam(beam) => Some(beam),
+            Self::SupportedBeam(beam) => Some(beam.as_ref()),
             Self::Plate(plate) => Some(plate),
+            Self::Digit(digit) => Some(digit),
             Self::Measured(_) => None,
         }
     }

@@ -1,7 +1,8 @@
 //! From a recording to training patterns, and from trained weights to a locator.
 
 use super::{
-    InputScale, NetworkConfig, NetworkLocator, OutputCoding, Patterns, Topology, TrainedNetwork, TrainingTask,
+    InputScale, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
+    TrainedNetwork, TrainingTask,
 };
 use crate::mechanics::{Extent, Surface};
 use crate::network::locator::ChannelScaling;
@@ -95,14 +96,14 @@ impl NetworkFitting {
 
     /// The locator that a trained network makes.
     pub fn locator(&self, network: TrainedNetwork) -> NetworkLocator {
-        NetworkLocator {
+        NetworkLocator::from(NetworkParts {
             topology: network.topology,
             weights: network.weights,
             scaling: self.scaling.clone(),
             output_scale_m: self.output_scale_m.clone(),
             extent: self.extent,
             outcome: network.outcome,
-        }
+        })
     }
 }
 

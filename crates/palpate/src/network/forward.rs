@@ -82,7 +82,8 @@ mod tests {
     #[test]
     fn every_instruction_set_gives_the_single_pass() {
         use Activation::{Linear, Logistic, Tanh};
-        for rows in [0, 1, 15, 16, 17, 100] {
+        // From none to more than all the groups that any instruction set takes together, and some left over.
+        for rows in [0, 1, 15, 16, 17, 100, 300] {
             compare(&[8, 10, 1], true, (Logistic, Logistic), rows);
             compare(&[8, 10, 1], false, (Tanh, Linear), rows);
             compare(&[3, 4, 5, 2], true, (Tanh, Logistic), rows);

@@ -1,6 +1,6 @@
 //! A fitted network: scaling, weights and coding, all that a reading needs to become a position.
 
-use super::{Topology, TrainingOutcome};
+use super::{PreparedNetwork, Topology, TrainingOutcome};
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::mechanics::Extent;
@@ -24,10 +24,10 @@ impl ChannelScaling {
     }
 }
 
-/// A network that locates.
+/// What training a network gives, and what a locator file holds of it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NetworkLocator {
+pub struct NetworkParts {
     /// Its shape.
     pub topology: Topology,
     /// Its weights, in the order that [`Topology`] states.
@@ -42,7 +42,28 @@ pub struct NetworkLocator {
     pub outcome: TrainingOutcome,
 }
 
-impl NetworkLocator {
+/// A network that locates.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(from = "NetworkParts", into = "NetworkParts")]
+pub struct NetworkLocator {
+    parts: NetworkParts,
+    /// `None` where a file's numbers do not fit together, which [`Locate::check`] reports.
+    network: Option<PreparedNetwork>,
+}
+
+impl From<NetworkParts> for NetworkLocator {
+    fn from(parts: NetworkParts) -> Self {
+        Self { network: PreparedNetwork::new(&parts.topology, &parts.weights), parts }
+    }
+}
+
+impl From<NetworkLocator> for NetworkParts {
+    fn from(locator: NetworkLocator) -> Self {
+        locator.parts
+    }
+}
+
+impl NetworkParts {
     fn check_numbers(&self, channels: usize) -> Result<(), LocatorFault> {
         let sizes = &self.topology.sizes;
         let count = LocatorFault::check_count;
@@ -55,9 +76,7 @@ impl NetworkLocator {
         count("channel scalings", channels, self.scaling.len())?;
         count("output scales", self.topology.outputs(), self.output_scale_m.len())?;
         count("outputs", 1 + usize::from(self.extent.width_m.is_some()), self.topology.outputs())?;
-        let weights = sizes.windows(2).try_fold(0usize, |sum, pair| {
-            pair[1].checked_mul(pair[0].checked_add(usize::from(self.topology.biases))?)?.checked_add(sum)
-        });
+        let weights = self.topology.checked_weight_count();
         count("weights", weights.unwrap_or(usize::MAX), self.weights.len())?;
         let finite = "a finite number";
         LocatorFault::check_numbers("weight", self.weights.iter().copied(), |_| true, finite)?;
@@ -67,21 +86,33 @@ impl NetworkLocator {
             self.scaling.iter().map(|scaling| scaling.divisor).chain(self.output_scale_m.iter().copied());
         LocatorFault::check_numbers("scale", scales, |scale| scale > 0.0, "greater than 0")
     }
+}
+
+/// Channels for which the inputs lie on the stack.
+const FEW_CHANNELS: usize = 16;
+
+impl NetworkLocator {
+    /// What it was made from.
+    pub fn parts(&self) -> &NetworkParts {
+        &self.parts
+    }
 
     /// The position for a reading of as many channels as the network has inputs; elsewhere `None`.
     pub fn position(&self, reading: &[f64]) -> Option<Position> {
-        let topology = &self.topology;
-        let network = palpate_core::Network {
-            sizes: &topology.sizes,
-            biases: topology.biases,
-            hidden_activation: topology.hidden_activation,
-            output_activation: topology.output_activation,
-            weights: &self.weights,
+        let (mut few, mut many) = ([0.0; FEW_CHANNELS], Vec::new());
+        let inputs = if let Some(inputs) = few.get_mut(..reading.len()) {
+            inputs
+        } else {
+            many.resize(reading.len(), 0.0);
+            &mut many[..]
         };
-        let inputs: Vec<f64> = reading.iter().zip(&self.scaling).map(|(r, s)| s.apply(*r)).collect();
-        let mut outputs = vec![0.0; topology.outputs()];
-        network.forward_into(&inputs, &mut outputs, &mut vec![0.0; network.scratch_len()]).ok()?;
-        let mut coordinates = outputs.iter().zip(&self.output_scale_m).map(|(a, scale)| a * scale);
+        for ((input, r), scaling) in inputs.iter_mut().zip(reading).zip(&self.parts.scaling) {
+            *input = scaling.apply(*r);
+        }
+        let mut outputs = [0.0; 2];
+        let outputs = outputs.get_mut(..self.parts.topology.outputs())?;
+        self.network.as_ref()?.forward_into(inputs, outputs).ok()?;
+        let mut coordinates = outputs.iter().zip(&self.parts.output_scale_m).map(|(a, scale)| a * scale);
         Some(Position { x_m: coordinates.next()?, y_m: coordinates.next().unwrap_or(0.0) })
     }
 }
@@ -89,11 +120,11 @@ impl NetworkLocator {
 impl Locate for NetworkLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let position = self.position(reading).unwrap_or(Position::along(f64::NAN));
-        let on_surface = self.extent.contains(position);
+        let on_surface = self.parts.extent.contains(position);
         Estimate::of_position(position, if on_surface { Status::Located } else { Status::OutsideSurface })
     }
 
     fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.check_numbers(bench.layout.len())
+        self.parts.check_numbers(bench.layout.len())
     }
 }

@@ -8,6 +8,7 @@ mod levenberg_marquardt;
 mod locator;
 mod outcome;
 mod patterns;
+mod prepared;
 mod scalar;
 mod topology;
 mod train;
@@ -20,9 +21,10 @@ pub use levenberg_marquardt::{
     LevenbergMarquardtConfig, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
 };
-pub use locator::{ChannelScaling, NetworkLocator};
+pub use locator::{ChannelScaling, NetworkLocator, NetworkParts};
 pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;
 pub use patterns::Patterns;
+pub use prepared::PreparedNetwork;
 pub use topology::Topology;
 pub use train::{SeedQueue, TrainingTask, train_many, train_one};

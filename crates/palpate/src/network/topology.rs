@@ -64,4 +64,11 @@ impl Topology {
     pub fn weight_count(&self) -> usize {
         (0..self.layers()).map(|layer| self.rows(layer) * self.row_len(layer)).sum()
     }
+
+    /// The same of a shape that may be nonsense: `None` when there is no such number.
+    pub(crate) fn checked_weight_count(&self) -> Option<usize> {
+        self.sizes.windows(2).try_fold(0usize, |sum, pair| {
+            pair[1].checked_mul(pair[0].checked_add(usize::from(self.biases))?)?.checked_add(sum)
+        })
+    }
 }

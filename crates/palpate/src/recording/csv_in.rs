@@ -152,14 +152,15 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
 }
 
 /// What a row says of its contact.
-struct Touch {
-    position: Position,
-    force_n: Option<f64>,
+pub(super) struct Touch {
+    pub position: Position,
+    pub force_n: Option<f64>,
     hidden: Option<f64>,
 }
 
 /// Which fields of a row say where and how hard the contact was.
-struct ContactFields {
+#[derive(Clone, Debug)]
+pub(super) struct ContactFields {
     x: usize,
     y: Option<usize>,
     position_unit: Unit,
@@ -169,7 +170,7 @@ struct ContactFields {
 }
 
 impl ContactFields {
-    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+    pub fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
         let find = |column| head.find(column, columns.header);
         let (x, y) = match &columns.position {
             PositionColumns::Along(x) => (find(x)?, None),
@@ -186,7 +187,7 @@ impl ContactFields {
         Ok(Self { x, y, position_unit, frame, force, hidden: hidden.transpose()? })
     }
 
-    fn touch(&self, cells: &Cells, schema: &Schema) -> Result<Touch, CsvError> {
+    pub fn touch(&self, cells: &Cells, schema: &Schema) -> Result<Touch, CsvError> {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
         let position = self.frame.position(x_m, y_m);

@@ -25,7 +25,7 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, mut out: impl
     csv.flush()
 }
 
-fn header(columns: &Columns) -> Vec<String> {
+pub(super) fn header(columns: &Columns) -> Vec<String> {
     let position = match &columns.position {
         PositionColumns::Along(x) => vec![x],
         PositionColumns::Plane { x, y } => vec![x, y],
@@ -40,7 +40,7 @@ fn header(columns: &Columns) -> Vec<String> {
     all.map(name).collect()
 }
 
-fn record(row: &Row, columns: &Columns) -> Vec<String> {
+pub(super) fn record(row: &Row, columns: &Columns) -> Vec<String> {
     let mut record = vec![columns.position_unit.format_si(row.position.x_m)];
     if let PositionColumns::Plane { .. } = columns.position {
         record.push(columns.position_unit.format_si(row.position.y_m));

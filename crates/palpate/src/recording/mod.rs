@@ -8,6 +8,7 @@ mod csv_out;
 mod fields;
 mod folds;
 mod reading_parser;
+mod timed;
 mod warnings;
 
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,7 @@ pub use csv_in::{Schema, read, read_pair};
 pub use csv_out::write;
 pub use folds::{Fold, TooFewPositions};
 pub use reading_parser::ReadingParser;
+pub use timed::{TimedParser, TimedReading, TimedRecording, write_timed};
 pub use warnings::Warning;
 
 use crate::contact::{Contact, Position};

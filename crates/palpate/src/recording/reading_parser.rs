@@ -90,7 +90,7 @@ pub(super) fn without_mark(text: &str) -> &str {
 }
 
 /// `bytes` as text, without the line's end.
-fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvError> {
+pub(super) fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvError> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Ok(text.trim_end_matches(['\r', '\n'])),
         Err(_) => {

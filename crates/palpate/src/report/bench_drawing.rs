@@ -14,6 +14,8 @@ const ARROW_TAIL_Y: f64 = 34.0;
 /// Middle of the undeflected beam.
 const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
+/// The same of the thickest stretch of a stepped beam, and of any stretch at least.
+const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
 /// Room beneath the beam for the deflected shape, at its deepest.
 const DEFLECTION_ROOM: f64 = 56.0;
 const PROBE_TOP: f64 = 164.0;
@@ -21,6 +23,8 @@ const PROBE_HEIGHT: f64 = 18.0;
 const PROBE_HALF_WIDTH: f64 = 4.5;
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
+/// What springs stand on: beneath the beam at its deepest.
+const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const NUMBER_TOP: f64 = 186.0;
 const NUMBER_LINE: f64 = 16.0;
 const NUMBER_SIZE: f64 = 11.0;
@@ -37,6 +41,8 @@ pub struct BenchDrawing {
     pub length_mm: f64,
     /// How the beam is held.
     pub supports: Vec<BenchSupport>,
+    /// Stretches of different thickness, from left to right; empty for a beam that has one thickness.
+    pub steps: Vec<BenchStep>,
     /// Position of each sensor; they are numbered from 1 in this order.
     pub sensors_mm: Vec<f64>,
     /// Where the load acts.
@@ -48,6 +54,15 @@ pub struct BenchDrawing {
     pub deflection_mm: Vec<(f64, f64)>,
     /// Width of the image in pixels at scale 1; drawn within 320 to 4,000. The height follows from the content.
     pub width_px: u32,
+}
+
+/// A stretch of the beam that has one thickness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BenchStep {
+    /// Where it ends, in millimetres.
+    pub to_mm: f64,
+    /// Its thickness, in millimetres.
+    pub thickness_mm: f64,
 }
 
 /// A support of the beam.
@@ -66,6 +81,10 @@ pub enum BenchSupportKind {
     Simple,
     /// A clamp: neither deflection nor slope.
     Clamped,
+    /// A slide: no slope, free to deflect.
+    Guided,
+    /// A spring.
+    Elastic,
 }
 
 /// A part of the bench that has a position.
@@ -73,6 +92,8 @@ pub enum BenchSupportKind {
 pub enum BenchPart {
     /// A support.
     Support,
+    /// A step of the beam's thickness.
+    Step,
     /// A sensor.
     Sensor,
     /// The load.
@@ -83,6 +104,7 @@ impl std::fmt::Display for BenchPart {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.write_str(match self {
             BenchPart::Support => "support",
+            BenchPart::Step => "step",
             BenchPart::Sensor => "sensor",
             BenchPart::Load => "load",
         })
@@ -128,8 +150,8 @@ pub fn bench_to_svg(bench: &BenchDrawing) -> Result<String, BenchDrawingError> {
     Ok(canvas::svg(width_px, height_px, |canvas| {
         draw_sensors(canvas, bench, &frame);
         numbers.labels.iter().for_each(|label| canvas.text(label));
-        draw_beam(canvas, &frame);
-        bench.supports.iter().for_each(|support| draw_support(canvas, support, &frame));
+        draw_beam(canvas, bench, &frame);
+        bench.supports.iter().for_each(|support| draw_support(canvas, bench, support, &frame));
         draw_deflection(canvas, bench, &frame);
         draw_load(canvas, bench, &frame);
         draw_dimension(canvas, bench, &frame, dimension_y);
@@ -143,8 +165,9 @@ fn validate(bench: &BenchDrawing) -> Result<(), BenchDrawingError> {
         return Err(BenchDrawingError::Length { length_mm });
     }
     let supports = bench.supports.iter().map(|support| (BenchPart::Support, support.position_mm));
+    let steps = bench.steps.iter().map(|step| (BenchPart::Step, step.to_mm));
     let sensors = bench.sensors_mm.iter().map(|&position_mm| (BenchPart::Sensor, position_mm));
-    let mut parts = supports.chain(sensors).chain([(BenchPart::Load, bench.load_mm)]);
+    let mut parts = supports.chain(steps).chain(sensors).chain([(BenchPart::Load, bench.load_mm)]);
     match parts.find(|(_, position_mm)| !(0.0..=length_mm).contains(position_mm)) {
         Some((part, position_mm)) => Err(BenchDrawingError::OffBeam { part, position_mm, length_mm }),
         None => Ok(()),
@@ -260,20 +283,43 @@ fn draw_sensors(canvas: &Canvas<'_>, bench: &BenchDrawing, frame: &Frame) {
     }
 }
 
-/// The beam as it is without a load.
-fn draw_beam(canvas: &Canvas<'_>, frame: &Frame) {
-    let beam = Rect {
-        left: MARGIN,
-        right: frame.width - MARGIN,
-        top: BEAM_Y - BEAM_HALF_THICKNESS,
-        bottom: BEAM_Y + BEAM_HALF_THICKNESS,
-    };
-    canvas.rectangle(beam, GRID.to_rgba());
+/// Half the drawn thickness of a stretch of the beam; of the whole beam where it has no steps.
+fn half_thickness(bench: &BenchDrawing, step: Option<&BenchStep>) -> f64 {
+    let thickest_mm = bench.steps.iter().map(|step| step.thickness_mm).fold(0.0, f64::max);
+    let (largest, least) = STEPPED_HALF_THICKNESS;
+    match step {
+        Some(step) if bench.steps.len() > 1 => {
+            (largest * step.thickness_mm / thickest_mm).clamp(least, largest)
+        }
+        _ => BEAM_HALF_THICKNESS,
+    }
 }
 
-fn draw_support(canvas: &Canvas<'_>, support: &BenchSupport, frame: &Frame) {
+/// The beam as it is without a load.
+fn draw_beam(canvas: &Canvas<'_>, bench: &BenchDrawing, frame: &Frame) {
+    let stretch = |left: f64, right: f64, half: f64| {
+        let beam = Rect { left, right, top: BEAM_Y - half, bottom: BEAM_Y + half };
+        canvas.rectangle(beam, GRID.to_rgba());
+    };
+    if bench.steps.is_empty() {
+        return stretch(MARGIN, frame.width - MARGIN, BEAM_HALF_THICKNESS);
+    }
+    let mut from = MARGIN;
+    for step in &bench.steps {
+        let to = frame.across(step.to_mm);
+        stretch(from, to, half_thickness(bench, Some(step)));
+        from = to;
+    }
+}
+
+fn draw_support(canvas: &Canvas<'_>, bench: &BenchDrawing, support: &BenchSupport, frame: &Frame) {
     let across = frame.across(support.position_mm);
-    let top = BEAM_Y + BEAM_HALF_THICKNESS;
+    let over = bench.steps.iter().find(|step| step.to_mm >= support.position_mm);
+    let top = BEAM_Y + half_thickness(bench, over);
+    let block = |left: f64, right: f64, half_height: f64| {
+        let (top, bottom) = (BEAM_Y - half_height, BEAM_Y + half_height);
+        canvas.rectangle(Rect { left, right, top, bottom }, QUIET_INK.to_rgba());
+    };
     match support.kind {
         BenchSupportKind::Simple => {
             let base = top + SUPPORT_HEIGHT;
@@ -282,12 +328,48 @@ fn draw_support(canvas: &Canvas<'_>, support: &BenchSupport, frame: &Frame) {
             canvas.polygon(&wedge, QUIET_INK.to_rgba());
         }
         BenchSupportKind::Clamped => {
-            let outward = if across < frame.width / 2.0 { -SUPPORT_HALF_WIDTH } else { SUPPORT_HALF_WIDTH };
-            let (top, bottom) = (BEAM_Y - SUPPORT_HEIGHT, BEAM_Y + SUPPORT_HEIGHT);
-            let (left, right) = (across.min(across + outward), across.max(across + outward));
-            canvas.rectangle(Rect { left, right, top, bottom }, QUIET_INK.to_rgba());
+            // An end is held from beyond it, the beam between its ends from both sides.
+            let (left, right) = if support.position_mm <= 0.0 {
+                (across - SUPPORT_HALF_WIDTH, across)
+            } else if support.position_mm >= bench.length_mm {
+                (across, across + SUPPORT_HALF_WIDTH)
+            } else {
+                (across - 0.5 * SUPPORT_HALF_WIDTH, across + 0.5 * SUPPORT_HALF_WIDTH)
+            };
+            block(left, right, SUPPORT_HEIGHT);
         }
+        BenchSupportKind::Guided => {
+            let at = frame.surface_y(across);
+            let half = 0.4 * SUPPORT_HALF_WIDTH;
+            let (top, bottom) = (at - 0.5 * SUPPORT_HEIGHT, at + 0.5 * SUPPORT_HEIGHT);
+            canvas.rectangle(
+                Rect { left: across - half, right: across + half, top, bottom },
+                QUIET_INK.to_rgba(),
+            );
+            for guide in [across - 0.75 * SUPPORT_HALF_WIDTH, across + 0.75 * SUPPORT_HALF_WIDTH] {
+                let ends = [(guide, top.min(BEAM_Y) - 8.0), (guide, bottom.max(BEAM_Y) + 8.0)];
+                canvas.line(&ends, 2.0, QUIET_INK);
+            }
+        }
+        BenchSupportKind::Elastic => draw_spring(canvas, (across, frame.surface_y(across))),
     }
+}
+
+/// A zigzag that stands on the ground and carries the point.
+fn draw_spring(canvas: &Canvas<'_>, (across, top): Point) {
+    const TURNS: usize = 6;
+    let foot = SPRING_GROUND_Y;
+    let head = top + 0.2 * (foot - top);
+    let turn = |i: usize| {
+        let side = if i.is_multiple_of(2) { 0.6 } else { -0.6 };
+        let share = (i as f64 + 0.5) / TURNS as f64;
+        (across + side * SUPPORT_HALF_WIDTH, head + share * (foot - 4.0 - head))
+    };
+    let mut points = vec![(across, top), (across, head)];
+    points.extend((0..TURNS).map(turn));
+    points.extend([(across, foot - 4.0), (across, foot)]);
+    canvas.line(&points, 1.6, QUIET_INK);
+    canvas.line(&[(across - SUPPORT_HALF_WIDTH, foot), (across + SUPPORT_HALF_WIDTH, foot)], 2.0, QUIET_INK);
 }
 
 /// The deflected shape and its largest deflection.

@@ -31,6 +31,8 @@ mod chart;
 mod chart_svg;
 mod colour_map;
 mod comparison_report;
+mod dead_areas_report;
+mod digit_figures;
 mod evaluation_report;
 mod geometry;
 mod heat_map;
@@ -43,28 +45,33 @@ mod page;
 mod paper_report;
 mod plane_figures;
 mod png;
+mod profile_report;
 mod report_file;
 mod scale;
 mod study_parts;
 mod study_report;
 mod text;
 mod ticks;
+mod track_report;
 
 #[cfg(test)]
 mod tests;
 
 pub use bench_drawing::{
-    BenchDrawing, BenchDrawingError, BenchPart, BenchSupport, BenchSupportKind, bench_to_svg,
+    BenchDrawing, BenchDrawingError, BenchPart, BenchStep, BenchSupport, BenchSupportKind, bench_to_svg,
 };
 pub use chart::{
     Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
 };
 pub use chart_svg::chart_to_svg;
 pub use comparison_report::{ComparisonReport, comparison_report};
+pub use dead_areas_report::dead_areas_report;
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
 pub use heat_map::{HeatMap, HeatPanel, heat_map_to_svg};
 pub use limit_report::{LimitReport, limit_report};
 pub use paper_report::paper_report;
 pub use png::{PngError, svg_to_png};
+pub use profile_report::{ProfileReport, profile_report};
 pub use report_file::{ReportError, ReportFile};
 pub use study_report::{StudyReport, study_report};
+pub use track_report::{TrackReport, track_report};

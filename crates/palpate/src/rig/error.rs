@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use crate::arrangement::ArrangementError;
 use crate::contact::Position;
+use crate::mechanics::modal::ModalBeamError;
 use crate::mechanics::plate::NothingToRead;
-use crate::mechanics::{BeamError, Extent, PlateError};
-use crate::units::UnitError;
+use crate::mechanics::{BeamError, DigitError, Extent, PlateError, SupportedBeamError};
+use crate::sensing::SensorKind;
+use crate::units::{UnitError, format_length_mm};
 
 /// A rig file, or a section of one in a study, that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -85,6 +87,9 @@ pub enum RigProblem {
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),
+    /// A beam on supports that cannot be computed.
+    #[error(transparent)]
+    SupportedBeam(SupportedBeamError),
     /// A plate that cannot be computed.
     #[error(transparent)]
     Plate(PlateError),
@@ -95,6 +100,52 @@ pub enum RigProblem {
         number: usize,
         /// Why.
         reason: NothingToRead,
+    },
+    /// A beam whose motion cannot be computed.
+    #[error(transparent)]
+    ModalBeam(ModalBeamError),
+    /// A moving contact that leaves the surface.
+    #[error(
+        "`{key}` is at {}, off the surface; it must be within 0 and {}",
+        format_length_mm(*x_m),
+        format_length_mm(*length_m)
+    )]
+    MotionOffSurface {
+        /// The key.
+        key: &'static str,
+        /// Where it is, in metres.
+        x_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// A moving contact that is read too often to be held.
+    #[error("the motion takes {readings} readings; at most {most} can be held")]
+    TooManyReadings {
+        /// Its duration times the rate.
+        readings: f64,
+        /// The most it can be.
+        most: f64,
+    },
+    /// A digit that cannot be computed.
+    #[error(transparent)]
+    Digit(DigitError),
+    /// A sensor on a digit that is no strain gauge.
+    #[error("a digit is read by strain gauges; `measure` is `{kind}`")]
+    NotAGauge {
+        /// What it measures.
+        kind: crate::sensing::SensorKind,
+    },
+    /// A force that bends a digit further than its model goes.
+    #[error(
+        "`force` is {value}; with a contact at the tip this digit bears at most {:.3} N, a load F·l²/(E·I) of {}",
+        most_n,
+        crate::mechanics::Digit::MOST_LOAD
+    )]
+    TooMuchForce {
+        /// The force, as written.
+        value: String,
+        /// The largest, in newtons.
+        most_n: f64,
     },
     /// Training positions that cannot be laid out.
     #[error(transparent)]
@@ -113,19 +164,53 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
+    /// A load that is not a stretch of the surface.
+    #[error(
+        "the load goes from {} to {}; it must go from left to right, within 0 and {}",
+        format_length_mm(*from_m),
+        format_length_mm(*to_m),
+        format_length_mm(*length_m)
+    )]
+    LoadStretch {
+        /// Where it begins, in metres.
+        from_m: f64,
+        /// Where it ends, in metres.
+        to_m: f64,
+        /// The surface's length, in metres.
+        length_m: f64,
+    },
+    /// A load on a plane.
+    #[error("[[load]] describes a stretch of a line; this surface has a width too")]
+    LoadOnPlane,
     /// A reaction sensor where nothing supports the surface.
     #[error(
-        "reaction sensor {number} is at {}, where no support is{}",
+        "reaction sensor {number} is at {}, where no support takes up force; {}",
         extent.place_in_words(*position),
-        if extent.is_plane() { String::new() } else { format!("; the supports are at {}", extent.bounds_in_words()) }
+        force_takers(*extent, supports)
     )]
     NoSupport {
         /// Which sensor of its section, from 1.
         number: usize,
         /// Where it is.
         position: Position,
+        /// Where supports take up force.
+        supports: Vec<Position>,
         /// The surface.
         extent: Extent,
+    },
+    /// A sensor that reads 0 wherever the surface is touched.
+    #[error(
+        "{kind} sensor {number} is at {}, where {}: it would read 0 wherever the surface is touched",
+        format_length_mm(*x_m),
+        stillness(*kind)
+    )]
+    NeverMoves {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Where it is, in metres.
+        x_m: f64,
     },
     /// A position with one coordinate on a plane, or with more than one on a line.
     #[error(
@@ -190,9 +275,9 @@ pub enum RigProblem {
     #[error("one reading cannot scale both {first} and {second} sensors")]
     MixedKinds {
         /// What some measure.
-        first: crate::sensing::SensorKind,
+        first: SensorKind,
         /// What others measure.
-        second: crate::sensing::SensorKind,
+        second: SensorKind,
     },
     /// A column is given by name in a file without a header.
     #[error(
@@ -224,7 +309,10 @@ impl RigError {
             RigProblem::Coordinates { plane: true, .. } => {
                 Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
             }
+            RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
+            RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
             _ => None,
         }
     }
@@ -249,6 +337,26 @@ impl RigProblem {
     /// This problem, of something that is not there.
     pub(crate) fn nowhere(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
+    }
+}
+
+/// "those that do are at 0 mm and 400 mm".
+fn force_takers(extent: Extent, supports: &[Position]) -> String {
+    let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
+    match places.as_slice() {
+        [] => "none of the supports does".to_owned(),
+        [only] => format!("the only one that does is at {only}"),
+        [first @ .., last] => format!("those that do are at {} and {last}", first.join(", ")),
+    }
+}
+
+/// Why a sensor of this kind reads nothing.
+fn stillness(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Deflection => "a support holds the surface",
+        SensorKind::Slope => "a support holds the slope",
+        SensorKind::Strain => "nothing bends the surface",
+        SensorKind::Reaction | SensorKind::Raw => "nothing acts",
     }
 }
 

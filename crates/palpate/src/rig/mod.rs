@@ -16,7 +16,8 @@ use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::estimator::EstimatorConfig;
-use crate::mechanics::Extent;
+use crate::mechanics::modal::ModalBeam;
+use crate::mechanics::{Extent, Motion, UniformLoad};
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +28,21 @@ pub struct Rig {
     pub training: Option<Training>,
     /// The method that locates.
     pub estimator: EstimatorConfig,
+    /// Loads for a load profile to be simulated from.
+    pub loads: Vec<UniformLoad>,
+    /// How a contact moves, and what moves with it, where the rig says.
+    pub motion: Option<MotionRig>,
+}
+
+/// A moving contact of a rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionRig {
+    /// Where the contact goes.
+    pub motion: Motion,
+    /// The beam with its inertia and damping.
+    pub beam: ModalBeam,
+    /// Readings a second, in hertz; greater than 0.
+    pub rate_hz: f64,
 }
 
 /// The training positions of a rig.

@@ -8,7 +8,7 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDes
 use toml::Spanned;
 
 use super::value::{RawColumn, RawPosition, RawQuantity};
-pub(crate) use supports::{EdgesSection, SupportSection, SupportsSection};
+pub(crate) use supports::{BeamSectionKeys, EdgesSection, SupportKeys, SupportsKey};
 
 mod supports;
 
@@ -25,6 +25,8 @@ pub(crate) struct RigSections {
     pub training: Key<TrainingSection>,
     pub estimator: Key<EstimatorSection>,
     pub recording: Key<RecordingSection>,
+    pub motion: Key<MotionSection>,
+    pub load: Option<Vec<Spanned<LoadSection>>>,
 }
 
 /// `[surface]`
@@ -36,10 +38,13 @@ pub(crate) struct SurfaceSection {
     pub width: Key<RawQuantity>,
     pub thickness: Key<RawQuantity>,
     pub youngs_modulus: Key<RawQuantity>,
-    pub supports: Key<SupportsSection>,
+    pub supports: Key<SupportsKey>,
+    pub sections: Key<Vec<Spanned<BeamSectionKeys>>>,
     pub poissons_ratio: Key<f64>,
     pub edges: Key<EdgesSection>,
     pub elements: Key<i64>,
+    pub density: Key<RawQuantity>,
+    pub direction: Key<String>,
 }
 
 /// `[sensors]`, or several `[[sensors]]`
@@ -61,6 +66,7 @@ pub(crate) struct SensorsSection {
     pub resolution: Key<RawQuantity>,
     pub gain_error: Key<RawQuantity>,
     pub offset_error: Key<RawQuantity>,
+    pub position_error: Key<RawQuantity>,
     pub range: Key<Vec<Spanned<RawQuantity>>>,
     pub dead: Key<Vec<Spanned<i64>>>,
 }
@@ -69,6 +75,15 @@ pub(crate) struct SensorsSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactSection {
+    pub force: Key<RawQuantity>,
+}
+
+/// One `[[load]]`: a force spread over part of the surface
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LoadSection {
+    pub from: Key<RawQuantity>,
+    pub to: Key<RawQuantity>,
     pub force: Key<RawQuantity>,
 }
 
@@ -84,6 +99,21 @@ pub(crate) struct TrainingSection {
     pub positions: Key<Vec<Spanned<RawPosition>>>,
     pub repeats: Key<i64>,
     pub force: Key<RawQuantity>,
+}
+
+/// `[motion]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MotionSection {
+    pub from: Key<RawQuantity>,
+    pub to: Key<RawQuantity>,
+    pub speed: Key<RawQuantity>,
+    pub turn: Key<RawQuantity>,
+    pub passes: Key<i64>,
+    pub lifted: Key<RawQuantity>,
+    pub touch: Key<RawQuantity>,
+    pub rate: Key<RawQuantity>,
+    pub damping: Key<RawQuantity>,
 }
 
 /// `[estimator]`
@@ -106,6 +136,7 @@ pub(crate) struct EstimatorSection {
     pub from: Key<String>,
     pub contacts: Key<i64>,
     pub force_sd: Key<RawQuantity>,
+    pub theory: Key<String>,
 }
 
 impl EstimatorSection {
@@ -130,6 +161,7 @@ impl EstimatorSection {
             place("from", &self.from),
             place("contacts", &self.contacts),
             place("force_sd", &self.force_sd),
+            place("theory", &self.theory),
         ];
         keys.into_iter().flatten().collect()
     }
@@ -154,6 +186,7 @@ impl EstimatorSection {
             from: self.from.or(base.from),
             contacts: self.contacts.or(base.contacts),
             force_sd: self.force_sd.or(base.force_sd),
+            theory: self.theory.or(base.theory),
         }
     }
 }

@@ -1,4 +1,5 @@
 mod planes;
+mod plates;
 
 use super::*;
 use crate::mechanics::{Beam, Extent, SurfaceSpec};
@@ -7,6 +8,8 @@ use crate::recording::{Column, PositionColumns};
 use crate::sensing::Layout;
 use crate::sensing::SensorKind;
 use crate::support::data::recording;
+
+mod supports;
 
 const PAPER: &str = include_str!("../../../../examples/paper.toml");
 const FSI_WATER: &str = include_str!("../../../../examples/fsi-water.toml");
@@ -100,6 +103,34 @@ fn refused(base: &str, changes: &[(&str, &str)]) -> String {
     shown.collect::<Vec<_>>().join("\n\n")
 }
 
+/// The flexible digit's bench.
+const DIGIT: &str = include_str!("../../../../examples/digit.toml");
+
+#[test]
+fn a_bad_digit_is_refused_with_a_caret() {
+    let shown = refused(
+        DIGIT,
+        &[
+            ("\"0.5 mm\"", "\"0 mm\""),
+            ("\"0.5 mm\"", "\"1e-120 mm\""),
+            ("\"80 mm\"", "\"121 mm\""),
+            ("\"normal\"", "\"norml\""),
+            ("\"normal\"", "\"sideways\""),
+            ("direction = ", "supports = \"simple\"\ndirection = "),
+            ("measure = \"strain\"", "measure = \"deflection\""),
+            ("measure = \"strain\"", "measure = \"raw\""),
+            ("\"4 N\"", "\"40 N\""),
+            ("[training]", "[contact]\nforce = \"15 N\"\n[training]"),
+            ("[estimator]", "[estimator]\ntheory = \"lineal\""),
+            ("[estimator]", "[estimator]\nfrom = \"mechanics\""),
+        ],
+    );
+    let without = pointed(&DIGIT.replacen("direction", "#", 1));
+    let on_a_beam = pointed(&BENCH.replacen("[sensors]", "direction = \"normal\"\n[sensors]", 1));
+    let of_a_network = pointed(&BENCH.replacen("[estimator]", "[estimator]\ntheory = \"exact\"", 1));
+    insta::assert_snapshot!([shown, without, on_a_beam, of_a_network].join("\n\n"));
+}
+
 #[test]
 fn a_bad_surface_is_refused_with_a_caret() {
     let shown = refused(
@@ -141,6 +172,8 @@ fn bad_sensors_are_refused_with_a_caret() {
             ("count = 8", "count = 8\nnoise = \"5 N\""),
             ("count = 8", "count = 8\nnoise = \"-5 um\""),
             ("count = 8", "count = 8\ngain_error = \"100 %\""),
+            ("count = 8", "count = 8\nposition_error = \"5 N\""),
+            ("\"deflection\"\ncount = 8", "\"reaction\"\npositions = [\"0 mm\"]\nposition_error = \"1 mm\""),
             ("count = 8", "count = 8\nrange = [\"5 mm\", \"-5 mm\"]"),
             ("count = 8", "count = 8\nrange = [\"5 mm\"]"),
             ("count = 8", "count = 8\ndead = [3, 9]"),
@@ -225,6 +258,22 @@ fn a_bad_recording_section_is_refused_with_a_caret() {
 }
 
 #[test]
+fn a_bad_load_is_refused_with_a_caret() {
+    let loaded = format!("{BENCH}[[load]]\nfrom = \"130 mm\"\nto = \"150 mm\"\nforce = \"2 N\"\n");
+    let shown = refused(
+        &loaded,
+        &[
+            ("from = \"130 mm\"\n", ""),
+            ("to = \"150 mm\"", "to = \"130 mm\""),
+            ("to = \"150 mm\"", "to = \"450 mm\""),
+            ("force = \"2 N\"", "force = \"0 N\""),
+            ("force = \"2 N\"", "force = \"2 N\"\npressure = 1"),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+}
+
+#[test]
 fn every_key_can_be_said() {
     let text = r#"
         [surface]
@@ -241,6 +290,7 @@ fn every_key_can_be_said() {
         resolution = "1 um"
         gain_error = "5 %"
         offset_error = "2 um"
+        position_error = "0.5 mm"
         range = ["-5 mm", "5 mm"]
         dead = [3]
         [[sensors]]
@@ -274,6 +324,10 @@ fn every_key_can_be_said() {
         channel_unit = ["um", "um", "um", "N", "N"]
         force = 7
         force_unit = "mN"
+        [[load]]
+        from = "130 mm"
+        to = "15 cm"
+        force = "2 N"
     "#;
     insta::assert_debug_snapshot!(Rig::from_toml(text).unwrap());
 }
@@ -310,6 +364,8 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
             training: arm.training.clone(),
             estimator: arm.estimator.clone(),
             recording: None,
+            motion: None,
+            load: None,
         })
     });
     let rigs: Vec<Result<Rig, RigError>> = rigs.collect();

@@ -19,6 +19,8 @@ pub struct ChannelModel {
     pub gain_error: f64,
     /// Offset errors o lie uniformly within ± this; at least 0.
     pub offset_error: f64,
+    /// The sensor sits within ± this of its place, uniformly, along each side of the surface, in metres; at least 0.
+    pub position_error_m: f64,
     /// Lowest and highest value that it can report, where it saturates.
     pub range: Option<(f64, f64)>,
     /// Whether it reports 0 whatever happens.

@@ -10,6 +10,7 @@ const PERFECT: ChannelModel = ChannelModel {
     resolution: 0.0,
     gain_error: 0.0,
     offset_error: 0.0,
+    position_error_m: 0.0,
     range: None,
     dead: false,
 };

@@ -64,3 +64,25 @@ fn what_cannot_be_simulated_is_refused_with_the_reason() {
     ];
     insta::assert_snapshot!(messages.join("\n"));
 }
+
+#[test]
+fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
+    let line = Extent { length_m: 0.4, width_m: None };
+    let mut here = Layout::even(SensorKind::Deflection, 8, 0.4);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    assert_eq!(displaced(&here, line, &mut rng), here);
+    here.sensors[0].position.x_m = 0.0;
+    here.sensors.iter_mut().for_each(|sensor| sensor.channel.position_error_m = 5e-4);
+    let mut moved = Vec::new();
+    for _ in 0..200 {
+        let placed = displaced(&here, line, &mut rng);
+        assert!(placed.sensors[0].position.x_m >= 0.0);
+        moved.extend(
+            placed.sensors[1..].iter().zip(&here.sensors[1..]).map(|(p, h)| p.position.x_m - h.position.x_m),
+        );
+        assert!(placed.sensors.iter().all(|sensor| sensor.position.y_m == 0.0));
+    }
+    let largest = moved.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
+    let mean = moved.iter().sum::<f64>() / moved.len() as f64;
+    assert!(largest <= 5e-4 && largest > 4.9e-4 && mean.abs() < 5e-5, "{largest} {mean}");
+}

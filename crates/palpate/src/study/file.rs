@@ -206,6 +206,8 @@ impl StudyFile {
             training: arm.training.clone().or_else(|| self.training.clone()),
             estimator: self.estimator_of(arm),
             recording: None,
+            motion: None,
+            load: None,
         })?;
         if rig.bench.surface.model().is_none() || rig.bench.force_n.is_none() || rig.training.is_none() {
             return Err(StudyProblem::NotSimulated { arm: name }.at(arm.name.span()));

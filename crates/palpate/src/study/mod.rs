@@ -1,5 +1,6 @@
 //! Experiments in sets: arms, each fitted from many seeds and judged at the same contact positions.
 
+pub mod dead_areas;
 mod file;
 mod networks_csv;
 pub mod paper;

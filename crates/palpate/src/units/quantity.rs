@@ -12,7 +12,7 @@ use super::{Dimension, Unit};
 /// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m; a ratio of 5 % is 0.05).
+    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
     pub value: f64,
     /// What it measures.
     pub dimension: Dimension,
@@ -75,8 +75,22 @@ struct Symbols(Option<Dimension>);
 
 impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Stiffness, Strain};
-        let all = [Length, Force, Modulus, Angle, Strain, Ratio, Density, Stiffness];
+        use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
+        use Dimension::{Frequency, RotationalStiffness, Speed, Stiffness, Time};
+        let all = [
+            Length,
+            Force,
+            Modulus,
+            Angle,
+            Strain,
+            Ratio,
+            Density,
+            Stiffness,
+            RotationalStiffness,
+            Speed,
+            Time,
+            Frequency,
+        ];
         let units =
             all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
         for (i, unit) in units.enumerate() {
@@ -217,9 +231,9 @@ fn readable_unit(quantity: Quantity) -> Option<Unit> {
         return quantity.dimension.units().find(|unit| unit.factor() == 1.0);
     }
     let hidden: &[&str] = if magnitude < 10.0 {
-        &["m", "cm", "deg", "um/m", "mm/m", "g/cm3", "kN/m"]
+        &["m", "cm", "deg", "um/m", "mm/m", "g/cm3"]
     } else {
-        &["cm", "deg", "um/m", "mm/m", "g/cm3", "kN/m"]
+        &["cm", "deg", "um/m", "mm/m", "g/cm3"]
     };
     let mut best = None;
     for unit in quantity.dimension.units().filter(|unit| !hidden.contains(&unit.symbol())) {

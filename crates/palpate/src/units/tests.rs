@@ -25,6 +25,9 @@ fn quantities_are_read_as_people_write_them() {
         ("5 %", 0.05, Dimension::Ratio),
         ("7850 kg/m3", 7850.0, Dimension::Density),
         ("7.85 g/cm3", 7850.0, Dimension::Density),
+        ("2 N/mm", 2000.0, Dimension::Stiffness),
+        ("2 kN/m", 2000.0, Dimension::Stiffness),
+        ("0.5 N·m/rad", 0.5, Dimension::RotationalStiffness),
         ("0.7", 0.7, Dimension::None),
     ];
     for (text, value, dimension) in written {
@@ -73,7 +76,9 @@ fn quantities_are_shown_with_a_readable_prefix() {
         (0.002, Dimension::Angle),
         (0.05, Dimension::Ratio),
         (7850.0, Dimension::Density),
-        (5000.0, Dimension::Stiffness),
+        (2000.0, Dimension::Stiffness),
+        (150.0, Dimension::Stiffness),
+        (0.5, Dimension::RotationalStiffness),
         (0.7, Dimension::None),
     ];
     let shown = shown.map(|(value, dimension)| Quantity { value, dimension }.to_string());
@@ -89,7 +94,9 @@ fn quantities_are_shown_with_a_readable_prefix() {
         "2 mrad",
         "5 %",
         "7850 kg/m3",
-        "5 N/mm",
+        "2 N/mm",
+        "150 N/m",
+        "0.5 Nm/rad",
         "0.7",
     ];
     assert_eq!(shown, expected);

@@ -23,8 +23,16 @@ pub enum Dimension {
     Ratio,
     /// Mass per volume, in kg/m³.
     Density,
-    /// Force per displacement, in N/m.
+    /// Force per length that a spring gives way by, in N/m.
     Stiffness,
+    /// Couple per angle that a spring turns by, in N·m/rad.
+    RotationalStiffness,
+    /// Length per time, in m/s.
+    Speed,
+    /// Time, in seconds.
+    Time,
+    /// How often a second, in hertz.
+    Frequency,
 }
 
 impl Dimension {
@@ -40,6 +48,10 @@ impl Dimension {
             Self::Ratio => "a ratio",
             Self::Density => "a density",
             Self::Stiffness => "a stiffness",
+            Self::RotationalStiffness => "a rotational stiffness",
+            Self::Speed => "a speed",
+            Self::Time => "a time",
+            Self::Frequency => "a frequency",
         }
     }
 
@@ -101,9 +113,19 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("kg/m3", Dimension::Density, Scale::Power(0)),
     ("kg/m³", Dimension::Density, Scale::Power(0)),
     ("N/m", Dimension::Stiffness, Scale::Power(0)),
-    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
     ("kN/m", Dimension::Stiffness, Scale::Power(3)),
-    ("kN/mm", Dimension::Stiffness, Scale::Power(6)),
+    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
+    ("Nm/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("N·m/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("mm/s", Dimension::Speed, Scale::Power(-3)),
+    ("m/s", Dimension::Speed, Scale::Power(0)),
+    ("us", Dimension::Time, Scale::Power(-6)),
+    ("µs", Dimension::Time, Scale::Power(-6)),
+    ("μs", Dimension::Time, Scale::Power(-6)),
+    ("ms", Dimension::Time, Scale::Power(-3)),
+    ("s", Dimension::Time, Scale::Power(0)),
+    ("Hz", Dimension::Frequency, Scale::Power(0)),
+    ("kHz", Dimension::Frequency, Scale::Power(3)),
 ];
 
 /// A unit of measure.

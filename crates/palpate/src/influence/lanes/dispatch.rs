@@ -1,7 +1,7 @@
 //! Picks the widest arithmetic that the machine has, when the program runs.
 
 use super::portable::Array;
-use crate::influence::answer::{Rows, locate_each};
+use crate::influence::batch::{Rows, locate_each};
 use crate::influence::scratch::Scratch;
 use crate::influence::search::Search;
 use palpate_core::Estimate;

@@ -3,7 +3,8 @@
 use super::{fit, noisy, rig};
 use crate::bench::Bench;
 use crate::influence::InfluenceConfig;
-use crate::influence::answer::{NOTHING, Rows};
+use crate::influence::answer::NOTHING;
+use crate::influence::batch::Rows;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;

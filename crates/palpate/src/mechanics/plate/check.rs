@@ -141,10 +141,10 @@ fn check_memory(spec: &PlateSpec) -> Result<(), PlateError> {
 /// a node couples with itself and its eight neighbours; and the solutions that hold the simple supports.
 pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     const NUMBER_BYTES: f64 = 8.0;
+    /// Columns of nearly the same pattern are stored as one block, with zeros: the most numbers for one that couples.
+    const PADDING: f64 = 1.25;
     /// A matrix element is a value and a row, and the library that factors it makes a copy.
     const ELEMENT_BYTES: f64 = 2.0 * (8.0 + 8.0);
-    /// Columns of nearly the same pattern are stored as one block: so many numbers for one that is needed, measured.
-    const PADDING: f64 = 1.15;
     let mesh = Mesh::new(spec.extent(), spec.elements);
     let (columns, rows) = mesh.nodes();
     let pair = (NODE_DEGREES * NODE_DEGREES) as f64;

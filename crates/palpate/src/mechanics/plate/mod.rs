@@ -34,7 +34,7 @@ use solved::Solved;
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
 ///
 /// What was computed is no part of the plate: it is neither compared nor written to files. It stays in memory as long as a
-/// clone lives: some 10 MB for the default mesh, 300 MB for 200 × 200 elements.
+/// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(try_from = "PlateSpec", into = "PlateSpec")]
 pub struct Plate {
@@ -108,6 +108,16 @@ impl Surface for Plate {
 
     fn is_supported_at(&self, position: Position) -> bool {
         check::support_at(&self.spec, position).is_some()
+    }
+
+    fn force_supports(&self) -> Vec<Position> {
+        let mut places: Vec<Position> = self.spec.supports.iter().map(|support| support.position).collect();
+        places.sort_by(|a, b| a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m)));
+        places
+    }
+
+    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
+        self.nothing_to_read(kind, sensor).is_some()
     }
 
     /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force

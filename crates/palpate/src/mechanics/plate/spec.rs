@@ -80,7 +80,7 @@ pub enum PointSupportKind {
 impl PlateSpec {
     /// Elements along the longer side where nothing else is said: the error of deflections is then about 10⁻⁴ of the
     /// largest deflection (docs/plates.md).
-    pub const DEFAULT_ELEMENTS: usize = 48;
+    pub const DEFAULT_ELEMENTS: usize = 128;
 
     /// Flexural rigidity D = E·t³/(12·(1 − ν²)), in N·m.
     pub fn flexural_rigidity(&self) -> f64 {

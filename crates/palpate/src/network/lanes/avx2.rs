@@ -56,12 +56,9 @@ impl Lanes<4> for F64x4 {
     instruction!(mul_add(factor, term) _mm256_fmadd_pd);
     instruction!(mul_sub(factor, term) _mm256_fmsub_pd);
     #[inline(always)]
-    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+    fn power_of_two(self) -> Self {
         // SAFETY: see the head of this file.
-        Self(unsafe {
-            let exponent = _mm256_slli_epi64::<52>(_mm256_castpd_si256(shifted.0));
-            _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(self.0), exponent))
-        })
+        Self(unsafe { _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(self.0))) })
     }
     #[inline(always)]
     fn look_up(table: &Table<f64>, picks: &[u32; 4], values: &mut [Self]) {
@@ -98,12 +95,28 @@ impl Lanes<8> for F32x8 {
     instruction!(mul_add(factor, term) _mm256_fmadd_ps);
     instruction!(mul_sub(factor, term) _mm256_fmsub_ps);
     #[inline(always)]
-    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+    fn power_of_two(self) -> Self {
         // SAFETY: see the head of this file.
-        Self(unsafe {
-            let exponent = _mm256_slli_epi32::<23>(_mm256_castps_si256(shifted.0));
-            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(self.0), exponent))
-        })
+        Self(unsafe { _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(self.0))) })
+    }
+    #[inline(always)]
+    fn transpose(rows: &[[f32; 8]; 8]) -> [Self; 8] {
+        let mut columns = [Self::splat(0.0); 8];
+        for half in 0..2 {
+            // SAFETY: see the head of this file; the loads are unaligned, and each takes one half of one row.
+            unsafe {
+                let part = |k: usize| _mm_loadu_ps(rows[k].as_ptr().add(4 * half));
+                let rows = |k: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(part(k)), part(k + 4));
+                let (low, high) = (|a, b| _mm256_unpacklo_ps(a, b), |a, b| _mm256_unpackhi_ps(a, b));
+                let (ab_low, ab_high) = (low(rows(0), rows(1)), high(rows(0), rows(1)));
+                let (cd_low, cd_high) = (low(rows(2), rows(3)), high(rows(2), rows(3)));
+                columns[4 * half] = Self(_mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low));
+                columns[4 * half + 1] = Self(_mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low));
+                columns[4 * half + 2] = Self(_mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high));
+                columns[4 * half + 3] = Self(_mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high));
+            }
+        }
+        columns
     }
     #[inline(always)]
     fn look_up(table: &Table<f32>, picks: &[u32; 8], values: &mut [Self]) {

@@ -56,12 +56,9 @@ impl Lanes<8> for F64x8 {
     instruction!(mul_add(factor, term) _mm512_fmadd_pd);
     instruction!(mul_sub(factor, term) _mm512_fmsub_pd);
     #[inline(always)]
-    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+    fn power_of_two(self) -> Self {
         // SAFETY: see the head of this file.
-        Self(unsafe {
-            let exponent = _mm512_slli_epi64::<52>(_mm512_castpd_si512(shifted.0));
-            _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(self.0), exponent))
-        })
+        Self(unsafe { _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(self.0))) })
     }
     #[inline(always)]
     fn look_up(table: &Table<f64>, picks: &[u32; 8], values: &mut [Self]) {
@@ -112,12 +109,25 @@ impl Lanes<16> for F32x16 {
     instruction!(mul_add(factor, term) _mm512_fmadd_ps);
     instruction!(mul_sub(factor, term) _mm512_fmsub_ps);
     #[inline(always)]
-    fn scale_by_power_of_two(self, shifted: Self) -> Self {
+    fn power_of_two(self) -> Self {
         // SAFETY: see the head of this file.
-        Self(unsafe {
-            let exponent = _mm512_slli_epi32::<23>(_mm512_castps_si512(shifted.0));
-            _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(self.0), exponent))
-        })
+        Self(unsafe { _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(self.0))) })
+    }
+    #[inline(always)]
+    fn transpose(rows: &[[f32; 8]; 16]) -> [Self; 8] {
+        // SAFETY: see the head of this file; the loads are unaligned, and each takes one of the eight pairs of rows.
+        unsafe {
+            let pair = |k: usize| _mm512_loadu_ps(rows.as_ptr().add(2 * k).cast());
+            let upper = quarters([pair(0), pair(1), pair(2), pair(3)]);
+            let lower = quarters([pair(4), pair(5), pair(6), pair(7)]);
+            // A quarter of a register holds a column's four numbers of every other row.
+            let near = _mm512_setr_epi32(0, 8, 1, 9, 2, 10, 3, 11, 16, 24, 17, 25, 18, 26, 19, 27);
+            let far = _mm512_add_epi32(near, _mm512_set1_epi32(4));
+            std::array::from_fn(|k| {
+                let places = if k < 4 { near } else { far };
+                Self(_mm512_permutex2var_ps(upper[k % 4], places, lower[k % 4]))
+            })
+        }
     }
     #[inline(always)]
     fn look_up(table: &Table<f32>, picks: &[u32; 16], values: &mut [Self]) {
@@ -133,5 +143,25 @@ impl Lanes<16> for F32x16 {
                 *value = Self(_mm512_permutex2var_ps(part(0), picks, part(1)));
             }
         }
+    }
+}
+
+/// Transposes the four squares of 4 × 4 numbers that lie side by side in four registers.
+///
+/// # Safety
+/// The machine must have AVX-512 F.
+#[inline(always)]
+unsafe fn quarters(rows: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: the caller has AVX-512 F.
+    unsafe {
+        let [a, b, c, d] = rows;
+        let (ab_low, ab_high) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+            _mm512_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
     }
 }

@@ -2,6 +2,7 @@
 
 use super::forward::{self, Batch};
 use super::portable::Array;
+use super::single::{self, Four, Layer};
 use super::{Lanes, kernel};
 use crate::network::{SeedQueue, TrainedNetwork, TrainingTask, scalar};
 
@@ -192,7 +193,7 @@ pub(crate) fn forward_lanes(set: InstructionSet, batch: &Batch<f32>, outputs: &m
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
         InstructionSet::Avx2 => unsafe { forward_fma(batch, outputs) },
-        _ => forward::run::<Array<f32, 8, false>, 8>(batch, outputs),
+        _ => forward::run::<Array<f32, 8, false>, 8, 10>(batch, outputs),
     }
 }
 
@@ -201,7 +202,7 @@ pub(crate) fn forward_lanes(set: InstructionSet, batch: &Batch<f32>, outputs: &m
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,fma")]
 unsafe fn forward_avx512(batch: &Batch<f32>, outputs: &mut [f32]) {
-    forward::run::<super::avx512::F32x16, 16>(batch, outputs);
+    forward::run::<super::avx512::F32x16, 16, 8>(batch, outputs);
 }
 
 /// # Safety
@@ -209,5 +210,33 @@ unsafe fn forward_avx512(batch: &Batch<f32>, outputs: &mut [f32]) {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 unsafe fn forward_fma(batch: &Batch<f32>, outputs: &mut [f32]) {
-    forward::run::<super::avx2::F32x8, 8>(batch, outputs);
+    forward::run::<super::avx2::F32x8, 8, 8>(batch, outputs);
+}
+
+/// Sends one reading through the layers of a network; see [`single::run`].
+pub(crate) fn forward_one(layers: &[Layer], inputs: &[f64], outputs: &mut [f64], scratch: &mut [Four]) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the features have just been found.
+        return unsafe { forward_one_avx2(layers, inputs, outputs, scratch) };
+    }
+    forward_one_portable(layers, inputs, outputs, scratch);
+}
+
+/// The twin of [`forward_one`] for every machine.
+pub(crate) fn forward_one_portable(
+    layers: &[Layer],
+    inputs: &[f64],
+    outputs: &mut [f64],
+    scratch: &mut [Four],
+) {
+    single::run::<Array<f64, 4, false>>(layers, inputs, outputs, scratch);
+}
+
+/// # Safety
+/// The machine must have AVX2 and FMA.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+unsafe fn forward_one_avx2(layers: &[Layer], inputs: &[f64], outputs: &mut [f64], scratch: &mut [Four]) {
+    single::run::<super::avx2::F64x4>(layers, inputs, outputs, scratch);
 }

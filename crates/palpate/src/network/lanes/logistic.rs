@@ -28,7 +28,7 @@ fn denominators<V: Lanes<N>, const N: usize, const B: usize>(z: [V; B]) -> [V; B
         }
     }
     for i in 0..B {
-        power[i] = power[i].scale_by_power_of_two(shifted[i]).add(number(1.0));
+        power[i] = power[i].mul_add(shifted[i].power_of_two(), number(1.0));
     }
     power
 }
@@ -49,33 +49,37 @@ fn logistic_block<V: Lanes<N>, const N: usize, const B: usize>(values: &mut [V; 
     }
 }
 
-#[inline(always)]
-fn logistic<V: Lanes<N>, const N: usize>(values: &mut [V]) {
-    let (blocks, rest) = values.as_chunks_mut::<BLOCK>();
-    for block in blocks {
-        logistic_block(block);
-    }
-    let (pairs, rest) = rest.as_chunks_mut::<2>();
-    for pair in pairs {
-        logistic_block(pair);
-    }
-    for single in rest.as_chunks_mut::<1>().0 {
-        logistic_block(single);
-    }
-}
-
 /// Replaces a layer's weighted sums by its outputs.
 #[inline(always)]
 pub(crate) fn activate<V: Lanes<N>, const N: usize>(activation: Activation, values: &mut [V]) {
+    let (blocks, rest) = values.as_chunks_mut::<BLOCK>();
+    for block in blocks {
+        activate_block(activation, block);
+    }
+    let (pairs, rest) = rest.as_chunks_mut::<2>();
+    for pair in pairs {
+        activate_block(activation, pair);
+    }
+    for single in rest.as_chunks_mut::<1>().0 {
+        activate_block(activation, single);
+    }
+}
+
+/// [`activate`] for B sums, in step.
+#[inline(always)]
+pub(super) fn activate_block<V: Lanes<N>, const N: usize, const B: usize>(
+    activation: Activation,
+    values: &mut [V; B],
+) {
     let one = V::splat(V::Real::from_f64(1.0));
     match activation {
-        Activation::Logistic => logistic(values),
+        Activation::Logistic => logistic_block(values),
         Activation::Tanh => {
             // tanh(z) = 2 σ(2z) − 1
             for value in values.iter_mut() {
                 *value = value.add(*value);
             }
-            logistic(values);
+            logistic_block(values);
             for value in values.iter_mut() {
                 *value = value.add(*value).sub(one);
             }

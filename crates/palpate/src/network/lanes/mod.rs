@@ -15,16 +15,20 @@ mod kernel;
 mod logistic;
 mod order;
 mod portable;
+mod single;
 
+#[cfg(test)]
+pub(super) use dispatch::forward_one_portable;
 pub use dispatch::{InstructionSet, Precision};
-pub(super) use dispatch::{forward_lanes, train_lanes, train_scalar};
+pub(super) use dispatch::{forward_lanes, forward_one, train_lanes, train_scalar};
 pub(super) use forward::Batch;
 pub(super) use logistic::{activate, derivative};
 pub(super) use order::{OrderDrawer, Streams};
+pub(super) use single::Layer;
 
 /// The number in one lane.
 pub(crate) trait Real: Copy + PartialOrd + Send + Sync + 'static {
-    /// Adding then subtracting it rounds to a whole number, whose low bits then lie lowest in the sum: 1.5·2^mantissa.
+    /// Adding then subtracting it rounds to a whole number n; the sum's low bits are then the exponent of 2^n: 1.5·2^mantissa + bias.
     const ROUNDER: Self;
     /// Coefficients of the minimax polynomial of 2^r on |r| ≤ ½ (Remez, relative error), lowest first.
     const EXP2: &'static [Self];
@@ -35,7 +39,7 @@ pub(crate) trait Real: Copy + PartialOrd + Send + Sync + 'static {
 }
 
 impl Real for f64 {
-    const ROUNDER: Self = 6_755_399_441_055_744.0;
+    const ROUNDER: Self = 6_755_399_441_056_767.0;
     // Relative error 1.4e-14.
     const EXP2: &'static [Self] = &[
         1.000_000_000_000_012_7,
@@ -61,7 +65,7 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
-    const ROUNDER: Self = 12_582_912.0;
+    const ROUNDER: Self = 12_583_039.0;
     // Relative error 7.5e-8.
     const EXP2: &'static [Self] =
         &[1.000_000_1, 0.693_146_94, 0.240_221_2, 0.055_507_13, 0.009_675_541, 0.001_327_647_2];
@@ -92,8 +96,21 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self · factor − term`
     fn mul_sub(self, factor: Self, term: Self) -> Self;
-    /// `self · 2^n`, where `shifted` = n + [`Real::ROUNDER`] and the result is a normal number.
-    fn scale_by_power_of_two(self, shifted: Self) -> Self;
+    /// 2^n of `self` = n + [`Real::ROUNDER`], where that is a normal number.
+    fn power_of_two(self) -> Self;
+    /// Turns N rows of eight numbers into one register a column.
+    #[inline(always)]
+    fn transpose(rows: &[[Self::Real; 8]; N]) -> [Self; 8] {
+        let mut columns = [Self::splat(rows[0][0]); 8];
+        for (k, column) in columns.iter_mut().enumerate() {
+            let mut lanes = [rows[0][0]; N];
+            for l in 0..N {
+                lanes[l] = rows[l][k];
+            }
+            *column = Self::from_array(lanes);
+        }
+        columns
+    }
     /// For every column of the table, the value of each lane's pick, of which only the low bits count.
     fn look_up(table: &Table<Self::Real>, picks: &[u32; N], values: &mut [Self]);
 }

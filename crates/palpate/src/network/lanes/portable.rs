@@ -76,10 +76,8 @@ macro_rules! array_lanes {
                 }
             }
             #[inline(always)]
-            fn scale_by_power_of_two(self, shifted: Self) -> Self {
-                each_lane!(self.0, l => <$real>::from_bits(
-                    self.0[l].to_bits().wrapping_add(shifted.0[l].to_bits() << $shift)
-                ))
+            fn power_of_two(self) -> Self {
+                each_lane!(self.0, l => <$real>::from_bits(self.0[l].to_bits() << $shift))
             }
             #[inline(always)]
             fn look_up(table: &Table<$real>, picks: &[u32; N], values: &mut [Self]) {

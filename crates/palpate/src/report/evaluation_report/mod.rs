@@ -195,10 +195,12 @@ impl EvaluationReport<'_> {
 
     fn surface_in_words(&self) -> String {
         let extent = self.bench().surface.extent();
-        let kind = match self.bench().surface {
-            SurfaceSpec::Beam(_) => "beam",
-            SurfaceSpec::Plate(_) => "plate",
-            SurfaceSpec::Measured(_) => "measured, without a model",
+        let kind = match &self.bench().surface {
+            SurfaceSpec::Beam(_) => "beam".to_owned(),
+            SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
+            SurfaceSpec::Plate(_) => "plate".to_owned(),
+            SurfaceSpec::Digit(_) => "flexible digit".to_owned(),
+            SurfaceSpec::Measured(_) => "measured, without a model".to_owned(),
         };
         let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));
         format!("{kind}, {} mm{width}", mm(extent.length_m))

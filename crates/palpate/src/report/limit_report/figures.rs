@@ -5,7 +5,8 @@ use maud::{Markup, html};
 use super::LimitReport;
 use crate::limit::{Bound, LimitCurve, LimitWarning};
 use crate::mechanics::SurfaceSpec;
-use crate::report::beam_drawing::beam_drawing;
+use crate::report::beam_drawing::{beam_drawing, supported_beam_drawing};
+use crate::report::digit_figures::{force_limit_figure, linear_theory_figures, shapes_figure};
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
@@ -17,11 +18,22 @@ const LOGARITHMIC_FROM: f64 = 10.0;
 const MOST_LENGTHS: f64 = 10.0;
 
 pub(super) fn bench_figure(report: &LimitReport) -> Result<Option<Figure>, ReportError> {
-    let SurfaceSpec::Beam(beam) = &report.bench.surface else { return Ok(None) };
-    let (svg, load) = beam_drawing(beam, &report.bench.layout, report.known.force_n)?;
+    let (layout, force_n) = (&report.bench.layout, report.known.force_n);
+    let (drawn, beam, solution) = match &report.bench.surface {
+        SurfaceSpec::Beam(beam) => {
+            (beam_drawing(beam, layout, force_n), "a beam on two wedges".to_owned(), "in closed form")
+        }
+        SurfaceSpec::SupportedBeam(beam) => {
+            let words = format!("a beam, {},", beam.spec().supports_in_words());
+            (supported_beam_drawing(beam, layout, force_n), words, "as beam theory has it exactly")
+        }
+        SurfaceSpec::Digit(digit) => return Ok(Some(shapes_figure(digit, layout, force_n))),
+        SurfaceSpec::Plate(_) | SurfaceSpec::Measured(_) => return Ok(None),
+    };
+    let (svg, load) = drawn?;
     let caption = html! {
-        "The bench: a beam on two wedges and " (counted(report.bench.layout.len(), "sensor", "sensors")) ", with "
-        (stated(report.known.force_n)) " N at " (mm(load.x_m)) " mm. Blue: the bent beam, in closed form."
+        "The bench: " (beam) " and " (counted(layout.len(), "sensor", "sensors")) ", with "
+        (stated(force_n)) " N at " (mm(load.x_m)) " mm. Blue: the bent beam, " (solution) "."
     };
     let alternative = "The bench: beam, supports, sensors and load".to_owned();
     Ok(Some(Figure { number: 1, alternative, svg, caption }))
@@ -55,6 +67,14 @@ pub(super) fn limit_figure(report: &LimitReport) -> Figure {
         }
     };
     Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+}
+
+/// What only a digit has: the limit of the force, and how far the linear theory goes.
+pub(super) fn digit_figures(report: &LimitReport) -> Vec<Figure> {
+    let SurfaceSpec::Digit(digit) = &report.bench.surface else { return Vec::new() };
+    let mut figures = vec![force_limit_figure(report.unknown, 3)];
+    figures.extend(linear_theory_figures(report.bench, report.limit, digit, 4));
+    figures
 }
 
 fn values(series: &[Series]) -> impl Iterator<Item = f64> + '_ {

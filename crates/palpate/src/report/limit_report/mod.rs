@@ -40,7 +40,11 @@ pub struct LimitReport<'a> {
 /// # Errors
 /// [`ReportError`] when the bench cannot be drawn or a figure does not become a picture.
 pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError> {
-    let figures: Vec<_> = figures::bench_figure(report)?.into_iter().chain([report.limit_figure()]).collect();
+    let mut figures: Vec<_> =
+        figures::bench_figure(report)?.into_iter().chain([report.limit_figure()]).collect();
+    let further = figures::digit_figures(report);
+    let numbers: Vec<usize> = further.iter().map(|figure| figure.number).collect();
+    figures.extend(further);
     let figures = Figures(figures);
     let section = |id, heading, body| Section { id, heading, body };
     let page = Page {
@@ -51,7 +55,10 @@ pub fn limit_report(report: &LimitReport) -> Result<Vec<ReportFile>, ReportError
             section(
                 "limit",
                 if report.is_plane() { "The limit over the surface" } else { "The limit along the surface" },
-                html! { (figures.show(2)) (report.limit_table(1)) },
+                html! {
+                    (figures.show(2)) (report.limit_table(1))
+                    @for number in numbers { (figures.show(number)) }
+                },
             ),
             section("warnings", "What this bench cannot tell", report.warnings_in_words()),
             section("meaning", "What the limit means", meaning()),

@@ -15,6 +15,7 @@ fn bench(sensors: usize, load_mm: f64, width_px: u32) -> BenchDrawing {
         supports: [0.0, length_mm]
             .map(|position_mm| BenchSupport { position_mm, kind: BenchSupportKind::Simple })
             .to_vec(),
+        steps: Vec::new(),
         sensors_mm: (1..=sensors).map(|i| i as f64 * length_mm / (sensors + 1) as f64).collect(),
         load_mm,
         load_label: "3 N".into(),
@@ -61,6 +62,24 @@ fn cases() -> Vec<(String, BenchDrawing)> {
         ),
         ("metres", BenchDrawing { deflection_mm: scaled(1000.0), ..base() }),
         ("micrometres", BenchDrawing { deflection_mm: scaled(1e-4), ..base() }),
+        (
+            "every support, and steps",
+            BenchDrawing {
+                supports: [
+                    (0.0, BenchSupportKind::Clamped),
+                    (100.0, BenchSupportKind::Guided),
+                    (200.0, BenchSupportKind::Elastic),
+                    (300.0, BenchSupportKind::Clamped),
+                    (400.0, BenchSupportKind::Guided),
+                ]
+                .map(|(position_mm, kind)| BenchSupport { position_mm, kind })
+                .to_vec(),
+                steps: [(150.0, 2.0), (300.0, 0.1), (400.0, 1.0)]
+                    .map(|(to_mm, thickness_mm)| BenchStep { to_mm, thickness_mm })
+                    .to_vec(),
+                ..base()
+            },
+        ),
         (
             "deepest at the end",
             BenchDrawing { deflection_mm: vec![(0.0, 0.0), (200.0, -1.0), (400.0, -5.0)], ..base() },

@@ -2,6 +2,7 @@
 
 mod bench;
 mod charts;
+mod dead_areas;
 mod pages;
 mod parts;
 

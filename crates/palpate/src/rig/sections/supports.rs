@@ -11,18 +11,28 @@ use crate::rig::value::{RawPosition, RawQuantity};
 
 /// `supports`: one word for all, or a list
 #[derive(Clone, Debug)]
-pub(crate) enum SupportsSection {
+pub(crate) enum SupportsKey {
     Word(String),
-    List(Vec<Spanned<SupportSection>>),
+    List(Vec<Spanned<SupportKeys>>),
 }
 
 /// One of `supports`
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SupportSection {
+#[serde(deny_unknown_fields, expecting = "a support such as { at = \"0 mm\", kind = \"clamped\" }")]
+pub(crate) struct SupportKeys {
     pub at: Key<RawPosition>,
     pub kind: Key<String>,
     pub stiffness: Key<RawQuantity>,
+    pub rotational_stiffness: Key<RawQuantity>,
+}
+
+/// One of `sections` of a beam
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a section such as { to = \"100 mm\", thickness = \"2 mm\" }")]
+pub(crate) struct BeamSectionKeys {
+    pub to: Key<RawQuantity>,
+    pub width: Key<RawQuantity>,
+    pub thickness: Key<RawQuantity>,
 }
 
 /// `edges`: one word for all, or one for each
@@ -42,27 +52,27 @@ pub(crate) struct EachEdge {
     pub top: Key<String>,
 }
 
-impl<'de> Deserialize<'de> for SupportsSection {
+impl<'de> Deserialize<'de> for SupportsKey {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct WordOrList;
 
         impl<'de> Visitor<'de> for WordOrList {
-            type Value = SupportsSection;
+            type Value = SupportsKey;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a word such as \"simple\", or a list of supports")
             }
 
-            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<SupportsSection, E> {
-                Ok(SupportsSection::Word(word.to_owned()))
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<SupportsKey, E> {
+                Ok(SupportsKey::Word(word.to_owned()))
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SupportsSection, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SupportsKey, A::Error> {
                 let mut supports = Vec::new();
                 while let Some(support) = seq.next_element()? {
                     supports.push(support);
                 }
-                Ok(SupportsSection::List(supports))
+                Ok(SupportsKey::List(supports))
             }
         }
 

@@ -6,11 +6,11 @@ use toml::Spanned;
 
 use super::places::{grid_sides, place};
 use crate::arrangement::{Arrangement, ArrangementError};
-use crate::mechanics::Extent;
+use crate::mechanics::{Digit, Extent, SurfaceSpec};
 use crate::rig::Training;
 use crate::rig::error::{RigError, RigProblem};
-use crate::rig::sections::{ContactSection, TrainingSection};
-use crate::rig::value::{choice, count, positive, quantity};
+use crate::rig::sections::{ContactSection, RigSections, TrainingSection};
+use crate::rig::value::{RawQuantity, choice, count, positive, quantity};
 use crate::units::Dimension;
 
 /// More training positions, or presses of one position, than anyone makes.
@@ -20,6 +20,28 @@ const MOST_BOUND: &str = "at least 1 and at most 100000";
 pub(super) fn validate_force(section: Option<&Spanned<ContactSection>>) -> Result<Option<f64>, RigError> {
     let force = section.and_then(|section| section.get_ref().force.as_ref());
     force.map(|force| positive("force", force, Dimension::Force)).transpose()
+}
+
+/// A digit's model goes as far as a load of [`Digit::MOST_LOAD`] at the tip.
+pub(super) fn check_forces(
+    sections: &RigSections,
+    surface: &SurfaceSpec,
+    contact_n: Option<f64>,
+    training: Option<&Training>,
+) -> Result<(), RigError> {
+    let SurfaceSpec::Digit(digit) = surface else { return Ok(()) };
+    let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
+    let contact = sections.contact.as_ref().and_then(|section| section.get_ref().force.as_ref());
+    let press = sections.training.as_ref().and_then(|section| section.get_ref().force.as_ref());
+    let check = |raw: Option<&Spanned<RawQuantity>>, force_n: Option<f64>| match (raw, force_n) {
+        (Some(raw), Some(force_n)) if force_n > most_n => {
+            let value = raw.get_ref().to_string();
+            Err(RigProblem::TooMuchForce { value, most_n }.at(raw.span()))
+        }
+        _ => Ok(()),
+    };
+    check(contact, contact_n)?;
+    check(press, training.and_then(|training| training.force_n))
 }
 
 #[derive(Clone, Copy)]

@@ -4,6 +4,7 @@ use toml::Spanned;
 
 use crate::centroid::CentroidConfig;
 use crate::closed_form::ClosedFormConfig;
+use crate::digit::{DigitConfig, DigitTheory};
 use crate::estimator::EstimatorConfig;
 use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::{InfluenceConfig, InfluenceSource};
@@ -49,8 +50,9 @@ pub(super) fn validate(
     let kind = keys.kind.as_ref().map_or(Ok("network"), |kind| choice("kind", kind, &known))?;
     let (with, of_kind): (_, &[&str]) = match kind {
         "influence" => ("kind = \"influence\"", &["from", "contacts", "force_sd"]),
+        "digit" => ("kind = \"digit\"", &["theory"]),
         "network" => ("kind = \"network\"", &NETWORK_KEYS),
-        _ => ("a kind other than \"network\" and \"influence\"", &[]),
+        _ => ("a kind other than \"network\", \"influence\" and \"digit\"", &[]),
     };
     if let Some((key, span)) = keys.present().into_iter().find(|(key, _)| !of_kind.contains(key)) {
         return Err(RigProblem::UnusedKey { key, with }.at(span));
@@ -60,11 +62,19 @@ pub(super) fn validate(
         "network-lm" => Ok(EstimatorConfig::NetworkLm(LevenbergMarquardtConfig::default())),
         "gaussian-process" => Ok(EstimatorConfig::GaussianProcess(GaussianProcessConfig::default())),
         "closed-form" => Ok(EstimatorConfig::ClosedForm(ClosedFormConfig)),
+        "digit" => digit(keys).map(EstimatorConfig::Digit),
         "neighbours" => Ok(EstimatorConfig::Neighbours(NeighboursConfig::default())),
         "centroid" => Ok(EstimatorConfig::Centroid(CentroidConfig)),
         "auto" => Ok(EstimatorConfig::Auto),
         _ => network(keys, layout).map(EstimatorConfig::Network),
     }
+}
+
+fn digit(keys: &EstimatorSection) -> Result<DigitConfig, RigError> {
+    let theories = [("exact", DigitTheory::Exact), ("linear", DigitTheory::Linear)];
+    let theory =
+        keys.theory.as_ref().map_or(Ok(DigitTheory::default()), |raw| choice("theory", raw, &theories))?;
+    Ok(DigitConfig { theory })
 }
 
 fn influence(keys: &EstimatorSection, force_n: Option<f64>) -> Result<InfluenceConfig, RigError> {

@@ -3,9 +3,12 @@
 mod columns;
 mod contact;
 mod estimator;
+mod load;
+mod motion;
 mod places;
 mod plate;
 mod sensors;
+mod supported_beam;
 mod surface;
 
 use crate::bench::Bench;
@@ -31,6 +34,7 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     if let (Some(training), None, true) = (&sections.training, pressed_n, simulated) {
         return Err(RigProblem::NoForce.at(training.span()));
     }
+    contact::check_forces(sections, &surface, force_n, training.as_ref())?;
     if let (Some(section), Some(training)) = (&sections.training, &training) {
         let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());
         if values > MOST_VALUES {
@@ -38,7 +42,9 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
         }
     }
     let estimator = estimator::validate(sections.estimator.as_ref(), &layout, force_n)?;
+    let loads = load::validate(sections.load.as_deref(), &surface)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
-    Ok(Rig { bench, training, estimator })
+    let motion = motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface)?;
+    Ok(Rig { bench, training, estimator, loads, motion })
 }

@@ -9,7 +9,7 @@ use crate::contact::Position;
 use crate::mechanics::plate::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
 use crate::mechanics::{Plate, PlateError};
 use crate::rig::error::{RigError, RigProblem};
-use crate::rig::sections::{EdgesSection, SupportSection, SupportsSection, SurfaceSection};
+use crate::rig::sections::{EdgesSection, SupportKeys, SupportsKey, SurfaceSection};
 use crate::rig::value::{RawPosition, RawQuantity, choice, count, number, positive, quantity};
 use crate::units::Dimension;
 
@@ -58,10 +58,10 @@ fn edges(section: Option<&Spanned<EdgesSection>>) -> Result<Edges, RigError> {
     }
 }
 
-fn supports(section: &Spanned<SupportsSection>) -> Result<Vec<PointSupport>, RigError> {
+fn supports(section: &Spanned<SupportsKey>) -> Result<Vec<PointSupport>, RigError> {
     match section.get_ref() {
-        SupportsSection::List(list) => list.iter().map(support).collect(),
-        SupportsSection::Word(word) => {
+        SupportsKey::List(list) => list.iter().map(support).collect(),
+        SupportsKey::Word(word) => {
             let (value, bound) = (word.clone(), "a list of points on a plate; its edges are held by `edges`");
             Err(RigProblem::OutOfRange { key: "supports", value, bound }.at(section.span()))
         }
@@ -74,10 +74,14 @@ enum Kind {
     Elastic,
 }
 
-fn support(section: &Spanned<SupportSection>) -> Result<PointSupport, RigError> {
+fn support(section: &Spanned<SupportKeys>) -> Result<PointSupport, RigError> {
     let keys = section.get_ref();
     let missing = |key| RigProblem::MissingKey { section: "surface.supports", key }.at(section.span());
     let position = point(keys.at.as_ref().ok_or_else(|| missing("at"))?)?;
+    if let Some(rotational) = &keys.rotational_stiffness {
+        let problem = RigProblem::UnusedKey { key: "rotational_stiffness", with: "a plate" };
+        return Err(problem.at(rotational.span()));
+    }
     let kinds = [("simple", Kind::Simple), ("elastic", Kind::Elastic)];
     let kind = match choice("kind", keys.kind.as_ref().ok_or_else(|| missing("kind"))?, &kinds)? {
         Kind::Simple => match &keys.stiffness {
@@ -119,7 +123,7 @@ fn point(raw: &Spanned<RawPosition>) -> Result<Position, RigError> {
 fn culprit(section: &Spanned<SurfaceSection>, error: PlateError) -> Range<usize> {
     let keys = section.get_ref();
     let support = |number: usize| match keys.supports.as_ref().map(Spanned::get_ref) {
-        Some(SupportsSection::List(list)) => list.get(number - 1).map(Spanned::span),
+        Some(SupportsKey::List(list)) => list.get(number - 1).map(Spanned::span),
         _ => None,
     };
     let place = match error {

@@ -72,6 +72,9 @@ impl Context<'_> {
     fn append(&self, sensors: &mut Vec<Sensor>) -> Result<(), RigError> {
         let measure = self.section.measure.as_ref().ok_or_else(|| self.missing("measure"))?;
         let kind = choice("measure", measure, &SensorKind::ALL.map(|kind| (kind.name(), kind)))?;
+        if kind != SensorKind::Strain && matches!(self.surface, SurfaceSpec::Digit(_)) {
+            return Err(RigProblem::NotAGauge { kind }.at(measure.span()));
+        }
         if kind == SensorKind::Raw && self.surface.model().is_some() {
             return Err(RigProblem::RawOnModel.at(measure.span()));
         }
@@ -100,7 +103,7 @@ impl Context<'_> {
             (None, Some(raw), None) => {
                 let [columns, rows] = grid_sides(raw, extent, MOST, "at least 1 and at most 10000 in all")?;
                 let positions = inner_grid(extent, columns, rows);
-                self.check_supported(kind, &positions, |_| raw.span())?;
+                self.check_places(kind, &positions, |_| raw.span())?;
                 Ok(positions)
             }
             // Where a raw channel is means nothing.
@@ -110,7 +113,7 @@ impl Context<'_> {
             (Some(raw), None, None) => {
                 let count = count("count", raw, 1..=MOST, MOST_BOUND)?;
                 let positions: Vec<_> = even_positions(count, extent.length_m).collect();
-                self.check_supported(kind, &positions, |_| raw.span())?;
+                self.check_places(kind, &positions, |_| raw.span())?;
                 Ok(positions)
             }
             (None, None, None) => match (self.channel_count, kind) {
@@ -140,14 +143,14 @@ impl Context<'_> {
             return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of 1 to 10000" }
                 .at(listed.span()));
         }
-        self.check_supported(kind, &positions, |i| {
+        self.check_places(kind, &positions, |i| {
             listed.get_ref().get(i).map_or(listed.span(), Spanned::span)
         })?;
         Ok(positions)
     }
 
-    /// A sensor must have something to read, and a reaction sensor of a modelled surface sit at a support.
-    fn check_supported(
+    /// Under a modelled surface a reaction sensor must sit at a support, and the others where something moves.
+    fn check_places(
         &self,
         kind: SensorKind,
         positions: &[Position],
@@ -161,14 +164,19 @@ impl Context<'_> {
                 return Err(RigProblem::NothingToRead { number: i + 1, reason }.at(span(i)));
             }
         }
-        let (Some(surface), SensorKind::Reaction) = (self.surface.model(), kind) else { return Ok(()) };
-        let extent = surface.extent();
-        match positions.iter().position(|position| !surface.is_supported_at(*position)) {
-            Some(i) => {
-                Err(RigProblem::NoSupport { number: i + 1, position: positions[i], extent }.at(span(i)))
+        let Some(surface) = self.surface.model() else { return Ok(()) };
+        for (i, position) in positions.iter().enumerate() {
+            let (number, x_m, extent) = (i + 1, position.x_m, surface.extent());
+            if kind == SensorKind::Reaction && !surface.is_supported_at(*position) {
+                let supports = surface.force_supports();
+                let problem = RigProblem::NoSupport { number, position: *position, supports, extent };
+                return Err(problem.at(span(i)));
             }
-            None => Ok(()),
+            if surface.never_moves(kind, *position) {
+                return Err(RigProblem::NeverMoves { number, kind, x_m }.at(span(i)));
+            }
         }
+        Ok(())
     }
 
     fn channel(&self, kind: SensorKind) -> Result<ChannelModel, RigError> {
@@ -185,9 +193,21 @@ impl Context<'_> {
             resolution: size("resolution", &self.section.resolution)?,
             gain_error,
             offset_error: size("offset_error", &self.section.offset_error)?,
+            position_error_m: self.position_error(kind)?,
             range: self.range(dimension)?,
             dead: false,
         })
+    }
+
+    /// A reaction sensor is part of its support, and a raw channel's place means nothing.
+    fn position_error(&self, kind: SensorKind) -> Result<f64, RigError> {
+        let Some(raw) = &self.section.position_error else { return Ok(0.0) };
+        let unused = |with| Err(RigProblem::UnusedKey { key: "position_error", with }.at(raw.span()));
+        match kind {
+            SensorKind::Reaction => unused("measure = \"reaction\""),
+            SensorKind::Raw => unused("measure = \"raw\""),
+            _ => not_negative("position_error", raw, Dimension::Length),
+        }
     }
 
     fn range(&self, dimension: Dimension) -> Result<Option<(f64, f64)>, RigError> {

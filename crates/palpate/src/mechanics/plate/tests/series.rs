@@ -41,8 +41,7 @@ fn clamping(terms: usize, right_side: impl Fn(f64) -> f64) -> f64 {
     let order: Vec<f64> = odd(terms).collect();
     let mut moments = vec![0.0; terms];
     for _ in 0..60 {
-        for r in 0..terms {
-            let i = order[r];
+        for (r, i) in order.iter().copied().enumerate() {
             let others: f64 = (0..terms).filter(|c| *c != r).map(|c| mixed(i, order[c]) * moments[c]).sum();
             moments[r] = (right_side(i) - others) / (mixed(i, i) + own(i));
         }

@@ -1,0 +1,350 @@
+//! `palpate track`: a moving contact, line by line or smoothed.
+
+use crate::failure::{Complaint, Failure};
+use crate::table::table;
+use crate::{input, interrupt, output};
+use palpate::contact::Contact;
+use palpate::estimator::{Locator, SmoothTracker, Track, Tracker, TrackerConfig};
+use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
+use palpate::recording::{CsvError, TimedParser, TimedReading};
+use palpate::report::{TrackReport, track_report};
+use std::fs::File;
+use std::io::{BufRead, BufReader, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// Follow a moving contact: readings in time in (a CSV file, or stdin), the track out.
+///
+/// Time comes from a column `time_s` or from --rate. Where the file has the true contacts, the errors are said at the
+/// end, on stderr.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// An influence locator of a surface with a model
+    locator: PathBuf,
+    /// The readings; `-` or nothing for stdin
+    readings: Option<PathBuf>,
+    /// Readings a second, where no column `time_s` tells the time
+    #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
+    rate: Option<f64>,
+    /// Go back over the whole recording: nothing is printed before its end
+    #[arg(long)]
+    smooth: bool,
+    /// The surface's first natural frequency: reckon with its inertia
+    #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
+    frequency: Option<f64>,
+    /// A rig with [motion]: its natural frequency is taken, and a report shows the errors of its motion at other speeds
+    #[arg(long, value_name = "RIG", conflicts_with = "frequency")]
+    rig: Option<PathBuf>,
+    /// Seed of the simulations with other speeds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Print one JSON object a line instead of CSV
+    #[arg(long)]
+    json: bool,
+    /// Folder for a report
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let locator = input::read_locator(&arguments.locator)?;
+    let tracking = locator
+        .tracking()
+        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
+    let rig = arguments.rig.as_deref().map(input::read_rig).transpose()?;
+    let swings = rig.as_ref().and_then(|rig| rig.motion).map(|moving| moving.beam.frequency_hz(1));
+    let config =
+        TrackerConfig { natural_frequency_hz: arguments.frequency.or(swings), ..TrackerConfig::default() };
+    let keeps = arguments.smooth || arguments.report.is_some();
+    let follower = if keeps {
+        Follower::Smoother(SmoothTracker::new(tracking.likelihood(), config))
+    } else {
+        Follower::Filter(Tracker::new(tracking.likelihood(), config))
+    };
+    let mut stream = Stream {
+        arguments,
+        follower,
+        name: String::new(),
+        lines: 0,
+        lost: 0,
+        times: 0,
+        numbers: Vec::new(),
+        seen: Seen::default(),
+    };
+    stream.run(&locator)?;
+    let (filtered, smoothed) = stream.finish()?;
+    stream.say_errors(&filtered, &smoothed);
+    if let Some(folder) = &arguments.report {
+        let sweep = match &rig {
+            Some(rig) => sweep_speeds(&locator, config, rig, arguments.seed).map_err(Complaint::new)?,
+            None => Vec::new(),
+        };
+        stream.report(folder, &locator, (&filtered, &smoothed), &sweep)?;
+    }
+    match stream.lost {
+        0 => Ok(()),
+        lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", stream.lines))),
+    }
+}
+
+/// What takes the readings.
+enum Follower<'a> {
+    Filter(Tracker<'a>),
+    Smoother(SmoothTracker<'a>),
+}
+
+/// The true contacts so far.
+#[derive(Default)]
+struct Seen {
+    truths: Vec<Contact>,
+    /// Of the filter, where it is not the smoother that keeps them and there is a truth to compare them with.
+    tracks: Vec<Track>,
+}
+
+struct Stream<'a> {
+    arguments: &'a Arguments,
+    follower: Follower<'a>,
+    name: String,
+    lines: u64,
+    /// Rows that gave no estimate.
+    lost: u64,
+    /// Readings so far, skipped ones too: --rate counts them.
+    times: u64,
+    /// The line of each track.
+    numbers: Vec<u64>,
+    seen: Seen,
+}
+
+impl Stream<'_> {
+    fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
+        let mut source = self.open()?;
+        let columns = locator.bench.recording_columns();
+        let mut parser = TimedParser::new(&self.name, locator.bench.schema(&columns));
+        let mut out = std::io::stdout().lock();
+        if !self.arguments.json {
+            output::print(&mut out, HEADING.as_bytes())?;
+        }
+        let mut line = Vec::new();
+        while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
+            match parser.parse_line(&line) {
+                Ok(None) => {}
+                Ok(Some(reading)) => self.follow(&reading, &mut out)?,
+                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
+                Err(error) => self.skip(&error),
+            }
+            if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
+                let complaint = Complaint::new(format!("{} has no column `time_s`", self.name));
+                return Err(complaint.help("--rate says how many readings there are a second").into());
+            }
+        }
+        if parser.awaits_columns() {
+            let complaint = Complaint::new(format!("{} holds no reading", self.name));
+            return Err(complaint.help("it must begin with a header").into());
+        }
+        Ok(())
+    }
+
+    fn open(&mut self) -> Result<Box<dyn BufRead>, Failure> {
+        let path = self.arguments.readings.as_deref().unwrap_or(Path::new("-"));
+        if path == Path::new("-") {
+            if std::io::stdin().is_terminal() {
+                eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
+            }
+            self.name = "stdin".to_owned();
+            return Ok(Box::new(std::io::stdin().lock()));
+        }
+        self.name = path.display().to_string();
+        let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
+        Ok(Box::new(BufReader::new(file)))
+    }
+
+    /// Reads the next line; false at the end.
+    fn read_line(&mut self, source: &mut Box<dyn BufRead>, line: &mut Vec<u8>) -> Result<bool, Failure> {
+        line.clear();
+        let read = source.read_until(b'\n', line);
+        let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
+        self.lines += u64::from(read > 0);
+        Ok(read > 0)
+    }
+
+    fn follow(&mut self, reading: &TimedReading, out: &mut impl Write) -> Result<(), Failure> {
+        let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
+        let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
+        self.times += 1;
+        let track = match &mut self.follower {
+            Follower::Filter(tracker) => tracker.follow(time_s, &reading.reading).map(Some),
+            Follower::Smoother(tracker) => tracker.follow(time_s, &reading.reading).map(|()| None),
+        };
+        let track = match track {
+            Ok(track) => track,
+            Err(error) => {
+                self.lost += 1;
+                eprintln!("palpate: skipped line {}: {error}", self.lines);
+                return Ok(());
+            }
+        };
+        self.seen.truths.extend(reading.truth);
+        let Some(track) = track else {
+            self.numbers.push(self.lines);
+            return Ok(());
+        };
+        self.print(&track, self.lines, out)?;
+        if reading.truth.is_some() {
+            self.seen.tracks.push(track);
+        }
+        // A reader at the other end of a pipe wants each estimate now.
+        out.flush().map_err(|_| Failure::NobodyReads)
+    }
+
+    /// The filter's tracks and the smoother's, and prints those that were kept back.
+    fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
+        let Follower::Smoother(tracker) = &self.follower else {
+            return Ok((std::mem::take(&mut self.seen.tracks), Vec::new()));
+        };
+        let filtered = tracker.filtered().to_vec();
+        let smoothed = if self.arguments.smooth { tracker.smoothed() } else { Vec::new() };
+        let mut out = std::io::stdout().lock();
+        let shown = if self.arguments.smooth { &smoothed } else { &filtered };
+        for (track, line) in shown.iter().zip(&self.numbers) {
+            self.print(track, *line, &mut out)?;
+        }
+        Ok((filtered, smoothed))
+    }
+
+    fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
+        let line = if self.arguments.json { json(track, line)? } else { csv(track) };
+        output::print(out, line.as_bytes())
+    }
+
+    fn skip(&mut self, error: &CsvError) {
+        self.lost += 1;
+        eprintln!("palpate: skipped: {error}");
+    }
+
+    /// The errors of both, where the truth is known.
+    fn errors(&self, filtered: &[Track], smoothed: &[Track]) -> Vec<(&'static str, TrackErrors)> {
+        let truths = &self.seen.truths;
+        let of = |name, tracks: &[Track]| {
+            let known = !tracks.is_empty() && tracks.len() == truths.len();
+            let errors = if known { TrackErrors::of(tracks, truths) } else { None };
+            errors.map(|errors| (name, errors))
+        };
+        [of("filter", filtered), of("smoother", smoothed)].into_iter().flatten().collect()
+    }
+
+    fn say_errors(&self, filtered: &[Track], smoothed: &[Track]) {
+        let errors = self.errors(filtered, smoothed);
+        if errors.is_empty() {
+            return;
+        }
+        let row = |(name, errors): &(&'static str, TrackErrors)| {
+            let mm = |error_m: f64| format!("{:.3}", error_m * 1e3);
+            let percent = |share: f64| format!("{:.1}", share * 100.0);
+            vec![
+                (*name).to_owned(),
+                errors.tracked.to_string(),
+                mm(errors.track_m),
+                mm(errors.single_m),
+                format!("{:.2}", errors.ratio()),
+                percent(errors.track_covered),
+                percent(errors.single_covered),
+            ]
+        };
+        let heading =
+            ["average error, mm", "readings", "track", "single", "ratio", "covered, %", "single, %"];
+        eprintln!("{}", table(&heading, errors.iter().map(row)));
+    }
+
+    fn report(
+        &self,
+        folder: &Path,
+        locator: &Locator,
+        (filtered, smoothed): (&[Track], &[Track]),
+        sweep: &[SpeedErrors],
+    ) -> Result<(), Failure> {
+        output::make_folder(folder)?;
+        let (tracks, how) = if smoothed.is_empty() { (filtered, "filter") } else { (smoothed, "smoother") };
+        let known = self.seen.truths.len() == tracks.len();
+        let report = TrackReport {
+            title: &format!("A contact followed through {}", self.name),
+            source: &self.name,
+            length_m: locator.bench.surface.extent().length_m,
+            tracks,
+            how,
+            truths: if known { &self.seen.truths } else { &[] },
+            errors: &self.errors(filtered, smoothed),
+            sweep,
+        };
+        for file in track_report(&report).map_err(Complaint::new)? {
+            output::write_file(&folder.join(&file.name), &file.bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// The columns of [`csv`]; without a contact, all but the first and the last are empty.
+const HEADING: &str = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching\n";
+
+fn csv(track: &Track) -> String {
+    let contact = track.tracked.map_or_else(
+        || ",,,,".to_owned(),
+        |tracked| {
+            let (low_m, high_m) = tracked.x_95_m;
+            format!(
+                "{:.4},{:.4},{:.4},{:.4},{:.4}",
+                tracked.x_m * 1e3,
+                tracked.speed_m_per_s,
+                tracked.force_n,
+                low_m * 1e3,
+                high_m * 1e3
+            )
+        },
+    );
+    format!("{},{contact},{:.4}\n", track.time_s, track.touching)
+}
+
+/// A track as JSON.
+#[derive(serde::Serialize)]
+struct JsonTrack {
+    line: u64,
+    time_s: f64,
+    touching: f64,
+    #[serde(flatten)]
+    contact: Option<JsonContact>,
+    single_mm: f64,
+    single_status: &'static str,
+}
+
+#[derive(serde::Serialize)]
+struct JsonContact {
+    x_mm: f64,
+    speed_m_per_s: f64,
+    force_n: f64,
+    x_95_mm: [f64; 2],
+    sd_mm: f64,
+    sd_speed_m_per_s: f64,
+    sd_force_n: f64,
+}
+
+fn json(track: &Track, line: u64) -> Result<String, Failure> {
+    let contact = track.tracked.map(|tracked| {
+        let ([sd_m, sd_speed_m_per_s, sd_force_n], (low_m, high_m)) = (tracked.sd, tracked.x_95_m);
+        JsonContact {
+            x_mm: tracked.x_m * 1e3,
+            speed_m_per_s: tracked.speed_m_per_s,
+            force_n: tracked.force_n,
+            x_95_mm: [low_m * 1e3, high_m * 1e3],
+            sd_mm: sd_m * 1e3,
+            sd_speed_m_per_s,
+            sd_force_n,
+        }
+    });
+    let object = JsonTrack {
+        line,
+        time_s: track.time_s,
+        touching: track.touching,
+        contact,
+        single_mm: track.alone.contact.position.x_m * 1e3,
+        single_status: track.alone.status.name(),
+    };
+    serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+}

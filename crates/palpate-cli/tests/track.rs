@@ -1,0 +1,86 @@
+//! `palpate track` from outside, on the example of a moving load.
+#![forbid(unsafe_code)]
+
+mod support {
+    pub mod command;
+}
+
+use serde_json::Value;
+use std::fs;
+use support::command::{complained, run, said};
+use tempfile::TempDir;
+
+const RIG: &str = include_str!("../../../examples/moving-load.toml");
+
+/// A folder with a locator and a recording of the example.
+fn moved() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let told =
+        said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
+    assert!(told.contains("17.17 Hz") && told.contains("13.73 m/s"), "{told}");
+    folder
+}
+
+/// The numbers of a row of the errors that are said at the end.
+fn row(stderr: &[u8], name: &str) -> Vec<f64> {
+    let text = String::from_utf8_lossy(stderr).into_owned();
+    let line = text.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{text}"));
+    line.split_whitespace().skip(1).map(|cell| cell.parse().unwrap()).collect()
+}
+
+#[test]
+fn the_example_s_track_is_closer_than_its_readings() {
+    let folder = moved();
+    let output = run(
+        folder.path(),
+        &["track", "locator.json", "moving.csv", "--rig", "rig.toml", "--smooth", "--report", "page"],
+    );
+    let told = said(&output);
+    assert_eq!(told.lines().next(), Some("time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching"));
+    let readings = fs::read_to_string(folder.path().join("moving.csv")).unwrap().lines().count() - 2;
+    assert_eq!(told.lines().count() - 1, readings);
+    let (filter, smoother) = (row(&output.stderr, "filter"), row(&output.stderr, "smoother"));
+    assert!(filter[3] >= 2.5, "{filter:?}");
+    assert!(smoother[3] >= 4.0, "{smoother:?}");
+    assert!((90.0..99.0).contains(&filter[4]), "{filter:?}");
+    for name in ["report.html", "figure-1.png", "figure-2.png", "figure-3.svg"] {
+        assert!(folder.path().join("page").join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn rows_that_cannot_be_followed_are_skipped_and_counted() {
+    let folder = moved();
+    let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    let mut lines: Vec<String> = csv.lines().take(8).map(str::to_owned).collect();
+    // Again the time of the line before, and a field that is no number.
+    lines[5] = lines[5].replacen("0.003,", "0.002,", 1);
+    lines[6] = lines[6].replacen("0.004,", "soon,", 1);
+    fs::write(folder.path().join("bad.csv"), lines.join("\n") + "\n").unwrap();
+    let output = run(folder.path(), &["track", "locator.json", "bad.csv", "--json"]);
+    let complaint = complained(&output, 3);
+    assert!(complaint.contains("2 of 8 lines gave no estimate"), "{complaint}");
+    let told: Vec<Value> = String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(told.len(), 4);
+    assert!((told[3]["x_mm"].as_f64().unwrap() - 50.0).abs() < 2.0, "{}", told[3]);
+}
+
+#[test]
+fn what_cannot_be_tracked_is_refused_in_words() {
+    let folder = moved();
+    said(&run(folder.path(), &["simulate", "rig.toml", "-o", "presses.csv"]));
+    let without_time = complained(&run(folder.path(), &["track", "locator.json", "presses.csv"]), 2);
+    assert!(without_time.contains("--rate"), "{without_time}");
+    said(&run(folder.path(), &["track", "locator.json", "presses.csv", "--rate", "100 Hz"]));
+    let network = RIG.replacen("\"influence\"", "\"neighbours\"", 1);
+    fs::write(folder.path().join("other.toml"), network).unwrap();
+    said(&run(folder.path(), &["fit", "other.toml", "-o", "other.json"]));
+    let other = complained(&run(folder.path(), &["track", "other.json", "moving.csv"]), 2);
+    assert!(other.contains("kind `neighbours`"), "{other}");
+}

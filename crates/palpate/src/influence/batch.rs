@@ -1,0 +1,97 @@
+//! Many readings, eight at a time.
+//!
+//! One reading alone is a chain: its misfits, its valleys, a place, sums over channels, a division, the next place. The
+//! machine waits for each. Of eight readings the chains run side by side: all that is done once a reading, places,
+//! divisions and the sums over channels, is done for eight readings in one register, by the code and with the order of
+//! sums that one reading has, so the estimates are the same to the last bit. A reading that needs more than the lowest
+//! of its valleys, or more than a few steps, goes through the search for one reading.
+//!
+//! Where the time goes, by sampling: about four tenths into what is still done reading by reading, the scan of coarse
+//! nodes, its valleys and where to start in them; about a quarter into the refinement of a known force, a third into that
+//! of an unknown one; the rest into whitening and writing estimates.
+
+use super::answer::{conclude, locate_into};
+use super::lanes::{Abreast, Eight};
+use super::scratch::{ForEight, Scratch};
+use super::search::{Minimum, NEGLIGIBLE, Search};
+use palpate_core::Estimate;
+
+/// Readings one after the other, of so many channels each.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub readings: &'a [f64],
+    pub channels: usize,
+}
+
+/// Steps that eight readings take together; a reading that is not at its minimum then would keep the others waiting.
+const MOST_STEPS: usize = 4;
+
+/// Writes the estimate of one contact for each row.
+#[inline(always)]
+pub(super) fn locate_each<V: Eight>(
+    search: &Search,
+    rows: Rows,
+    scratch: &mut Scratch,
+    estimates: &mut [Estimate],
+) {
+    let channels = rows.channels.max(1);
+    let count = estimates.len().min(rows.readings.len() / channels);
+    let eights = count - count % 8;
+    let (readings, rest) = rows.readings.split_at(eights * channels);
+    let (estimates, last) = estimates.split_at_mut(eights);
+    for (readings, estimates) in readings.chunks_exact(8 * channels).zip(estimates.as_chunks_mut().0) {
+        locate_eight::<V>(search, Rows { readings, channels }, scratch, estimates);
+    }
+    for (reading, estimate) in rest.chunks_exact(channels).zip(last) {
+        locate_into::<V>(search, reading, scratch, estimate);
+    }
+}
+
+/// Writes the estimates of eight readings.
+#[inline(always)]
+fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate; 8]) {
+    let groups = search.groups();
+    scratch.eight.resize(groups);
+    let ForEight { whitened, profiles } = &mut scratch.eight;
+    let [mut squares, mut places_m, mut forces_n, mut floors] = [[0.0; 8]; 4];
+    let readings = rows.readings.chunks_exact(rows.channels);
+    for (i, (reading, profile)) in readings.clone().zip(&mut *profiles).enumerate() {
+        let whitened = &mut whitened[i * groups..][..groups];
+        squares[i] = search.whiten::<V>(reading, whitened);
+        let lowest = search.lowest_valley::<V>(squares[i], whitened, profile);
+        floors[i] = f64::NEG_INFINITY;
+        if let Some((start, floor)) = lowest {
+            (places_m[i], forces_n[i], floors[i]) = (start.x_m, start.force_n, floor);
+        }
+    }
+    let start = (V::load(&places_m), V::load(&forces_n));
+    let (minima, arrived) = search.refine::<V, V>(whitened, start, MOST_STEPS);
+    let minima = one_by_one(&minima);
+    let mut hard = !arrived;
+    for i in 0..8 {
+        if floors[i] > minima[i].misfit + NEGLIGIBLE {
+            conclude(search, squares[i], &minima[i..=i], &profiles[i], &mut estimates[i]);
+        } else {
+            hard |= 1 << i;
+        }
+    }
+    for (i, reading) in readings.enumerate() {
+        if hard >> i & 1 == 1 {
+            locate_into::<V>(search, reading, scratch, &mut estimates[i]);
+        }
+    }
+}
+
+/// The minima of eight readings, reading by reading.
+#[inline(always)]
+fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
+    let [xx, xf, ff] = minima.covariance;
+    let (xx, xf, ff) = (xx.lanes(), xf.lanes(), ff.lanes());
+    let (x_m, force_n, misfit) = (minima.x_m.lanes(), minima.force_n.lanes(), minima.misfit.lanes());
+    let mut each = [Minimum::<f64>::nowhere(); 8];
+    for i in 0..8 {
+        let covariance = [xx[i], xf[i], ff[i]];
+        each[i] = Minimum { x_m: x_m[i], force_n: force_n[i], misfit: misfit[i], covariance };
+    }
+    each
+}

@@ -1,0 +1,172 @@
+//! The flexible digit: a thin cantilever finger with strain gauges, after Ma and his colleagues.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Elastica, Extent, ForceDirection, InfluenceFunction, ResponseFunction, ResponseGradient, Surface,
+};
+use crate::contact::{Contact, Position};
+use crate::sensing::SensorKind;
+
+/// A straight finger of rectangular section, clamped at x = 0 and free at x = l, that bends as far as a force bends it.
+///
+/// It is read by strain gauges. For small forces they are proportional to the force, and that is its [`Surface`]; for any
+/// force they are those of its [`Elastica`]. Positions are counted along the finger, so a contact keeps its position when
+/// the finger bends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Digit {
+    /// Length l from the clamp to the tip, in metres.
+    pub length_m: f64,
+    /// Width of the section, in metres.
+    pub width_m: f64,
+    /// Thickness t of the section, in metres.
+    pub thickness_m: f64,
+    /// Young's modulus E, in pascals.
+    pub youngs_modulus_pa: f64,
+    /// Where the contact's force points.
+    pub direction: ForceDirection,
+}
+
+/// Why a digit cannot be computed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DigitError {
+    /// A dimension is not a positive, finite number.
+    #[error("a digit's {name} is {value}; it must be greater than 0 and finite")]
+    NotPositive {
+        /// Which: "length", "width", "thickness" or "youngs_modulus".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// The force that bends it markedly, E·I/l², is not a positive, finite number.
+    #[error("a digit's characteristic force E·I/l² is {force_n} N; it must be greater than 0 and finite")]
+    Stiffness {
+        /// E·I/l², in newtons.
+        force_n: f64,
+    },
+}
+
+impl Digit {
+    /// The largest load F·s²/(E·I) of a contact that palpate looks for: where the founding tables of the bent cantilever
+    /// end. A vertical load of 10 turns the contact by 82°, a normal one by 157°.
+    pub const MOST_LOAD: f64 = 10.0;
+
+    /// Checks that every dimension is positive and finite, and that the stiffness is so too.
+    ///
+    /// # Errors
+    /// [`DigitError`], with the name and value of the first dimension that is not.
+    pub fn validate(&self) -> Result<(), DigitError> {
+        let dimensions = [
+            ("length", self.length_m),
+            ("width", self.width_m),
+            ("thickness", self.thickness_m),
+            ("youngs_modulus", self.youngs_modulus_pa),
+        ];
+        for (name, value) in dimensions {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(DigitError::NotPositive { name, value });
+            }
+        }
+        let force_n = self.characteristic_force_n();
+        let compliance = 1.0 / force_n;
+        if force_n > 0.0 && force_n.is_finite() && compliance.is_finite() {
+            Ok(())
+        } else {
+            Err(DigitError::Stiffness { force_n })
+        }
+    }
+
+    /// Bending stiffness E·I in N·m², with I = width·t³/12.
+    pub fn bending_stiffness(&self) -> f64 {
+        self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
+    }
+
+    /// The force at the tip whose load F·l²/(E·I) is 1, in newtons: up to a tenth of it the finger is linear within 1 %.
+    pub fn characteristic_force_n(&self) -> f64 {
+        self.bending_stiffness() / (self.length_m * self.length_m)
+    }
+
+    /// The finger's exact shape when it is touched at `contact`.
+    pub fn shape(&self, contact: Contact) -> Elastica {
+        Elastica::new(self.direction, self.bending_stiffness(), contact.position.x_m, contact.force_n)
+    }
+
+    /// Strain on the lower face per downward curvature, in metres: −t/2. A downward force stretches the upper face.
+    pub fn strain_per_curvature_m(&self) -> f64 {
+        -0.5 * self.thickness_m
+    }
+}
+
+/// One gauge on a [`Digit`]; 0 for any other kind of sensor, which rigs refuse.
+#[derive(Clone, Copy, Debug)]
+struct Gauge<'a> {
+    digit: &'a Digit,
+    /// −t/2, or 0 for another kind.
+    strain_per_curvature_m: f64,
+    at_m: f64,
+}
+
+/// Small forces: the curvature per newton at a is (a − x)/(E·I) before the contact, and 0 beyond.
+impl InfluenceFunction for Gauge<'_> {
+    fn at(&self, contact: Position) -> f64 {
+        let lever_m = (contact.x_m - self.at_m).max(0.0);
+        self.strain_per_curvature_m * lever_m / self.digit.bending_stiffness()
+    }
+
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        let seen = if contact.x_m >= self.at_m { 1.0 } else { 0.0 };
+        [self.strain_per_curvature_m * seen / self.digit.bending_stiffness(), 0.0]
+    }
+}
+
+/// Any force.
+impl ResponseFunction for Gauge<'_> {
+    fn at(&self, contact: Contact) -> f64 {
+        self.strain_per_curvature_m * self.digit.shape(contact).curvature(self.at_m)
+    }
+
+    fn gradient(&self, contact: Contact) -> ResponseGradient {
+        let [along, force] = self.digit.shape(contact).curvature_gradient(self.at_m);
+        let scale = self.strain_per_curvature_m;
+        ResponseGradient { position: [scale * along, 0.0], force: scale * force }
+    }
+}
+
+impl Digit {
+    fn gauge(&self, kind: SensorKind, sensor: Position) -> Gauge<'_> {
+        let is_gauge = kind == SensorKind::Strain;
+        let strain_per_curvature_m = if is_gauge { self.strain_per_curvature_m() } else { 0.0 };
+        Gauge { digit: self, strain_per_curvature_m, at_m: sensor.x_m }
+    }
+}
+
+impl Surface for Digit {
+    fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
+        Arc::new(self.gauge(kind, sensor))
+    }
+
+    fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
+        Arc::new(self.gauge(kind, sensor))
+    }
+
+    fn is_supported_at(&self, _: Position) -> bool {
+        false
+    }
+
+    /// Strain t·l/(2·E·I), at the clamp for a force at the tip.
+    fn full_scale(&self, kind: SensorKind) -> f64 {
+        match kind {
+            SensorKind::Strain => 0.5 * self.thickness_m * self.length_m / self.bending_stiffness(),
+            _ => 0.0,
+        }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent { length_m: self.length_m, width_m: None }
+    }
+}
+
+#[cfg(test)]
+mod tests;

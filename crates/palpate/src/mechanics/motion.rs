@@ -1,0 +1,132 @@
+//! A contact that goes to and fro.
+
+use std::f64::consts::PI;
+
+use crate::contact::{Contact, Position};
+
+/// A contact that moves between two places of a line and back, as often as is said.
+///
+/// A pass starts and ends at rest. Its speed builds up and falls as (1 − cos)/2 over `turn_m` at either end, so that it has
+/// no jump in the acceleration, and is constant between: a turn of length s at speed v takes 2s/v and accelerates by
+/// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`, and lets go and comes down over `touch_s` each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Where the first pass starts, in metres.
+    pub from_m: f64,
+    /// Where it ends, in metres; not where it starts.
+    pub to_m: f64,
+    /// The constant speed between the turns, in m/s; greater than 0.
+    pub speed_m_per_s: f64,
+    /// Length of the turn at either end, in metres; greater than 0, at most half the way.
+    pub turn_m: f64,
+    /// How often the way is gone, there or back; at least 1.
+    pub passes: usize,
+    /// How long nothing touches between two passes, in seconds; 0 to keep touching.
+    pub lifted_s: f64,
+    /// How long the force takes to fall or build up beside that, in seconds; means nothing where `lifted_s` is 0.
+    pub touch_s: f64,
+}
+
+impl Motion {
+    /// How long it takes, in seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.passes as f64 * self.pass_s() + (self.passes - 1) as f64 * self.rest_s()
+    }
+
+    /// The contact at `time_s`, held to the first and the last moment; its force, in newtons, is `force_n` or, while it is
+    /// lifted, less.
+    pub fn contact_at(&self, time_s: f64, force_n: f64) -> Contact {
+        let time_s = time_s.clamp(0.0, self.duration_s());
+        let cycle_s = self.pass_s() + self.rest_s();
+        let pass = ((time_s / cycle_s).floor() as usize).min(self.passes - 1);
+        let since_s = time_s - pass as f64 * cycle_s;
+        let way = self.way_m(since_s.min(self.pass_s())) / self.length_m();
+        let share = if pass.is_multiple_of(2) { way } else { 1.0 - way };
+        Contact {
+            position: Position::along(self.from_m + share * (self.to_m - self.from_m)),
+            force_n: force_n * self.pressed(since_s - self.pass_s()),
+        }
+    }
+
+    fn length_m(&self) -> f64 {
+        (self.to_m - self.from_m).abs()
+    }
+
+    /// How long a turn takes.
+    fn turn_s(&self) -> f64 {
+        2.0 * self.turn_m / self.speed_m_per_s
+    }
+
+    fn pass_s(&self) -> f64 {
+        2.0 * self.turn_s() + (self.length_m() - 2.0 * self.turn_m) / self.speed_m_per_s
+    }
+
+    fn rest_s(&self) -> f64 {
+        if self.lifted_s > 0.0 { self.lifted_s + 2.0 * self.touch_s } else { 0.0 }
+    }
+
+    /// How far a pass has come.
+    fn way_m(&self, since_s: f64) -> f64 {
+        let (turn_s, left_s) = (self.turn_s(), self.pass_s() - since_s);
+        let turning = |t: f64| 0.5 * self.speed_m_per_s * (t - turn_s / PI * (PI * t / turn_s).sin());
+        if since_s < turn_s {
+            turning(since_s)
+        } else if left_s < turn_s {
+            self.length_m() - turning(left_s.max(0.0))
+        } else {
+            self.turn_m + self.speed_m_per_s * (since_s - turn_s)
+        }
+    }
+
+    /// The share of the force at a time after the end of a pass: it falls, is 0, and builds up, each as (1 ± cos)/2.
+    fn pressed(&self, rest_s: f64) -> f64 {
+        if rest_s <= 0.0 || self.lifted_s <= 0.0 {
+            return 1.0;
+        }
+        let to_edge_s = rest_s.min(self.rest_s() - rest_s);
+        if to_edge_s >= self.touch_s { 0.0 } else { 0.5 * (1.0 + (PI * to_edge_s / self.touch_s).cos()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOTION: Motion = Motion {
+        from_m: 0.35,
+        to_m: 0.05,
+        speed_m_per_s: 0.5,
+        turn_m: 0.05,
+        passes: 3,
+        lifted_s: 0.3,
+        touch_s: 0.1,
+    };
+
+    #[test]
+    fn it_goes_there_and_back_and_is_lifted_between() {
+        // A pass takes 0.2 s of turns twice and 0.4 s between them, a rest 0.5 s.
+        assert!((MOTION.duration_s() - (3.0 * 0.8 + 2.0 * 0.5)).abs() < 1e-12);
+        let at = |time_s: f64| {
+            let Contact { position, force_n } = MOTION.contact_at(time_s, 3.0);
+            format!("{:.1} mm {force_n:.2} N", position.x_m * 1e3)
+        };
+        let told = [-1.0, 0.2, 0.4, 0.8, 0.85, 1.05, 1.3, 1.5, 2.1, 9.0].map(at);
+        insta::assert_snapshot!(told.join(", "), @"350.0 mm 3.00 N, 300.0 mm 3.00 N, 200.0 mm 3.00 N, 50.0 mm 3.00 N, 50.0 mm 1.50 N, 50.0 mm 0.00 N, 50.0 mm 3.00 N, 100.0 mm 3.00 N, 350.0 mm 3.00 N, 50.0 mm 3.00 N");
+    }
+
+    #[test]
+    fn its_speed_and_acceleration_stay_within_their_bounds() {
+        let touching = Motion { lifted_s: 0.0, ..MOTION };
+        let (h, most) = (1e-4, PI * 0.25 / (4.0 * 0.05));
+        let x = |time_s: f64| touching.contact_at(time_s, 1.0).position.x_m;
+        for i in 1..(touching.duration_s() / h) as i32 {
+            let t = h * f64::from(i);
+            let (speed, acceleration) =
+                ((x(t + h) - x(t - h)) / (2.0 * h), (x(t + h) - 2.0 * x(t) + x(t - h)) / (h * h));
+            assert!(
+                speed.abs() <= 0.5 + 1e-9 && acceleration.abs() <= most + 0.05,
+                "{t}: {speed} {acceleration}"
+            );
+        }
+    }
+}

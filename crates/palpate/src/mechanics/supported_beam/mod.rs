@@ -1,0 +1,226 @@
+//! A straight beam on any supports, with steps of its section, after Euler and Bernoulli: exact everywhere.
+//!
+//! Between its ends, supports and section steps an unloaded beam is bent into cubics. So is an influence function: by the
+//! theorems of Betti and Maxwell, what a sensor reads of a unit force at a is the deflection at a that a disturbance at the
+//! sensor causes. For a sensor at s these are
+//!
+//! | sensor | disturbance |
+//! |---|---|
+//! | deflection y(s) | a unit force downward |
+//! | slope y'(s) | a unit couple |
+//! | strain (t/2)·y''(s) | a kink of −t/(2·E·I) |
+//! | reaction of a support at s | the ground under it rises by 1 |
+//!
+//! What the beam admits to the left and to the right of the sensor is known once for all sensors (see `sweep`); fitting the
+//! two together is one system of six equations a sensor, and its answer is the whole influence function, with its gradient.
+
+mod check;
+mod error;
+mod peak;
+mod response;
+mod shape;
+mod spec;
+mod state;
+mod sweep;
+mod words;
+
+pub use error::{BeamPart, RigidMotion, SupportedBeamError};
+pub use spec::{BeamSection, BeamSupport, BeamSupportKind, SupportedBeamSpec};
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, InfluenceFunction, Surface};
+use crate::contact::Position;
+use crate::sensing::SensorKind;
+use check::SAME_PLACE;
+use response::{Disturbance, Site, Structure};
+use shape::Shape;
+use state::State;
+use sweep::{Element, Hold};
+
+/// Influences below this share of full scale are 0 but for rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// A beam on any supports, ready to be asked for influence functions.
+///
+/// Signs are those of the simply supported [`Beam`](super::Beam). At a section step, and at a support that takes up a couple,
+/// the curvature jumps: a strain sensor there is on the right of it, at the beam's right end on the left.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "SupportedBeamSpec", into = "SupportedBeamSpec")]
+pub struct SupportedBeam {
+    spec: SupportedBeamSpec,
+    structure: Structure,
+    /// The largest bending stiffness D, in N·m².
+    stiffness_nm2: f64,
+    /// Of every kind of sensor, in the order of [`SensorKind::ALL`].
+    full_scales: [f64; SensorKind::ALL.len()],
+}
+
+impl SupportedBeam {
+    /// Checks the description and solves the beam as far as all sensors share.
+    ///
+    /// # Errors
+    /// [`SupportedBeamError`], for the first thing that is wrong.
+    pub fn new(spec: SupportedBeamSpec) -> Result<Self, SupportedBeamError> {
+        spec.check()?;
+        let stiffnesses = spec.sections.iter().map(|s| s.bending_stiffness(spec.youngs_modulus_pa));
+        let stiffness_nm2 = stiffnesses.fold(0.0, f64::max);
+        let structure = structure(&spec, stiffness_nm2);
+        let mut beam = Self { spec, structure, stiffness_nm2, full_scales: [0.0; SensorKind::ALL.len()] };
+        beam.full_scales = SensorKind::ALL.map(|kind| beam.largest_influence(kind));
+        let good = |kind: SensorKind| {
+            let largest = beam.full_scale(kind);
+            kind == SensorKind::Raw || (largest > 0.0 && largest.is_finite())
+        };
+        if SensorKind::ALL.into_iter().all(good) {
+            Ok(beam)
+        } else {
+            let compliance_m_per_n = beam.full_scale(SensorKind::Deflection);
+            Err(SupportedBeamError::Compliance { compliance_m_per_n })
+        }
+    }
+
+    /// The description.
+    pub fn spec(&self) -> &SupportedBeamSpec {
+        &self.spec
+    }
+
+    /// Where a sensor of this kind sits, and the disturbance there whose shape is its influence function; `None` where it
+    /// reads nothing that a model explains.
+    fn disturbance(&self, kind: SensorKind, site: Site) -> Option<Disturbance> {
+        let (l, stiffness) = (self.spec.length_m, self.stiffness_nm2);
+        match kind {
+            SensorKind::Deflection => Some(Disturbance::Jump(State::SHEAR * -(l.powi(3) / stiffness))),
+            SensorKind::Slope => Some(Disturbance::Jump(State::MOMENT * (l * l / stiffness))),
+            SensorKind::Strain => {
+                let Element { stiffness: share, thickness_m, .. } = self.structure.elements[site.element];
+                Some(Disturbance::Jump(State::SLOPE * -(0.5 * thickness_m * l / (share * stiffness))))
+            }
+            SensorKind::Reaction => {
+                let held = self.structure.hold_at(site)?.yielding.is_some();
+                held.then_some(Disturbance::Settlement)
+            }
+            SensorKind::Raw => None,
+        }
+    }
+
+    fn shape_at(&self, kind: SensorKind, site: Site) -> Shape {
+        match self.disturbance(kind, site) {
+            Some(disturbance) => self.structure.shape(site, disturbance),
+            None => self.structure.unbent(),
+        }
+    }
+
+    fn shape(&self, kind: SensorKind, sensor: Position) -> Shape {
+        self.shape_at(kind, self.structure.site(sensor.x_m / self.spec.length_m))
+    }
+
+    fn largest_influence(&self, kind: SensorKind) -> f64 {
+        let elements = self.structure.elements.iter().enumerate();
+        let peak = |element, offset| self.shape_at(kind, Site { element, offset }).peak();
+        let of_element = |(i, element): (usize, &Element)| match kind {
+            SensorKind::Raw => 0.0,
+            // Reactions are felt at the nodes only.
+            SensorKind::Reaction => peak(i, 0.0).max(peak(i, element.length)),
+            _ => peak::largest(element.length, |offset| peak(i, offset)),
+        };
+        // The total order keeps a NaN, which `new` refuses.
+        elements.map(of_element).max_by(f64::total_cmp).unwrap_or(f64::NAN)
+    }
+}
+
+impl Surface for SupportedBeam {
+    fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
+        Arc::new(self.shape(kind, sensor))
+    }
+
+    fn is_supported_at(&self, position: Position) -> bool {
+        let slack_m = SAME_PLACE * self.spec.length_m;
+        let here = |support: &BeamSupport| (support.at_m - position.x_m).abs() <= slack_m;
+        self.spec.supports.iter().any(|support| support.kind.takes_force() && here(support))
+    }
+
+    fn force_supports(&self) -> Vec<Position> {
+        let takers = self.spec.supports.iter().filter(|support| support.kind.takes_force());
+        let mut places: Vec<Position> = takers.map(|support| Position::along(support.at_m)).collect();
+        places.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        places
+    }
+
+    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
+        let negligible = ROUNDING * self.full_scale(kind);
+        kind != SensorKind::Raw && self.shape(kind, sensor).peak() <= negligible
+    }
+
+    /// Over contact positions exact, as the extremes of cubics; over sensor positions by a scan of every element and golden
+    /// section, to rounding. Found once, when the beam is made.
+    fn full_scale(&self, kind: SensorKind) -> f64 {
+        let known = SensorKind::ALL.into_iter().zip(self.full_scales);
+        known.into_iter().find(|(other, _)| *other == kind).map_or(0.0, |(_, full_scale)| full_scale)
+    }
+
+    fn extent(&self) -> Extent {
+        Extent { length_m: self.spec.length_m, width_m: None }
+    }
+}
+
+impl TryFrom<SupportedBeamSpec> for SupportedBeam {
+    type Error = SupportedBeamError;
+
+    fn try_from(spec: SupportedBeamSpec) -> Result<Self, SupportedBeamError> {
+        Self::new(spec)
+    }
+}
+
+impl From<SupportedBeam> for SupportedBeamSpec {
+    fn from(beam: SupportedBeam) -> Self {
+        beam.spec
+    }
+}
+
+/// Nodes at the ends, supports and section steps, and the stretches between them.
+fn structure(spec: &SupportedBeamSpec, stiffness_nm2: f64) -> Structure {
+    let l = spec.length_m;
+    let places = spec.sections.iter().map(|section| section.to_m);
+    let places = places.chain(spec.supports.iter().map(|support| support.at_m));
+    let mut nodes: Vec<f64> = places.map(|x_m| x_m / l).collect();
+    nodes.retain(|place| (SAME_PLACE..=1.0 - SAME_PLACE).contains(place));
+    nodes.extend([0.0, 1.0]);
+    nodes.sort_by(f64::total_cmp);
+    nodes.dedup_by(|next, before| *next - *before <= SAME_PLACE);
+    let hold = |place: &f64| {
+        let here = |support: &&BeamSupport| (support.at_m / l - place).abs() <= SAME_PLACE;
+        spec.supports
+            .iter()
+            .find(here)
+            .map_or(Hold::default(), |support| hold(support.kind, l, stiffness_nm2))
+    };
+    let element = |ends: &[f64]| {
+        let middle_m = 0.5 * (ends[0] + ends[1]) * l;
+        let covering = spec.sections.iter().find(|section| section.to_m >= middle_m);
+        let section = covering.or(spec.sections.last())?;
+        let stiffness = section.bending_stiffness(spec.youngs_modulus_pa) / stiffness_nm2;
+        Some(Element { length: ends[1] - ends[0], stiffness, thickness_m: section.thickness_m })
+    };
+    let elements = nodes.windows(2).filter_map(element).collect();
+    let holds = nodes.iter().map(hold).collect();
+    Structure::new(l, nodes, holds, elements)
+}
+
+/// Compliances in the states' unit: a force of 1 N makes V jump by l³/D, a couple of 1 N·m makes M jump by l²/D, and
+/// the slope there is l times that of the beam.
+fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
+    let rigid = |takes: bool| takes.then_some(0.0);
+    match kind {
+        BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } => Hold {
+            yielding: Some(stiffness_nm2 / (stiffness_n_per_m * l.powi(3))),
+            turning: rotational_stiffness_nm_per_rad.map(|stiffness| stiffness_nm2 / (stiffness * l)),
+        },
+        _ => Hold { yielding: rigid(kind.takes_force()), turning: rigid(kind.takes_couple()) },
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! Recordings of contacts that move: a `time_s` column beside the others.
+//!
+//! Whoever reads such a file as an ordinary recording passes the column over, as any column without a role.
+
+use std::io::{self, Write};
+
+use super::Recording;
+use super::cells::Cells;
+use super::columns::{Column, Columns, Header};
+use super::csv_error::CsvError;
+use super::csv_in::{ContactFields, Schema};
+use super::csv_out::{header, record};
+use super::reading_parser::{ChannelFields, is_passed_over, utf8, without_mark};
+use crate::contact::Contact;
+use crate::mechanics::Extent;
+use crate::units::Unit;
+
+/// The column of time, in seconds.
+const TIME: &str = "time_s";
+
+/// A recording with the time of every row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedRecording {
+    /// The rows; a force of 0 says that nothing touched.
+    pub recording: Recording,
+    /// When each was taken, in seconds.
+    pub times_s: Vec<f64>,
+}
+
+/// Writes a recording as [`write`](super::write) does, with the time first.
+///
+/// # Errors
+/// Whatever `out` reports.
+pub fn write_timed(
+    timed: &TimedRecording,
+    extent: Extent,
+    comment: &str,
+    mut out: impl Write,
+) -> io::Result<()> {
+    let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
+    let timed_record = |time: String, rest: Vec<String>| std::iter::once(time).chain(rest);
+    writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
+    let mut csv = csv::Writer::from_writer(out);
+    csv.write_record(timed_record(TIME.to_owned(), header(&columns)))?;
+    for (row, time_s) in timed.recording.rows.iter().zip(&timed.times_s) {
+        csv.write_record(timed_record(Unit::NONE.format_si(*time_s), record(row, &columns)))?;
+    }
+    csv.flush()
+}
+
+/// One line of readings in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedReading {
+    /// When it was taken, where the file says, in seconds.
+    pub time_s: Option<f64>,
+    /// The true contact, where the file says; its force is 0 where nothing touched.
+    pub truth: Option<Contact>,
+    /// One value a channel, in SI units.
+    pub reading: Vec<f64>,
+}
+
+/// Turns lines of CSV into readings in time; only the channel columns need to be there.
+pub struct TimedParser<'a> {
+    source: String,
+    schema: Schema<'a>,
+    found: Option<Found>,
+    line: usize,
+}
+
+/// What the first line told.
+#[derive(Clone, Debug)]
+struct Found {
+    time: Option<usize>,
+    contact: Option<ContactFields>,
+    channels: ChannelFields,
+    width: usize,
+}
+
+impl<'a> TimedParser<'a> {
+    /// A parser for the lines of `source`, from the first one.
+    pub fn new(source: &str, schema: Schema<'a>) -> Self {
+        Self { source: source.to_owned(), schema, found: None, line: 0 }
+    }
+
+    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
+    pub fn awaits_columns(&self) -> bool {
+        self.found.is_none()
+    }
+
+    /// Whether a column tells the time.
+    pub fn has_time(&self) -> bool {
+        self.found.as_ref().is_some_and(|found| found.time.is_some())
+    }
+
+    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on
+    /// with the next line.
+    ///
+    /// # Errors
+    /// [`CsvError`] with line and column, as [`ReadingParser::parse_line`](super::ReadingParser::parse_line) has them, and
+    /// for a time or a contact that is no number, or a contact off the surface.
+    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
+        self.line += 1;
+        let text = utf8(&self.source, self.line, line)?;
+        let text = if self.line == 1 { without_mark(text) } else { text };
+        if is_passed_over(text) {
+            return Ok(None);
+        }
+        let cells = Cells::parse(&self.source, self.line, text)?;
+        let header = self.schema.columns.header;
+        let found = match &mut self.found {
+            Some(found) => found,
+            none => {
+                let found = none.insert(Found::of(&cells, &self.schema)?);
+                if header == Header::Present {
+                    return Ok(None);
+                }
+                found
+            }
+        };
+        cells.check_width(found.width)?;
+        let time_s = found.time.map(|field| cells.number(field, Unit::NONE)).transpose()?;
+        let touch = found.contact.as_ref().map(|contact| contact.touch(&cells, &self.schema)).transpose()?;
+        // A force that nobody knows is not 0: something touched.
+        let truth = touch.map(|touch| Contact {
+            position: touch.position,
+            force_n: touch.force_n.unwrap_or(f64::INFINITY),
+        });
+        Ok(Some(TimedReading { time_s, truth, reading: found.channels.reading(&cells)? }))
+    }
+}
+
+impl Found {
+    fn of(head: &Cells, schema: &Schema) -> Result<Self, CsvError> {
+        let columns = schema.columns;
+        let named = columns.header == Header::Present;
+        let time = Column::Name(TIME.to_owned());
+        let time = if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
+        let contact = if named { ContactFields::find(head, columns).ok() } else { None };
+        let channels = ChannelFields::find(head, columns)?;
+        Ok(Self { time, contact, channels, width: head.width() })
+    }
+}

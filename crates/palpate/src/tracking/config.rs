@@ -1,0 +1,45 @@
+//! What a tracker expects of contacts.
+
+/// How contacts come, move and go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerConfig {
+    /// Motions from steady to brisk: standard deviation of the acceleration, in m/s².
+    pub accelerations_m_per_s2: [f64; 3],
+    /// How long an acceleration lasts, in seconds: its correlation falls by e in that time.
+    pub acceleration_s: f64,
+    /// How long a contact keeps to one of the motions on average, in seconds.
+    pub motion_s: f64,
+    /// Standard deviation of the speed of a contact that has just come, in m/s.
+    pub speed_sd_m_per_s: f64,
+    /// How far an unknown force drifts in a second, as a share of it.
+    pub force_drift: f64,
+    /// How often a second a contact comes while nothing touches, and goes while something does.
+    pub changes_per_s: f64,
+    /// How often a second a contact goes and is at once somewhere else.
+    pub jumps_per_s: f64,
+    /// The surface's first natural frequency in hertz, where it is known: its inertia is then reckoned with.
+    pub natural_frequency_hz: Option<f64>,
+}
+
+impl TrackerConfig {
+    /// 1/ω² of the first natural frequency, in s²; 0 where that is not known.
+    pub(super) fn inertia_s2(&self) -> f64 {
+        self.natural_frequency_hz.map_or(0.0, |hz| (2.0 * std::f64::consts::PI * hz).powi(-2))
+    }
+}
+
+impl Default for TrackerConfig {
+    /// For hands, robots and wheels up to some metres a second.
+    fn default() -> Self {
+        Self {
+            accelerations_m_per_s2: [0.03, 0.6, 12.0],
+            acceleration_s: 0.1,
+            motion_s: 1.0,
+            speed_sd_m_per_s: 0.5,
+            force_drift: 0.1,
+            changes_per_s: 1.0,
+            jumps_per_s: 1e-3,
+            natural_frequency_hz: None,
+        }
+    }
+}
