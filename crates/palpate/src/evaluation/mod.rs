@@ -8,7 +8,9 @@ mod tracking;
 pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
 pub use cross_validation::{CrossValidationError, cross_validate};
 pub use statistics::{Spread, percentile};
-pub use tracking::{Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds};
+pub use tracking::{
+    FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
+};
 
 use crate::contact::Position;
 use crate::estimator::{ContactEstimate, Locator, ReadingError};

@@ -1,7 +1,7 @@
 //! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
 
 use crate::contact::Contact;
-use crate::estimator::{Locator, NotTrackable, SmoothTracker, Track, TrackerConfig};
+use crate::estimator::{Locator, NotTrackable, SmoothTracker, Track, TrackError, TrackerConfig};
 use crate::recording::TimedRecording;
 use crate::rig::{MotionRig, Rig};
 use crate::simulate::{SimulateError, simulate_moving};
@@ -75,22 +75,30 @@ pub struct Followed {
     pub smoothed: Vec<Track>,
 }
 
+/// Why a recording cannot be followed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FollowError {
+    /// The locator cannot follow.
+    #[error(transparent)]
+    NotTrackable(#[from] NotTrackable),
+    /// A row is out of order.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+}
+
 /// Follows a recording whose times rise.
 ///
 /// # Errors
-/// [`NotTrackable`] for a locator that has no likelihood.
+/// [`FollowError`] for a locator that has no likelihood, or a time that is not later than the one before.
 pub fn follow(
     locator: &Locator,
     config: TrackerConfig,
     recording: &TimedRecording,
-) -> Result<Followed, NotTrackable> {
+) -> Result<Followed, FollowError> {
     let tracking = locator.tracking()?;
     let mut tracker = SmoothTracker::new(tracking.likelihood(), config);
     for (row, time_s) in recording.recording.rows.iter().zip(&recording.times_s) {
-        // A reading out of order is left out, as in a stream.
-        if tracker.follow(*time_s, &row.reading).is_err() {
-            continue;
-        }
+        tracker.follow(*time_s, &row.reading)?;
     }
     Ok(Followed { smoothed: tracker.smoothed(), filtered: tracker.filtered().to_vec() })
 }
@@ -113,7 +121,7 @@ pub struct SpeedErrors {
 pub enum SweepError {
     /// The locator cannot follow.
     #[error(transparent)]
-    NotTrackable(#[from] NotTrackable),
+    Follow(#[from] FollowError),
     /// The rig cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),

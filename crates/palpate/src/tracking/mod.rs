@@ -9,12 +9,11 @@
 //! mirror image or a wide valley is several of them (a Gaussian sum: D. Alspach and H. Sorenson, same Trans. 17, 1972);
 //! those that readings contradict fade and are dropped.
 //!
-//! Against a grid of positions and speeds this is exact where it matters, far below any affordable cell, and about a
-//! hundred times cheaper: within a valley the likelihood is Gaussian to good approximation as soon as a contact has been
-//! seen for some readings.
+//! A grid of positions and speeds that resolves what a track reaches would have some 10⁵ cells; within a valley of the
+//! likelihood a Gaussian says the same to good approximation, as soon as a contact has been seen for some readings.
 //!
-//! The smoother goes back over a hypothesis with what came later (C.-J. Kim, J. Econometrics 60, 1994: Rauch, Tung and
-//! Striebel's recursion for models that switch).
+//! The smoother goes back over a hypothesis with what came later, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA
+//! Journal 3, 1965) on the bank as one Gaussian.
 
 mod bank;
 mod config;

@@ -80,10 +80,10 @@ impl Patches {
                 // The derivative by column goes with the derivative's weight along, and so on.
                 let (i, j) = (right + 2 * (kind % 2), up + 2 * (kind / 2));
                 let (f, along, across) = (u[i] * v[j], du[i] * v[j], u[i] * dv[j]);
-                for lane in 0..8 {
-                    values.f[lane] += f * lanes[lane];
-                    values.along[lane] += along * lanes[lane];
-                    values.across[lane] += across * lanes[lane];
+                for (lane, value) in lanes.iter().enumerate() {
+                    values.f[lane] += f * value;
+                    values.along[lane] += along * value;
+                    values.across[lane] += across * value;
                 }
             }
         }

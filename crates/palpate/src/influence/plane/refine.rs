@@ -69,10 +69,8 @@ pub(super) fn solve(mut matrix: [[f64; 3]; 3], mut right: [f64; 3], free: [bool;
     }
     for k in 0..3 {
         if !free[k] {
-            for i in 0..3 {
-                matrix[i][k] = 0.0;
-                matrix[k][i] = 0.0;
-            }
+            matrix.iter_mut().for_each(|row| row[k] = 0.0);
+            matrix[k] = [0.0; 3];
             matrix[k][k] = 1.0;
             right[k] = 0.0;
         }
@@ -82,11 +80,10 @@ pub(super) fn solve(mut matrix: [[f64; 3]; 3], mut right: [f64; 3], free: [bool;
         if matrix[p][p].is_nan() || matrix[p][p] <= 1e-14 * diagonal[p] {
             return None;
         }
+        let pivot = matrix[p];
         for r in p + 1..3 {
-            let factor = matrix[r][p] / matrix[p][p];
-            for c in p..3 {
-                matrix[r][c] -= factor * matrix[p][c];
-            }
+            let factor = matrix[r][p] / pivot[p];
+            matrix[r].iter_mut().zip(pivot).for_each(|(entry, above)| *entry -= factor * above);
             right[r] -= factor * right[p];
         }
     }
