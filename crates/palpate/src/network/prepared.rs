@@ -4,9 +4,6 @@ use super::Topology;
 use super::lanes::{Layer, forward_one};
 use palpate_core::BufferMismatch;
 
-/// Registers of four nodes of the widest layer for which the scratch lies on the stack: 32 nodes.
-const FEW_REGISTERS: usize = 8;
-
 /// A network in double precision whose weights lie in columns, as vector units want them. With weights of size 1 its outputs are those of
 /// [`palpate_core::Network::forward_into`] to within 10⁻¹⁴.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,8 +11,6 @@ pub struct PreparedNetwork {
     layers: Vec<Layer>,
     inputs: usize,
     outputs: usize,
-    /// Registers of the widest layer.
-    registers: usize,
 }
 
 impl PreparedNetwork {
@@ -26,9 +21,8 @@ impl PreparedNetwork {
         if !usable || topology.checked_weight_count() != Some(weights.len()) {
             return None;
         }
-        let layers = Layer::all(topology, weights);
-        let registers = layers.iter().map(Layer::registers).max()?;
-        Some(Self { layers, inputs: topology.inputs(), outputs: topology.outputs(), registers })
+        let (inputs, outputs) = (topology.inputs(), topology.outputs());
+        Some(Self { layers: Layer::all(topology, weights), inputs, outputs })
     }
 
     /// a = f(W x + b), layer by layer, from scaled inputs to outputs.
@@ -38,11 +32,7 @@ impl PreparedNetwork {
     pub fn forward_into(&self, inputs: &[f64], outputs: &mut [f64]) -> Result<(), BufferMismatch> {
         check(self.inputs, inputs.len())?;
         check(self.outputs, outputs.len())?;
-        if self.registers <= FEW_REGISTERS {
-            forward_one(&self.layers, inputs, outputs, &mut [[0.0; 4]; 2 * FEW_REGISTERS]);
-        } else {
-            forward_one(&self.layers, inputs, outputs, &mut vec![[0.0; 4]; 2 * self.registers]);
-        }
+        forward_one(&self.layers, inputs, outputs);
         Ok(())
     }
 }
@@ -95,8 +85,7 @@ mod tests {
                         let expected = core(&topology, &weights, &x);
                         let [mut found, mut twin] = [vec![0.0; expected.len()], vec![0.0; expected.len()]];
                         prepared.forward_into(&x, &mut found).unwrap();
-                        let scratch = &mut vec![[0.0; 4]; 2 * prepared.registers];
-                        forward_one_portable(&prepared.layers, &x, &mut twin, scratch);
+                        forward_one_portable(&prepared.layers, &x, &mut twin);
                         for ((found, twin), expected) in found.iter().zip(&twin).zip(expected) {
                             assert!((found - expected).abs() < 1e-14, "{topology:?}: {found}, {expected}");
                             assert!((twin - expected).abs() < 1e-14, "{topology:?}: {twin}, {expected}");

@@ -2,7 +2,7 @@
 
 use super::forward::{self, Batch};
 use super::portable::Array;
-use super::single::{self, Four, Layer};
+use super::single::{self, Layer};
 use super::{Lanes, kernel};
 use crate::network::{SeedQueue, TrainedNetwork, TrainingTask, scalar};
 
@@ -214,29 +214,24 @@ unsafe fn forward_fma(batch: &Batch<f32>, outputs: &mut [f32]) {
 }
 
 /// Sends one reading through the layers of a network; see [`single::run`].
-pub(crate) fn forward_one(layers: &[Layer], inputs: &[f64], outputs: &mut [f64], scratch: &mut [Four]) {
+pub(crate) fn forward_one(layers: &[Layer], inputs: &[f64], outputs: &mut [f64]) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the features have just been found.
-        return unsafe { forward_one_avx2(layers, inputs, outputs, scratch) };
+        return unsafe { forward_one_avx2(layers, inputs, outputs) };
     }
-    forward_one_portable(layers, inputs, outputs, scratch);
+    forward_one_portable(layers, inputs, outputs);
 }
 
 /// The twin of [`forward_one`] for every machine.
-pub(crate) fn forward_one_portable(
-    layers: &[Layer],
-    inputs: &[f64],
-    outputs: &mut [f64],
-    scratch: &mut [Four],
-) {
-    single::run::<Array<f64, 4, false>>(layers, inputs, outputs, scratch);
+pub(crate) fn forward_one_portable(layers: &[Layer], inputs: &[f64], outputs: &mut [f64]) {
+    single::run::<Array<f64, 4, false>>(layers, inputs, outputs);
 }
 
 /// # Safety
 /// The machine must have AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn forward_one_avx2(layers: &[Layer], inputs: &[f64], outputs: &mut [f64], scratch: &mut [Four]) {
-    single::run::<super::avx2::F64x4>(layers, inputs, outputs, scratch);
+unsafe fn forward_one_avx2(layers: &[Layer], inputs: &[f64], outputs: &mut [f64]) {
+    single::run::<super::avx2::F64x4>(layers, inputs, outputs);
 }

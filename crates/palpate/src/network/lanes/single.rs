@@ -9,7 +9,7 @@ use crate::network::{Activation, Topology};
 use palpate_core::Logistic;
 
 /// Four numbers, one a node.
-pub(crate) type Four = [f64; 4];
+type Four = [f64; 4];
 
 /// A layer, its weights in columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl Layer {
     }
 
     /// Registers that its outputs fill.
-    pub(crate) fn registers(&self) -> usize {
+    fn registers(&self) -> usize {
         self.nodes.div_ceil(4)
     }
 }
@@ -57,29 +57,46 @@ fn known_or<const KNOWN: usize>(count: usize) -> usize {
     if KNOWN == ANY { count } else { KNOWN }
 }
 
-/// Sends `inputs` through `layers`, of which there is at least one; `scratch` is twice as long as the widest has registers.
+/// Registers of the widest layer for which a layer's outputs lie on the stack: 32 nodes.
+const FEW_REGISTERS: usize = 8;
+
+/// Sends `inputs` through `layers`, of which there is at least one.
 #[inline(always)]
-pub(super) fn run<V: Lanes<4, Real = f64>>(
+pub(super) fn run<V: Lanes<4, Real = f64>>(layers: &[Layer], inputs: &[f64], outputs: &mut [f64]) {
+    let registers = layers.iter().map(Layer::registers).max().unwrap_or(0);
+    match layers {
+        // The paper's: where the loops unroll, more of the next reading fits into the machine's window.
+        [first, last] if first.is(8, 10) && last.is(10, 1) => {
+            let (mut hidden, mut output) = ([[0.0; 4]; 3], [[0.0; 4]; 1]);
+            pass::<V, 8, 10>(first, inputs, &mut hidden);
+            pass::<V, 10, 1>(last, hidden.as_flattened(), &mut output);
+            outputs.copy_from_slice(&output.as_flattened()[..1]);
+        }
+        _ if registers <= FEW_REGISTERS => {
+            let (from, to) = (&mut [[0.0; 4]; FEW_REGISTERS], &mut [[0.0; 4]; FEW_REGISTERS]);
+            run_any::<V>(layers, inputs, outputs, from, to);
+        }
+        _ => {
+            let (mut from, mut to) = (vec![[0.0; 4]; registers], vec![[0.0; 4]; registers]);
+            run_any::<V>(layers, inputs, outputs, &mut from, &mut to);
+        }
+    }
+}
+
+/// [`run`] for any shape, with room for the widest layer's outputs twice.
+#[inline(always)]
+fn run_any<'a, V: Lanes<4, Real = f64>>(
     layers: &[Layer],
     inputs: &[f64],
     outputs: &mut [f64],
-    scratch: &mut [Four],
+    mut from: &'a mut [Four],
+    mut to: &'a mut [Four],
 ) {
-    let (mut from, mut to) = scratch.split_at_mut(scratch.len() / 2);
-    match layers {
-        // The paper's: where the loops unroll, two readings fit into the machine's window.
-        [first, last] if first.is(8, 10) && last.is(10, 1) => {
-            pass::<V, 8, 10>(first, inputs, to);
-            pass::<V, 10, 1>(last, to.as_flattened(), from);
-        }
-        _ => {
-            for (k, layer) in layers.iter().enumerate() {
-                pass::<V, ANY, ANY>(layer, if k == 0 { inputs } else { from.as_flattened() }, to);
-                std::mem::swap(&mut from, &mut to);
-            }
-        }
+    for (k, layer) in layers.iter().enumerate() {
+        pass::<V, ANY, ANY>(layer, if k == 0 { inputs } else { from.as_flattened() }, to);
+        std::mem::swap(&mut from, &mut to);
     }
-    outputs.iter_mut().zip(from.as_flattened()).for_each(|(output, a)| *output = *a);
+    outputs.copy_from_slice(&from.as_flattened()[..outputs.len()]);
 }
 
 /// a = f(W x + b)
