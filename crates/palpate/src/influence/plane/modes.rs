@@ -1,14 +1,14 @@
 //! How probable the surroundings of each minimum are, and the moments of position and force there.
 //!
-//! Minima that are narrow and clear of the edges are normal distributions (Laplace's approximation). Where one of them is
-//! not, the probability is summed up over the surface instead: near an edge it is cut off, and where the readings tell
-//! little it is bent. Of the coarse cells those that could matter are halved until the misfit is smooth within their parts, each
-//! with the force that is best there; a part that is too far from the reading is left out with all that it holds. The prior is flat over the surface,
-//! and in the size of the signal.
+//! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
+//! approximation). Any other reading's probability is summed up over the surface: near an edge it is cut off, where the
+//! readings tell little it is bent, and several minima share it. Of the coarse cells those that could matter are halved
+//! until the misfit is smooth within their parts, each with the force that is best there; a part that is too far from the
+//! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
-use super::coarse::{MOST_VALLEYS, Profile};
+use super::coarse::MOST_VALLEYS;
 use super::refine::solve;
-use super::search::{Minimum, Search};
+use super::search::{Minimum, Scratch, Search};
 use crate::influence::belief::ForceBelief;
 
 /// The surroundings of a minimum.
@@ -22,10 +22,33 @@ pub(super) struct Mode {
     pub covariance: [f64; 6],
 }
 
+/// What the readings tell of a contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings {
+    modes: [Mode; MOST_VALLEYS],
+    count: usize,
+    /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
+    /// shape must be to hold 95 % of the probability.
+    pub region: [f64; 6],
+}
+
+impl Surroundings {
+    /// The most probable first.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes[..self.count]
+    }
+}
+
+/// Another place with at least this share of the probability is said.
+pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
+/// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
+const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 /// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
 const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.
 const CLEAR: f64 = 3.0;
+/// At two standard deviations a paraboloid is 4 above its minimum; what is off by more than this is bent.
+const MOST_BENT: f64 = 1.0;
 /// A misfit this much above the best has no probability worth adding up: e⁻⁶.
 const CUT: f64 = 12.0;
 /// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
@@ -35,30 +58,26 @@ const FINE: f64 = 2.0;
 const LEAST_M: f64 = 1e-9;
 
 impl Search {
-    /// The surroundings of each of `minima`, the most probable first.
-    pub fn modes(
-        &self,
-        whitened: &[f64],
-        minima: &[Minimum],
-        profile: &Profile,
-    ) -> ([Mode; MOST_VALLEYS], usize) {
+    /// The surroundings of `minima`, best first, of the reading in the scratch.
+    pub fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
         let mut modes = [Mode::default(); MOST_VALLEYS];
         let are_plain = minima.iter().zip(&mut modes).all(|(minimum, mode)| {
-            let plain = self.plain(minimum, minima[0].misfit);
+            let plain = self.plain(minimum, &minima[0]);
             plain.inspect(|plain| *mode = *plain).is_some()
         });
-        if !are_plain {
-            self.sum_up(whitened, minima, profile, &mut modes);
+        let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
+        let is_alone = are_plain && modes[0].weight >= (1.0 - MODE_THAT_MATTERS) * sum;
+        if is_alone && self.is_paraboloid(&scratch.whitened, &modes[0]) {
+            modes[0].weight = 1.0;
+            return Surroundings { modes, count: 1, region: modes[0].covariance };
         }
-        let modes_sum: f64 = modes[..minima.len()].iter().map(|mode| mode.weight).sum();
-        modes[..minima.len()].iter_mut().for_each(|mode| mode.weight /= modes_sum);
-        modes[..minima.len()].sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        (modes, minima.len())
+        self.sum_up(minima, scratch);
+        self.summed(minima, &mut scratch.leaves)
     }
 
-    /// A minimum as a normal distribution, its weight relative to the misfit `reference`; `None` where it is wide, near an
-    /// edge, or not told at all.
-    fn plain(&self, minimum: &Minimum, reference: f64) -> Option<Mode> {
+    /// A minimum as a normal distribution, its weight relative to that of `best`; `None` where it is wide, near an edge, or
+    /// not told at all.
+    fn plain(&self, minimum: &Minimum, best: &Minimum) -> Option<Mode> {
         let covariance = self.covariance(minimum)?;
         let [xx, xy, _, yy, ..] = covariance;
         let sd_m = [xx.sqrt(), yy.sqrt()];
@@ -68,8 +87,32 @@ impl Search {
                 && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
         });
         let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
-        let weight = (0.5 * (reference - minimum.misfit)).exp() * volume;
+        let weight = (0.5 * (self.cost(best) - self.cost(minimum))).exp() * volume;
         (narrow && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
+    }
+
+    /// Minus twice the logarithm of the likelihood, but for a constant.
+    fn cost(&self, minimum: &Minimum) -> f64 {
+        minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
+    }
+
+    /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
+    fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
+        let [xx, xy, _, yy, ..] = mode.covariance;
+        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+        let radius = half.hypot(xy);
+        let (sin, cos) = (0.5 * xy.atan2(half)).sin_cos();
+        let (longer, shorter) = ((mean + radius).sqrt(), (mean - radius).max(0.0).sqrt());
+        let [x_m, y_m, _] = mode.mean;
+        let here = self.profiled(whitened, [x_m, y_m]).1;
+        let is_straight = |along: f64, across: f64| {
+            let rise = self.profiled(whitened, [x_m + 2.0 * along, y_m + 2.0 * across]).1 - here;
+            (rise - 4.0).abs() <= MOST_BENT
+        };
+        [1.0, -1.0].iter().all(|side| {
+            is_straight(side * longer * cos, side * longer * sin)
+                && is_straight(-side * shorter * sin, side * shorter * cos)
+        })
     }
 
     /// The inverse of the information; `None` where the reading does not tell.
@@ -86,46 +129,134 @@ impl Search {
         Some([x[0], x[1], x[2], y[1], y[2], force[2]])
     }
 
-    /// Sums the probability up: what lies nearest to a minimum is its mode's.
-    fn sum_up(&self, whitened: &[f64], minima: &[Minimum], profile: &Profile, modes: &mut [Mode]) {
-        let best = minima[0].misfit;
-        let mut moments = [Moments::default(); MOST_VALLEYS];
+    /// Puts the parts of the surface that hold the probability into the scratch.
+    fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) {
+        let Scratch { whitened, profile, blocks, leaves } = scratch;
+        leaves.clear();
+        let best = self.cost(&minima[0]);
         let most = best + CUT;
-        let mut blocks = Vec::with_capacity(64);
-        for cell in (0..self.coarse.cells()).filter(|cell| self.floor(profile, *cell) <= most) {
+        for cell in 0..self.coarse.cells() {
+            let middle_m = self.coarse.middle_m(cell);
+            if self.floor(profile, cell) + self.spread(middle_m) > most {
+                continue;
+            }
             let force_n = profile.force_n(cell, self.force);
             blocks.push(Block {
-                middle_m: self.coarse.middle_m(cell),
+                middle_m,
                 size_m: self.coarse.cell_m,
                 length: self.coarse.lengths[cell].map(|length| force_n * length),
             });
             while let Some(block) = blocks.pop() {
                 let (force_n, misfit) = self.profiled(whitened, block.middle_m);
-                if block.floor(misfit) > most {
+                let spread = self.spread(block.middle_m);
+                if block.floor(misfit) + spread > most {
                     continue;
                 }
                 if let Some(halves) = block.halves() {
                     blocks.extend(halves);
                 } else {
-                    let weight = (0.5 * (best - misfit)).exp() * block.size_m[0] * block.size_m[1];
+                    let area = block.size_m[0] * block.size_m[1];
                     let [x_m, y_m] = block.middle_m;
-                    moments[nearest(minima, block.middle_m)].add(weight, [x_m, y_m, force_n]);
+                    leaves.push(Leaf {
+                        weight: (0.5 * (best - misfit - spread)).exp() * area,
+                        at: [x_m, y_m, force_n],
+                        mode: nearest(minima, block.middle_m),
+                        distance: 0.0,
+                    });
                 }
             }
         }
+    }
+
+    /// The modes of what was summed up: what lies nearest to a minimum is its mode's.
+    fn summed(&self, minima: &[Minimum], leaves: &mut [Leaf]) -> Surroundings {
+        let mut moments = [Moments::default(); MOST_VALLEYS];
+        let mut all = Moments::default();
+        for leaf in &*leaves {
+            moments[leaf.mode].add(leaf.weight, leaf.at);
+            all.add(leaf.weight, leaf.at);
+        }
+        if all.weight.is_nan() || all.weight <= 0.0 {
+            return self.nothing_summed(&minima[0]);
+        }
+        let mut modes = [Mode::default(); MOST_VALLEYS];
         for ((mode, moments), minimum) in modes.iter_mut().zip(&moments).zip(minima) {
             *mode = moments.mode(minimum);
-            let told = minimum.information[2][2];
-            if told > 0.0 && !matches!(self.force, ForceBelief::Known(_)) {
-                mode.covariance[5] += 1.0 / told;
-            }
+            mode.weight /= all.weight;
+            mode.covariance[5] += self.own_variance(minimum);
         }
+        let count = minima.len();
+        modes[..count].sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let Mode { mean: [x, y, f], mut covariance, .. } = all.mode(&minima[0]);
+        let [dx, dy, df] = [x - modes[0].mean[0], y - modes[0].mean[1], f - modes[0].mean[2]];
+        let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
+        covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
+        covariance[5] += self.own_variance(&minima[0]);
+        let growth = growth(leaves, modes[0].mean, &covariance);
+        Surroundings { modes, count, region: covariance.map(|value| growth * value) }
+    }
+
+    /// Variance of a force at a place that is known.
+    fn own_variance(&self, minimum: &Minimum) -> f64 {
+        let told = minimum.information[2][2];
+        let known = matches!(self.force, ForceBelief::Known(_));
+        if known || told <= 0.0 { 0.0 } else { 1.0 / told }
+    }
+
+    /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
+    fn nothing_summed(&self, minimum: &Minimum) -> Surroundings {
+        let [xx, yy] = self.size_m.map(|size_m| size_m * size_m / 12.0);
+        let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        modes[0] = Mode { weight: 1.0, mean: minimum.at, covariance: region };
+        Surroundings { modes, count: 1, region }
     }
 }
 
+/// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
+fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
+    let [xx, xy, _, yy, ..] = *covariance;
+    let determinant = xx * yy - xy * xy;
+    if determinant.is_nan() || determinant <= 0.0 {
+        return 1.0;
+    }
+    for leaf in &mut *leaves {
+        let (x, y) = (leaf.at[0] - about[0], leaf.at[1] - about[1]);
+        leaf.distance = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
+    }
+    leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
+    let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
+    // Half of a leaf lies within the ellipse through its middle; between leaves the share is straight.
+    let (mut inside, mut last) = (0.0, (0.0, 0.0));
+    for leaf in &*leaves {
+        let held = (inside + 0.5 * leaf.weight) / all;
+        if held >= 0.95 {
+            let (distance, share) = last;
+            let part = if held > share { (0.95 - share) / (held - share) } else { 1.0 };
+            return (distance + part * (leaf.distance - distance)) / ELLIPSE_95;
+        }
+        inside += leaf.weight;
+        last = (leaf.distance, held);
+    }
+    1.0
+}
+
+/// A part of the surface that its middle stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    /// Its probability, but for a factor.
+    weight: f64,
+    /// x, y and the force that is best there.
+    at: [f64; 3],
+    /// Whose minimum is nearest.
+    mode: usize,
+    /// Squared, from the estimate, in standard deviations.
+    distance: f64,
+}
+
 /// A part of the surface, which is halved until its middle stands for it.
-#[derive(Clone, Copy)]
-struct Block {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
     middle_m: [f64; 2],
     size_m: [f64; 2],
     /// How far apart the whitened readings of its ends are, along and across.

@@ -5,6 +5,7 @@
 //! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
+use super::modes::{Block, Leaf};
 use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
 use crate::influence::belief::ForceBelief;
@@ -22,6 +23,10 @@ pub(super) struct Search {
     variances: Vec<Lanes>,
     /// 1/(1 + v) at every node, for the known force or the calibration's, in groups of eight channels.
     weights: Vec<Lanes>,
+    /// Σ ln(1 + v) at every node.
+    spreads: Vec<f64>,
+    /// The least weight in the middle of every coarse cell.
+    least_weights: Vec<f64>,
     /// The force of these weights, in newtons.
     weights_force_n: f64,
     pub coarse: Coarse,
@@ -41,6 +46,10 @@ pub(super) struct Search {
 pub(super) struct Scratch {
     pub whitened: Vec<f64>,
     pub profile: Profile,
+    /// Parts of the surface that are still to be looked at.
+    pub blocks: Vec<Block>,
+    /// Those that hold the probability.
+    pub leaves: Vec<Leaf>,
 }
 
 /// x and y in metres, and the force in newtons.
@@ -85,8 +94,16 @@ impl Search {
             _ => reference_force_n,
         };
         let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
-        let weights = variances.iter().map(|lanes| lanes.map(weight)).collect();
+        let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
         let coarse = Coarse::new(table, &patches, live.len(), force);
+        // Channels that only fill a group up have v = 0, and a weight of 1.
+        let node = |node: usize| weights[node * patches.groups..][..patches.groups].as_flattened().iter();
+        let spreads = (0..table.nodes()).map(|n| node(n).map(|w| -w.ln()).sum()).collect();
+        let least = |cell: usize| {
+            let [x_m, y_m] = coarse.middle_m(cell);
+            node(patches.nearest(x_m, y_m)).copied().fold(1.0, f64::min)
+        };
+        let least_weights = (0..coarse.cells()).map(least).collect();
         let unknowns = 1 + force.unknowns();
         let channels = live.len();
         Self {
@@ -103,6 +120,8 @@ impl Search {
             patches,
             variances,
             weights,
+            spreads,
+            least_weights,
             weights_force_n,
             coarse,
             force,
@@ -143,11 +162,11 @@ impl Search {
         (found, found[..kept].iter().take_while(matters).count().max(1))
     }
 
-    /// About the least misfit in a coarse cell.
+    /// About the least misfit in a coarse cell, of which the profile holds that without weights.
     pub fn floor(&self, profile: &Profile, cell: usize) -> f64 {
         let reach = profile.force_n(cell, self.force) * self.coarse.reaches[cell];
         let closest = (profile.misfits()[cell].max(0.0).sqrt() - reach).max(0.0);
-        closest * closest
+        self.least_weights[cell] * closest * closest
     }
 
     /// Whether two minima lie in one valley: on the straight way between them the misfit hardly rises.
@@ -189,6 +208,11 @@ impl Search {
         let (pull, norm) = (product + mean * precision, norm + precision);
         let force_n = if norm > 0.0 { (pull / norm).max(0.0) } else { 0.0 };
         (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * pull))
+    }
+
+    /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.
+    pub fn spread(&self, [x_m, y_m]: [f64; 2]) -> f64 {
+        self.spreads[self.patches.nearest(x_m, y_m)]
     }
 
     /// The best force at a place.
