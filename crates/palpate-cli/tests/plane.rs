@@ -55,7 +55,7 @@ fn every_estimator_runs_on_the_plate() {
     let best = &estimators[0];
     assert_eq!(best["name"], "influence");
     assert!(best["limit_ratio"].as_f64().unwrap() < 1.2, "{best}");
-    assert!((93.0..=97.0).contains(&best["coverage_95"].as_f64().unwrap()), "{best}");
+    assert!((85.0..=99.0).contains(&best["coverage_95"].as_f64().unwrap()), "{best}");
     let report = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(all.iter().all(|name| report.contains(name)) && report.contains("Errors over the surface"));
 }
