@@ -4,8 +4,9 @@
 use cpu_time::ThreadTime;
 use palpate::arrangement::every;
 use palpate::bench::Bench;
-use palpate::contact::Contact;
+use palpate::contact::{Contact, Position};
 use palpate::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
+use palpate::mechanics::Extent;
 use palpate::method::FitTask;
 use palpate::recording::Recording;
 use palpate::rig::Rig;
@@ -24,14 +25,18 @@ fn main() {
         })
         .collect();
     println!("fit of 36 × 5 presses: {:.0} ms", median(&mut times) * 1e3);
+    let all =
+        every(Extent { length_m: 0.3, width_m: Some(0.3) }, 0.01).expect("a centimetre is a fair spacing");
+    let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
+    let plain: Vec<Position> = all.iter().copied().filter(middle).collect();
     for force_n in [Some(5.0), None] {
         let bench = Bench { force_n, ..rig.bench.clone() };
         let locator = fit(&bench, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
-        println!(
-            "estimate with uncertainty, force {known}: {:.2} µs a reading",
-            microseconds(&locator, &rig)
-        );
+        for (place, positions) in [("the middle, half as long and wide", &plain), ("the whole plate", &all)] {
+            let time_us = microseconds(&locator, &rig, positions);
+            println!("estimate with uncertainty, force {known}, {place}: {time_us:.2} µs a reading");
+        }
     }
 }
 
@@ -40,11 +45,10 @@ fn fit(bench: &Bench, recording: &Recording) -> PlaneLocator {
     fitted.expect("the presses suit the bench").expect("nobody stops it")
 }
 
-/// Median time of an estimate over readings all over the plate.
-fn microseconds(locator: &PlaneLocator, rig: &Rig) -> f64 {
+/// Median time of an estimate, readings being all alike.
+fn microseconds(locator: &PlaneLocator, rig: &Rig, positions: &[Position]) -> f64 {
     let surface = rig.bench.surface.model().expect("a plate has a model");
     let sensors = CleanSensors::new(surface, &rig.bench.layout);
-    let positions = every(surface.extent(), 0.01).expect("a centimetre is a fair spacing");
     let readings: Vec<Vec<f64>> =
         positions.iter().map(|&position| sensors.reading(Contact { position, force_n: 5.0 })).collect();
     let mut scratch = PlaneScratch::default();

@@ -108,8 +108,8 @@ impl ComparisonReport<'_> {
             caption: html! {
                 "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
                 (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. × limit: mean \
-                 error over what physics allows, where the limit is at most 1/200 of the length, 1/80 of it away from the ends. A \
-                 dash: the estimator or the bench has none."
+                 error over what physics allows, where the limit is at most " (if self.bench.surface.extent().is_plane() { "1/20" } else { "1/200" })
+                " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
             },
             columns: vec![
                 short("estimator"),

@@ -88,7 +88,6 @@ pub fn heat_map_to_svg(map: &HeatMap) -> String {
 struct Layout {
     height: f64,
     plots: Vec<Rect>,
-    columns: usize,
     bar: Rect,
     colours: AxisScale,
     x: (AxisScale, Vec<Tick>),
@@ -132,7 +131,7 @@ impl Layout {
         let (x, y) = (axis(map.length_mm), axis(map.width_mm));
         let x_ticks = ticks::choose(&x, &Ticks::Automatic, &|ticks| fit_beside(&x, ticks, map_width));
         let y_ticks = ticks::choose(&y, &Ticks::Automatic, &|ticks| fit_above(&y, ticks, map_height));
-        Self { height, plots, columns, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
+        Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
     }
 
     fn title(&self, map: &HeatMap) -> Label {
@@ -168,13 +167,12 @@ impl Layout {
             colour: INK,
             ..label(&name, (plot.left, plot.top - 11.0), Anchor::Start)
         });
-        // The maps of the lowest row say what the axes are.
-        let last_row = self.plots.len().div_ceil(self.columns) - 1;
-        let lowest = self.plots.get(last_row * self.columns).is_some_and(|first| first.top == plot.top);
-        if lowest {
+        // The lowest map of a column names the axis beneath it.
+        if !self.plots.iter().any(|other| other.left == plot.left && other.top > plot.top) {
             let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 4.0);
-            labels.push(label("x, mm (upward: y, mm)", at, Anchor::Middle));
+            labels.push(label("x, mm", at, Anchor::Middle));
         }
+        labels.push(label("y, mm", (plot.left - 7.0, plot.top - 11.0), Anchor::End));
         labels
     }
 
@@ -201,9 +199,9 @@ impl Layout {
                 colour: QUIET_INK,
             });
         }
-        let at = (right + BAR_LABELS, top - 11.0);
-        let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + GAP + GUTTER);
-        canvas.text(&Label { text, at, anchor: Anchor::End, size: NAME_SIZE, colour: INK });
+        let at = (left, top - 11.0);
+        let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + MARGIN);
+        canvas.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
     }
 }
 

@@ -1,34 +1,29 @@
 //! From minima of the misfit to an estimate that owns up to what it does not know.
 
-use super::coarse::MOST_VALLEYS;
-use super::modes::Mode;
-use super::search::{Scratch, Search};
+use super::modes::{MODE_THAT_MATTERS, Mode};
+use super::search::{Scratch, Search, Unknowns};
 use crate::contact::Position;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
-/// Another place with at least this share of the probability is said.
-const MODE_THAT_MATTERS: f64 = 0.01;
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
-/// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
-const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 
 /// The estimate of one contact.
+///
+/// The time of a plain reading is that of the scan, a product for every coarse cell and channel, and of some six of
+/// Levenberg's steps, 16 corner numbers × 3 sums for every group of eight channels each. Where the probability is summed up
+/// instead, it is that of the misfit at a thousand places or so.
 pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
     let square = search.whiten(reading, scratch);
     let (minima, count) = search.minima(square, scratch);
     let (minima, best) = (&minima[..count], minima[0]);
-    let mut modes = [Mode::default(); MOST_VALLEYS];
-    for (i, mode) in modes[..count].iter_mut().enumerate() {
-        *mode = search.mode(&scratch.whitened, minima, i);
-    }
-    let modes = &mut modes[..count];
-    share(modes);
     if square <= best.misfit + search.charge && square <= search.worst_noise {
-        return Estimate::of_position(position(&modes[0]), Status::NoContact);
+        return Estimate::of_position(position(best.at), Status::NoContact);
     }
+    let surroundings = search.surroundings(minima, scratch);
+    let modes = surroundings.modes();
     let alone = |mode: &Mode| contact(search, mode, mode.covariance);
-    let mut estimate = Estimate::of_contact(contact(search, &modes[0], region(modes)), Status::Located);
+    let mut estimate = Estimate::of_contact(contact(search, &modes[0], surroundings.region), Status::Located);
     for mode in modes[1..].iter().filter(|mode| mode.weight >= MODE_THAT_MATTERS) {
         estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
         estimate.status = Status::Ambiguous;
@@ -39,54 +34,8 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
     estimate
 }
 
-/// Weights become shares, the most probable mode first.
-fn share(modes: &mut [Mode]) {
-    let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
-    let alone = if sum > 0.0 { 0.0 } else { 1.0 };
-    for (i, mode) in modes.iter_mut().enumerate() {
-        mode.weight = if sum > 0.0 {
-            mode.weight / sum
-        } else if i == 0 {
-            alone
-        } else {
-            0.0
-        };
-    }
-    modes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-}
-
-/// The covariance about the first mode whose 95 % ellipse holds 95 % of the probability: that of the mode where it is
-/// alone; else the moments of all modes about it, grown until the ellipse reaches as many of them as that takes.
-fn region(modes: &[Mode]) -> [f64; 6] {
-    let first = &modes[0];
-    if first.weight >= 1.0 - MODE_THAT_MATTERS {
-        return first.covariance;
-    }
-    let away = |mode: &Mode| [0, 1, 2].map(|k| mode.mean[k] - first.mean[k]);
-    let mut covariance = [0.0; 6];
-    for mode in modes {
-        let [x, y, f] = away(mode);
-        let squares = [x * x, x * y, x * f, y * y, y * f, f * f];
-        for ((sum, own), square) in covariance.iter_mut().zip(mode.covariance).zip(squares) {
-            *sum += mode.weight * (own + square);
-        }
-    }
-    let [xx, xy, _, yy, ..] = covariance;
-    let determinant = xx * yy - xy * xy;
-    let (mut held, mut growth) = (0.0, 1.0f64);
-    for mode in modes {
-        if held < 0.95 && determinant > 0.0 {
-            let [x, y, _] = away(mode);
-            let distance = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
-            growth = growth.max(distance / ELLIPSE_95);
-        }
-        held += mode.weight;
-    }
-    covariance.map(|value| growth * value)
-}
-
-fn position(mode: &Mode) -> Position {
-    Position { x_m: mode.mean[0], y_m: mode.mean[1] }
+fn position([x_m, y_m, _]: Unknowns) -> Position {
+    Position { x_m, y_m }
 }
 
 /// A contact with an uncertainty that is held to the surface.
@@ -97,5 +46,9 @@ fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimat
     };
     let uncertainty =
         Uncertainty { covariance, x_95_m: interval(0, covariance[0]), y_95_m: interval(1, covariance[3]) };
-    ContactEstimate { position: position(mode), force_n: Some(mode.mean[2]), uncertainty: Some(uncertainty) }
+    ContactEstimate {
+        position: position(mode.mean),
+        force_n: Some(mode.mean[2]),
+        uncertainty: Some(uncertainty),
+    }
 }

@@ -1,18 +1,20 @@
-//! How probable the surroundings of a minimum are, and the moments of position and force there.
+//! How probable the surroundings of each minimum are, and the moments of position and force there.
 //!
-//! A minimum that is narrow and clear of the edges is a normal distribution (Laplace's approximation). Any other is summed
-//! up over a grid along the axes of its covariance, within the surface, with the force that is best at each point: near an
-//! edge the distribution is cut off, and where the readings tell little it is bent. The grid follows the moments that it
-//! finds, as the first covariance may be far off. A prior that is flat over the surface, and in the size of the signal.
+//! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
+//! approximation). Any other reading's probability is summed up over the surface: near an edge it is cut off, where the
+//! readings tell little it is bent, and several minima share it. Of the coarse cells those that could matter are halved
+//! until the misfit is smooth within their parts, each with the force that is best there; a part that is too far from the
+//! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
+use super::coarse::MOST_VALLEYS;
 use super::refine::solve;
-use super::search::{Minimum, Search};
+use super::search::{Minimum, Scratch, Search};
 use crate::influence::belief::ForceBelief;
 
 /// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Mode {
-    /// Its share of the probability, once all are known; before that, up to a common factor.
+    /// Its share of the probability.
     pub weight: f64,
     /// Mean of x, y and W.
     pub mean: [f64; 3],
@@ -20,41 +22,97 @@ pub(super) struct Mode {
     pub covariance: [f64; 6],
 }
 
-/// A minimum with a wider standard deviation, in spacings of the coarse nodes, is no paraboloid.
-const MOST_SPACINGS: f64 = 0.4;
+/// What the readings tell of a contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings {
+    modes: [Mode; MOST_VALLEYS],
+    count: usize,
+    /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
+    /// shape must be to hold 95 % of the probability.
+    pub region: [f64; 6],
+}
+
+impl Surroundings {
+    /// The most probable first.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes[..self.count]
+    }
+}
+
+/// Another place with at least this share of the probability is said.
+pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
+/// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
+const ELLIPSE_95: f64 = 5.991_464_547_107_979;
+/// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
+const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.
-const CLEAR: f64 = 4.0;
-/// Points of the grid each way, and how far it reaches, in standard deviations.
-const POINTS: usize = 13;
-const REACH: f64 = 3.6;
-/// How often the grid follows its moments, at most.
-const ROUNDS: usize = 3;
+const CLEAR: f64 = 3.0;
+/// At two standard deviations a paraboloid is 4 above its minimum; what is off by more than this is bent.
+const MOST_BENT: f64 = 1.0;
+/// A misfit this much above the best has no probability worth adding up: e⁻⁶.
+const CUT: f64 = 12.0;
+/// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
+/// standard deviations is off by 2·e^(−2π²/h²), a hundredth.
+const FINE: f64 = 2.0;
+/// No block is halved below this, however loud the readings are.
+const LEAST_M: f64 = 1e-9;
 
 impl Search {
-    /// The surroundings of the first of `minima` number `i`, relative to the misfit `reference`.
-    pub fn mode(&self, whitened: &[f64], minima: &[Minimum], i: usize) -> Mode {
-        let (minimum, reference) = (&minima[i], minima[0].misfit);
-        if let Some(covariance) = self.covariance(minimum)
-            && self.is_plain(minimum, &covariance)
-        {
-            let [xx, xy, _, yy, ..] = covariance;
-            let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
-            let weight = (0.5 * (reference - minimum.misfit)).exp() * volume;
-            return Mode { weight, mean: minimum.at, covariance };
+    /// The surroundings of `minima`, best first, of the reading in the scratch.
+    pub fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        let are_plain = minima.iter().zip(&mut modes).all(|(minimum, mode)| {
+            let plain = self.plain(minimum, &minima[0]);
+            plain.inspect(|plain| *mode = *plain).is_some()
+        });
+        let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
+        let is_alone = are_plain && modes[0].weight >= (1.0 - MODE_THAT_MATTERS) * sum;
+        if is_alone && self.is_paraboloid(&scratch.whitened, &modes[0]) {
+            modes[0].weight = 1.0;
+            return Surroundings { modes, count: 1, region: modes[0].covariance };
         }
-        let mut mode = Mode { weight: 0.0, mean: minimum.at, covariance: self.guess(minimum) };
-        for _ in 0..ROUNDS {
-            let finer = self.sum_up(whitened, minima, i, &mode);
-            let area = |mode: &Mode| mode.covariance[0] * mode.covariance[3] - mode.covariance[1].powi(2);
-            let settled = area(&finer) > 0.5 * area(&mode) && area(&finer) < 2.0 * area(&mode);
-            if finer.weight > 0.0 {
-                mode = finer;
-            }
-            if settled || finer.weight <= 0.0 {
-                break;
-            }
-        }
-        mode
+        self.sum_up(minima, scratch);
+        self.summed(minima, &mut scratch.leaves)
+    }
+
+    /// A minimum as a normal distribution, its weight relative to that of `best`; `None` where it is wide, near an edge, or
+    /// not told at all.
+    fn plain(&self, minimum: &Minimum, best: &Minimum) -> Option<Mode> {
+        let covariance = self.covariance(minimum)?;
+        let [xx, xy, _, yy, ..] = covariance;
+        let sd_m = [xx.sqrt(), yy.sqrt()];
+        let narrow = (0..2).all(|k| {
+            sd_m[k] <= MOST_CELLS * self.coarse.cell_m[k]
+                && CLEAR * sd_m[k] < minimum.at[k]
+                && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
+        });
+        let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
+        let weight = (0.5 * (self.cost(best) - self.cost(minimum))).exp() * volume;
+        (narrow && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
+    }
+
+    /// Minus twice the logarithm of the likelihood, but for a constant.
+    fn cost(&self, minimum: &Minimum) -> f64 {
+        minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
+    }
+
+    /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
+    fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
+        let [xx, xy, _, yy, ..] = mode.covariance;
+        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+        let radius = half.hypot(xy);
+        let (sin, cos) = (0.5 * xy.atan2(half)).sin_cos();
+        let (longer, shorter) = ((mean + radius).sqrt(), (mean - radius).max(0.0).sqrt());
+        let [x_m, y_m, _] = mode.mean;
+        let here = self.profiled(whitened, [x_m, y_m]).1;
+        let is_straight = |along: f64, across: f64| {
+            let rise = self.profiled(whitened, [x_m + 2.0 * along, y_m + 2.0 * across]).1 - here;
+            (rise - 4.0).abs() <= MOST_BENT
+        };
+        [1.0, -1.0].iter().all(|side| {
+            is_straight(side * longer * cos, side * longer * sin)
+                && is_straight(-side * shorter * sin, side * shorter * cos)
+        })
     }
 
     /// The inverse of the information; `None` where the reading does not tell.
@@ -71,81 +129,177 @@ impl Search {
         Some([x[0], x[1], x[2], y[1], y[2], force[2]])
     }
 
-    /// Whether a minimum is narrow, and clear of the edges.
-    fn is_plain(&self, minimum: &Minimum, covariance: &[f64; 6]) -> bool {
-        let sd_m = [covariance[0].sqrt(), covariance[3].sqrt()];
-        minimum.misfit.is_finite()
-            && (0..2).all(|k| {
-                sd_m[k] <= MOST_SPACINGS * self.coarse.spacing_m[k]
-                    && CLEAR * sd_m[k] < minimum.at[k]
-                    && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
-            })
-    }
-
-    /// A first covariance of the position: that of the information and of a position anywhere on the surface.
-    fn guess(&self, minimum: &Minimum) -> [f64; 6] {
-        let i = &minimum.information;
-        let by_force =
-            if i[2][2] > 0.0 && !matches!(self.force, ForceBelief::Known(_)) { 1.0 / i[2][2] } else { 0.0 };
-        let anywhere = |k: usize| 12.0 / self.size_m[k].powi(2);
-        let xx = (i[0][0] - by_force * i[0][2] * i[0][2]).max(0.0) + anywhere(0);
-        let yy = (i[1][1] - by_force * i[1][2] * i[1][2]).max(0.0) + anywhere(1);
-        let xy = i[0][1] - by_force * i[0][2] * i[1][2];
-        let determinant = xx * yy - xy * xy;
-        if determinant > 0.0 {
-            [yy / determinant, -xy / determinant, 0.0, xx / determinant, 0.0, 0.0]
-        } else {
-            [1.0 / xx, 0.0, 0.0, 1.0 / yy, 0.0, 0.0]
-        }
-    }
-
-    /// Sums over a grid around a mode: of the points on the surface, those that are nearer to the minimum than to others.
-    fn sum_up(&self, whitened: &[f64], minima: &[Minimum], i: usize, mode: &Mode) -> Mode {
-        let [xx, xy, _, yy, ..] = mode.covariance;
-        // Cholesky's factor of the position's covariance.
-        let along = xx.sqrt();
-        let (slope, across) = (xy / along, (yy - xy * xy / xx).max(1e-12 * yy).sqrt());
-        let step = 2.0 * REACH / (POINTS - 1) as f64;
-        let mut sums = Moments::default();
-        for u in 0..POINTS {
-            for v in 0..POINTS {
-                let (u, v) = (u as f64 * step - REACH, v as f64 * step - REACH);
-                let at = [mode.mean[0] + along * u, mode.mean[1] + slope * u + across * v];
-                if self.is_on_surface(at) && nearest(minima, at) == i {
-                    let (force_n, misfit) = self.profiled(whitened, at);
-                    let weight = (0.5 * (minima[0].misfit - misfit)).exp();
-                    sums.add(weight, [at[0] - mode.mean[0], at[1] - mode.mean[1], force_n]);
+    /// Puts the parts of the surface that hold the probability into the scratch.
+    fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) {
+        let Scratch { whitened, profile, blocks, leaves } = scratch;
+        leaves.clear();
+        let best = self.cost(&minima[0]);
+        let most = best + CUT;
+        for cell in 0..self.coarse.cells() {
+            let middle_m = self.coarse.middle_m(cell);
+            if self.floor(profile, cell) + self.spread(middle_m) > most {
+                continue;
+            }
+            let force_n = profile.force_n(cell, self.force);
+            blocks.push(Block {
+                middle_m,
+                size_m: self.coarse.cell_m,
+                length: self.coarse.lengths[cell].map(|length| force_n * length),
+            });
+            while let Some(block) = blocks.pop() {
+                let (force_n, misfit) = self.profiled(whitened, block.middle_m);
+                let spread = self.spread(block.middle_m);
+                if block.floor(misfit) + spread > most {
+                    continue;
+                }
+                if let Some(halves) = block.halves() {
+                    blocks.extend(halves);
+                } else {
+                    let area = block.size_m[0] * block.size_m[1];
+                    let [x_m, y_m] = block.middle_m;
+                    leaves.push(Leaf {
+                        weight: (0.5 * (best - misfit - spread)).exp() * area,
+                        at: [x_m, y_m, force_n],
+                        mode: nearest(minima, block.middle_m),
+                        distance: 0.0,
+                    });
                 }
             }
         }
-        let mut found = sums.mode(step * step * along * across);
-        found.mean[0] += mode.mean[0];
-        found.mean[1] += mode.mean[1];
-        // A distribution within one point of the grid is as wide as the grid's cells at least.
-        found.covariance[0] += step * step * xx / 12.0;
-        found.covariance[1] += step * step * xy / 12.0;
-        found.covariance[3] += step * step * yy / 12.0;
-        let ff = minima[i].information[2][2];
-        if ff > 0.0 && !matches!(self.force, ForceBelief::Known(_)) {
-            found.covariance[5] += 1.0 / ff;
-        }
-        found
     }
 
-    fn is_on_surface(&self, at: [f64; 2]) -> bool {
-        (0..2).all(|k| (0.0..=self.size_m[k]).contains(&at[k]))
+    /// The modes of what was summed up: what lies nearest to a minimum is its mode's.
+    fn summed(&self, minima: &[Minimum], leaves: &mut [Leaf]) -> Surroundings {
+        let mut moments = [Moments::default(); MOST_VALLEYS];
+        let mut all = Moments::default();
+        for leaf in &*leaves {
+            moments[leaf.mode].add(leaf.weight, leaf.at);
+            all.add(leaf.weight, leaf.at);
+        }
+        if all.weight.is_nan() || all.weight <= 0.0 {
+            return self.nothing_summed(&minima[0]);
+        }
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        for ((mode, moments), minimum) in modes.iter_mut().zip(&moments).zip(minima) {
+            *mode = moments.mode(minimum);
+            mode.weight /= all.weight;
+            mode.covariance[5] += self.own_variance(minimum);
+        }
+        let count = minima.len();
+        modes[..count].sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let Mode { mean: [x, y, f], mut covariance, .. } = all.mode(&minima[0]);
+        let [dx, dy, df] = [x - modes[0].mean[0], y - modes[0].mean[1], f - modes[0].mean[2]];
+        let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
+        covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
+        covariance[5] += self.own_variance(&minima[0]);
+        let growth = growth(leaves, modes[0].mean, &covariance);
+        Surroundings { modes, count, region: covariance.map(|value| growth * value) }
+    }
+
+    /// Variance of a force at a place that is known.
+    fn own_variance(&self, minimum: &Minimum) -> f64 {
+        let told = minimum.information[2][2];
+        let known = matches!(self.force, ForceBelief::Known(_));
+        if known || told <= 0.0 { 0.0 } else { 1.0 / told }
+    }
+
+    /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
+    fn nothing_summed(&self, minimum: &Minimum) -> Surroundings {
+        let [xx, yy] = self.size_m.map(|size_m| size_m * size_m / 12.0);
+        let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        modes[0] = Mode { weight: 1.0, mean: minimum.at, covariance: region };
+        Surroundings { modes, count: 1, region }
+    }
+}
+
+/// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
+fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
+    let [xx, xy, _, yy, ..] = *covariance;
+    let determinant = xx * yy - xy * xy;
+    if determinant.is_nan() || determinant <= 0.0 {
+        return 1.0;
+    }
+    for leaf in &mut *leaves {
+        let (x, y) = (leaf.at[0] - about[0], leaf.at[1] - about[1]);
+        leaf.distance = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
+    }
+    leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
+    let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
+    // Half of a leaf lies within the ellipse through its middle; between leaves the share is straight.
+    let (mut inside, mut last) = (0.0, (0.0, 0.0));
+    for leaf in &*leaves {
+        let held = (inside + 0.5 * leaf.weight) / all;
+        if held >= 0.95 {
+            let (distance, share) = last;
+            let part = if held > share { (0.95 - share) / (held - share) } else { 1.0 };
+            return (distance + part * (leaf.distance - distance)) / ELLIPSE_95;
+        }
+        inside += leaf.weight;
+        last = (leaf.distance, held);
+    }
+    1.0
+}
+
+/// A part of the surface that its middle stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    /// Its probability, but for a factor.
+    weight: f64,
+    /// x, y and the force that is best there.
+    at: [f64; 3],
+    /// Whose minimum is nearest.
+    mode: usize,
+    /// Squared, from the estimate, in standard deviations.
+    distance: f64,
+}
+
+/// A part of the surface, which is halved until its middle stands for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    middle_m: [f64; 2],
+    size_m: [f64; 2],
+    /// How far apart the whitened readings of its ends are, along and across.
+    length: [f64; 2],
+}
+
+impl Block {
+    /// About the least misfit within it, from that of its middle.
+    fn floor(&self, misfit: f64) -> f64 {
+        let reach = 0.5 * self.length[0].hypot(self.length[1]);
+        let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
+        closest * closest
+    }
+
+    /// Its halves along the longer way; `None` of one that is short both ways.
+    fn halves(&self) -> Option<[Self; 2]> {
+        let k = usize::from(self.length[1] > self.length[0]);
+        if self.length[k].is_nan() || self.length[k] <= FINE || self.size_m[k] <= LEAST_M {
+            return None;
+        }
+        let half = |side: f64| {
+            let mut block = *self;
+            block.size_m[k] *= 0.5;
+            block.length[k] *= 0.5;
+            block.middle_m[k] += side * 0.5 * block.size_m[k];
+            block
+        };
+        Some([half(-1.0), half(1.0)])
     }
 }
 
 /// Which minimum is nearest to a place.
 fn nearest(minima: &[Minimum], at: [f64; 2]) -> usize {
-    let distance = |minimum: &Minimum| (minimum.at[0] - at[0]).hypot(minimum.at[1] - at[1]);
+    if minima.len() == 1 {
+        return 0;
+    }
+    let square = |minimum: &Minimum| (minimum.at[0] - at[0]).powi(2) + (minimum.at[1] - at[1]).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
-    minima.iter().map(distance).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
+    minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
 }
 
 /// Sums from which mean and covariance follow.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Moments {
     weight: f64,
     first: [f64; 3],
@@ -160,9 +314,10 @@ impl Moments {
         self.second.iter_mut().zip(squares).for_each(|(sum, value)| *sum += weight * value);
     }
 
-    fn mode(&self, cell: f64) -> Mode {
+    /// The mode of these moments; where nothing was added, the minimum without a weight.
+    fn mode(&self, minimum: &Minimum) -> Mode {
         if self.weight <= 0.0 {
-            return Mode::default();
+            return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
         }
         let mean @ [x, y, f] = self.first.map(|sum| sum / self.weight);
         let mut covariance = self.second.map(|sum| sum / self.weight);
@@ -171,6 +326,6 @@ impl Moments {
         for variance in [0, 3, 5] {
             covariance[variance] = covariance[variance].max(0.0);
         }
-        Mode { weight: self.weight * cell, mean, covariance }
+        Mode { weight: self.weight, mean, covariance }
     }
 }

@@ -94,6 +94,24 @@ impl Patches {
         values
     }
 
+    /// f alone at a place, of the sensors of a group.
+    #[inline]
+    pub fn value(&self, place: &Place, group: usize) -> Lanes {
+        let Place { node, along: [u, _], across: [v, _] } = place;
+        let mut value = [0.0; 8];
+        for side in 0..4 {
+            let (right, up) = (side % 2, side / 2);
+            let corner = &self.nodes[(node + right + up * self.columns) * self.groups + group];
+            for (kind, lanes) in corner.iter().enumerate() {
+                let weight = u[right + 2 * (kind % 2)] * v[up + 2 * (kind / 2)];
+                for lane in 0..8 {
+                    value[lane] += weight * lanes[lane];
+                }
+            }
+        }
+        value
+    }
+
     /// f of a group at a node.
     pub fn at_node(&self, column: usize, row: usize, group: usize) -> &Lanes {
         &self.nodes[(row * self.columns + column) * self.groups + group][0]

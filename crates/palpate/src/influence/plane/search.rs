@@ -5,6 +5,7 @@
 //! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
+use super::modes::{Block, Leaf};
 use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
 use crate::influence::belief::ForceBelief;
@@ -20,10 +21,16 @@ pub(super) struct Search {
     pub patches: Patches,
     /// Variance of f at every node, in groups of eight channels.
     variances: Vec<Lanes>,
+    /// 1/(1 + v) at every node, for the known force or the calibration's, in groups of eight channels.
+    weights: Vec<Lanes>,
+    /// Σ ln(1 + v) at every node.
+    spreads: Vec<f64>,
+    /// The least weight in the middle of every coarse cell.
+    least_weights: Vec<f64>,
+    /// The force of these weights, in newtons.
+    weights_force_n: f64,
     pub coarse: Coarse,
     pub force: ForceBelief,
-    /// The calibration's mean force, in newtons: its offsets are as uncertain as its influences at this force.
-    reference_force_n: f64,
     /// Length and width, in metres.
     pub size_m: [f64; 2],
     /// What a contact costs, by the criterion that counts contacts (Chen and Chen, Biometrika 95, 2008).
@@ -39,6 +46,10 @@ pub(super) struct Search {
 pub(super) struct Scratch {
     pub whitened: Vec<f64>,
     pub profile: Profile,
+    /// Parts of the surface that are still to be looked at.
+    pub blocks: Vec<Block>,
+    /// Those that hold the probability.
+    pub leaves: Vec<Leaf>,
 }
 
 /// x and y in metres, and the force in newtons.
@@ -77,12 +88,27 @@ impl Search {
                     table.variances[node * table.sensors + s] * inverse * inverse;
             }
         }
-        let coarse = Coarse::new(table, &patches, live.len());
+        // Offsets are as uncertain as influences at the calibration's force, so a softer touch counts as one of that force.
+        let weights_force_n = match force {
+            ForceBelief::Known(force_n) => force_n.max(reference_force_n),
+            _ => reference_force_n,
+        };
+        let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
+        let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
+        let coarse = Coarse::new(table, &patches, live.len(), force);
+        // Channels that only fill a group up have v = 0, and a weight of 1.
+        let node = |node: usize| weights[node * patches.groups..][..patches.groups].as_flattened().iter();
+        let spreads = (0..table.nodes()).map(|n| node(n).map(|w| -w.ln()).sum()).collect();
+        let least = |cell: usize| {
+            let [x_m, y_m] = coarse.middle_m(cell);
+            node(patches.nearest(x_m, y_m)).copied().fold(1.0, f64::min)
+        };
+        let least_weights = (0..coarse.cells()).map(least).collect();
         let unknowns = 1 + force.unknowns();
         let channels = live.len();
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
-            charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.nodes() as f64).ln(),
+            charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
             worst_misfit: match channels.saturating_sub(unknowns) {
                 0 => f64::INFINITY,
                 freedom => chi_squared_bound(1e-4, freedom),
@@ -93,9 +119,12 @@ impl Search {
             inverse_sd,
             patches,
             variances,
+            weights,
+            spreads,
+            least_weights,
+            weights_force_n,
             coarse,
             force,
-            reference_force_n,
         }
     }
 
@@ -112,9 +141,13 @@ impl Search {
         self.coarse.scan(&scratch.whitened, square, self.force, &mut scratch.profile);
         let (valleys, count) = self.coarse.valleys(&scratch.profile);
         let mut found = [NOWHERE; MOST_VALLEYS];
-        let mut kept = 0;
-        for start_m in &valleys[..count] {
-            let minimum = self.refine(&scratch.whitened, *start_m);
+        let (mut kept, mut best) = (0, f64::INFINITY);
+        for valley in &valleys[..count] {
+            if self.floor(&scratch.profile, valley.cell) > best + NEGLIGIBLE {
+                continue;
+            }
+            let minimum = self.refine(&scratch.whitened, self.coarse.middle_m(valley.cell));
+            best = best.min(minimum.misfit);
             match found[..kept].iter().position(|other| self.same(&scratch.whitened, other, &minimum)) {
                 Some(i) if minimum.misfit < found[i].misfit => found[i] = minimum,
                 Some(_) => {}
@@ -129,60 +162,90 @@ impl Search {
         (found, found[..kept].iter().take_while(matters).count().max(1))
     }
 
+    /// About the least misfit in a coarse cell, of which the profile holds that without weights.
+    pub fn floor(&self, profile: &Profile, cell: usize) -> f64 {
+        let reach = profile.force_n(cell, self.force) * self.coarse.reaches[cell];
+        let closest = (profile.misfits()[cell].max(0.0).sqrt() - reach).max(0.0);
+        self.least_weights[cell] * closest * closest
+    }
+
     /// Whether two minima lie in one valley: on the straight way between them the misfit hardly rises.
     fn same(&self, whitened: &[f64], a: &Minimum, b: &Minimum) -> bool {
         const STEPS: usize = 8;
         const RISE: f64 = 1.0;
-        let near = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < 0.1 * self.coarse.spacing_m[k]);
-        near || (1..STEPS).all(|step| {
-            let t = step as f64 / STEPS as f64;
-            let at = |k: usize| a.at[k] + t * (b.at[k] - a.at[k]);
-            let [x_m, y_m] = [at(0), at(1)];
-            self.profiled(whitened, [x_m, y_m]).1 <= a.misfit.max(b.misfit) + RISE
-        })
+        let close = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < 0.1 * self.coarse.cell_m[k]);
+        close
+            || (1..STEPS).all(|step| {
+                let t = step as f64 / STEPS as f64;
+                let at = |k: usize| a.at[k] + t * (b.at[k] - a.at[k]);
+                let [x_m, y_m] = [at(0), at(1)];
+                self.profiled(whitened, [x_m, y_m]).1 <= a.misfit.max(b.misfit) + RISE
+            })
     }
 
     /// The best force at a place, and the misfit with it.
+    #[inline]
     pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> (f64, f64) {
-        let force_n = self.best_force(whitened, [x_m, y_m]);
-        (force_n, self.equations(whitened, [x_m, y_m, force_n], None).misfit)
-    }
-
-    /// The best force at a place, as far as the noise alone is concerned.
-    pub fn best_force(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> f64 {
-        if let ForceBelief::Known(force_n) = self.force {
-            return force_n;
-        }
         let place = self.patches.place(x_m, y_m);
-        let (mean, precision) = self.force.mean_and_precision();
-        let (mut product, mut norm) = (mean * precision, precision);
-        for (group, d) in whitened.chunks(8).enumerate() {
-            let f = self.patches.values(&place, group).f;
-            product += d.iter().zip(&f).map(|(d, f)| d * f).sum::<f64>();
-            norm += f.iter().map(|f| f * f).sum::<f64>();
+        let weights = self.near(&self.weights, [x_m, y_m]);
+        let mut sums = [[0.0; 8]; 3];
+        for (group, (chunk, weights)) in whitened.chunks(8).zip(weights).enumerate() {
+            let f = self.patches.value(&place, group);
+            let mut d = [0.0; 8];
+            d[..chunk.len()].copy_from_slice(chunk);
+            for lane in 0..8 {
+                let (weighted_d, weighted_f) = (weights[lane] * d[lane], weights[lane] * f[lane]);
+                sums[0][lane] += weighted_d * d[lane];
+                sums[1][lane] += weighted_d * f[lane];
+                sums[2][lane] += weighted_f * f[lane];
+            }
         }
-        if norm > 0.0 { (product / norm).max(0.0) } else { 0.0 }
+        let [square, product, norm] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        if let ForceBelief::Known(force_n) = self.force {
+            return (force_n, square + force_n * (force_n * norm - 2.0 * product));
+        }
+        let (mean, precision) = self.force.mean_and_precision();
+        let (pull, norm) = (product + mean * precision, norm + precision);
+        let force_n = if norm > 0.0 { (pull / norm).max(0.0) } else { 0.0 };
+        (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * pull))
     }
 
-    /// The variances of f at the node nearest to a place, as a slice of groups.
-    fn variances_near(&self, [x_m, y_m]: [f64; 2]) -> &[Lanes] {
-        let groups = self.patches.groups;
-        &self.variances[self.patches.nearest(x_m, y_m) * groups..][..groups]
+    /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.
+    pub fn spread(&self, [x_m, y_m]: [f64; 2]) -> f64 {
+        self.spreads[self.patches.nearest(x_m, y_m)]
+    }
+
+    /// The best force at a place.
+    pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
+        match self.force {
+            ForceBelief::Known(force_n) => force_n,
+            _ => self.profiled(whitened, at).0,
+        }
+    }
+
+    /// The groups of the node nearest to a place.
+    #[inline]
+    fn near<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
+        &groups[self.patches.nearest(x_m, y_m) * self.patches.groups..][..self.patches.groups]
     }
 
     /// The normal equations; the calibration's variances are those `near` some place, or where the contact is.
     pub fn equations(&self, whitened: &[f64], at: Unknowns, near: Option<[f64; 2]>) -> Equations {
         let [x_m, y_m, force_n] = at;
         let place = self.patches.place(x_m, y_m);
-        let variances = self.variances_near(near.unwrap_or([x_m, y_m]));
-        let scale = force_n.max(self.reference_force_n).powi(2);
+        let near = near.unwrap_or([x_m, y_m]);
+        let (weights, variances) = (self.near(&self.weights, near), self.near(&self.variances, near));
+        let harder = (force_n > self.weights_force_n).then_some(force_n * force_n);
         let mut sums = [[0.0; 8]; 10];
-        for (group, (chunk, variances)) in whitened.chunks(8).zip(variances).enumerate() {
+        for (group, chunk) in whitened.chunks(8).enumerate() {
             let values = self.patches.values(&place, group);
             let mut d = [0.0; 8];
             d[..chunk.len()].copy_from_slice(chunk);
             for lane in 0..8 {
-                let weight = 1.0 / (1.0 + scale * variances[lane]);
+                let weight = match harder {
+                    None => weights[group][lane],
+                    Some(scale) => 1.0 / (1.0 + scale * variances[group][lane]),
+                };
                 let (f, gx, gy) =
                     (values.f[lane], force_n * values.along[lane], force_n * values.across[lane]);
                 let e = d[lane] - force_n * f;
