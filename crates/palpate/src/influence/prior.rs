@@ -67,24 +67,24 @@ impl<'a> Prior<'a> {
     pub fn new(surface: &'a dyn Surface, sensor: &Sensor, mean: Mean) -> Self {
         let Sensor { kind, position, .. } = *sensor;
         let extent = surface.extent();
-        let function = |at: Position| surface.influence_function(kind, at);
-        let beside = |at_m: f64, size_m: f64, moved: &dyn Fn(f64) -> Position| {
-            let (before, behind) = ((at_m - 1e-4 * size_m).max(0.0), (at_m + 1e-4 * size_m).min(size_m));
-            ([function(moved(before)), function(moved(behind))], behind - before)
-        };
         // A reaction sensor is part of its support, and does not sit beside it.
         let moves = kind != SensorKind::Reaction;
-        let along = moves.then(|| beside(position.x_m, extent.length_m, &|x_m| Position { x_m, ..position }));
-        let across = extent
-            .width_m
-            .filter(|_| moves)
-            .map(|width_m| beside(position.y_m, width_m, &|y_m| Position { y_m, ..position }));
-        Self {
-            mean,
-            full_scale: surface.full_scale(kind),
-            function: function(position),
-            beside: [along, across],
-        }
+        let around = |at_m: f64, size_m: f64| {
+            moves.then(|| ((at_m - 1e-4 * size_m).max(0.0), (at_m + 1e-4 * size_m).min(size_m)))
+        };
+        let along = around(position.x_m, extent.length_m);
+        let across = extent.width_m.and_then(|width_m| around(position.y_m, width_m));
+        let mut places = vec![position];
+        places.extend(along.iter().flat_map(|(a, b)| [*a, *b]).map(|x_m| Position { x_m, ..position }));
+        places.extend(across.iter().flat_map(|(a, b)| [*a, *b]).map(|y_m| Position { y_m, ..position }));
+        let mut functions = surface.influence_functions(kind, &places).into_iter();
+        let function = functions.next().unwrap_or_else(|| surface.influence_function(kind, position));
+        let mut beside = |ends: Option<(f64, f64)>| {
+            let (before, behind) = ends?;
+            Some(([functions.next()?, functions.next()?], behind - before))
+        };
+        let beside = [beside(along), beside(across)];
+        Self { mean, full_scale: surface.full_scale(kind), function, beside }
     }
 
     /// The parts at a contact position.
@@ -171,9 +171,8 @@ impl<'a> Mixture<'a> {
             None => (MIXED, 1),
             Some(width_m) => (side(extent.length_m / width_m), side(width_m / extent.length_m)),
         };
-        let sensors = cells(extent, columns, rows).into_iter();
         Self {
-            functions: sensors.map(|sensor| surface.influence_function(mixed, sensor)).collect(),
+            functions: surface.influence_functions(mixed, &cells(extent, columns, rows)),
             scale: surface.full_scale(mixed),
             taken: supports.iter().map(|at| surface.influence_function(kind, *at)).collect(),
         }

@@ -39,6 +39,15 @@ pub trait Surface: Send + Sync {
     /// solved by elements this is one solution, so ask once and keep the answer.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_>;
 
+    /// The influence functions of several sensors of one kind; some surfaces have them sooner together than one by one.
+    fn influence_functions(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+    ) -> Vec<Arc<dyn InfluenceFunction + '_>> {
+        sensors.iter().map(|sensor| self.influence_function(kind, *sensor)).collect()
+    }
+
     /// What a sensor reads under any force, its influence times the force unless the surface bends too far for that.
     fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
         Arc::new(Proportional(self.influence_function(kind, sensor)))

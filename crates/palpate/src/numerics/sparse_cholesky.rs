@@ -111,14 +111,16 @@ impl SparseCholesky {
         }
     }
 
-    /// The solution x of A·x = b in the place of b.
+    /// The solution x of A·x = b in the place of b; or of several b, one after the other, in one sweep through the factor,
+    /// whose reading from memory bounds a sweep for one.
     ///
     /// # Panics
-    /// When b is not as long as the matrix.
+    /// When b is not as long as the matrix, or a multiple of that.
     pub fn solve_in_place(&self, b: &mut [f64]) {
-        let scratch = self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
+        let (rows, columns) = (self.symbolic.nrows(), b.len() / self.symbolic.nrows().max(1));
+        let scratch = self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
         let mut memory = MemBuffer::new(scratch);
-        let right_side = MatMut::from_column_major_slice_mut(b, self.symbolic.nrows(), 1);
+        let right_side = MatMut::from_column_major_slice_mut(b, rows, columns);
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
             right_side,

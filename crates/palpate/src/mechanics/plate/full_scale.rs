@@ -44,8 +44,8 @@ fn largest(spec: &PlateSpec, solved: &Solved, kind: SensorKind) -> f64 {
         SensorKind::Reaction => spec.supports.iter().map(|support| support.position).collect(),
         SensorKind::Deflection | SensorKind::Slope | SensorKind::Strain => grid(spec),
     };
-    let largest = sensors.into_iter().map(|at| PlateInfluence::new(spec, solved, kind, at).largest());
-    largest.fold(0.0, f64::max)
+    let functions = PlateInfluence::of_all(spec, solved, kind, &sensors);
+    functions.iter().map(PlateInfluence::largest).fold(0.0, f64::max)
 }
 
 fn grid(spec: &PlateSpec) -> Vec<Position> {

@@ -19,20 +19,24 @@ pub(super) struct PlateInfluence {
 }
 
 impl PlateInfluence {
-    /// The influence function of a sensor of this `kind` at `sensor`; 0 everywhere for a raw channel, or a reaction where
+    /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction where
     /// there is no support.
-    pub fn new(spec: &PlateSpec, solved: &Solved, kind: SensorKind, sensor: Position) -> Self {
+    pub fn of_all(spec: &PlateSpec, solved: &Solved, kind: SensorKind, sensors: &[Position]) -> Vec<Self> {
         let mesh = solved.mesh;
+        let by_load = |load: &dyn Fn(Position) -> Functional, factor: f64| {
+            let loads: Vec<_> = sensors.iter().map(|sensor| (load(*sensor), factor)).collect();
+            solved.solutions(&loads)
+        };
         let degrees = match kind {
-            SensorKind::Deflection => solved.solution(&weights(&mesh, sensor, Derivative::None), -1.0),
-            SensorKind::Slope => solved.solution(&weights(&mesh, sensor, Derivative::X), -1.0),
+            SensorKind::Deflection => by_load(&|sensor| weights(&mesh, sensor, Derivative::None), -1.0),
+            SensorKind::Slope => by_load(&|sensor| weights(&mesh, sensor, Derivative::X), -1.0),
             // Strain on the lower face, t/2 below the middle, is (t/2)·∂²w/∂x²: a plate that is hollow above is stretched
             // below.
-            SensorKind::Strain => solved.solution(&curvature(&mesh, sensor), -0.5 * spec.thickness_m),
-            SensorKind::Reaction => reaction(spec, solved, sensor),
-            SensorKind::Raw => vec![0.0; mesh.degrees()],
+            SensorKind::Strain => by_load(&|sensor| curvature(&mesh, sensor), -0.5 * spec.thickness_m),
+            SensorKind::Reaction => sensors.iter().map(|sensor| reaction(spec, solved, *sensor)).collect(),
+            SensorKind::Raw => vec![vec![0.0; mesh.degrees()]; sensors.len()],
         };
-        Self { mesh, degrees }
+        degrees.into_iter().map(|degrees| Self { mesh, degrees }).collect()
     }
 
     /// The largest magnitude at the nodes.
@@ -91,7 +95,8 @@ fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Vec<f64> {
     match kind {
         PointSupportKind::Simple => solved.reaction(i).unwrap_or_else(none),
         PointSupportKind::Elastic { stiffness_n_per_m } => {
-            solved.solution(&weights(&solved.mesh, position, Derivative::None), stiffness_n_per_m)
+            let load = weights(&solved.mesh, position, Derivative::None);
+            solved.solutions(&[(load, stiffness_n_per_m)]).pop().unwrap_or_else(none)
         }
     }
 }

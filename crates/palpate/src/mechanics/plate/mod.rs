@@ -100,10 +100,20 @@ impl Plate {
 impl Surface for Plate {
     /// NaN everywhere when [`Plate::solve`] fails.
     fn influence_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
-        match self.solved() {
-            Ok(solved) => Arc::new(PlateInfluence::new(&self.spec, solved, kind, sensor)),
-            Err(_) => Arc::new(NotANumber),
-        }
+        self.influence_functions(kind, &[sensor]).pop().unwrap_or_else(|| Arc::new(NotANumber))
+    }
+
+    /// In few sweeps through the factor.
+    fn influence_functions(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+    ) -> Vec<Arc<dyn InfluenceFunction + '_>> {
+        let Ok(solved) = self.solved() else {
+            return sensors.iter().map(|_| Arc::new(NotANumber) as Arc<dyn InfluenceFunction>).collect();
+        };
+        let all = PlateInfluence::of_all(&self.spec, solved, kind, sensors).into_iter();
+        all.map(|function| Arc::new(function) as Arc<dyn InfluenceFunction>).collect()
     }
 
     fn is_supported_at(&self, position: Position) -> bool {

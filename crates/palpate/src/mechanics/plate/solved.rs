@@ -26,6 +26,9 @@ pub(super) struct Solved {
     simple_supports: SimpleSupports,
 }
 
+/// Loads that are solved for in one sweep through the factor: more would cost memory and save little.
+const TOGETHER: usize = 24;
+
 /// What holds the points of the simple supports.
 struct SimpleSupports {
     /// Of each support of the plate, which of the simple ones it is.
@@ -52,11 +55,18 @@ impl Solved {
         Ok(Self { mesh, unknowns, factor, simple_supports })
     }
 
-    /// All degrees of freedom under the load `functional`, times `factor`.
-    pub fn solution(&self, functional: &Functional, factor: f64) -> Vec<f64> {
-        let mut u = solve(&self.unknowns, &self.factor, functional);
-        self.simple_supports.hold(&self.unknowns, &mut u);
-        self.unknowns.spread(&u, factor)
+    /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by.
+    pub fn solutions(&self, loads: &[(Functional, f64)]) -> Vec<Vec<f64>> {
+        let each = loads.chunks(TOGETHER).flat_map(|loads| {
+            let functionals: Vec<&Functional> = loads.iter().map(|(functional, _)| functional).collect();
+            let mut solved = solve(&self.unknowns, &self.factor, &functionals);
+            let spread = |(u, (_, factor)): (&mut [f64], &(Functional, f64))| {
+                self.simple_supports.hold(&self.unknowns, u);
+                self.unknowns.spread(u, *factor)
+            };
+            solved.chunks_exact_mut(self.unknowns.count().max(1)).zip(loads).map(spread).collect::<Vec<_>>()
+        });
+        each.collect()
     }
 
     /// The force of a simple support on the plate, positive upward, under a downward unit force, as degrees of freedom of a
@@ -90,7 +100,7 @@ impl SimpleSupports {
         let numbers: Vec<_> = numbers.collect();
         let rigid = springs.into_iter().zip(&numbers).filter(|(_, number)| number.is_some());
         let deflections: Vec<Functional> = rigid.map(|(spring, _)| spring.deflection).collect();
-        let solutions: Vec<_> = deflections.iter().map(|load| solve(unknowns, factor, load)).collect();
+        let solutions: Vec<_> = deflections.iter().map(|load| solve(unknowns, factor, &[load])).collect();
         let compliance =
             Array2::from_shape_fn((count, count), |(i, j)| reading(unknowns, &deflections[i], &solutions[j]));
         Ok(Self { numbers, deflections, compliance: Cholesky::factor(compliance)?, solutions })
@@ -142,11 +152,14 @@ fn springs(spec: &PlateSpec, mesh: &Mesh) -> Vec<Spring> {
     spec.supports.iter().map(spring).collect()
 }
 
-fn solve(unknowns: &Unknowns, factor: &SparseCholesky, load: &Functional) -> Vec<f64> {
-    let mut u = vec![0.0; unknowns.count()];
-    for (degree, value) in load {
-        if let Some(place) = unknowns.place(*degree) {
-            u[place] += value;
+/// The unknowns under each load, one after the other.
+fn solve(unknowns: &Unknowns, factor: &SparseCholesky, loads: &[&Functional]) -> Vec<f64> {
+    let mut u = vec![0.0; unknowns.count() * loads.len()];
+    for (u, load) in u.chunks_exact_mut(unknowns.count().max(1)).zip(loads) {
+        for (degree, value) in *load {
+            if let Some(place) = unknowns.place(*degree) {
+                u[place] += value;
+            }
         }
     }
     factor.solve_in_place(&mut u);
