@@ -84,3 +84,35 @@ fn what_cannot_be_tracked_is_refused_in_words() {
     let other = complained(&run(folder.path(), &["track", "other.json", "moving.csv"]), 2);
     assert!(other.contains("kind `neighbours`"), "{other}");
 }
+
+#[test]
+fn two_contacts_are_followed_in_columns_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = include_str!("../../../examples/two-moving-loads.toml");
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
+    let output =
+        run(folder.path(), &["track", "locator.json", "moving.csv", "--rig", "rig.toml", "--report", "page"]);
+    let told = said(&output);
+    let heading = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching,position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
+    assert_eq!(told.lines().next(), Some(heading));
+    assert!(told.lines().all(|line| line.split(',').count() == 13));
+    let filter = row(&output.stderr, "filter");
+    assert!(filter[3] >= 2.5 && filter[6] >= 95.0, "{filter:?}");
+    let json = run(folder.path(), &["track", "locator.json", "moving.csv", "--json"]);
+    let last: Value = serde_json::from_str(said(&json).lines().last().unwrap()).unwrap();
+    assert!(last["two_touching"].as_f64().unwrap() > 0.9, "{last}");
+    assert!(last["second"]["x_mm"].as_f64().is_some(), "{last}");
+}
+
+#[test]
+fn inertia_is_refused_where_the_mode_is_not_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = include_str!("../../../examples/continuous-beam.toml");
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let output = run(folder.path(), &["track", "locator.json", "--frequency", "17 Hz"]);
+    let complaint = complained(&output, 2);
+    assert!(complaint.contains("half a sine"), "{complaint}");
+}

@@ -3,10 +3,9 @@
 
 use cpu_time::ThreadTime;
 use palpate::bench::Bench;
-use palpate::estimator::{Fitting, Locator, Tracker, TrackerConfig};
+use palpate::estimator::{Fitting, Locator, Swing, Tracker, TrackerConfig};
 use palpate::evaluation::{TrackErrors, follow};
-use palpate::mechanics::Motion;
-use palpate::rig::{MotionRig, Rig};
+use palpate::rig::Rig;
 use palpate::simulate::{simulate, simulate_moving};
 
 const ROUNDS: usize = 7;
@@ -19,8 +18,7 @@ fn main() {
         println!("force {}", if force_n.is_some() { "known" } else { "unknown" });
         let locator = fit(&rig, force_n);
         for speed_m_per_s in [0.1, 0.2, 0.5, 1.0] {
-            let motion = Motion { speed_m_per_s, ..moving.motion };
-            let rig = Rig { motion: Some(MotionRig { motion, ..moving }), ..rig.clone() };
+            let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s)), ..rig.clone() };
             println!("  {speed_m_per_s} m/s");
             measure(&locator, &rig);
         }
@@ -37,11 +35,14 @@ fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
 fn measure(locator: &Locator, rig: &Rig) {
     let timed = simulate_moving(rig, 2).expect("the example can be moved");
     let rows = &timed.recording.rows;
-    let truths: Vec<_> = rows.iter().filter_map(|row| row.contact()).collect();
-    let own = rig.motion.map(|moving| moving.beam.frequency_hz(1));
-    for (name, natural_frequency_hz) in [("quasi-static", None), ("with inertia", own)] {
-        let config = TrackerConfig { natural_frequency_hz, ..TrackerConfig::default() };
-        let tracking = locator.tracking().expect("an influence locator");
+    let truths = timed.truths();
+    let own = rig.motion.map(|moving| Swing {
+        frequency_hz: moving.beam.frequency_hz(1),
+        damping_ratio: moving.beam.damping_ratio,
+    });
+    for (name, swing) in [("in balance", None), ("with inertia", own)] {
+        let config = TrackerConfig { swing, ..TrackerConfig::default() };
+        let tracking = locator.tracking(&config).expect("an influence locator");
         let mut rates: Vec<f64> = (0..ROUNDS)
             .map(|_| {
                 let mut tracker = Tracker::new(tracking.likelihood(), config);

@@ -1,10 +1,10 @@
-//! `palpate track`: a moving contact, line by line or smoothed.
+//! `palpate track`: moving contacts, line by line or smoothed.
 
 use crate::failure::{Complaint, Failure};
 use crate::table::table;
 use crate::{input, interrupt, output};
 use palpate::contact::Contact;
-use palpate::estimator::{Locator, SmoothTracker, Track, Tracker, TrackerConfig};
+use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig};
 use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate::recording::{CsvError, TimedParser, TimedReading};
 use palpate::report::{TrackReport, track_report};
@@ -12,9 +12,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// Follow a moving contact: readings in time in (a CSV file, or stdin), the track out.
+/// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
 ///
-/// Time comes from a column `time_s` or from --rate. Where the file has the true contacts, the errors are said at the
+/// Two are followed by a locator whose estimator has `contacts = 2`. Time comes from a column `time_s` or from --rate. Where the file has the true contacts, the errors are said at the
 /// end, on stderr.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -28,10 +28,10 @@ pub struct Arguments {
     /// Go back over the whole recording: nothing is printed before its end
     #[arg(long)]
     smooth: bool,
-    /// The surface's first natural frequency: reckon with its inertia
+    /// The first natural frequency of a beam on two simple supports: reckon with its inertia, and 1 % of the critical damping
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
     frequency: Option<f64>,
-    /// A rig with [motion]: its natural frequency is taken, and a report shows the errors of its motion at other speeds
+    /// A rig with [motion]: its natural frequency and damping are taken, and a report shows the errors of its motion at other speeds
     #[arg(long, value_name = "RIG", conflicts_with = "frequency")]
     rig: Option<PathBuf>,
     /// Seed of the simulations with other speeds
@@ -47,13 +47,17 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let locator = input::read_locator(&arguments.locator)?;
-    let tracking = locator
-        .tracking()
-        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
     let rig = arguments.rig.as_deref().map(input::read_rig).transpose()?;
-    let swings = rig.as_ref().and_then(|rig| rig.motion).map(|moving| moving.beam.frequency_hz(1));
-    let config =
-        TrackerConfig { natural_frequency_hz: arguments.frequency.or(swings), ..TrackerConfig::default() };
+    let told =
+        arguments.frequency.map(|frequency_hz| Swing { frequency_hz, damping_ratio: Swing::DAMPING_RATIO });
+    let beam = rig.as_ref().and_then(|rig| rig.motion).map(|moving| moving.beam);
+    let own =
+        beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
+    let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
+    let tracking = locator
+        .tracking(&config)
+        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
+    let most_contacts = tracking.likelihood().most_contacts();
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {
         Follower::Smoother(SmoothTracker::new(tracking.likelihood(), config))
@@ -63,6 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut stream = Stream {
         arguments,
         follower,
+        most_contacts,
         name: String::new(),
         lines: 0,
         lost: 0,
@@ -95,7 +100,7 @@ enum Follower<'a> {
 /// The true contacts so far.
 #[derive(Default)]
 struct Seen {
-    truths: Vec<Contact>,
+    truths: Vec<Vec<Contact>>,
     /// Of the filter, where it is not the smoother that keeps them and there is a truth to compare them with.
     tracks: Vec<Track>,
 }
@@ -103,6 +108,8 @@ struct Seen {
 struct Stream<'a> {
     arguments: &'a Arguments,
     follower: Follower<'a>,
+    /// How many contacts a line of CSV has room for.
+    most_contacts: usize,
     name: String,
     lines: u64,
     /// Rows that gave no estimate.
@@ -121,7 +128,7 @@ impl Stream<'_> {
         let mut parser = TimedParser::new(&self.name, locator.bench.schema(&columns));
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
-            output::print(&mut out, HEADING.as_bytes())?;
+            output::print(&mut out, heading(self.most_contacts).as_bytes())?;
         }
         let mut line = Vec::new();
         while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
@@ -182,7 +189,7 @@ impl Stream<'_> {
                 return Ok(());
             }
         };
-        self.seen.truths.extend(reading.truth);
+        self.seen.truths.extend(reading.truth.clone());
         let Some(track) = track else {
             self.numbers.push(self.lines);
             return Ok(());
@@ -211,7 +218,7 @@ impl Stream<'_> {
     }
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
-        let line = if self.arguments.json { json(track, line)? } else { csv(track) };
+        let line = if self.arguments.json { json(track, line)? } else { csv(track, self.most_contacts) };
         output::print(out, line.as_bytes())
     }
 
@@ -247,10 +254,19 @@ impl Stream<'_> {
                 format!("{:.2}", errors.ratio()),
                 percent(errors.track_covered),
                 percent(errors.single_covered),
+                percent(errors.track_number_right),
             ]
         };
-        let heading =
-            ["average error, mm", "readings", "track", "single", "ratio", "covered, %", "single, %"];
+        let heading = [
+            "average error, mm",
+            "contacts",
+            "track",
+            "single",
+            "ratio",
+            "covered, %",
+            "single, %",
+            "number right, %",
+        ];
         eprintln!("{}", table(&heading, errors.iter().map(row)));
     }
 
@@ -281,25 +297,35 @@ impl Stream<'_> {
     }
 }
 
-/// The columns of [`csv`]; without a contact, all but the first and the last are empty.
-const HEADING: &str = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching\n";
+/// The columns of [`csv`] for as many contacts; those of a contact that does not touch are empty.
+fn heading(most_contacts: usize) -> String {
+    let mut heading = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching".to_owned();
+    if most_contacts > 1 {
+        heading += ",position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
+    }
+    heading + "\n"
+}
 
-fn csv(track: &Track) -> String {
-    let contact = track.tracked.map_or_else(
-        || ",,,,".to_owned(),
-        |tracked| {
-            let (low_m, high_m) = tracked.x_95_m;
-            format!(
-                "{:.4},{:.4},{:.4},{:.4},{:.4}",
-                tracked.x_m * 1e3,
-                tracked.speed_m_per_s,
-                tracked.force_n,
-                low_m * 1e3,
-                high_m * 1e3
-            )
-        },
-    );
-    format!("{},{contact},{:.4}\n", track.time_s, track.touching)
+fn csv(track: &Track, most_contacts: usize) -> String {
+    let mut line =
+        format!("{},{},{:.4}", track.time_s, csv_contact(track.contacts.first()), track.touching());
+    if most_contacts > 1 {
+        line += &format!(",{},{:.4}", csv_contact(track.contacts.get(1)), track.numbers[2]);
+    }
+    line + "\n"
+}
+
+fn csv_contact(contact: Option<&Tracked>) -> String {
+    let Some(tracked) = contact else { return ",,,,".to_owned() };
+    let (low_m, high_m) = tracked.x_95_m;
+    format!(
+        "{:.4},{:.4},{:.4},{:.4},{:.4}",
+        tracked.x_m * 1e3,
+        tracked.speed_m_per_s,
+        tracked.force_n,
+        low_m * 1e3,
+        high_m * 1e3
+    )
 }
 
 /// A track as JSON.
@@ -308,8 +334,12 @@ struct JsonTrack {
     line: u64,
     time_s: f64,
     touching: f64,
+    /// The first contact, or the only one.
     #[serde(flatten)]
     contact: Option<JsonContact>,
+    two_touching: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<JsonContact>,
     single_mm: f64,
     single_status: &'static str,
 }
@@ -326,7 +356,7 @@ struct JsonContact {
 }
 
 fn json(track: &Track, line: u64) -> Result<String, Failure> {
-    let contact = track.tracked.map(|tracked| {
+    let contact = |tracked: &Tracked| {
         let ([sd_m, sd_speed_m_per_s, sd_force_n], (low_m, high_m)) = (tracked.sd, tracked.x_95_m);
         JsonContact {
             x_mm: tracked.x_m * 1e3,
@@ -337,12 +367,14 @@ fn json(track: &Track, line: u64) -> Result<String, Failure> {
             sd_speed_m_per_s,
             sd_force_n,
         }
-    });
+    };
     let object = JsonTrack {
         line,
         time_s: track.time_s,
-        touching: track.touching,
-        contact,
+        touching: track.touching(),
+        contact: track.contacts.first().map(contact),
+        two_touching: track.numbers[2],
+        second: track.contacts.get(1).map(contact),
         single_mm: track.alone.contact.position.x_m * 1e3,
         single_status: track.alone.status.name(),
     };

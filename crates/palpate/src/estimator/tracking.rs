@@ -1,22 +1,32 @@
-//! Which locators can follow a moving contact.
+//! Which locators can follow moving contacts.
 
 use super::{Locator, Method};
 use crate::influence::{BeamLikelihood, InfluenceLocator};
+use crate::mechanics::SurfaceSpec;
 use crate::method::Likelihood;
+use crate::tracking::TrackerConfig;
 
 /// What a tracker needs of a locator.
 pub struct Tracking {
     likelihood: BeamLikelihood,
 }
 
-/// A locator that cannot say how probable a reading is at a contact.
+/// A locator by which moving contacts cannot be followed, or not in that way.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
-pub struct NotTrackable {
-    /// The locator's kind.
-    pub kind: &'static str,
-    /// Whether its surface has no model.
-    pub measured: bool,
+pub enum NotTrackable {
+    /// It cannot say how probable a reading is at a contact.
+    #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
+    Kind {
+        /// The locator's kind.
+        kind: &'static str,
+        /// Whether its surface has no model.
+        measured: bool,
+    },
+    /// The shape in which its surface swings is not known.
+    #[error(
+        "inertia is reckoned with on a beam on two simple supports, whose first mode is half a sine; this surface is held otherwise: follow it in balance, without a natural frequency"
+    )]
+    Mode,
 }
 
 impl Tracking {
@@ -27,18 +37,22 @@ impl Tracking {
 }
 
 impl Locator {
-    /// What a tracker needs.
+    /// What a tracker of this configuration needs.
     ///
     /// # Errors
-    /// [`NotTrackable`] for a locator whose method has no likelihood.
-    pub fn tracking(&self) -> Result<Tracking, NotTrackable> {
+    /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.
+    pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
+        if config.swing.is_some() && !matches!(self.bench.surface, SurfaceSpec::Beam(_)) {
+            return Err(NotTrackable::Mode);
+        }
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
                 Ok(Tracking { likelihood: BeamLikelihood::new(beam) })
             }
-            method => {
-                Err(NotTrackable { kind: self.kind(), measured: matches!(method, Method::Influence(_)) })
-            }
+            method => Err(NotTrackable::Kind {
+                kind: self.kind(),
+                measured: matches!(method, Method::Influence(_)),
+            }),
         }
     }
 }

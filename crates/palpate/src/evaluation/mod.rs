@@ -10,6 +10,7 @@ pub use cross_validation::{CrossValidationError, cross_validate};
 pub use statistics::{Spread, percentile};
 pub use tracking::{
     FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
+    tracked_of,
 };
 
 use crate::contact::Position;

@@ -1,68 +1,145 @@
 //! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
 
 use crate::contact::Contact;
-use crate::estimator::{Locator, NotTrackable, SmoothTracker, Track, TrackError, TrackerConfig};
+use crate::estimator::{
+    ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
+    TrackerConfig,
+};
 use crate::recording::TimedRecording;
-use crate::rig::{MotionRig, Rig};
+use crate::rig::Rig;
 use crate::simulate::{SimulateError, simulate_moving};
 
-/// Mean errors over the readings while something touched, in metres, and how often the 95 % intervals held the contact.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+/// Mean errors over the contacts while they touched, in metres, and how often the 95 % intervals held them. Where there are
+/// several, those that were found are paired with the true ones so that the distances are least.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct TrackErrors {
     /// Readings while something touched.
     pub readings: usize,
-    /// Of those, readings at which the tracker had a contact; the track's errors are of these.
+    /// Contacts that touched and that the tracker had, over all readings; the track's errors are of these.
     pub tracked: usize,
     /// Mean error of a reading by itself.
     pub single_m: f64,
     /// Mean error of the track.
     pub track_m: f64,
-    /// Share of the readings by themselves whose interval held the contact.
+    /// Share of the contacts of readings by themselves whose interval held the true one.
     pub single_covered: f64,
     /// Share of the track's intervals that held it.
     pub track_covered: f64,
+    /// Share of all readings at which the reading by itself shows as many contacts as touch.
+    pub single_number_right: f64,
+    /// Share of all readings at which the tracker has as many.
+    pub track_number_right: f64,
+}
+
+/// Sums over contacts.
+#[derive(Default)]
+struct Sums {
+    contacts: usize,
+    error_m: f64,
+    covered: usize,
+    numbers_right: usize,
+}
+
+impl Sums {
+    /// Adds a reading's contacts, each found one with its interval.
+    fn add(&mut self, truths_m: &[f64], found: &[(f64, (f64, f64))]) {
+        self.numbers_right += usize::from(truths_m.len() == found.len());
+        let places_m: Vec<f64> = found.iter().map(|(x_m, _)| *x_m).collect();
+        for (truth, mate) in pairs(truths_m, &places_m) {
+            let (x_m, (low, high)) = found[mate];
+            self.contacts += 1;
+            self.error_m += (x_m - truths_m[truth]).abs();
+            self.covered += usize::from((low..=high).contains(&truths_m[truth]));
+        }
+    }
+
+    fn mean(&self, sum: f64) -> f64 {
+        sum / self.contacts.max(1) as f64
+    }
 }
 
 impl TrackErrors {
-    /// Compares tracks with the true contacts, one each, whose force is 0 where nothing touched; `None` where nothing ever
+    /// Compares tracks with the true contacts of each, whose force is 0 where they do not touch; `None` where nothing ever
     /// did, or nothing was tracked.
-    pub fn of(tracks: &[Track], truths: &[Contact]) -> Option<Self> {
-        let within = |(low, high): (f64, f64), x_m: f64| f64::from(u8::from((low..=high).contains(&x_m)));
-        let mut errors = Self {
-            readings: 0,
-            tracked: 0,
-            single_m: 0.0,
-            track_m: 0.0,
-            single_covered: 0.0,
-            track_covered: 0.0,
-        };
-        for (track, truth) in tracks.iter().zip(truths).filter(|(_, truth)| truth.force_n > 0.0) {
-            let x_m = truth.position.x_m;
-            let alone = &track.alone.contact;
-            errors.readings += 1;
-            errors.single_m += (alone.position.x_m - x_m).abs();
-            errors.single_covered +=
-                alone.uncertainty.map_or(0.0, |uncertainty| within(uncertainty.x_95_m, x_m));
-            if let Some(tracked) = track.tracked {
-                errors.tracked += 1;
-                errors.track_m += (tracked.x_m - x_m).abs();
-                errors.track_covered += within(tracked.x_95_m, x_m);
-            }
+    pub fn of(tracks: &[Track], truths: &[Vec<Contact>]) -> Option<Self> {
+        let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
+        for (one, truths) in tracks.iter().zip(truths) {
+            let touching = truths.iter().filter(|truth| truth.force_n > 0.0);
+            let truths_m: Vec<f64> = touching.map(|truth| truth.position.x_m).collect();
+            readings += usize::from(!truths_m.is_empty());
+            let tracked: Vec<_> = one.contacts.iter().map(|tracked| (tracked.x_m, tracked.x_95_m)).collect();
+            track.add(&truths_m, &tracked);
+            single.add(&truths_m, &alone(&one.alone, !truths_m.is_empty()));
         }
-        if errors.tracked == 0 {
-            return None;
-        }
-        let (all, tracked) = (errors.readings as f64, errors.tracked as f64);
-        errors.single_m /= all;
-        errors.single_covered /= all;
-        errors.track_m /= tracked;
-        errors.track_covered /= tracked;
-        Some(errors)
+        let all = tracks.len().min(truths.len()) as f64;
+        (track.contacts > 0).then(|| Self {
+            readings,
+            tracked: track.contacts,
+            single_m: single.mean(single.error_m),
+            track_m: track.mean(track.error_m),
+            single_covered: single.mean(single.covered as f64),
+            track_covered: track.mean(track.covered as f64),
+            single_number_right: single.numbers_right as f64 / all,
+            track_number_right: track.numbers_right as f64 / all,
+        })
     }
 
     /// How many times smaller the track's mean error is than that of the readings by themselves.
     pub fn ratio(&self) -> f64 {
         self.single_m / self.track_m
+    }
+}
+
+/// The contacts of a reading by itself; while something touches, its best guess at least.
+fn alone(estimate: &Estimate, touched: bool) -> Vec<(f64, (f64, f64))> {
+    if !touched && estimate.status == Status::NoContact {
+        return Vec::new();
+    }
+    let contacts = std::iter::once(&estimate.contact).chain(estimate.further.as_slice());
+    let found = |contact: &ContactEstimate| {
+        let interval = contact.uncertainty.map_or((f64::NAN, f64::NAN), |uncertainty| uncertainty.x_95_m);
+        (contact.position.x_m, interval)
+    };
+    contacts.map(found).collect()
+}
+
+/// For each true contact, the tracked one that is it; none for those that do not touch or were not found.
+pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
+    let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
+    let truths_m: Vec<f64> = touching.iter().map(|i| truths[*i].position.x_m).collect();
+    let found_m: Vec<f64> = track.contacts.iter().map(|tracked| tracked.x_m).collect();
+    let mut tracked = vec![None; truths.len()];
+    for (truth, mate) in pairs(&truths_m, &found_m) {
+        tracked[touching[truth]] = Some(track.contacts[mate]);
+    }
+    tracked
+}
+
+/// As many pairs of indices as the shorter list has, with the least sum of distances.
+fn pairs(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
+    if b.len() < a.len() {
+        return pairs(b, a).into_iter().map(|(i, j)| (j, i)).collect();
+    }
+    let mut best = (f64::INFINITY, Vec::new());
+    choose(a, b, &mut Vec::new(), 0.0, &mut best);
+    best.1.into_iter().enumerate().collect()
+}
+
+/// Goes through every choice of one of `b` for each of `a`, none twice; `chosen` is the choice so far.
+fn choose(a: &[f64], b: &[f64], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
+    if chosen.len() == a.len() {
+        if sum < best.0 {
+            *best = (sum, chosen.clone());
+        }
+        return;
+    }
+    for j in 0..b.len() {
+        if !chosen.contains(&j) {
+            let distance = (a[chosen.len()] - b[j]).abs();
+            chosen.push(j);
+            choose(a, b, chosen, sum + distance, best);
+            chosen.pop();
+        }
     }
 }
 
@@ -95,7 +172,7 @@ pub fn follow(
     config: TrackerConfig,
     recording: &TimedRecording,
 ) -> Result<Followed, FollowError> {
-    let tracking = locator.tracking()?;
+    let tracking = locator.tracking(&config)?;
     let mut tracker = SmoothTracker::new(tracking.likelihood(), config);
     for (row, time_s) in recording.recording.rows.iter().zip(&recording.times_s) {
         tracker.follow(*time_s, &row.reading)?;
@@ -145,10 +222,9 @@ pub fn sweep_speeds(
     let mut sweep = Vec::new();
     for ratio in SPEED_RATIOS {
         let speed_m_per_s = ratio * moving.beam.critical_speed_m_per_s();
-        let motion = crate::mechanics::Motion { speed_m_per_s, ..moving.motion };
-        let rig = Rig { motion: Some(MotionRig { motion, ..moving }), ..rig.clone() };
+        let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s)), ..rig.clone() };
         let recording = simulate_moving(&rig, seed)?;
-        let truths: Vec<Contact> = recording.recording.rows.iter().filter_map(|row| row.contact()).collect();
+        let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
         let errors = TrackErrors::of(&filtered, &truths).zip(TrackErrors::of(&smoothed, &truths));
         sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
@@ -159,4 +235,17 @@ pub fn sweep_speeds(
         }));
     }
     Ok(sweep)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pairs;
+
+    #[test]
+    fn contacts_are_paired_so_that_the_distances_are_least() {
+        assert_eq!(pairs(&[0.1, 0.3], &[0.31, 0.12]), [(0, 1), (1, 0)]);
+        assert_eq!(pairs(&[0.1, 0.3], &[0.25]), [(1, 0)]);
+        assert_eq!(pairs(&[0.1], &[0.5, 0.2, 0.0]), [(0, 1)]);
+        assert_eq!(pairs(&[], &[0.5]), []);
+    }
 }

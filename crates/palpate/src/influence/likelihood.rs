@@ -1,13 +1,21 @@
-//! How well a contact explains a reading, by the table of influence functions.
+//! How well contacts explain a reading, by the table of influence functions.
 //!
 //! Symbols: d whitened reading (less offsets, over the noise), f whitened influence and f′ its slope, W force, v variance
-//! of f from calibration. χ² = Σ w·(d − W·f)², with w = 1/(1 + W²·v), as where a single reading is located.
+//! of f from calibration; u the first mode's force, φ its shape and g what the sensors read per newton of it.
+//! χ² = Σ w·(d − Σ W·f − (u − Σ W·φ)·g)², with w = 1/(1 + Σ W²·v), as where a single reading is located.
+//!
+//! g needs no mechanics: a sensor's influence function is f(x) = Σ_k s_k·φ_k(x)/(m_k·ω_k²), with s_k what it reads of mode k,
+//! so g = s₁/(m₁·ω₁²) = (2/l)·∫f·φ dx is the share of the first mode in the table itself.
+
+use std::f64::consts::PI;
 
 use super::belief::ForceBelief;
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
 use crate::contact::Contact;
 use crate::method::{ContactFit, Likelihood, Locate};
+use crate::numerics::Cholesky;
+use ndarray::Array2;
 use palpate_core::Estimate;
 
 /// The likelihood of a [`BeamLocator`], ready to be asked often.
@@ -20,8 +28,8 @@ pub struct BeamLikelihood {
     scaling: Vec<(f64, f64)>,
     /// f, f′ and v of those.
     table: InfluenceTable,
-    /// f″ at the nodes, from f′ at their neighbours.
-    curvatures: Vec<f64>,
+    /// g of those.
+    first_mode: Vec<f64>,
 }
 
 impl BeamLikelihood {
@@ -45,20 +53,62 @@ impl BeamLikelihood {
             slopes: whitened(&parts.table.slopes, 1),
             variances: whitened(&parts.table.variances, 2),
         };
-        let curvatures = curvatures(&table);
-        Self { locator: locator.clone(), live, scaling, table, curvatures }
+        let first_mode = (0..live.len()).map(|s| share_of_first_mode(&table, s)).collect();
+        Self { locator: locator.clone(), live, scaling, table, first_mode }
+    }
+
+    fn fit<const C: usize, const K: usize>(
+        &self,
+        whitened: &[f64],
+        contacts: [Contact; C],
+        mode_n: Option<f64>,
+    ) -> ContactFit<K> {
+        let at = contacts.map(|contact| {
+            let x_m = contact.position.x_m;
+            (contact.force_n, self.table.cell(x_m), self.table.variances_near(x_m), self.scale(contact))
+        });
+        let shapes = contacts.map(|contact| self.first_mode(contact.position.x_m));
+        let balance_n: f64 =
+            contacts.iter().zip(shapes).map(|(contact, [shape, _])| contact.force_n * shape).sum();
+        let departure_n = mode_n.map_or(0.0, |mode_n| mode_n - balance_n);
+        let mut fit = ContactFit::NOTHING;
+        for (s, (d, g)) in whitened.iter().zip(&self.first_mode).enumerate() {
+            let g = if mode_n.is_some() { *g } else { 0.0 };
+            let mut residual = d - departure_n * g;
+            let mut variance = 1.0;
+            let mut derivatives = [0.0; K];
+            derivatives[0] = g;
+            for k in 0..C {
+                let (force_n, cell, variances, scale) = &at[k];
+                let (f, slope) = self.table.value_and_slope(cell, s);
+                residual -= force_n * f;
+                variance += scale * variances[s];
+                derivatives[1 + 2 * k] = force_n * (slope - shapes[k][1] * g);
+                derivatives[2 + 2 * k] = f - shapes[k][0] * g;
+            }
+            fit.add(residual, &derivatives, 1.0 / variance);
+        }
+        fit.mirrored()
+    }
+
+    /// By what v is multiplied; a force that is hardly there was not calibrated better for that.
+    fn scale(&self, contact: Contact) -> f64 {
+        contact.force_n.max(self.locator.reference_force_n()).powi(2)
     }
 }
 
-/// f″ at every node, by central differences of f′, and one-sided at the ends.
-fn curvatures(table: &InfluenceTable) -> Vec<f64> {
-    let (s, last) = (table.sensors, table.nodes() - 1);
-    let at = |node: usize| {
-        let (left, right) = (node.saturating_sub(1), (node + 1).min(last));
-        let run_m = table.node_m(right) - table.node_m(left);
-        (0..s).map(move |i| (table.slopes[right * s + i] - table.slopes[left * s + i]) / run_m)
+/// g of one sensor, by Simpson's rule over the nodes, whose number is odd.
+fn share_of_first_mode(table: &InfluenceTable, sensor: usize) -> f64 {
+    let last = table.nodes() - 1;
+    let weight = |node: usize| match node {
+        0 => 1.0,
+        node if node == last => 1.0,
+        node if node % 2 == 1 => 4.0,
+        _ => 2.0,
     };
-    (0..=last).flat_map(at).collect()
+    let at = |node: usize| (PI * node as f64 / last as f64).sin() * table.at_node(node)[sensor];
+    let sum: f64 = (0..=last).map(|node| weight(node) * at(node)).sum();
+    2.0 / (3.0 * last as f64) * sum
 }
 
 impl Likelihood for BeamLikelihood {
@@ -69,31 +119,63 @@ impl Likelihood for BeamLikelihood {
         whitened.iter().map(|d| d * d).sum()
     }
 
-    fn fit_at(&self, whitened: &[f64], contact: Contact, inertia_m2: f64) -> ContactFit {
-        let (x_m, force_n) = (contact.position.x_m, contact.force_n);
-        let variances = self.table.variances_near(x_m);
-        let scale = force_n.max(self.locator.reference_force_n()).powi(2);
-        let cell = self.table.cell(x_m);
-        let left = cell.node as usize;
-        let nearer_right = x_m - self.table.node_m(left) > 0.5 * self.table.spacing_m();
-        let node = left + usize::from(nearer_right);
-        let curvatures = &self.curvatures[node * self.table.sensors..];
-        let mut fit = ContactFit::default();
-        let mut uncertain = 0.0;
-        self.table.for_each(cell, |s, f, slope| {
-            let f = f - inertia_m2 * curvatures[s];
-            let weight = 1.0 / (1.0 + scale * variances[s]);
-            let (residual, g) = (whitened[s] - force_n * f, force_n * slope);
-            fit.misfit += weight * residual * residual;
-            fit.pull[0] += weight * residual * g;
-            fit.pull[1] += weight * residual * f;
-            fit.information[0] += weight * g * g;
-            fit.information[1] += weight * g * f;
-            fit.information[2] += weight * f * f;
-            uncertain += (weight * g).powi(2) * scale * variances[s];
-        });
-        fit.calibration_m2 = uncertain / fit.information[0].powi(2).max(f64::MIN_POSITIVE);
-        fit
+    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
+        self.fit(whitened, [], Some(mode_n))
+    }
+
+    fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3> {
+        self.fit(whitened, [contact], mode_n)
+    }
+
+    fn fit_two(&self, whitened: &[f64], contacts: [Contact; 2], mode_n: Option<f64>) -> ContactFit<5> {
+        self.fit(whitened, contacts, mode_n)
+    }
+
+    fn first_mode(&self, x_m: f64) -> [f64; 2] {
+        let wave = PI / self.table.length_m;
+        let (sin, cos) = (wave * x_m).sin_cos();
+        [sin, wave * cos]
+    }
+
+    fn signal(&self, contact: Contact) -> f64 {
+        let cell = self.table.cell(contact.position.x_m);
+        let own = |s| contact.force_n * self.table.value_and_slope(&cell, s).0;
+        (0..self.table.sensors).map(|s| own(s).powi(2)).sum()
+    }
+
+    /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
+    /// and var = Σ W²·v.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [f64; 2] {
+        let free = if self.known_force_n().is_some() { 1 } else { 2 };
+        let unknowns = free * contacts.len();
+        let cells: Vec<_> = contacts.iter().map(|contact| self.table.cell(contact.position.x_m)).collect();
+        let (mut a, mut b) = (Array2::zeros((unknowns, unknowns)), Array2::zeros((unknowns, unknowns)));
+        let mut j = [0.0; 4];
+        for s in 0..self.table.sensors {
+            let mut variance = 0.0;
+            for (k, (contact, cell)) in contacts.iter().zip(&cells).enumerate() {
+                let (f, slope) = self.table.value_and_slope(cell, s);
+                j[free * k] = contact.force_n * slope;
+                if free == 2 {
+                    j[free * k + 1] = f;
+                }
+                variance += self.scale(*contact) * self.table.variances_near(contact.position.x_m)[s];
+            }
+            let weight = 1.0 / (1.0 + variance);
+            for p in 0..unknowns {
+                for q in 0..unknowns {
+                    a[[p, q]] += weight * j[p] * j[q];
+                    b[[p, q]] += weight * weight * variance * j[p] * j[q];
+                }
+            }
+        }
+        let mut left = [0.0; 2];
+        if let Ok(cholesky) = Cholesky::factor(a) {
+            let inverse = cholesky.inverse();
+            let spread = inverse.dot(&b).dot(&inverse);
+            left.iter_mut().zip(0..contacts.len()).for_each(|(left, k)| *left = spread[[free * k, free * k]]);
+        }
+        left
     }
 
     fn locate_alone(&self, reading: &[f64]) -> Estimate {
@@ -109,5 +191,9 @@ impl Likelihood for BeamLikelihood {
             ForceBelief::Known(force_n) => Some(force_n),
             ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
         }
+    }
+
+    fn most_contacts(&self) -> usize {
+        self.locator.contacts()
     }
 }

@@ -112,6 +112,16 @@ impl InfluenceTable {
         }
     }
 
+    /// Value and slope of one sensor at a place.
+    #[inline]
+    pub(super) fn value_and_slope(&self, cell: &Cell<f64>, sensor: usize) -> (f64, f64) {
+        let left = cell.node as usize * self.sensors + sensor;
+        let right = left + self.sensors;
+        let nodes = [self.values[left], self.values[right], self.slopes[left], self.slopes[right]];
+        let mix = |w: &[f64; 4]| w[0] * nodes[0] + w[1] * nodes[1] + w[2] * nodes[2] + w[3] * nodes[3];
+        (mix(&cell.value), mix(&cell.slope))
+    }
+
     /// The variances of all sensors at the node nearest to a place.
     #[inline]
     pub(super) fn variances_near(&self, x_m: f64) -> &[f64] {

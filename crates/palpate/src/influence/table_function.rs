@@ -20,13 +20,11 @@ impl InfluenceTable {
 
 impl FittedInfluence<'_> {
     fn value_and_slope(&self, x_m: f64) -> (f64, f64) {
-        let mut found = (0.0, 0.0);
-        self.table.for_each(self.table.cell(x_m), |sensor, value, slope| {
-            if sensor == self.sensor {
-                found = (value, slope);
-            }
-        });
-        found
+        if self.sensor < self.table.sensors {
+            self.table.value_and_slope(&self.table.cell(x_m), self.sensor)
+        } else {
+            (0.0, 0.0)
+        }
     }
 }
 

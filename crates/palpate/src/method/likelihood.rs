@@ -1,17 +1,34 @@
-//! How probable a reading is at a contact: what a filter over time asks of a locator.
+//! How probable a reading is under contacts: what a filter over time asks of a locator.
 
 use crate::contact::Contact;
 use palpate_core::Estimate;
 
-/// A fitted method that can say how well a contact explains a reading, on a one-dimensional surface.
+/// A fitted method that can say how well contacts explain a reading, on a one-dimensional surface.
+///
+/// A surface that swings is bent by its first mode's force u = m·ω²·q where one in balance is bent by the contacts' share
+/// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
+/// faster modes are taken to be in balance.
 pub trait Likelihood: Send + Sync {
-    /// A reading as [`Likelihood::fit_at`] wants it, written over `whitened`; the misfit |d|² of no contact at all.
+    /// A reading as the fits want it, written over `whitened`; the misfit |d|² of no contact at all, in balance.
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) -> f64;
 
-    /// How a contact explains a reading that [`Likelihood::whiten`] prepared. With `inertia_m2` = v²/ω² the surface swings
-    /// under a contact of speed v, ω its first natural angular frequency, and reads f − inertia_m2·f″ per newton instead of
-    /// f: to first order it lags behind its static shape by that shape's own acceleration over ω².
-    fn fit_at(&self, whitened: &[f64], contact: Contact, inertia_m2: f64) -> ContactFit;
+    /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u.
+    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
+
+    /// How well a contact explains it; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
+    fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
+
+    /// How well two contacts explain it; the unknowns are u, place and force of the first, place and force of the second.
+    fn fit_two(&self, whitened: &[f64], contacts: [Contact; 2], mode_n: Option<f64>) -> ContactFit<5>;
+
+    /// The first mode's shape φ at a place, and its slope per metre.
+    fn first_mode(&self, x_m: f64) -> [f64; 2];
+
+    /// How far a contact moves the reading in balance: the sum of (W·f)² over the noise's variance, of all channels.
+    fn signal(&self, contact: Contact) -> f64;
+
+    /// Variance of the position of each contact, in m², that calibration leaves and no further reading takes away.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [f64; 2];
 
     /// The contacts that explain a reading by itself: the best estimate, and its other modes.
     fn locate_alone(&self, reading: &[f64]) -> Estimate;
@@ -21,18 +38,48 @@ pub trait Likelihood: Send + Sync {
 
     /// The force of every contact in newtons, where it is known exactly.
     fn known_force_n(&self) -> Option<f64>;
+
+    /// The most contacts that may touch at once.
+    fn most_contacts(&self) -> usize;
 }
 
-/// The misfit χ² of a contact and its second-order expansion about it, by Gauss and Newton: moved by δ in (position,
-/// force), it is about χ² − 2·gᵀδ + δᵀ·A·δ. The log-likelihood is −χ²/2, up to what is the same for every contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactFit {
+/// The misfit χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about
+/// χ² − 2·gᵀδ + δᵀ·A·δ. The log-likelihood is −χ²/2, up to what is the same for all unknowns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactFit<const K: usize> {
     /// χ².
     pub misfit: f64,
-    /// g, per metre and per newton.
-    pub pull: [f64; 2],
-    /// A: the Fisher information of position, of both, and of force, in m⁻², m⁻¹N⁻¹ and N⁻².
-    pub information: [f64; 3],
-    /// Variance of the position, in m², that calibration leaves and no further reading takes away.
-    pub calibration_m2: f64,
+    /// g, per unit of each unknown.
+    pub pull: [f64; K],
+    /// A: the Fisher information of each pair of unknowns.
+    pub information: [[f64; K]; K],
+}
+
+impl<const K: usize> ContactFit<K> {
+    /// The fit of no data at all.
+    pub const NOTHING: Self = Self { misfit: 0.0, pull: [0.0; K], information: [[0.0; K]; K] };
+
+    /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
+    #[inline(always)]
+    pub fn add(&mut self, residual: f64, derivatives: &[f64; K], weight: f64) {
+        self.misfit += weight * residual * residual;
+        for i in 0..K {
+            let weighed = weight * derivatives[i];
+            self.pull[i] += weighed * residual;
+            for j in i..K {
+                self.information[i][j] += weighed * derivatives[j];
+            }
+        }
+    }
+
+    /// With the information's lower triangle as its upper one.
+    #[must_use]
+    pub fn mirrored(mut self) -> Self {
+        for i in 0..K {
+            for j in 0..i {
+                self.information[i][j] = self.information[j][i];
+            }
+        }
+        self
+    }
 }

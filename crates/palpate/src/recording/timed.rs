@@ -1,4 +1,4 @@
-//! Recordings of contacts that move: a `time_s` column beside the others.
+//! Recordings of contacts that move: a `time_s` column beside the others, and those of a second contact.
 //!
 //! Whoever reads such a file as an ordinary recording passes the column over, as any column without a role.
 
@@ -11,12 +11,16 @@ use super::csv_error::CsvError;
 use super::csv_in::{ContactFields, Schema};
 use super::csv_out::{header, record};
 use super::reading_parser::{ChannelFields, is_passed_over, utf8, without_mark};
-use crate::contact::Contact;
+use crate::contact::{Contact, Position};
 use crate::mechanics::Extent;
+use crate::sensing::SensorKind;
 use crate::units::Unit;
 
 /// The column of time, in seconds.
 const TIME: &str = "time_s";
+
+/// The columns of a second contact.
+const SECOND: [&str; 2] = ["position_2_mm", "force_2_n"];
 
 /// A recording with the time of every row.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +29,19 @@ pub struct TimedRecording {
     pub recording: Recording,
     /// When each was taken, in seconds.
     pub times_s: Vec<f64>,
+    /// The second contact of each row; nothing where there is but one contact.
+    pub second: Vec<Contact>,
+}
+
+impl TimedRecording {
+    /// The true contacts of every row whose force is known.
+    pub fn truths(&self) -> Vec<Vec<Contact>> {
+        let rows = self.recording.rows.iter().enumerate();
+        let all = rows.filter_map(|(i, row)| {
+            row.contact().map(|first| std::iter::once(first).chain(self.second.get(i).copied()).collect())
+        });
+        all.collect()
+    }
 }
 
 /// Writes a recording as [`write`](super::write) does, with the time first.
@@ -38,12 +55,18 @@ pub fn write_timed(
     mut out: impl Write,
 ) -> io::Result<()> {
     let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
-    let timed_record = |time: String, rest: Vec<String>| std::iter::once(time).chain(rest);
+    let timed_record = |time: String, second: [String; 2], rest: Vec<String>| {
+        let second = second.into_iter().filter(|_| !timed.second.is_empty());
+        std::iter::once(time).chain(second).chain(rest)
+    };
     writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
     let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(timed_record(TIME.to_owned(), header(&columns)))?;
-    for (row, time_s) in timed.recording.rows.iter().zip(&timed.times_s) {
-        csv.write_record(timed_record(Unit::NONE.format_si(*time_s), record(row, &columns)))?;
+    csv.write_record(timed_record(TIME.to_owned(), SECOND.map(str::to_owned), header(&columns)))?;
+    for (i, (row, time_s)) in timed.recording.rows.iter().zip(&timed.times_s).enumerate() {
+        let second = timed.second.get(i).map_or_else(Default::default, |contact| {
+            [columns.position_unit.format_si(contact.position.x_m), Unit::NONE.format_si(contact.force_n)]
+        });
+        csv.write_record(timed_record(Unit::NONE.format_si(*time_s), second, record(row, &columns)))?;
     }
     csv.flush()
 }
@@ -53,8 +76,8 @@ pub fn write_timed(
 pub struct TimedReading {
     /// When it was taken, where the file says, in seconds.
     pub time_s: Option<f64>,
-    /// The true contact, where the file says; its force is 0 where nothing touched.
-    pub truth: Option<Contact>,
+    /// The true contacts, where the file says; the force is 0 of one that did not touch.
+    pub truth: Option<Vec<Contact>>,
     /// One value a channel, in SI units.
     pub reading: Vec<f64>,
 }
@@ -72,6 +95,7 @@ pub struct TimedParser<'a> {
 struct Found {
     time: Option<usize>,
     contact: Option<ContactFields>,
+    second: Option<[usize; 2]>,
     channels: ChannelFields,
     width: usize,
 }
@@ -125,8 +149,16 @@ impl<'a> TimedParser<'a> {
             position: touch.position,
             force_n: touch.force_n.unwrap_or(f64::INFINITY),
         });
+        let second = found.second.map(|fields| second_contact(&cells, fields)).transpose()?;
+        let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
         Ok(Some(TimedReading { time_s, truth, reading: found.channels.reading(&cells)? }))
     }
+}
+
+/// The second contact of a line, from the fields of its place and its force.
+fn second_contact(cells: &Cells, [x, force]: [usize; 2]) -> Result<Contact, CsvError> {
+    let position = Position::along(cells.number(x, SensorKind::Deflection.unit())?);
+    Ok(Contact { position, force_n: cells.number(force, SensorKind::Reaction.unit())? })
 }
 
 impl Found {
@@ -136,7 +168,14 @@ impl Found {
         let time = Column::Name(TIME.to_owned());
         let time = if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
         let contact = if named { ContactFields::find(head, columns).ok() } else { None };
+        let second = SECOND.map(|name| Column::Name(name.to_owned()));
+        let second = if named && second.iter().all(|column| head.has(column)) {
+            let [x, force] = &second;
+            Some([head.find(x, columns.header)?, head.find(force, columns.header)?])
+        } else {
+            None
+        };
         let channels = ChannelFields::find(head, columns)?;
-        Ok(Self { time, contact, channels, width: head.width() })
+        Ok(Self { time, contact, second, channels, width: head.width() })
     }
 }

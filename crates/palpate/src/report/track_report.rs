@@ -8,8 +8,8 @@ use super::{
     Axis, BandPoint, Chart, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
 };
 use crate::contact::Contact;
-use crate::estimator::Track;
-use crate::evaluation::{SpeedErrors, TrackErrors};
+use crate::estimator::{Track, Tracked};
+use crate::evaluation::{SpeedErrors, TrackErrors, tracked_of};
 
 /// What a track's report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -24,8 +24,8 @@ pub struct TrackReport<'a> {
     pub tracks: &'a [Track],
     /// Which of the two.
     pub how: &'a str,
-    /// The true contact of each track, where the source says; a force of 0 where nothing touched.
-    pub truths: &'a [Contact],
+    /// The true contacts of each track, where the source says; a force of 0 of those that did not touch.
+    pub truths: &'a [Vec<Contact>],
     /// Errors of the filter and of the smoother, by name, where the truth is known.
     pub errors: &'a [(&'static str, TrackErrors)],
     /// How the errors go with the speed; may be empty.
@@ -42,20 +42,15 @@ const MOST_OF_LINE: usize = 2000;
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
 pub fn track_report(report: &TrackReport) -> Result<Vec<ReportFile>, ReportError> {
-    let mut figures = vec![report.track_figure()];
-    if !report.truths.is_empty() {
-        figures.push(report.errors_figure());
-    }
+    let mut figures = vec![report.track_figure(), report.errors_figure()];
     if !report.sweep.is_empty() {
         figures.push(report.sweep_figure());
     }
     let figures = Figures(figures);
     let section = |id, heading, body| Section { id, heading, body };
     let mut sections = vec![section("track", "The track", figures.show(1))];
-    if !report.errors.is_empty() {
-        let body = html! { (figures.show(2)) (report.errors_table()) };
-        sections.push(section("errors", "Errors", body));
-    }
+    let errors = html! { (figures.show(2)) @if !report.errors.is_empty() { (report.errors_table()) } };
+    sections.push(section("errors", "Errors", errors));
     if !report.sweep.is_empty() {
         let body = html! { (figures.show(3)) (report.sweep_table()) };
         sections.push(section("speed", "Errors against the speed", body));
@@ -103,28 +98,26 @@ impl TrackReport<'_> {
                 marker: Marker::Cross,
             },
         });
-        let band = |track: &Track| {
-            let ends = track.tracked.map_or((f64::NAN, f64::NAN), |tracked| tracked.x_95_m);
-            BandPoint { x: track.time_s, low: ends.0 * 1e3, high: ends.1 * 1e3 }
+        let line = |label: String, colour, stroke, points| Series {
+            label,
+            colour,
+            kind: SeriesKind::Line { points, stroke },
         };
-        let points = self.tracks.iter().map(band).collect();
-        series.push(Series {
-            label: "95 % of the track".to_owned(),
-            colour: 0,
-            kind: SeriesKind::Band { points },
-        });
-        let line =
-            |track: &Track| (track.time_s, track.tracked.map_or(f64::NAN, |tracked| tracked.x_m * 1e3));
-        let kind = SeriesKind::Line { points: self.tracks.iter().map(line).collect(), stroke: Stroke::Solid };
-        series.push(Series { label: format!("track, {}", self.how), colour: 0, kind });
-        if !self.truths.is_empty() {
-            let truth = |(track, truth): (&Track, &Contact)| {
-                let x_m = if truth.force_n > 0.0 { truth.position.x_m } else { f64::NAN };
-                (track.time_s, x_m * 1e3)
+        for k in 0..self.most_contacts() {
+            let place = |track: &Track| {
+                (track.time_s, track.contacts.get(k).map_or(f64::NAN, |tracked| tracked.x_m * 1e3))
+            };
+            let points = self.tracks.iter().map(place).collect();
+            series.push(line(format!("track{}, {}", of_two(k, self), self.how), k, Stroke::Solid, points));
+        }
+        for k in 0..self.truths.iter().map(Vec::len).max().unwrap_or(0) {
+            let truth = |(track, truths): (&Track, &Vec<Contact>)| {
+                let touching = truths.get(k).filter(|truth| truth.force_n > 0.0);
+                (track.time_s, touching.map_or(f64::NAN, |truth| truth.position.x_m * 1e3))
             };
             let points = self.tracks.iter().zip(self.truths).map(truth).collect();
-            let kind = SeriesKind::Line { points, stroke: Stroke::Dashed };
-            series.push(Series { label: "true position".to_owned(), colour: 6, kind });
+            let label = if k == 0 { "true position" } else { "true position of the second" };
+            series.push(line(label.to_owned(), 6 + k, Stroke::Dashed, points));
         }
         let chart = Chart {
             title: "The contact over time".to_owned(),
@@ -134,44 +127,66 @@ impl TrackReport<'_> {
             height_px: 520,
             ..Chart::default()
         };
-        let caption = html! { "Where the contact was, where readings by themselves see it, and the track with its 95 % band." };
+        let caption = html! { "Where the contact was, where readings by themselves see it, and the track." };
         Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
     }
 
-    /// What is drawn less the true position, in mm, against the time.
+    /// The track less the true position, with its 95 % band; where the truth is not known, the band alone, about the track.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
-        let touched = || {
-            let pairs = self.tracks.iter().zip(self.truths).step_by(stride);
-            pairs.filter(|(_, truth)| truth.force_n > 0.0)
+        let known = !self.truths.is_empty();
+        let mut series = Vec::new();
+        for k in 0..self.most_contacts() {
+            let off = |i: usize| {
+                let track = &self.tracks[i];
+                let shown = match self.truths.get(i) {
+                    Some(truths) => {
+                        let tracked = tracked_of(track, truths).get(k).copied().flatten();
+                        tracked.zip(truths.get(k)).map(|(tracked, truth)| (tracked, truth.position.x_m))
+                    }
+                    None => track.contacts.get(k).map(|tracked| (*tracked, tracked.x_m)),
+                };
+                let mm = |end: fn(&Tracked) -> f64| {
+                    shown.map_or(f64::NAN, |(tracked, from_m)| (end(&tracked) - from_m) * 1e3)
+                };
+                (track.time_s, mm(|one| one.x_m), mm(|one| one.x_95_m.0), mm(|one| one.x_95_m.1))
+            };
+            let points: Vec<_> = (0..self.tracks.len()).step_by(stride).map(off).collect();
+            let band = points.iter().map(|(x, _, low, high)| BandPoint { x: *x, low: *low, high: *high });
+            let kind = SeriesKind::Band { points: band.collect() };
+            series.push(Series { label: format!("its 95 %{}", of_two(k, self)), colour: k, kind });
+            let line = points.iter().map(|(x, off, ..)| (*x, *off)).collect();
+            let kind = SeriesKind::Line { points: line, stroke: Stroke::Solid };
+            series.push(Series { label: format!("track{}", of_two(k, self)), colour: k, kind });
+        }
+        let (title, y, caption) = if known {
+            (
+                "How far the track is off",
+                "position less the true one, mm",
+                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
+            )
+        } else {
+            (
+                "How sure the track is",
+                "ends of the 95 % interval less the position, mm",
+                "The 95 % interval about the track over time.",
+            )
         };
-        let away =
-            |x_m: Option<f64>, truth: &Contact| x_m.map_or(f64::NAN, |x_m| (x_m - truth.position.x_m) * 1e3);
-        let line = |label: &str, colour, x_m: fn(&Track) -> Option<f64>| {
-            let points = touched().map(|(track, truth)| (track.time_s, away(x_m(track), truth))).collect();
-            let kind = SeriesKind::Line { points, stroke: Stroke::Solid };
-            Series { label: label.to_owned(), colour, kind }
-        };
-        let band = touched().map(|(track, truth)| {
-            let end = |x_m: f64| away(Some(x_m), truth);
-            let ends = track.tracked.map_or((f64::NAN, f64::NAN), |tracked| tracked.x_95_m);
-            BandPoint { x: track.time_s, low: end(ends.0), high: end(ends.1) }
-        });
-        let band = SeriesKind::Band { points: band.collect() };
         let chart = Chart {
-            title: "How far readings and track are off".to_owned(),
+            title: title.to_owned(),
             x: Axis::linear("time, s"),
-            y: Axis::linear("position less the true one, mm"),
-            series: vec![
-                line("single readings", 4, |track| Some(track.alone.contact.position.x_m)),
-                Series { label: "95 % of the track".to_owned(), colour: 1, kind: band },
-                line("track", 1, |track| track.tracked.map(|tracked| tracked.x_m)),
-            ],
+            y: Axis::linear(y),
+            series,
             height_px: 480,
             ..Chart::default()
         };
-        let caption = html! { "Errors over time, while something touched." };
+        let caption = html! { (caption) };
         Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+    }
+
+    /// How many contacts were followed at most.
+    fn most_contacts(&self) -> usize {
+        self.tracks.iter().map(|track| track.contacts.len()).max().unwrap_or(0)
     }
 
     fn sweep_figure(&self) -> Figure {
@@ -212,19 +227,21 @@ impl TrackReport<'_> {
                 text(number(errors.ratio())),
                 percent(errors.track_covered),
                 percent(errors.single_covered),
+                percent(errors.track_number_right),
             ]
         };
         let columns = [
-            "readings",
+            "contacts",
             "average error, mm",
             "of single readings, mm",
             "ratio",
             "covered, %",
             "of single readings, %",
+            "number right, %",
         ];
         Table {
             number: 1,
-            caption: html! { "Errors while something touched; covered: how often the 95 % interval held the contact." },
+            caption: html! { "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as many contacts were found as touched." },
             columns: std::iter::once(short("track")).chain(columns.map(numeric)).collect(),
             rows: self.errors.iter().map(row).collect(),
         }
@@ -261,5 +278,14 @@ impl TrackReport<'_> {
             rows: self.sweep.iter().map(row).collect(),
         }
         .markup()
+    }
+}
+
+/// Which of two contacts is meant; nothing where there is but one.
+fn of_two(k: usize, report: &TrackReport) -> &'static str {
+    match (report.most_contacts(), k) {
+        (2.., 0) => " of the first",
+        (2.., _) => " of the second",
+        _ => "",
     }
 }

@@ -14,7 +14,7 @@ pub(crate) use value::{RawQuantity, positive};
 
 use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;
-use crate::contact::Position;
+use crate::contact::{Contact, Position};
 use crate::estimator::EstimatorConfig;
 use crate::mechanics::modal::ModalBeam;
 use crate::mechanics::{Extent, Motion, UniformLoad};
@@ -34,15 +34,51 @@ pub struct Rig {
     pub motion: Option<MotionRig>,
 }
 
-/// A moving contact of a rig.
+/// The moving contacts of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionRig {
-    /// Where the contact goes.
-    pub motion: Motion,
+    /// The contact, or the first of two.
+    pub first: MovingContact,
+    /// The other one.
+    pub second: Option<MovingContact>,
     /// The beam with its inertia and damping.
     pub beam: ModalBeam,
     /// Readings a second, in hertz; greater than 0.
     pub rate_hz: f64,
+}
+
+/// One contact that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingContact {
+    /// Where it goes.
+    pub motion: Motion,
+    /// Its force in newtons, where that is not the one of the rig's presses.
+    pub force_n: Option<f64>,
+}
+
+impl MotionRig {
+    /// How long it takes until every contact has arrived, in seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.moving().map(|contact| contact.motion.duration_s()).fold(0.0, f64::max)
+    }
+
+    /// The contacts at `time_s`; `force_n` is the force, in newtons, of those that have none of their own.
+    pub fn contacts_at(&self, time_s: f64, force_n: f64) -> Vec<Contact> {
+        let at =
+            |contact: MovingContact| contact.motion.contact_at(time_s, contact.force_n.unwrap_or(force_n));
+        self.moving().map(at).collect()
+    }
+
+    /// The same contacts, the first at another speed between its turns.
+    #[must_use]
+    pub fn at_speed(self, speed_m_per_s: f64) -> Self {
+        let motion = Motion { speed_m_per_s, ..self.first.motion };
+        Self { first: MovingContact { motion, ..self.first }, ..self }
+    }
+
+    fn moving(&self) -> impl Iterator<Item = MovingContact> {
+        std::iter::once(self.first).chain(self.second)
+    }
 }
 
 /// The training positions of a rig.

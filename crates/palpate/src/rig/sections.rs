@@ -1,6 +1,7 @@
 //! The rig file as it is written, before anything is checked: every key optional, every value with its place.
 
 use std::fmt;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use serde::Deserialize;
@@ -25,7 +26,7 @@ pub(crate) struct RigSections {
     pub training: Key<TrainingSection>,
     pub estimator: Key<EstimatorSection>,
     pub recording: Key<RecordingSection>,
-    pub motion: Key<MotionSection>,
+    pub motion: Key<MotionSections>,
     pub load: Option<Vec<Spanned<LoadSection>>>,
 }
 
@@ -47,11 +48,40 @@ pub(crate) struct SurfaceSection {
     pub direction: Key<String>,
 }
 
-/// `[sensors]`, or several `[[sensors]]`
+/// One section, or several of one name.
 #[derive(Clone, Debug)]
-pub(crate) enum SensorsSections {
-    One(Box<SensorsSection>),
-    Many(Vec<Spanned<SensorsSection>>),
+pub(crate) enum OneOrMany<T> {
+    One(Box<T>),
+    Many(Vec<Spanned<T>>),
+}
+
+/// A section that there may be several of.
+pub(crate) trait Repeatable {
+    const NAME: &'static str;
+}
+
+/// `[sensors]`, or several `[[sensors]]`
+pub(crate) type SensorsSections = OneOrMany<SensorsSection>;
+
+impl Repeatable for SensorsSection {
+    const NAME: &'static str = "sensors";
+}
+
+/// `[motion]`, or several `[[motion]]`
+pub(crate) type MotionSections = OneOrMany<MotionSection>;
+
+impl Repeatable for MotionSection {
+    const NAME: &'static str = "motion";
+}
+
+impl<T> OneOrMany<T> {
+    /// Every section with its place; one alone is at `place`.
+    pub fn each(&self, place: Range<usize>) -> Vec<(&T, Range<usize>)> {
+        match self {
+            Self::One(section) => vec![(section, place)],
+            Self::Many(many) => many.iter().map(|section| (section.get_ref(), section.span())).collect(),
+        }
+    }
 }
 
 /// One `[sensors]` or `[[sensors]]`: sensors of one kind
@@ -101,7 +131,7 @@ pub(crate) struct TrainingSection {
     pub force: Key<RawQuantity>,
 }
 
-/// `[motion]`
+/// One `[motion]` or `[[motion]]`: how a contact moves
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionSection {
@@ -112,6 +142,7 @@ pub(crate) struct MotionSection {
     pub passes: Key<i64>,
     pub lifted: Key<RawQuantity>,
     pub touch: Key<RawQuantity>,
+    pub force: Key<RawQuantity>,
     pub rate: Key<RawQuantity>,
     pub damping: Key<RawQuantity>,
 }
@@ -217,31 +248,31 @@ pub(crate) enum UnitNames {
     Each(Vec<Spanned<String>>),
 }
 
-impl<'de> Deserialize<'de> for SensorsSections {
+impl<'de, T: Deserialize<'de> + Repeatable> Deserialize<'de> for OneOrMany<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OneOrMany;
+        struct TableOrTables<T>(PhantomData<T>);
 
-        impl<'de> Visitor<'de> for OneOrMany {
-            type Value = SensorsSections;
+        impl<'de, T: Deserialize<'de> + Repeatable> Visitor<'de> for TableOrTables<T> {
+            type Value = OneOrMany<T>;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table [sensors], or several [[sensors]]")
+                write!(f, "a table [{name}], or several [[{name}]]", name = T::NAME)
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SensorsSections, A::Error> {
-                Box::deserialize(MapAccessDeserializer::new(map)).map(SensorsSections::One)
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<OneOrMany<T>, A::Error> {
+                Box::deserialize(MapAccessDeserializer::new(map)).map(OneOrMany::One)
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SensorsSections, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<OneOrMany<T>, A::Error> {
                 let mut sections = Vec::new();
                 while let Some(section) = seq.next_element()? {
                     sections.push(section);
                 }
-                Ok(SensorsSections::Many(sections))
+                Ok(OneOrMany::Many(sections))
             }
         }
 
-        deserializer.deserialize_any(OneOrMany)
+        deserializer.deserialize_any(TableOrTables(PhantomData))
     }
 }
 

@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::SimulateError;
+use crate::contact::Contact;
 use crate::recording::{Provenance, Recording, Row, TimedRecording};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, Sensor, measure};
@@ -11,8 +12,8 @@ use crate::sensing::{ChannelErrors, Sensor, measure};
 /// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
 const MODES: usize = 10;
 
-/// Moves the contact of a rig as its `[motion]` says, from the beam in balance under it, and records what the faulty
-/// channels report. Gains and offsets are drawn once for the recording, noise for each reading. While the contact is
+/// Moves the contacts of a rig as its `[motion]` says, from the beam in balance under them, and records what the faulty
+/// channels report. Gains and offsets are drawn once for the recording, noise for each reading. While a contact is
 /// lifted its force is 0, and its position is where it comes down again.
 ///
 /// The same seed gives the same recording.
@@ -25,22 +26,24 @@ pub fn simulate_moving(rig: &Rig, seed: u64) -> Result<TimedRecording, SimulateE
     let layout = &rig.bench.layout;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::draw(layout, &mut rng);
-    let count = (moving.motion.duration_s() * moving.rate_hz).floor() as usize + 1;
+    let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;
     let times_s: Vec<f64> = (0..count).map(|i| i as f64 / moving.rate_hz).collect();
-    let mut response = moving.beam.at_rest(MODES, &[moving.motion.contact_at(0.0, force_n)]);
-    let mut rows = Vec::with_capacity(count);
+    let mut response = moving.beam.at_rest(MODES, &moving.contacts_at(0.0, force_n));
+    let (mut rows, mut second) = (Vec::with_capacity(count), Vec::new());
     for (i, time_s) in times_s.iter().enumerate() {
-        let contact = moving.motion.contact_at(*time_s, force_n);
+        let contacts = moving.contacts_at(*time_s, force_n);
         if i > 0 {
-            response.advance(&[contact], 1.0 / moving.rate_hz);
+            response.advance(&contacts, 1.0 / moving.rate_hz);
         }
         let clean = |sensor: &Sensor| response.reading(sensor.kind, sensor.position);
         let clean: Vec<f64> = layout.sensors.iter().map(clean).collect();
         let reading = measure(layout, &clean, &errors, &mut rng);
-        rows.push(Row { position: contact.position, force_n: Some(contact.force_n), hidden: None, reading });
+        let Contact { position, force_n } = contacts[0];
+        rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
+        second.extend(contacts.get(1));
     }
     let provenance =
         Provenance { source: "simulation".to_owned(), rows: count, digests: Vec::new(), seed: Some(seed) };
     let recording = Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance };
-    Ok(TimedRecording { recording, times_s })
+    Ok(TimedRecording { recording, times_s, second })
 }

@@ -1,111 +1,161 @@
-//! One contact under several motions, which mix.
+//! A surface and its contacts under several motions, which mix.
 
-use super::config::TrackerConfig;
-use super::gaussian::{Gaussian, Motion, V, W, X};
-use crate::contact::{Contact, Position};
+use super::gaussian::Gaussian;
+use super::step::{MOTIONS, OF_CONTACT, Step, U, W, X, contact, contacts, motion_of};
 use crate::method::{ContactFit, Likelihood};
 
-/// Motions of a contact.
-pub(super) const MOTIONS: usize = 3;
-
-/// A Gaussian for each motion, with its share of the probability.
+/// A Gaussian for each choice of motions, with its share of the probability: N numbers of a state, M = 3^C choices for its
+/// C contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bank {
-    pub shares: [f64; MOTIONS],
-    pub members: [Gaussian; MOTIONS],
+pub(super) struct Bank<const N: usize, const M: usize> {
+    pub shares: [f64; M],
+    pub members: [Gaussian<N>; M],
 }
 
-/// A time step, as the motions see it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Step {
-    pub motions: [Motion; MOTIONS],
-    /// The probability that a motion lasts through the step; the others share the rest.
-    pub lasts: f64,
-}
-
-impl Step {
-    /// A step of a contact with a force; `drifts` where the force is not known.
-    pub fn new(config: &TrackerConfig, duration_s: f64, force_n: f64, drifts: bool) -> Self {
-        let drift = if drifts { (config.force_drift * force_n).powi(2) * duration_s } else { 0.0 };
-        let motion = |sd: f64| Motion::new(duration_s, config.acceleration_s, sd, drift);
-        Self {
-            motions: config.accelerations_m_per_s2.map(motion),
-            lasts: (-duration_s / config.motion_s).exp(),
-        }
-    }
-
-    /// The probability that motion `from` becomes motion `to`.
-    pub fn passes(&self, from: usize, to: usize) -> f64 {
-        if from == to { self.lasts } else { (1.0 - self.lasts) / (MOTIONS - 1) as f64 }
-    }
-}
-
-impl Bank {
+impl<const N: usize, const M: usize> Bank<N, M> {
     /// The same for every motion.
-    pub fn of(belief: Gaussian) -> Self {
-        Self { shares: [1.0 / MOTIONS as f64; MOTIONS], members: [belief; MOTIONS] }
+    pub fn of(belief: Gaussian<N>) -> Self {
+        Self { shares: [1.0 / M as f64; M], members: [belief; M] }
     }
 
     /// All of it as one Gaussian.
-    pub fn mixed(&self) -> Gaussian {
+    pub fn mixed(&self) -> Gaussian<N> {
         Gaussian::mixed(self.shares.iter().copied().zip(self.members))
     }
 
     /// After a step and before its reading.
-    pub fn predicted(&self, step: &Step) -> Self {
-        let mut shares = [0.0; MOTIONS];
+    pub fn predicted(&self, step: &Step, likelihood: &dyn Likelihood) -> Self {
+        let mut shares = [0.0; M];
         let members = std::array::from_fn(|to| {
-            let share = |from: usize| step.passes(from, to) * self.shares[from];
-            shares[to] = (0..MOTIONS).map(share).sum();
-            let parts = (0..MOTIONS).map(|from| (share(from) / shares[to], self.members[from]));
-            Gaussian::mixed(parts).predicted(&step.motions[to])
+            let joint: [f64; M] =
+                std::array::from_fn(|from| step.passes(contacts(N), from, to) * self.shares[from]);
+            shares[to] = joint.iter().sum();
+            let parts = joint.iter().map(|joint| joint / shares[to]).zip(self.members);
+            let belief = Gaussian::mixed(parts);
+            let motions = |k: usize| step.motion(motion_of(to, k));
+            belief.predicted(&step.change(&belief, motions, likelihood))
         });
         Self { shares, members }
     }
 
-    /// After a reading; and the logarithm of how probable it was. The misfit is expanded about the mean, and once more about
-    /// where that leads if it leads farther than the reading itself can tell.
+    /// After a reading; and the logarithm of how probable it was. The misfit is expanded about `start`, or else the mean,
+    /// and again about where that leads if it leads farther than the reading itself can tell.
     ///
-    /// `inertia_s2` is 1/ω² of the surface's first natural frequency. The surface lags behind its static shape by that
-    /// shape's acceleration over ω²: by f′·v̇ as if the contact were elsewhere, and by f″·v².
-    pub fn updated(
+    /// The unknowns are u, then place and force of each contact: K = 1 + 2·C.
+    pub fn updated<const K: usize>(
         &self,
-        likelihood: &dyn Likelihood,
-        whitened: &[f64],
-        inertia_s2: f64,
-    ) -> Option<(Self, ContactFit, f64)> {
+        expand: impl Fn(&[f64; K]) -> ContactFit<K>,
+        start: Option<[f64; K]>,
+        length_m: f64,
+    ) -> Option<(Self, f64)> {
         const MOST_ROUNDS: usize = 3;
-        let length_m = likelihood.length_m();
-        let seen = |belief: &Gaussian| {
-            let [x_m, force_n] = belief.seen(inertia_s2);
-            [x_m.clamp(0.0, length_m), force_n.max(0.0)]
-        };
-        let before = self.mixed();
-        let inertia_m2 = inertia_s2 * before.mean[V].powi(2);
-        let mut about = seen(&before);
+        let mut about = start.unwrap_or_else(|| held(self.seen(), length_m));
         let mut round = 1;
         loop {
-            let contact = Contact { position: Position::along(about[0]), force_n: about[1] };
-            let fit = likelihood.fit_at(whitened, contact, inertia_m2);
-            let (after, evidence) = self.updated_about(&fit, about, inertia_s2)?;
-            let next = seen(&after.mixed());
-            let moved = fit.information[0] * (next[0] - about[0]).powi(2);
-            if moved < 0.1 || round == MOST_ROUNDS {
-                return Some((after.held_to(length_m), fit, evidence));
+            let fit = expand(&about);
+            let (after, evidence) = self.updated_about(&fit, &about)?;
+            let next = held(after.seen(), length_m);
+            let moved = (1..K).step_by(2).map(|k| fit.information[k][k] * (next[k] - about[k]).powi(2));
+            if moved.sum::<f64>() < 0.1 || round == MOST_ROUNDS {
+                return Some((after.held_to(length_m), evidence));
             }
             (about, round) = (next, round + 1);
         }
     }
 
+    /// What it was before a step, given that it was `later` after it and its reading.
+    ///
+    /// What came later says of the state before, whatever motion it was under, L_j = N_j(x | all)/N_j(x | so far), where
+    /// N_j, of motion j in the step, is from Rauch, Tung and Striebel's recursion on the mixture that motion j began with. Each
+    /// member is moved and weighed by L_j as by a reading, so that a variance never grows.
+    pub fn smoothed(&self, step: &Step, likelihood: &dyn Likelihood, later: &Self) -> Self {
+        let mut weights = [[0.0; M]; M];
+        let mut before = [[Gaussian::default(); M]; M];
+        for to in 0..M {
+            let joint: [f64; M] =
+                std::array::from_fn(|from| step.passes(contacts(N), from, to) * self.shares[from]);
+            let sum: f64 = joint.iter().sum();
+            let began = Gaussian::mixed(joint.iter().map(|joint| joint / sum).zip(self.members));
+            let motions = |k: usize| step.motion(motion_of(to, k));
+            let whole = began.smoothed(&step.change(&began, motions, likelihood), &later.members[to]);
+            let (fit, about) = whole.less(&began);
+            let results: [(Gaussian<N>, f64); M] =
+                self.members.map(|member| member.updated(&fit, &about, &std::array::from_fn(|i| i)));
+            let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
+            let shares: [f64; M] = std::array::from_fn(|from| joint[from] * (results[from].1 - best).exp());
+            let all: f64 = shares.iter().sum();
+            for from in 0..M {
+                let share = if all > 0.0 { shares[from] / all } else { joint[from] / sum };
+                weights[from][to] = later.shares[to] * share;
+                before[from][to] = results[from].0;
+            }
+        }
+        let shares = weights.map(|row| row.iter().sum::<f64>());
+        let members = std::array::from_fn(|from| {
+            let share = shares[from];
+            if share > 0.0 {
+                let parts = weights[from].iter().map(|weight| weight / share);
+                Gaussian::mixed(parts.zip(before[from]))
+            } else {
+                self.members[from]
+            }
+        });
+        Self { shares, members }
+    }
+
+    /// Without contact `k`: the bank of those that stay.
+    pub fn without<const N2: usize, const M2: usize>(&self, k: usize) -> Bank<N2, M2> {
+        let below = MOTIONS.pow(k as u32);
+        let stay = |i: usize| if i < contact(k) { i } else { i + OF_CONTACT };
+        let mut shares = [0.0; M2];
+        let members = std::array::from_fn(|to| {
+            let of = |motion: usize| to % below + below * (motion + MOTIONS * (to / below));
+            shares[to] = (0..MOTIONS).map(|motion| self.shares[of(motion)]).sum();
+            let share = shares[to];
+            let parts = (0..MOTIONS).map(|motion| {
+                let member = &self.members[of(motion)];
+                let part = Gaussian {
+                    mean: std::array::from_fn(|i| member.mean[stay(i)]),
+                    covariance: std::array::from_fn(|i| {
+                        std::array::from_fn(|j| member.covariance[stay(i)][stay(j)])
+                    }),
+                };
+                (self.shares[of(motion)] / share.max(f64::MIN_POSITIVE), part)
+            });
+            Gaussian::mixed(parts)
+        });
+        Bank { shares, members }
+    }
+
+    /// With one contact more, the last; the surface then swings as `joined` makes of it.
+    pub fn with<const N2: usize, const M2: usize>(
+        &self,
+        joined: impl Fn(&Gaussian<N>) -> Gaussian<N2>,
+    ) -> Bank<N2, M2> {
+        Bank {
+            shares: std::array::from_fn(|to| self.shares[to % M] / MOTIONS as f64),
+            members: std::array::from_fn(|to| joined(&self.members[to % M])),
+        }
+    }
+
+    fn seen<const K: usize>(&self) -> [f64; K] {
+        let mut seen = [0.0; K];
+        for (share, member) in self.shares.iter().zip(&self.members) {
+            seen.iter_mut().zip(entries::<K>()).for_each(|(seen, entry)| *seen += share * member.mean[entry]);
+        }
+        seen
+    }
+
     /// `None` where the reading is too improbable for numbers.
-    fn updated_about(&self, fit: &ContactFit, about: [f64; 2], inertia_s2: f64) -> Option<(Self, f64)> {
-        let results: [(Gaussian, f64); MOTIONS] =
-            self.members.map(|member| member.updated(fit, about, inertia_s2));
+    fn updated_about<const K: usize>(&self, fit: &ContactFit<K>, about: &[f64; K]) -> Option<(Self, f64)> {
+        let entries = entries::<K>();
+        let results: [(Gaussian<N>, f64); M] =
+            self.members.map(|member| member.updated(fit, about, &entries));
         let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return None;
         }
-        let weights: [f64; MOTIONS] = std::array::from_fn(|i| self.shares[i] * (results[i].1 - best).exp());
+        let weights: [f64; M] = std::array::from_fn(|i| self.shares[i] * (results[i].1 - best).exp());
         let sum: f64 = weights.iter().sum();
         let after =
             Self { shares: weights.map(|weight| weight / sum), members: results.map(|(member, _)| member) };
@@ -115,9 +165,28 @@ impl Bank {
     /// With positions on the surface and forces that press.
     fn held_to(mut self, length_m: f64) -> Self {
         for member in &mut self.members {
-            member.mean[X] = member.mean[X].clamp(0.0, length_m);
-            member.mean[W] = member.mean[W].max(0.0);
+            for at in (0..contacts(N)).map(contact) {
+                member.mean[at + X] = member.mean[at + X].clamp(0.0, length_m);
+                member.mean[at + W] = member.mean[at + W].max(0.0);
+            }
         }
         self
     }
+}
+
+/// Unknowns with places on the surface and forces that press.
+fn held<const K: usize>(mut unknowns: [f64; K], length_m: f64) -> [f64; K] {
+    for k in 1..K {
+        unknowns[k] = if k % 2 == 1 { unknowns[k].clamp(0.0, length_m) } else { unknowns[k].max(0.0) };
+    }
+    unknowns
+}
+
+/// Which entries of a state the unknowns of a fit are.
+fn entries<const K: usize>() -> [usize; K] {
+    std::array::from_fn(|k| match k {
+        0 => U,
+        k if k % 2 == 1 => contact(k / 2) + X,
+        k => contact(k / 2 - 1) + W,
+    })
 }

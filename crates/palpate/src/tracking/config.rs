@@ -1,6 +1,6 @@
-//! What a tracker expects of contacts.
+//! What a tracker expects of contacts and of the surface.
 
-/// How contacts come, move and go.
+/// How contacts come, move and go, and how the surface swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerConfig {
     /// Motions from steady to brisk: standard deviation of the acceleration, in m/s².
@@ -17,29 +17,36 @@ pub struct TrackerConfig {
     pub changes_per_s: f64,
     /// How often a second a contact goes and is at once somewhere else.
     pub jumps_per_s: f64,
-    /// The surface's first natural frequency in hertz, where it is known: its inertia is then reckoned with.
-    pub natural_frequency_hz: Option<f64>,
+    /// How the surface swings, where that is known; else it is taken to be in balance.
+    pub swing: Option<Swing>,
 }
 
-impl TrackerConfig {
-    /// 1/ω² of the first natural frequency, in s²; 0 where that is not known.
-    pub(super) fn inertia_s2(&self) -> f64 {
-        self.natural_frequency_hz.map_or(0.0, |hz| (2.0 * std::f64::consts::PI * hz).powi(-2))
-    }
+/// The first mode of a surface that swings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swing {
+    /// Its natural frequency, in hertz; greater than 0.
+    pub frequency_hz: f64,
+    /// The share of its critical damping, at least 0 and below 1.
+    pub damping_ratio: f64,
+}
+
+impl Swing {
+    /// The damping ratio of thin metal on wedges, where nobody measured it.
+    pub const DAMPING_RATIO: f64 = 0.01;
 }
 
 impl Default for TrackerConfig {
     /// For hands, robots and wheels up to some metres a second.
     fn default() -> Self {
         Self {
-            accelerations_m_per_s2: [0.03, 0.6, 12.0],
-            acceleration_s: 0.1,
+            accelerations_m_per_s2: [0.03, 0.6, 6.0],
+            acceleration_s: 0.3,
             motion_s: 1.0,
             speed_sd_m_per_s: 0.5,
             force_drift: 0.1,
             changes_per_s: 1.0,
             jumps_per_s: 1e-3,
-            natural_frequency_hz: None,
+            swing: None,
         }
     }
 }

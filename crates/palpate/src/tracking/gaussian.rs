@@ -1,170 +1,115 @@
-//! A Gaussian in position, speed, acceleration and force, moved by time and by readings.
+//! A Gaussian in the state of a surface and its contacts, moved by time and by readings.
 //!
-//! Symbols: m mean and P covariance of (x, v, v̇, W); S covariance of what a reading sees, place and force; g and A pull and
-//! information of a [`ContactFit`].
+//! Symbols: m mean and P covariance of the state; s the unknowns of a [`ContactFit`], which are entries of the state; g and A pull
+//! and information of the fit; A = L·Lᵀ.
 
 use crate::method::ContactFit;
 
-/// Position, speed, acceleration and force.
-pub(super) const STATES: usize = 4;
-pub(super) const X: usize = 0;
-pub(super) const V: usize = 1;
-pub(super) const A: usize = 2;
-pub(super) const W: usize = 3;
+pub(super) type Matrix<const N: usize> = [[f64; N]; N];
 
-pub(super) type Vector = [f64; STATES];
-pub(super) type Matrix = [[f64; STATES]; STATES];
-
-/// A belief about one contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Gaussian {
-    /// In m, m/s, m/s² and N.
-    pub mean: Vector,
-    pub covariance: Matrix,
-}
-
-/// What time does to a contact: m goes to F·m and P to F·P·Fᵀ + Q.
+/// A belief about N numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Motion {
-    forward: Matrix,
-    noise: Matrix,
+pub(super) struct Gaussian<const N: usize> {
+    pub mean: [f64; N],
+    pub covariance: Matrix<N>,
 }
 
-impl Motion {
-    /// A contact whose acceleration has standard deviation `sd` and a correlation that falls by e in `lasts_s` (R. Singer,
-    /// IEEE Trans. Aerosp. Electron. Syst. 6, 1970); its force gains a variance.
-    pub fn new(duration_s: f64, lasts_s: f64, sd: f64, force_variance: f64) -> Self {
-        let (t, u) = (duration_s, duration_s / lasts_s);
-        let e = (-u).exp();
-        let mut forward = [[0.0; STATES]; STATES];
-        (0..STATES).for_each(|i| forward[i][i] = 1.0);
-        forward[X][V] = t;
-        forward[X][A] = lasts_s * lasts_s * (u - 1.0 + e);
-        forward[V][A] = lasts_s * (1.0 - e);
-        forward[A][A] = e;
-        let mut noise = [[0.0; STATES]; STATES];
-        let mut set = |i: usize, j: usize, value: f64| {
-            noise[i][j] = value * sd * sd * lasts_s.powi(4 - i as i32 - j as i32);
-            noise[j][i] = noise[i][j];
-        };
-        if u < 0.05 {
-            // What the closed form comes to while it would lose its digits.
-            set(X, X, u.powi(5) / 10.0);
-            set(X, V, u.powi(4) / 4.0);
-            set(X, A, u.powi(3) / 3.0);
-            set(V, V, 2.0 * u.powi(3) / 3.0);
-            set(V, A, u * u);
-            set(A, A, 2.0 * u);
-        } else {
-            let ee = e * e;
-            set(X, X, 1.0 - ee + 2.0 * u + 2.0 * u.powi(3) / 3.0 - 2.0 * u * u - 4.0 * u * e);
-            set(X, V, ee + 1.0 - 2.0 * e + 2.0 * u * e - 2.0 * u + u * u);
-            set(X, A, 1.0 - ee - 2.0 * u * e);
-            set(V, V, 4.0 * e - 3.0 - ee + 2.0 * u);
-            set(V, A, ee + 1.0 - 2.0 * e);
-            set(A, A, 1.0 - ee);
-        }
-        noise[W][W] = force_variance;
-        Self { forward, noise }
-    }
+/// What a step of time does to a state, linear about where the state is believed to be: the mean becomes `mean`, and P
+/// becomes F·P·Fᵀ + Q.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Change<const N: usize> {
+    pub mean: [f64; N],
+    /// F.
+    pub forward: Matrix<N>,
+    /// Q.
+    pub noise: Matrix<N>,
+}
 
-    /// The motion whose noise is the mean of some that differ in nothing else, by their shares.
-    pub fn mixed<const N: usize>(shares: [f64; N], motions: &[Self; N]) -> Self {
-        let mut mixed = motions[0];
-        for i in 0..STATES {
-            for j in 0..STATES {
-                mixed.noise[i][j] =
-                    shares.iter().zip(motions).map(|(share, motion)| share * motion.noise[i][j]).sum();
-            }
-        }
-        mixed
-    }
-
+impl<const N: usize> Change<N> {
     /// F·P.
-    fn carried(&self, p: &Matrix) -> Matrix {
-        let f = &self.forward;
-        std::array::from_fn(|i| std::array::from_fn(|j| (0..STATES).map(|k| f[i][k] * p[k][j]).sum()))
+    fn carried(&self, p: &Matrix<N>) -> Matrix<N> {
+        let mut carried = [[0.0; N]; N];
+        for (row, forward) in carried.iter_mut().zip(&self.forward) {
+            for (share, from) in forward.iter().zip(p).filter(|(share, _)| **share != 0.0) {
+                row.iter_mut().zip(from).for_each(|(value, from)| *value += share * from);
+            }
+        }
+        carried
     }
 }
 
-impl Gaussian {
-    /// After a motion.
-    pub fn predicted(&self, motion: &Motion) -> Self {
-        let (f, carried) = (&motion.forward, motion.carried(&self.covariance));
-        let mean = std::array::from_fn(|i| (0..STATES).map(|k| f[i][k] * self.mean[k]).sum());
-        let mut covariance = motion.noise;
-        for i in 0..STATES {
-            for j in 0..STATES {
-                covariance[i][j] += (0..STATES).map(|k| carried[i][k] * f[j][k]).sum::<f64>();
+impl<const N: usize> Default for Gaussian<N> {
+    fn default() -> Self {
+        Self { mean: [0.0; N], covariance: [[0.0; N]; N] }
+    }
+}
+
+impl<const N: usize> Gaussian<N> {
+    /// After a step of time.
+    pub fn predicted(&self, change: &Change<N>) -> Self {
+        let carried = change.carried(&self.covariance);
+        let mut covariance = change.noise;
+        for (row, carried) in covariance.iter_mut().zip(&carried) {
+            for (value, forward) in row.iter_mut().zip(&change.forward) {
+                *value += dot(carried, forward);
             }
         }
-        Self { mean, covariance }
+        Self { mean: change.mean, covariance }
     }
 
-    /// Position and force as a reading sees them: an accelerated contact as if it were `inertia_s2` times its acceleration
-    /// behind.
-    pub fn seen(&self, inertia_s2: f64) -> [f64; 2] {
-        [self.mean[X] - inertia_s2 * self.mean[A], self.mean[W]]
-    }
-
-    /// After a reading whose misfit is expanded about (position, force) = `about`, as seen; and the logarithm of how
-    /// probable the reading was.
+    /// After a reading whose misfit in the entries `seen` is expanded about `about`; and the logarithm of how probable the
+    /// reading was.
     ///
-    /// P⁺ = P − P_s·(1 + A·S)⁻¹·A·P_sᵀ and m⁺ = m + P⁺_s·(g − A·δ), with P_s the covariance of the state with what is seen
-    /// and δ the distance of what is seen from `about`; the evidence is −½·(ln det(1 + A·S) + χ² less what the move explains).
-    pub fn updated(&self, fit: &ContactFit, about: [f64; 2], inertia_s2: f64) -> (Self, f64) {
-        let with_seen = |p: &Matrix| -> [[f64; 2]; STATES] {
-            std::array::from_fn(|i| [p[i][X] - inertia_s2 * p[i][A], p[i][W]])
-        };
-        let of_seen = |s: &[[f64; 2]; STATES]| {
-            [s[X][0] - inertia_s2 * s[A][0], s[X][1] - inertia_s2 * s[A][1], s[W][1]]
-        };
-        let seen = self.seen(inertia_s2);
-        let delta = [seen[0] - about[0], seen[1] - about[1]];
-        let [a, b, c] = fit.information;
-        let by = [a * delta[0] + b * delta[1], b * delta[0] + c * delta[1]];
-        let pull = [fit.pull[0] - by[0], fit.pull[1] - by[1]];
-        let misfit = fit.misfit - delta[0] * (fit.pull[0] + pull[0]) - delta[1] * (fit.pull[1] + pull[1]);
-        let before = with_seen(&self.covariance);
-        let [sx, sm, sw] = of_seen(&before);
-        // 1 + A·S, its determinant, and G = (1 + A·S)⁻¹·A, which is symmetric.
-        let (k00, k01) = (1.0 + a * sx + b * sm, a * sm + b * sw);
-        let (k10, k11) = (b * sx + c * sm, 1.0 + b * sm + c * sw);
-        let determinant = k00 * k11 - k01 * k10;
-        let g00 = (k11 * a - k01 * b) / determinant;
-        let g01 = (k11 * b - k01 * c) / determinant;
-        let g11 = (k00 * c - k10 * b) / determinant;
+    /// P⁺ = P − Y·Yᵀ with Y = P_s·L·R⁻ᵀ and R·Rᵀ = 1 + Lᵀ·P_ss·L; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of what is
+    /// believed from `about`; the evidence is −½·(ln det R·Rᵀ + χ² less what the move explains).
+    pub fn updated<const K: usize>(
+        &self,
+        fit: &ContactFit<K>,
+        about: &[f64; K],
+        seen: &[usize; K],
+    ) -> (Self, f64) {
+        let delta: [f64; K] = std::array::from_fn(|k| self.mean[seen[k]] - about[k]);
+        let pull: [f64; K] = std::array::from_fn(|k| fit.pull[k] - dot(&fit.information[k], &delta));
+        let misfit = fit.misfit - (0..K).map(|k| delta[k] * (fit.pull[k] + pull[k])).sum::<f64>();
+        let root = square_root(&fit.information);
+        let mut y: [[f64; K]; N] = std::array::from_fn(|i| {
+            std::array::from_fn(|c| (c..K).map(|k| self.covariance[i][seen[k]] * root[k][c]).sum())
+        });
+        let mut grown: Matrix<K> = std::array::from_fn(|r| {
+            std::array::from_fn(|c| (r..K).map(|k| root[k][r] * y[seen[k]][c]).sum())
+        });
+        (0..K).for_each(|k| grown[k][k] += 1.0);
+        let grown = square_root(&grown);
+        for row in &mut y {
+            for c in 0..K {
+                row[c] = (row[c] - (0..c).map(|k| grown[c][k] * row[k]).sum::<f64>()) / grown[c][c];
+            }
+        }
         let mut after = *self;
-        for i in 0..STATES {
+        for i in 0..N {
             for j in 0..=i {
-                let (left, right) = (before[i], before[j]);
-                let fall =
-                    left[0] * (g00 * right[0] + g01 * right[1]) + left[1] * (g01 * right[0] + g11 * right[1]);
-                after.covariance[i][j] -= fall;
+                after.covariance[i][j] -= dot(&y[i], &y[j]);
                 after.covariance[j][i] = after.covariance[i][j];
             }
         }
-        let left = with_seen(&after.covariance);
-        for (mean, left) in after.mean.iter_mut().zip(&left) {
-            *mean += left[0] * pull[0] + left[1] * pull[1];
-        }
-        let [lx, lm, lw] = of_seen(&left);
-        let explained = pull[0] * (lx * pull[0] + 2.0 * lm * pull[1]) + pull[1] * lw * pull[1];
-        (after, -0.5 * (determinant.max(f64::MIN_POSITIVE).ln() + misfit - explained))
+        let moved: [f64; N] =
+            std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][seen[k]] * pull[k]).sum());
+        after.mean.iter_mut().zip(&moved).for_each(|(mean, moved)| *mean += moved);
+        let explained: f64 = (0..K).map(|k| pull[k] * moved[seen[k]]).sum();
+        let log_determinant: f64 = (0..K).map(|k| 2.0 * grown[k][k].ln()).sum();
+        (after, -0.5 * (log_determinant + misfit - explained))
     }
 
     /// The Gaussian with the mean and covariance of a mixture; shares add up to 1.
     pub fn mixed(parts: impl Iterator<Item = (f64, Self)> + Clone) -> Self {
         let mut all = Self::default();
         for (share, part) in parts.clone() {
-            for i in 0..STATES {
-                all.mean[i] += share * part.mean[i];
-            }
+            all.mean.iter_mut().zip(&part.mean).for_each(|(mean, part)| *mean += share * part);
         }
         for (share, part) in parts {
-            let away: Vector = std::array::from_fn(|i| part.mean[i] - all.mean[i]);
-            for i in 0..STATES {
-                for j in 0..STATES {
+            let away: [f64; N] = std::array::from_fn(|i| part.mean[i] - all.mean[i]);
+            for i in 0..N {
+                for j in 0..N {
                     all.covariance[i][j] += share * (part.covariance[i][j] + away[i] * away[j]);
                 }
             }
@@ -172,44 +117,81 @@ impl Gaussian {
         all
     }
 
-    /// What it was before a motion, given that it was `later` after it (Rauch, Tung and Striebel 1965):
+    /// What it was before a step, given that it was `later` after it (Rauch, Tung and Striebel 1965):
     /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, by elimination on what is not known exactly.
-    pub fn smoothed(&self, motion: &Motion, later: &Self) -> Self {
-        let expected = self.predicted(motion);
-        let carried = motion.carried(&self.covariance);
-        let gain: Matrix =
+    pub fn smoothed(&self, change: &Change<N>, later: &Self) -> Self {
+        let expected = self.predicted(change);
+        let carried = change.carried(&self.covariance);
+        let gain: Matrix<N> =
             std::array::from_fn(|i| solve(&expected.covariance, std::array::from_fn(|j| carried[j][i])));
         let mut before = *self;
-        let news: Vector = std::array::from_fn(|k| later.mean[k] - expected.mean[k]);
-        let change: Matrix = std::array::from_fn(|k| {
+        let news: [f64; N] = std::array::from_fn(|k| later.mean[k] - expected.mean[k]);
+        let difference: Matrix<N> = std::array::from_fn(|k| {
             std::array::from_fn(|l| later.covariance[k][l] - expected.covariance[k][l])
         });
-        for i in 0..STATES {
+        for i in 0..N {
             before.mean[i] += dot(&gain[i], &news);
-            let through: Vector =
-                std::array::from_fn(|l| (0..STATES).map(|k| gain[i][k] * change[k][l]).sum());
+            let through: [f64; N] =
+                std::array::from_fn(|l| (0..N).map(|k| gain[i][k] * difference[k][l]).sum());
             for (value, gain) in before.covariance[i].iter_mut().zip(&gain) {
                 *value += dot(&through, gain);
             }
         }
         before
     }
+
+    /// What it knows beyond another belief that it grew from, as the fit of the readings that made the difference, and about
+    /// where that is expanded: their precision is P⁻¹ less the other's, and at m they pull with the other's P⁻¹·(m − m₀).
+    pub fn less(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
+        let (own, before) = (inverse(&self.covariance), inverse(&other.covariance));
+        let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
+        let information = std::array::from_fn(|i| std::array::from_fn(|j| own[i][j] - before[i][j]));
+        let pull = std::array::from_fn(|i| dot(&before[i], &moved));
+        (ContactFit { misfit: 0.0, pull, information }, self.mean)
+    }
 }
 
-fn dot(a: &Vector, b: &Vector) -> f64 {
+/// P⁻¹, with zeros for what has no variance.
+fn inverse<const N: usize>(p: &Matrix<N>) -> Matrix<N> {
+    let column = |i: usize| {
+        let mut unit = [0.0; N];
+        unit[i] = 1.0;
+        solve(p, unit)
+    };
+    std::array::from_fn(column)
+}
+
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// L of A = L·Lᵀ by Cholesky's rule; a column of zeros for what A, to rounding, says nothing of.
+fn square_root<const K: usize>(a: &Matrix<K>) -> Matrix<K> {
+    let mut root = [[0.0; K]; K];
+    for c in 0..K {
+        let left = a[c][c] - (0..c).map(|k| root[c][k] * root[c][k]).sum::<f64>();
+        if left <= 1e-14 * a[c][c] {
+            continue;
+        }
+        root[c][c] = left.sqrt();
+        for r in c + 1..K {
+            let known: f64 = (0..c).map(|k| root[r][k] * root[c][k]).sum();
+            root[r][c] = (a[r][c] - known) / root[c][c];
+        }
+    }
+    root
+}
+
 /// P⁻¹·b by Gauss's elimination, scaled to a diagonal of ones; 0 for what has no variance, as a known force.
-fn solve(p: &Matrix, b: Vector) -> Vector {
-    let scale: Vector = std::array::from_fn(|i| p[i][i].max(0.0).sqrt());
+fn solve<const N: usize>(p: &Matrix<N>, b: [f64; N]) -> [f64; N] {
+    let scale: [f64; N] = std::array::from_fn(|i| p[i][i].max(0.0).sqrt());
     let over = |value: f64, scale: f64| if scale > 0.0 { value / scale } else { 0.0 };
-    let mut a: Matrix =
+    let mut a: Matrix<N> =
         std::array::from_fn(|i| std::array::from_fn(|j| over(over(p[i][j], scale[i]), scale[j])));
-    let mut y: Vector = std::array::from_fn(|i| over(b[i], scale[i]));
-    for i in 0..STATES {
+    let mut y: [f64; N] = std::array::from_fn(|i| over(b[i], scale[i]));
+    for i in 0..N {
         if a[i][i] <= 1e-14 {
-            a[i] = [0.0; STATES];
+            a[i] = [0.0; N];
             a.iter_mut().for_each(|row| row[i] = 0.0);
             (a[i][i], y[i]) = (1.0, 0.0);
         }
@@ -220,8 +202,8 @@ fn solve(p: &Matrix, b: Vector) -> Vector {
             *y -= factor * right;
         }
     }
-    for i in (0..STATES).rev() {
-        let known: f64 = (i + 1..STATES).map(|c| a[i][c] * y[c]).sum();
+    for i in (0..N).rev() {
+        let known: f64 = (i + 1..N).map(|c| a[i][c] * y[c]).sum();
         y[i] = (y[i] - known) / a[i][i];
     }
     std::array::from_fn(|i| over(y[i], scale[i]))
@@ -231,24 +213,19 @@ fn solve(p: &Matrix, b: Vector) -> Vector {
 mod tests {
     use super::*;
 
-    const BELIEF: Gaussian = Gaussian {
-        mean: [0.2, 0.5, 1.0, 3.0],
-        covariance: [
-            [4e-6, 1e-6, 1e-5, 1e-4],
-            [1e-6, 1e-2, 1e-3, 2e-4],
-            [1e-5, 1e-3, 4.0, 1e-3],
-            [1e-4, 2e-4, 1e-3, 0.04],
-        ],
+    /// In place, speed and force.
+    const BELIEF: Gaussian<3> = Gaussian {
+        mean: [0.2, 0.5, 3.0],
+        covariance: [[4e-6, 1e-6, 1e-4], [1e-6, 1e-2, 2e-4], [1e-4, 2e-4, 0.04]],
     };
 
     #[test]
     fn a_reading_of_the_position_alone_is_the_textbook_s_kalman_filter() {
-        let fit =
-            ContactFit { misfit: 4.0, pull: [2e3, 0.0], information: [1e6, 0.0, 0.0], calibration_m2: 0.0 };
+        let fit = ContactFit { misfit: 4.0, pull: [2e3, 0.0], information: [[1e6, 0.0], [0.0, 0.0]] };
         // One measurement z of x with variance 1e-6, (z − 0.2)² / 1e-6 = 4: z = 0.202.
-        let (after, evidence) = BELIEF.updated(&fit, [0.2, 3.0], 0.0);
+        let (after, evidence) = BELIEF.updated(&fit, &[0.2, 3.0], &[0, 2]);
         let (innovation, spread) = (2e-3, 5e-6);
-        for i in 0..STATES {
+        for i in 0..3 {
             let gain = BELIEF.covariance[i][0] / spread;
             assert!((after.mean[i] - (BELIEF.mean[i] + gain * innovation)).abs() < 1e-12);
         }
@@ -259,19 +236,16 @@ mod tests {
 
     #[test]
     fn where_a_misfit_is_expanded_does_not_matter_while_it_is_a_parabola() {
-        let (information, pull, misfit) = ([1e6, 2e2, 50.0], [7e2, -1.5], 9.0);
+        let (information, pull, misfit) = ([[1e6, 2e2], [2e2, 50.0]], [7e2, -1.5], 9.0);
         let moved = |delta: [f64; 2]| {
-            let [a, b, c] = information;
-            let by = [a * delta[0] + b * delta[1], b * delta[0] + c * delta[1]];
-            let misfit = misfit - 2.0 * (pull[0] * delta[0] + pull[1] * delta[1])
-                + delta[0] * by[0]
-                + delta[1] * by[1];
-            ContactFit { misfit, pull: [pull[0] - by[0], pull[1] - by[1]], information, calibration_m2: 0.0 }
+            let by: [f64; 2] = std::array::from_fn(|k| dot(&information[k], &delta));
+            let misfit = misfit - 2.0 * dot(&pull, &delta) + dot(&delta, &by);
+            ContactFit { misfit, pull: [pull[0] - by[0], pull[1] - by[1]], information }
         };
-        let (here, one) = BELIEF.updated(&moved([0.0; 2]), [0.2, 3.0], 1e-4);
-        let (there, other) = BELIEF.updated(&moved([1e-3, 0.1]), [0.201, 3.1], 1e-4);
+        let (here, one) = BELIEF.updated(&moved([0.0; 2]), &[0.2, 3.0], &[0, 2]);
+        let (there, other) = BELIEF.updated(&moved([1e-3, 0.1]), &[0.201, 3.1], &[0, 2]);
         assert!((one - other).abs() < 1e-9);
-        for i in 0..STATES {
+        for i in 0..3 {
             assert!((here.mean[i] - there.mean[i]).abs() < 1e-10);
         }
     }
@@ -280,33 +254,18 @@ mod tests {
     fn what_comes_later_and_tells_nothing_new_changes_nothing() {
         for known in [false, true] {
             let mut belief = BELIEF;
+            let mut noise = [[0.0; 3]; 3];
+            (noise[1][1], noise[2][2]) = (1e-4, 1e-4);
             if known {
-                (0..STATES).for_each(|i| (belief.covariance[i][W], belief.covariance[W][i]) = (0.0, 0.0));
+                (0..3).for_each(|i| (belief.covariance[i][2], belief.covariance[2][i]) = (0.0, 0.0));
+                noise[2][2] = 0.0;
             }
-            let motion = Motion::new(0.01, 0.1, 2.0, if known { 0.0 } else { 1e-4 });
-            let back = belief.smoothed(&motion, &belief.predicted(&motion));
-            for i in 0..STATES {
+            let forward = [[1.0, 0.01, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let change = Change { mean: [0.205, 0.5, 3.0], forward, noise };
+            let back = belief.smoothed(&change, &belief.predicted(&change));
+            for i in 0..3 {
                 assert!((back.mean[i] - belief.mean[i]).abs() < 1e-12);
                 assert!((back.covariance[i][i] - belief.covariance[i][i]).abs() < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn a_motion_of_two_halves_is_the_whole_motion() {
-        // On both sides of where the closed form is replaced by its first terms.
-        for duration_s in [0.2, 9e-3] {
-            let motion = |share: f64| Motion::new(share * duration_s, 0.1, 2.0, share * 1e-4);
-            let halves = BELIEF.predicted(&motion(0.5)).predicted(&motion(0.5));
-            let whole = BELIEF.predicted(&motion(1.0));
-            for i in 0..STATES {
-                let rounded = 1e-9 + if duration_s < 0.1 { 0.05 } else { 0.0 };
-                assert!((halves.mean[i] - whole.mean[i]).abs() < 1e-12);
-                let off = (halves.covariance[i][i] - whole.covariance[i][i]).abs();
-                assert!(
-                    off <= rounded * motion(1.0).noise[i][i] + 1e-12 * whole.covariance[i][i],
-                    "{i}: {off}"
-                );
             }
         }
     }

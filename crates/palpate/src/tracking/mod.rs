@@ -1,30 +1,38 @@
-//! A moving contact: a Bayesian filter over position, speed and force, and a smoother over the whole recording.
+//! Moving contacts: a Bayesian filter over position, speed and force, and a smoother over the whole recording.
 //!
-//! What is hidden is whether anything touches, and if so where, how fast and how hard. A belief about it is a weight for
-//! "nothing touches" and a few hypotheses, each with a weight: a contact that came at some time and has moved since. A
-//! hypothesis is a bank of Gaussians in (x, v, W), one for each of a few motions from steady to brisk, which mix as
-//! motions change (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE Trans. Autom. Control 33, 1988). A reading
-//! moves them by its likelihood, expanded about the place that they expect (an iterated extended Kalman filter), and
-//! weighs them by how well they explain it. Hypotheses are born where the reading by itself could have come from, so a
-//! mirror image or a wide valley is several of them (a Gaussian sum: D. Alspach and H. Sorenson, same Trans. 17, 1972);
-//! those that readings contradict fade and are dropped.
+//! What is hidden is how many contacts touch, where, how fast and how hard each does, and how the surface swings. A belief
+//! about it is a few hypotheses, each with a weight: no contact, one or two, which came at some time and have moved since. A
+//! hypothesis is a bank of Gaussians in the joint state of surface and contacts, one for each choice of a few motions from
+//! steady to brisk, which mix as motions change (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE Trans. Autom.
+//! Control 33, 1988). A reading moves them by its likelihood, expanded about the places that they expect (an iterated
+//! extended Kalman filter), and weighs them by how well they explain it. Hypotheses are born where the reading by itself could
+//! have come from, so a mirror image or a wide valley is several of them (a Gaussian sum: D. Alspach and H. Sorenson, same
+//! Trans. 17, 1972); a second contact is born beside the one that is followed; and each contact of a hypothesis may let go,
+//! which makes another hypothesis. Those that readings contradict fade and are dropped.
+//!
+//! A surface that swings has two numbers of its own in the state, the force of its first mode and how fast that changes:
+//! they drive nothing but the readings, are driven by the contacts, and outlast them.
 //!
 //! A grid of positions and speeds that resolves what a track reaches would have some 10⁵ cells; within a valley of the
 //! likelihood a Gaussian says the same to good approximation, as soon as a contact has been seen for some readings.
 //!
 //! The smoother goes back over a hypothesis with what came later, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA
-//! Journal 3, 1965) on the bank as one Gaussian.
+//! Journal 3, 1965) for each motion.
 
 mod bank;
+mod belief;
+mod birth;
 mod config;
 mod gaussian;
-mod hypothesis;
 mod smoother;
+mod step;
+mod track;
 mod tracker;
 
-pub use config::TrackerConfig;
+pub use config::{Swing, TrackerConfig};
 pub use smoother::SmoothTracker;
-pub use tracker::{Track, TrackError, Tracked, Tracker};
+pub use track::{Track, TrackError, Tracked};
+pub use tracker::Tracker;
 
 #[cfg(test)]
 mod tests;

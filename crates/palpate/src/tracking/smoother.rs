@@ -1,33 +1,32 @@
 //! The smoother: each reading with those that came after it.
 
-use super::bank::Bank;
+use super::belief::Belief;
 use super::config::TrackerConfig;
-use super::gaussian::{Gaussian, Motion, W};
-use super::tracker::{Track, TrackError, Tracked, Tracker};
+use super::track::{Track, TrackError, Tracked};
+use super::tracker::Tracker;
 use crate::method::Likelihood;
 
 /// A [`Tracker`] that remembers, so that it can go back.
 pub struct SmoothTracker<'a> {
     tracker: Tracker<'a>,
-    length_m: f64,
+    likelihood: &'a dyn Likelihood,
     tracks: Vec<Track>,
-    /// What was held possible at each reading.
+    /// What was held possible at each reading, of contacts.
     past: Vec<Vec<Remembered>>,
 }
 
 /// A hypothesis as it was.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Remembered {
     id: u64,
-    bank: Bank,
-    floor_m2: f64,
+    belief: Belief,
 }
 
 impl<'a> SmoothTracker<'a> {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
         let tracker = Tracker::new(likelihood, config);
-        Self { tracker, length_m: likelihood.length_m(), tracks: Vec::new(), past: Vec::new() }
+        Self { tracker, likelihood, tracks: Vec::new(), past: Vec::new() }
     }
 
     /// Takes the next reading; see [`Tracker::follow`].
@@ -35,13 +34,30 @@ impl<'a> SmoothTracker<'a> {
     /// # Errors
     /// [`TrackError`] when the time is not later than before.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
-        self.tracks.push(self.tracker.follow(time_s, reading)?);
-        let remembered = self.tracker.hypotheses().iter().map(|hypothesis| Remembered {
-            id: hypothesis.id,
-            bank: hypothesis.bank,
-            floor_m2: hypothesis.fit.calibration_m2,
-        });
+        let track = self.tracker.follow(time_s, reading)?;
+        let lasts = |id: u64| self.tracker.hypotheses().iter().any(|hypothesis| hypothesis.id == id);
+        if let Some(before) = self.past.last_mut() {
+            // Nobody goes back to what neither lasted nor was shown.
+            let mut number = 0;
+            before.retain(|remembered| {
+                number += 1;
+                number == 1 || lasts(remembered.id)
+            });
+        }
+        // The one that is shown comes first.
+        let shown = track.contacts.len();
+        let (shown, others): (Vec<_>, Vec<_>) = self
+            .tracker
+            .hypotheses()
+            .iter()
+            .filter(|hypothesis| hypothesis.belief.contacts() > 0)
+            .partition(|hypothesis| hypothesis.belief.contacts() == shown);
+        let remembered = shown
+            .into_iter()
+            .chain(others)
+            .map(|hypothesis| Remembered { id: hypothesis.id, belief: hypothesis.belief.clone() });
         self.past.push(remembered.collect());
+        self.tracks.push(track);
         Ok(())
     }
 
@@ -50,32 +66,29 @@ impl<'a> SmoothTracker<'a> {
         &self.tracks
     }
 
-    /// What is known at each reading when all have been seen. Whether anything touches stays what the filter found; of
+    /// What is known at each reading when all have been seen. How many contacts there are stays what the filter found; of
     /// the hypotheses it held, the one that lasted is gone back over.
     pub fn smoothed(&self) -> Vec<Track> {
         let mut smoothed = self.tracks.clone();
-        // The contact at the reading after, as all readings show it.
-        let mut later: Option<(u64, Gaussian)> = None;
+        // The contacts at the reading after, as all readings show them.
+        let mut later: Option<(u64, Belief)> = None;
         for k in (0..smoothed.len()).rev() {
-            let lasting = later.and_then(|(id, belief)| {
-                let remembered = self.past[k].iter().find(|remembered| remembered.id == id);
-                remembered.map(|remembered| (remembered, self.gone_back(k, remembered, &belief)))
-            });
-            let last = || self.past[k].first().map(|remembered| (remembered, remembered.bank.mixed()));
-            let found = if self.tracks[k].tracked.is_some() { lasting.or_else(last) } else { None };
-            later = found.map(|(remembered, belief)| (remembered.id, belief));
-            smoothed[k].tracked =
-                found.map(|(remembered, belief)| Tracked::of(&belief, remembered.floor_m2, self.length_m));
+            let number = self.tracks[k].contacts.len();
+            let lasting = later.and_then(|(id, belief)| self.gone_back(k, id, &belief));
+            let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
+            let last = || self.past[k].first().map(|one| (one.id, one.belief.clone()));
+            later = if number > 0 { lasting.or_else(last) } else { None };
+            let moments = later.as_ref().map(|(_, belief)| belief.mixed().contacts());
+            smoothed[k].contacts =
+                moments.map_or_else(Vec::new, |moments| Tracked::of(&moments, self.likelihood));
         }
         smoothed
     }
 
-    /// What a hypothesis was at reading `k`, given what it was at the next: Rauch, Tung and Striebel's step with the bank as
-    /// one Gaussian, and the motion as restless as the bank's shares say.
-    fn gone_back(&self, k: usize, remembered: &Remembered, later: &Gaussian) -> Gaussian {
-        let belief = remembered.bank.mixed();
-        let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s, belief.mean[W]);
-        let shares = remembered.bank.predicted(&step).shares;
-        belief.smoothed(&Motion::mixed(shares, &step.motions), later)
+    /// What hypothesis `id` was at reading `k`, given what it was at the next.
+    fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
+        let remembered = self.past[k].iter().find(|remembered| remembered.id == id)?;
+        let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
+        remembered.belief.smoothed(&step, self.likelihood, later).map(|belief| (id, belief))
     }
 }

@@ -8,7 +8,7 @@ use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::influence::{BeamLikelihood, InfluenceConfig};
 use crate::mechanics::Motion;
-use crate::method::FitTask;
+use crate::method::{FitTask, Likelihood};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, measure};
 use crate::simulate::{clean_reading, simulate};
@@ -51,7 +51,7 @@ fn errors(likelihood: &BeamLikelihood, readings: &[(f64, Contact, Vec<f64>)]) ->
     for ((track, smooth), (_, truth, _)) in tracker.filtered().iter().zip(&smoothed).zip(readings) {
         let x_m = truth.position.x_m;
         errors[0] += (track.alone.contact.position.x_m - x_m).abs();
-        for (i, tracked) in [track.tracked.unwrap(), smooth.tracked.unwrap()].into_iter().enumerate() {
+        for (i, tracked) in [track.contacts[0], smooth.contacts[0]].into_iter().enumerate() {
             errors[i + 1] += (tracked.x_m - x_m).abs();
             covered[i] += f64::from(u8::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m)));
         }
@@ -63,7 +63,7 @@ fn errors(likelihood: &BeamLikelihood, readings: &[(f64, Contact, Vec<f64>)]) ->
 #[test]
 fn a_track_is_several_times_closer_than_its_readings() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..rig.motion.unwrap().motion };
+    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..rig.motion.unwrap().first.motion };
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(3.0), 3.0, 5.0), (None, 4.0, 6.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
@@ -76,19 +76,110 @@ fn a_track_is_several_times_closer_than_its_readings() {
 #[test]
 fn a_contact_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
-    let motion =
-        Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..rig.motion.unwrap().motion };
+    let motion = Motion {
+        speed_m_per_s: 1.0,
+        passes: 2,
+        lifted_s: 0.2,
+        touch_s: 0.02,
+        ..rig.motion.unwrap().first.motion
+    };
     let likelihood = likelihood(&rig, None);
     let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
     let mut wrong = 0;
     for (time_s, truth, reading) in readings(&rig, motion, 3) {
         let track = tracker.follow(time_s, &reading).unwrap();
-        let touching = track.tracked.is_some();
-        assert_eq!(touching, track.touching > 0.5);
+        let touching = !track.contacts.is_empty();
+        assert_eq!(touching, track.touching() > 0.5);
         wrong += usize::from(touching != (truth.force_n > 0.0));
     }
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
+}
+
+#[test]
+fn a_beam_that_swings_is_explained_by_its_first_mode() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, Some(3.0));
+    let load = |x_m: f64| Contact { position: Position::along(x_m), force_n: 3.0 };
+    // Bent as by a load in the middle, which has just jumped elsewhere.
+    let mut response = rig.motion.unwrap().beam.at_rest(1, &[load(0.2)]);
+    response.change_loads(&[load(0.1)]);
+    let sensors = &rig.bench.layout.sensors;
+    let reading: Vec<f64> =
+        sensors.iter().map(|sensor| response.reading(sensor.kind, sensor.position)).collect();
+    let mut whitened = Vec::new();
+    likelihood.whiten(&reading, &mut whitened);
+    let misfit = |mode_n: Option<f64>| likelihood.fit_one(&whitened, load(0.1), mode_n).misfit;
+    assert!(misfit(Some(3.0)) < 2.0, "{}", misfit(Some(3.0)));
+    assert!(misfit(None) > 1e3, "{}", misfit(None));
+}
+
+#[test]
+fn the_pulls_of_a_fit_are_the_slopes_of_its_misfit() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, None);
+    let whitened: Vec<f64> = (0..8).map(|i| f64::from(i % 3) * 4.0).collect();
+    let unknowns = [4.0, 0.1013, 3.0, 0.3021, 2.0];
+    let fit = |[mode_n, x_m, force_n, other_m, other_n]: [f64; 5]| {
+        let contacts = [(x_m, force_n), (other_m, other_n)]
+            .map(|(x_m, force_n)| Contact { position: Position::along(x_m), force_n });
+        likelihood.fit_two(&whitened, contacts, Some(mode_n))
+    };
+    for (k, step) in [1e-4, 1e-7, 1e-4, 1e-7, 1e-4].into_iter().enumerate() {
+        let moved = |by: f64| {
+            let mut unknowns = unknowns;
+            unknowns[k] += by;
+            fit(unknowns).misfit
+        };
+        let slope = (moved(step) - moved(-step)) / (2.0 * step);
+        let pull = fit(unknowns).pull[k];
+        assert!((slope + 2.0 * pull).abs() < 1e-4 * pull.abs(), "{k}: {slope} {pull}");
+    }
+}
+
+/// Readings in balance under two contacts, each with its force.
+fn two_readings(rig: &Rig, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contact; 2], Vec<f64>)> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let errors = ChannelErrors::none(&rig.bench.layout);
+    let surface = rig.bench.surface.model().unwrap();
+    let duration_s = motions[0].duration_s().max(motions[1].duration_s());
+    let at = |i: usize| {
+        let time_s = i as f64 / RATE_HZ;
+        let contacts = [motions[0].contact_at(time_s, 3.0), motions[1].contact_at(time_s, 2.0)];
+        let [first, second] = contacts.map(|contact| clean_reading(surface, &rig.bench.layout, contact));
+        let clean: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
+        (time_s, contacts, measure(&rig.bench.layout, &clean, &errors, &mut rng))
+    };
+    (0..(duration_s * RATE_HZ) as usize).map(at).collect()
+}
+
+#[test]
+fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
+    let rig = Rig::from_toml(include_str!("../../../../examples/two-moving-loads.toml")).unwrap();
+    let moving = rig.motion.unwrap();
+    let motions = [moving.first.motion, moving.second.unwrap().motion];
+    let recording = simulate(&rig, 1).unwrap();
+    let task = FitTask { bench: &rig.bench, recording: &recording, seed: 0 };
+    let config = InfluenceConfig { contacts: 2, ..InfluenceConfig::default() };
+    let likelihood = BeamLikelihood::new(&config.fit_beam(task, &mut || true).unwrap().unwrap());
+    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
+    let (mut wrong, mut error_m, mut found, mut all) = (0, 0.0, 0, 0);
+    for (time_s, truths, reading) in two_readings(&rig, motions, 3) {
+        let track = tracker.follow(time_s, &reading).unwrap();
+        let touching: Vec<f64> =
+            truths.iter().filter(|truth| truth.force_n > 0.0).map(|truth| truth.position.x_m).collect();
+        all += 1;
+        wrong += usize::from(touching.len() != track.contacts.len());
+        let mut places: Vec<f64> = track.contacts.iter().map(|tracked| tracked.x_m).collect();
+        places.sort_by(f64::total_cmp);
+        if touching.len() == places.len() {
+            error_m += touching.iter().zip(&places).map(|(a, b)| (a - b).abs()).sum::<f64>();
+            found += places.len();
+        }
+    }
+    let mean_m = error_m / found as f64;
+    assert!(wrong * 20 < all, "{wrong} of {all}");
+    assert!(mean_m < 1e-3, "{mean_m}");
 }
 
 #[test]
@@ -121,8 +212,8 @@ fn absurd_readings_and_gaps_leave_numbers_behind() {
     let absurd = [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]];
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
         let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
-        assert!(track.touching.is_finite());
-        if let Some(tracked) = track.tracked {
+        assert!(track.touching().is_finite());
+        for tracked in track.contacts {
             assert!(tracked.x_m.is_finite() && (0.0..=0.4).contains(&tracked.x_m), "{tracked:?}");
         }
     }

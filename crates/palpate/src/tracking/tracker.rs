@@ -1,87 +1,61 @@
 //! The filter: each reading as it comes.
 
-use super::bank::{Bank, Step};
+use super::belief::{Belief, Mixed, Moments, Seen};
+use super::birth::Births;
 use super::config::TrackerConfig;
-use super::gaussian::{Gaussian, V, W, X};
-use super::hypothesis::{Hypothesis, are_one, births};
+use super::step::Step;
+use super::track::{Track, TrackError, Tracked};
 use crate::method::Likelihood;
-use crate::numerics::normal_distribution;
 use palpate_core::Estimate;
 
-/// The most contacts that are held possible at once.
+/// The most hypotheses that are held possible at once.
 const MOST_HYPOTHESES: usize = 12;
 /// A hypothesis this many times less probable than the best is dropped, as its logarithm.
 const NEGLIGIBLE: f64 = 16.0;
-/// Below this share of the probability, one hypothesis does not speak for all.
-const SURE: f64 = 0.98;
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// The most contacts that are followed at once.
+const MOST_CONTACTS: usize = 2;
 
-/// Follows one contact on a one-dimensional surface through readings in time.
+/// A contact that moves a reading by less than this, in squares of the noise's standard deviation over all channels, is as
+/// likely as not to be gone with the next one: it could be anything anywhere.
+const UNSEEN: f64 = 9.0;
+
+/// Follows contacts on a one-dimensional surface through readings in time.
 pub struct Tracker<'a> {
     likelihood: &'a dyn Likelihood,
     config: TrackerConfig,
-    /// ln of the probability that nothing touches.
-    nothing: f64,
     hypotheses: Vec<Hypothesis>,
     time_s: Option<f64>,
     next_id: u64,
     whitened: Vec<f64>,
 }
 
-/// What is known at one reading.
+/// What may be: a surface with some contacts that came at some time and have moved since.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Track {
-    /// When the reading was taken, in seconds.
-    pub time_s: f64,
-    /// The probability that something touches.
-    pub touching: f64,
-    /// The contact, where something rather touches than not.
-    pub tracked: Option<Tracked>,
-    /// What the reading says by itself.
-    pub alone: Estimate,
+pub(super) struct Hypothesis {
+    /// Tells it from every other one.
+    pub id: u64,
+    /// ln of its probability.
+    pub weight: f64,
+    pub belief: Belief,
+    /// Whether the readings hardly show the first contact, or the second.
+    unseen: [bool; MOST_CONTACTS],
 }
 
-/// A contact that is followed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracked {
-    /// Where it is, in metres.
-    pub x_m: f64,
-    /// How fast it moves, in m/s.
-    pub speed_m_per_s: f64,
-    /// How hard it presses, in newtons.
-    pub force_n: f64,
-    /// Standard deviations of the three, the position's with what calibration leaves.
-    pub sd: [f64; 3],
-    /// The 95 % interval of the position, in metres.
-    pub x_95_m: (f64, f64),
-}
-
-/// A reading that cannot be followed.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum TrackError {
-    /// Time does not go on.
-    #[error("the reading is of {time_s} s; it must be later than the one before, of {before_s} s")]
-    Time {
-        /// Its time, in seconds.
-        time_s: f64,
-        /// The time of the one before.
-        before_s: f64,
-    },
+/// ln of the probabilities with which contacts have just come.
+#[derive(Clone, Copy, Debug)]
+struct Newborn {
+    /// One, where nothing was or something else is no more.
+    one: f64,
+    /// Two, likewise.
+    two: f64,
+    /// A second one, beside each hypothesis with one.
+    beside: f64,
 }
 
 impl<'a> Tracker<'a> {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
-        Self {
-            likelihood,
-            config,
-            nothing: 0.0,
-            hypotheses: Vec::new(),
-            time_s: None,
-            next_id: 0,
-            whitened: Vec::new(),
-        }
+        Self { likelihood, config, hypotheses: Vec::new(), time_s: None, next_id: 0, whitened: Vec::new() }
     }
 
     /// Takes the next reading: one finite value a channel, at `time_s` seconds.
@@ -90,14 +64,19 @@ impl<'a> Tracker<'a> {
     /// [`TrackError`] when the time is not later than before; the reading is then as if it had not been.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
         let duration_s = self.duration(time_s)?;
-        let silence = self.likelihood.whiten(reading, &mut self.whitened);
+        let mut whitened = std::mem::take(&mut self.whitened);
+        self.likelihood.whiten(reading, &mut whitened);
         let alone = self.likelihood.locate_alone(reading);
         let newborn = self.let_time_pass(duration_s);
-        self.weigh(silence);
-        self.give_birth(newborn, &alone);
-        self.tidy();
+        let seen =
+            Seen { likelihood: self.likelihood, whitened: &whitened, swings: self.config.swing.is_some() };
+        let born = self.births(newborn, seen, &alone);
+        self.weigh(seen);
+        self.hypotheses.extend(born);
+        let mixed = self.tidy();
+        self.whitened = whitened;
         self.time_s = Some(time_s);
-        Ok(self.track(time_s, alone))
+        Ok(self.track(time_s, alone, &mixed))
     }
 
     /// The hypotheses, the most probable first.
@@ -105,9 +84,9 @@ impl<'a> Tracker<'a> {
         &self.hypotheses
     }
 
-    /// How this tracker's contacts move in a step.
-    pub(super) fn step(&self, duration_s: f64, force_n: f64) -> Step {
-        Step::new(&self.config, duration_s, force_n, self.likelihood.known_force_n().is_none())
+    /// What a step of time does.
+    pub(super) fn step(&self, duration_s: f64) -> Step {
+        Step::new(&self.config, duration_s, self.likelihood.known_force_n().is_some())
     }
 
     fn duration(&self, time_s: f64) -> Result<Option<f64>, TrackError> {
@@ -118,34 +97,72 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Moves every hypothesis, and lets contacts come and go; ln of the probability that one has just come.
-    fn let_time_pass(&mut self, duration_s: Option<f64>) -> f64 {
-        // Before the first reading, a contact is as probable as none.
+    fn most_contacts(&self) -> usize {
+        self.likelihood.most_contacts().min(MOST_CONTACTS)
+    }
+
+    /// Moves every hypothesis, and lets contacts come and go.
+    fn let_time_pass(&mut self, duration_s: Option<f64>) -> Newborn {
+        // Before the first reading, any number of contacts is as probable.
         let Some(duration_s) = duration_s else {
-            self.nothing = 0.5f64.ln();
-            return self.nothing;
+            let each = -((1 + self.most_contacts()) as f64).ln();
+            let belief = Belief::nothing();
+            self.add(each, belief);
+            return Newborn { one: each, two: each, beside: f64::NEG_INFINITY };
         };
         let changes = 0.5 * (1.0 - (-2.0 * self.config.changes_per_s * duration_s).exp());
         let jumps = 1.0 - (-self.config.jumps_per_s * duration_s).exp();
-        let touching: f64 = self.hypotheses.iter().map(|hypothesis| hypothesis.weight.exp()).sum();
-        let nothing = self.nothing.exp();
-        for i in 0..self.hypotheses.len() {
-            let step = self.step(duration_s, self.hypotheses[i].bank.mixed().mean[W]);
-            let hypothesis = &mut self.hypotheses[i];
-            hypothesis.bank = hypothesis.bank.predicted(&step);
-            hypothesis.weight += (1.0 - changes).ln() + (1.0 - jumps).ln();
+        let step = self.step(duration_s);
+        let most = self.most_contacts();
+        let mut with = [0.0; 1 + MOST_CONTACTS];
+        let mut left = Vec::new();
+        for hypothesis in &mut self.hypotheses {
+            let contacts = hypothesis.belief.contacts();
+            with[contacts] += hypothesis.weight.exp();
+            hypothesis.belief = hypothesis.belief.predicted(&step, self.likelihood);
+            let ends = hypothesis.unseen.map(|unseen| if unseen { 0.5f64 } else { changes });
+            for (k, ends) in ends.into_iter().enumerate().take(contacts) {
+                let rest = hypothesis.belief.without(k);
+                left.extend(rest.map(|belief| (hypothesis.weight + ends.ln(), belief)));
+            }
+            let comes = if contacts < most { changes } else { 0.0 };
+            let stays: f64 = ends.iter().take(contacts).map(|ends| (-ends).ln_1p()).sum();
+            hypothesis.weight += stays + (-comes).ln_1p() + (-jumps).ln_1p();
         }
-        self.nothing = (nothing * (1.0 - changes) + touching * changes).ln();
-        (nothing * changes + touching * (1.0 - changes) * jumps).ln()
+        self.let_go(left);
+        Newborn {
+            one: (with[0] * changes + with[1] * jumps + with[2] * changes * jumps).ln(),
+            two: (with[0] * changes * changes + with[1] * changes * jumps + with[2] * jumps).ln(),
+            beside: changes.ln(),
+        }
+    }
+
+    /// Adds what contacts leave behind when they let go. There is one hypothesis of nothing, which stands for all.
+    fn let_go(&mut self, left: Vec<(f64, Belief)>) {
+        for (weight, belief) in left {
+            let same = self.hypotheses.iter_mut().find(|hypothesis| hypothesis.belief.contacts() == 0);
+            match (same, belief.contacts()) {
+                (Some(nothing), 0) => {
+                    let sum = weight.max(nothing.weight) + (-(weight - nothing.weight).abs()).exp().ln_1p();
+                    nothing.belief.absorb(&belief, (weight - sum).exp());
+                    nothing.weight = sum;
+                }
+                _ => self.add(weight, belief),
+            }
+        }
+    }
+
+    fn add(&mut self, weight: f64, belief: Belief) {
+        self.hypotheses.push(Hypothesis { id: self.next_id, weight, belief, unseen: [false; MOST_CONTACTS] });
+        self.next_id += 1;
     }
 
     /// Weighs what there is by the reading, and moves it.
-    fn weigh(&mut self, silence: f64) {
-        self.nothing -= 0.5 * silence;
+    fn weigh(&mut self, seen: Seen) {
         for hypothesis in &mut self.hypotheses {
-            match hypothesis.bank.updated(self.likelihood, &self.whitened, self.config.inertia_s2()) {
-                Some((bank, fit, evidence)) => {
-                    (hypothesis.bank, hypothesis.fit) = (bank, fit);
+            match hypothesis.belief.updated(seen) {
+                Some((belief, evidence)) => {
+                    hypothesis.belief = belief;
                     hypothesis.weight += evidence;
                 }
                 None => hypothesis.weight = f64::NEG_INFINITY,
@@ -153,96 +170,90 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    fn give_birth(&mut self, newborn: f64, alone: &Estimate) {
-        for (evidence, belief, fit) in births(self.likelihood, &self.config, &self.whitened, alone) {
-            let (id, weight) = (self.next_id, newborn + evidence);
-            self.hypotheses.push(Hypothesis { id, weight, bank: Bank::of(belief), fit });
-            self.next_id += 1;
+    /// What comes with this reading, weighed by it.
+    fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
+        let births = Births { seen, config: &self.config, alone };
+        let mut born: Vec<(f64, Belief)> = Vec::new();
+        for (evidence, belief) in births.from_nothing() {
+            let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };
+            born.push((weight + evidence, belief));
         }
+        for hypothesis in &self.hypotheses {
+            if let Belief::One(bank) = &hypothesis.belief {
+                let weight = hypothesis.weight + newborn.beside;
+                born.extend(births.beside(bank).map(|(evidence, belief)| (weight + evidence, belief)));
+            }
+        }
+        let first = self.next_id;
+        self.next_id += born.len() as u64;
+        let numbered = born.into_iter().zip(first..);
+        let unseen = [false; MOST_CONTACTS];
+        numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
     }
 
     /// Makes the weights probabilities again, drops what is improbable, and lets the more probable of two that are one
-    /// stand for both.
-    fn tidy(&mut self) {
+    /// stand for both; what is left, as single Gaussians.
+    fn tidy(&mut self) -> Vec<Mixed> {
         self.hypotheses.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let mut kept: Vec<(Hypothesis, Gaussian)> = Vec::with_capacity(MOST_HYPOTHESES);
         let best = self.hypotheses.first().map_or(f64::NEG_INFINITY, |first| first.weight);
-        for hypothesis in self.hypotheses.drain(..) {
+        if best == f64::NEG_INFINITY {
+            // A reading that nothing explains at all tells nothing: begin again.
+            self.hypotheses.clear();
+            self.add(0.0, Belief::nothing());
+            return vec![Belief::nothing().mixed()];
+        }
+        let mut kept: Vec<Hypothesis> = Vec::with_capacity(MOST_HYPOTHESES);
+        let mut moments: Vec<Vec<Moments>> = Vec::with_capacity(MOST_HYPOTHESES);
+        let mut mixed: Vec<Mixed> = Vec::with_capacity(MOST_HYPOTHESES);
+        for mut hypothesis in self.hypotheses.drain(..) {
+            // That nothing touches stays possible, as a start for what comes.
+            let nothing = hypothesis.belief.contacts() == 0;
             let probable = hypothesis.weight > best - NEGLIGIBLE;
-            if !probable || kept.len() == MOST_HYPOTHESES {
-                break;
+            if !nothing && (!probable || kept.len() >= MOST_HYPOTHESES) {
+                continue;
             }
-            let belief = hypothesis.bank.mixed();
-            match kept.iter_mut().find(|(_, other)| are_one(other, &belief)) {
-                Some((other, _)) => other.weight += (hypothesis.weight - other.weight).exp().ln_1p(),
-                None => kept.push((hypothesis, belief)),
+            let belief = hypothesis.belief.mixed();
+            let contacts = belief.contacts();
+            match moments.iter().position(|other| are_one(other, &contacts)) {
+                Some(same) => {
+                    let other: &mut Hypothesis = &mut kept[same];
+                    other.weight += (hypothesis.weight - other.weight).exp().ln_1p();
+                }
+                None => {
+                    for (unseen, contact) in hypothesis.unseen.iter_mut().zip(&contacts) {
+                        *unseen = self.likelihood.signal(contact.contact()) < UNSEEN;
+                    }
+                    kept.push(hypothesis);
+                    moments.push(contacts);
+                    mixed.push(belief);
+                }
             }
         }
-        self.hypotheses.extend(kept.into_iter().map(|(hypothesis, _)| hypothesis));
-        let most = self.nothing.max(best);
-        let sum = (self.nothing - most).exp()
-            + self.hypotheses.iter().map(|hypothesis| (hypothesis.weight - most).exp()).sum::<f64>();
-        let all = most + sum.ln();
-        self.nothing = (self.nothing - all).max(f64::MIN);
-        self.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.weight -= all);
+        self.hypotheses = kept;
+        let sum: f64 = self.hypotheses.iter().map(|hypothesis| (hypothesis.weight - best).exp()).sum();
+        let all = best + sum.ln();
+        self.hypotheses
+            .iter_mut()
+            .for_each(|hypothesis| hypothesis.weight = (hypothesis.weight - all).max(f64::MIN));
+        mixed
     }
 
-    fn track(&self, time_s: f64, alone: Estimate) -> Track {
-        let touching = (1.0 - self.nothing.exp()).clamp(0.0, 1.0);
-        let tracked = self.hypotheses.first().filter(|_| touching > 0.5).map(|best| {
-            let floor_m2 = best.fit.calibration_m2;
-            let mut tracked = Tracked::of(&best.bank.mixed(), floor_m2, self.likelihood.length_m());
-            if best.weight < touching.ln() + SURE.ln() {
-                tracked.x_95_m = self.interval(floor_m2);
-            }
-            tracked
-        });
-        Track { time_s, touching, tracked, alone }
-    }
-
-    /// The 95 % interval over all hypotheses.
-    fn interval(&self, floor_m2: f64) -> (f64, f64) {
-        let beliefs: Vec<(f64, f64, f64)> = self
-            .hypotheses
-            .iter()
-            .map(|hypothesis| {
-                let belief = hypothesis.bank.mixed();
-                (hypothesis.weight.exp(), belief.mean[X], (belief.covariance[X][X] + floor_m2).sqrt())
-            })
-            .collect();
-        let all: f64 = beliefs.iter().map(|(weight, ..)| weight).sum();
-        let below = |x_m: f64| -> f64 {
-            beliefs
-                .iter()
-                .map(|(weight, mean, sd)| weight * normal_distribution((x_m - mean) / sd))
-                .sum::<f64>()
-                / all
-        };
-        let quantile = |share: f64| {
-            let (mut low, mut high) = (0.0, self.likelihood.length_m());
-            for _ in 0..24 {
-                let middle = 0.5 * (low + high);
-                if below(middle) < share { low = middle } else { high = middle }
-            }
-            0.5 * (low + high)
-        };
-        (quantile(0.025), quantile(0.975))
+    fn track(&self, time_s: f64, alone: Estimate, mixed: &[Mixed]) -> Track {
+        let mut numbers = [0.0; 1 + MOST_CONTACTS];
+        for hypothesis in &self.hypotheses {
+            numbers[hypothesis.belief.contacts()] += hypothesis.weight.exp();
+        }
+        let number = (1..numbers.len()).fold(0, |best, i| if numbers[i] > numbers[best] { i } else { best });
+        let of_number = self.hypotheses.iter().zip(mixed).filter(|(one, _)| one.belief.contacts() == number);
+        let beliefs: Vec<(f64, Vec<Moments>)> =
+            of_number.map(|(hypothesis, mixed)| (hypothesis.weight.exp(), mixed.contacts())).collect();
+        let contacts = Tracked::all(&beliefs, self.likelihood);
+        Track { time_s, numbers, contacts, alone }
     }
 }
 
-impl Tracked {
-    /// The contact that a belief is about, of a surface of length `length_m`.
-    pub(super) fn of(belief: &Gaussian, floor_m2: f64, length_m: f64) -> Self {
-        let [x_m, speed_m_per_s, _, force_n] = belief.mean;
-        let variance = |i: usize| belief.covariance[i][i].max(0.0);
-        let sd = [(variance(X) + floor_m2).sqrt(), variance(V).sqrt(), variance(W).sqrt()];
-        let half_m = NORMAL_95 * sd[0];
-        Self {
-            x_m,
-            speed_m_per_s,
-            force_n,
-            sd,
-            x_95_m: ((x_m - half_m).max(0.0), (x_m + half_m).min(length_m)),
-        }
-    }
+/// Whether two sets of contacts are the same, in either order; so are two beliefs that nothing touches.
+fn are_one(a: &[Moments], b: &[Moments]) -> bool {
+    let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_one_with(b));
+    a.len() == b.len() && (same(&mut b.iter()) || same(&mut b.iter().rev()))
 }

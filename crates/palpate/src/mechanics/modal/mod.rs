@@ -17,6 +17,7 @@ mod oscillator;
 mod response;
 
 pub use beam::{ModalBeam, ModalBeamError};
+pub use oscillator::Oscillator;
 pub use response::ModalResponse;
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 /// place and velocity swings freely; both are known in closed form, so a step is exact however long it is (N. C. Nigam
 /// and P. C. Jennings, Bull. Seismol. Soc. Am. 59, 1969).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Oscillator {
+pub struct Oscillator {
     /// ω, in rad/s.
     omega: f64,
     /// ζ, below 1.
@@ -26,6 +26,8 @@ pub(super) struct State {
 }
 
 impl Oscillator {
+    /// An oscillator with angular frequency ω = `omega`, in rad/s, and damping ratio ζ = `zeta`, at least 0 and below 1, in
+    /// steps of `step_s` seconds.
     pub fn new(omega: f64, zeta: f64, step_s: f64) -> Self {
         let damped = omega * (1.0 - zeta * zeta).sqrt();
         let decay = (-zeta * omega * step_s).exp();
@@ -38,8 +40,13 @@ impl Oscillator {
         Self { omega, zeta, step_s, free }
     }
 
+    /// What free swinging makes of (q, q̇) in one step, by rows.
+    pub fn free(&self) -> [[f64; 2]; 2] {
+        self.free
+    }
+
     /// One step, over which p goes evenly from `from` to `to`.
-    pub fn step(&self, state: State, from: f64, to: f64) -> State {
+    pub(super) fn step(&self, state: State, from: f64, to: f64) -> State {
         let square = self.omega * self.omega;
         let slope = (to - from) / self.step_s;
         let b = slope / square;

@@ -45,6 +45,7 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let loads = load::validate(sections.load.as_deref(), &surface)?;
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
-    let motion = motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface)?;
+    let motion =
+        motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface, force_n)?;
     Ok(Rig { bench, training, estimator, loads, motion })
 }

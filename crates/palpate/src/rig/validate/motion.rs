@@ -1,13 +1,15 @@
-//! `[motion]`
+//! `[motion]`, or two `[[motion]]`
+
+use std::ops::Range;
 
 use toml::Spanned;
 
 use crate::mechanics::modal::ModalBeam;
 use crate::mechanics::{Motion, SurfaceSpec};
-use crate::rig::MotionRig;
 use crate::rig::error::{RigError, RigProblem};
-use crate::rig::sections::{MotionSection, SurfaceSection};
+use crate::rig::sections::{MotionSection, MotionSections, SurfaceSection};
 use crate::rig::value::{RawQuantity, bounded, count, not_negative, positive, quantity};
+use crate::rig::{MotionRig, MovingContact};
 use crate::units::Dimension;
 
 const SECTION: &str = "motion";
@@ -20,79 +22,131 @@ const TOUCH_S: f64 = 0.1;
 const DAMPING: f64 = 0.01;
 
 pub(super) fn validate(
-    section: Option<&Spanned<MotionSection>>,
+    sections: Option<&Spanned<MotionSections>>,
     surface_section: Option<&Spanned<SurfaceSection>>,
     surface: &SurfaceSpec,
+    known_force_n: Option<f64>,
 ) -> Result<Option<MotionRig>, RigError> {
     let density = surface_section.and_then(|section| section.get_ref().density.as_ref());
     let density =
         density.map(|raw| Ok((positive("density", raw, Dimension::Density)?, raw.span()))).transpose()?;
-    let Some(section) = section else { return Ok(None) };
-    let SurfaceSpec::Beam(beam) = surface else {
-        return Err(
-            RigProblem::UnusedKey { key: SECTION, with: "a surface other than a beam" }.at(section.span())
-        );
+    let Some(sections) = sections else { return Ok(None) };
+    let listed = sections.get_ref().each(sections.span());
+    let context =
+        |(keys, span): &(_, Range<usize>)| Context { keys: *keys, span: span.clone(), known_force_n };
+    let contacts: Vec<Context> = listed.iter().map(context).collect();
+    let (first, second) = match contacts.as_slice() {
+        [first] => (first, None),
+        [first, second] => (first, Some(second)),
+        others => {
+            let value = format!("a list of {}", others.len());
+            let at = others.get(2).map_or(sections.span(), |third| third.span.clone());
+            return Err(RigProblem::OutOfRange { key: SECTION, value, bound: "one, or a list of two" }.at(at));
+        }
     };
-    let (density_kg_per_m3, span) = density
-        .ok_or_else(|| RigProblem::MissingKey { section: "surface", key: "density" }.at(section.span()))?;
-    let keys = section.get_ref();
+    let SurfaceSpec::Beam(beam) = surface else {
+        let with = "a surface other than a beam";
+        return Err(RigProblem::UnusedKey { key: SECTION, with }.at(first.span.clone()));
+    };
+    let (density_kg_per_m3, span) = density.ok_or_else(|| {
+        RigProblem::MissingKey { section: "surface", key: "density" }.at(first.span.clone())
+    })?;
     let below_1 = |ratio: f64| (0.0..1.0).contains(&ratio);
-    let damping = keys.damping.as_ref();
-    let damping_ratio = damping.map_or(Ok(DAMPING), |raw| {
+    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(DAMPING), |raw| {
         bounded("damping", raw, Dimension::Ratio, below_1, "at least 0 and below 1")
     })?;
     let beam = ModalBeam { beam: *beam, density_kg_per_m3, damping_ratio };
     beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(span))?;
-    let motion = motion(section, beam.beam.length_m)?;
-    let rate_hz = positive("rate", need("rate", keys.rate.as_ref(), section)?, Dimension::Frequency)?;
-    let readings = motion.duration_s() * rate_hz;
-    if readings > MOST_READINGS || !readings.is_finite() {
-        return Err(RigProblem::TooManyReadings { readings, most: MOST_READINGS }.at(section.span()));
-    }
-    Ok(Some(MotionRig { motion, beam, rate_hz }))
-}
-
-fn motion(section: &Spanned<MotionSection>, length_m: f64) -> Result<Motion, RigError> {
-    let keys = section.get_ref();
-    let place = |key, raw: &Option<Spanned<RawQuantity>>| {
-        let raw = need(key, raw.as_ref(), section)?;
-        let x_m = quantity(key, raw, Dimension::Length)?;
-        let inside = (0.0..=length_m).contains(&x_m);
-        if inside { Ok(x_m) } else { Err(RigProblem::MotionOffSurface { key, x_m, length_m }.at(raw.span())) }
+    let rate_hz = positive("rate", first.need("rate", first.keys.rate.as_ref())?, Dimension::Frequency)?;
+    let moving = MotionRig {
+        first: first.contact(beam.beam.length_m)?,
+        second: second.map(|second| second.further(beam.beam.length_m)).transpose()?,
+        beam,
+        rate_hz,
     };
-    let (from_m, to_m) = (place("from", &keys.from)?, place("to", &keys.to)?);
-    let way_m = (to_m - from_m).abs();
-    if way_m == 0.0 {
-        let to = need("to", keys.to.as_ref(), section)?;
-        let value = to.get_ref().to_string();
-        return Err(RigProblem::OutOfRange { key: "to", value, bound: "elsewhere than `from`" }.at(to.span()));
+    let readings = moving.duration_s() * rate_hz;
+    if readings > MOST_READINGS || !readings.is_finite() {
+        return Err(RigProblem::TooManyReadings { readings, most: MOST_READINGS }.at(sections.span()));
     }
-    let half_way = |turn_m: f64| turn_m > 0.0 && turn_m <= 0.5 * way_m;
-    let turn_m = keys.turn.as_ref().map_or(Ok(TURN * way_m), |raw| {
-        bounded("turn", raw, Dimension::Length, half_way, "greater than 0 and at most half the way")
-    })?;
-    let passes = keys
-        .passes
-        .as_ref()
-        .map_or(Ok(1), |raw| count("passes", raw, 1..=100_000, "at least 1 and at most 100000"))?;
-    let lifted_s =
-        keys.lifted.as_ref().map_or(Ok(0.0), |raw| not_negative("lifted", raw, Dimension::Time))?;
-    let touch_s = keys.touch.as_ref().map_or(Ok(TOUCH_S), |raw| positive("touch", raw, Dimension::Time))?;
-    if let (Some(touch), true) = (&keys.touch, lifted_s == 0.0) {
-        return Err(
-            RigProblem::UnusedKey { key: "touch", with: "a contact that is never `lifted`" }.at(touch.span())
-        );
-    }
-    let speed_m_per_s = positive("speed", need("speed", keys.speed.as_ref(), section)?, Dimension::Speed)?;
-    Ok(Motion { from_m, to_m, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
+    Ok(Some(moving))
 }
 
-fn need<'a>(
-    key: &'static str,
-    value: Option<&'a Spanned<RawQuantity>>,
-    section: &Spanned<MotionSection>,
-) -> Result<&'a Spanned<RawQuantity>, RigError> {
-    value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(section.span()))
+/// One section.
+struct Context<'a> {
+    keys: &'a MotionSection,
+    span: Range<usize>,
+    known_force_n: Option<f64>,
+}
+
+impl<'a> Context<'a> {
+    /// A contact beside another one, which says what both share.
+    fn further(&self, length_m: f64) -> Result<MovingContact, RigError> {
+        for (key, value) in [("rate", &self.keys.rate), ("damping", &self.keys.damping)] {
+            if let Some(value) = value {
+                let with = "a second [[motion]]; the first says it for both";
+                return Err(RigProblem::UnusedKey { key, with }.at(value.span()));
+            }
+        }
+        self.contact(length_m)
+    }
+
+    fn contact(&self, length_m: f64) -> Result<MovingContact, RigError> {
+        let force = self.keys.force.as_ref();
+        if let (Some(raw), Some(_)) = (force, self.known_force_n) {
+            let with = "a [contact] whose force is known";
+            return Err(RigProblem::UnusedKey { key: "force", with }.at(raw.span()));
+        }
+        let force_n = force.map(|raw| positive("force", raw, Dimension::Force)).transpose()?;
+        Ok(MovingContact { motion: self.motion(length_m)?, force_n })
+    }
+
+    fn motion(&self, length_m: f64) -> Result<Motion, RigError> {
+        let keys = self.keys;
+        let place = |key, raw: &'a Option<Spanned<RawQuantity>>| {
+            let raw = self.need(key, raw.as_ref())?;
+            let x_m = quantity(key, raw, Dimension::Length)?;
+            let inside = (0.0..=length_m).contains(&x_m);
+            if inside {
+                Ok(x_m)
+            } else {
+                Err(RigProblem::MotionOffSurface { key, x_m, length_m }.at(raw.span()))
+            }
+        };
+        let (from_m, to_m) = (place("from", &keys.from)?, place("to", &keys.to)?);
+        let way_m = (to_m - from_m).abs();
+        if way_m == 0.0 {
+            let to = self.need("to", keys.to.as_ref())?;
+            let value = to.get_ref().to_string();
+            let bound = "elsewhere than `from`";
+            return Err(RigProblem::OutOfRange { key: "to", value, bound }.at(to.span()));
+        }
+        let half_way = |turn_m: f64| turn_m > 0.0 && turn_m <= 0.5 * way_m;
+        let turn_m = keys.turn.as_ref().map_or(Ok(TURN * way_m), |raw| {
+            bounded("turn", raw, Dimension::Length, half_way, "greater than 0 and at most half the way")
+        })?;
+        let passes = keys
+            .passes
+            .as_ref()
+            .map_or(Ok(1), |raw| count("passes", raw, 1..=100_000, "at least 1 and at most 100000"))?;
+        let lifted_s =
+            keys.lifted.as_ref().map_or(Ok(0.0), |raw| not_negative("lifted", raw, Dimension::Time))?;
+        let touch_s =
+            keys.touch.as_ref().map_or(Ok(TOUCH_S), |raw| positive("touch", raw, Dimension::Time))?;
+        if let (Some(touch), true) = (&keys.touch, lifted_s == 0.0) {
+            let with = "a contact that is never `lifted`";
+            return Err(RigProblem::UnusedKey { key: "touch", with }.at(touch.span()));
+        }
+        let speed_m_per_s = positive("speed", self.need("speed", keys.speed.as_ref())?, Dimension::Speed)?;
+        Ok(Motion { from_m, to_m, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
+    }
+
+    fn need(
+        &self,
+        key: &'static str,
+        value: Option<&'a Spanned<RawQuantity>>,
+    ) -> Result<&'a Spanned<RawQuantity>, RigError> {
+        value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(self.span.clone()))
+    }
 }
 
 #[cfg(test)]
@@ -104,8 +158,48 @@ mod tests {
     #[test]
     fn a_motion_is_read_with_its_beam() {
         let moving = Rig::from_toml(RIG).unwrap().motion.unwrap();
-        assert_eq!((moving.motion.passes, moving.rate_hz, moving.beam.damping_ratio), (4, 1000.0, 0.01));
-        assert!((moving.motion.speed_m_per_s, moving.beam.density_kg_per_m3) == (0.5, 7850.0));
+        assert_eq!(
+            (moving.first.motion.passes, moving.rate_hz, moving.beam.damping_ratio),
+            (4, 1000.0, 0.01)
+        );
+        assert!((moving.first.motion.speed_m_per_s, moving.beam.density_kg_per_m3) == (0.5, 7850.0));
+    }
+
+    /// The example with an unknown force and a second contact that says `keys`.
+    fn with_second(keys: &str) -> String {
+        let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen("[contact]\nforce = \"3 N\"", "", 1);
+        let second = "[[motion]]\nfrom = \"300 mm\"\nto = \"200 mm\"\nspeed = \"0.2 m/s\"\n";
+        text.replacen("[training]", "[training]\nforce = \"3 N\"", 1) + second + keys
+    }
+
+    #[test]
+    fn a_second_contact_has_a_force_of_its_own() {
+        let moving = Rig::from_toml(&with_second("force = \"2 N\"")).unwrap().motion.unwrap();
+        let forces = |time_s| moving.contacts_at(time_s, 3.0).into_iter().map(|contact| contact.force_n);
+        assert!(forces(0.0).eq([3.0, 2.0]));
+        assert_eq!(moving.duration_s(), moving.first.motion.duration_s());
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_second_contact_is_said_with_its_place() {
+        let third = "[[motion]]\nfrom = \"1 mm\"";
+        let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third].map(|keys| {
+            let text = with_second(keys);
+            let error = Rig::from_toml(&text).unwrap_err();
+            format!(
+                "{error} | {}",
+                error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""))
+            )
+        });
+        insta::assert_snapshot!(told.join("\n"), @r#"
+        `rate` does not go with a second [[motion]]; the first says it for both | "1 kHz"
+        `damping` does not go with a second [[motion]]; the first says it for both | 0.1
+        `force` is -1 N; it must be greater than 0 | "-1 N"
+        `motion` is a list of 3; it must be one, or a list of two | [[motion]]
+        "#);
+        let known = RIG.replacen("passes = 4", "force = \"2 N\"", 1);
+        let told = Rig::from_toml(&known).unwrap_err().to_string();
+        assert_eq!(told, "`force` does not go with a [contact] whose force is known");
     }
 
     #[test]

@@ -26,12 +26,7 @@ pub(super) fn validate(
 ) -> Result<Layout, RigError> {
     let sections = sections.ok_or_else(|| RigProblem::MissingSection { section: SECTION }.nowhere())?;
     let channels = recording.and_then(|recording| recording.get_ref().channels.as_ref());
-    let listed: Vec<(&SensorsSection, std::ops::Range<usize>)> = match sections.get_ref() {
-        SensorsSections::One(section) => vec![(section, sections.span())],
-        SensorsSections::Many(many) => {
-            many.iter().map(|section| (section.get_ref(), section.span())).collect()
-        }
-    };
+    let listed = sections.get_ref().each(sections.span());
     let channel_count = channels.filter(|_| listed.len() == 1).map(|channels| channels.get_ref().len());
     let mut sensors = Vec::new();
     for (section, span) in listed {
