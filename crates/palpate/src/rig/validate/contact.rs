@@ -165,7 +165,8 @@ fn explicit(section: &Spanned<TrainingSection>, extent: Extent) -> Result<Arrang
         return Err(RigProblem::OutOfRange { key: "positions", value, bound: "a list of at least 1" }
             .at(positions.span()));
     }
-    let positions = positions.get_ref().iter().map(|raw| place(raw, extent)).collect::<Result<_, _>>()?;
+    let positions =
+        positions.get_ref().iter().map(|raw| place("positions", raw, extent)).collect::<Result<_, _>>()?;
     Ok(Arrangement::Explicit(positions))
 }
 

@@ -2,6 +2,7 @@
 
 mod columns;
 mod contact;
+mod design;
 mod estimator;
 mod load;
 mod motion;
@@ -46,5 +47,6 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let columns = columns::validate(sections.recording.as_ref(), &layout, surface.extent())?;
     let bench = Bench { surface, layout, force_n, columns };
     let motion = motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface)?;
-    Ok(Rig { bench, training, estimator, loads, motion })
+    let design = design::validate(sections.design.as_ref(), &bench)?;
+    Ok(Rig { bench, training, estimator, loads, motion, design })
 }

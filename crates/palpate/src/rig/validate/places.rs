@@ -8,11 +8,15 @@ use crate::rig::error::{RigError, RigProblem};
 use crate::rig::value::{RawPosition, RawQuantity, count, quantity};
 use crate::units::Dimension;
 
-/// A position as `positions` lists it: one length on a line, a pair on a plane.
-pub(super) fn place(raw: &Spanned<RawPosition>, extent: Extent) -> Result<Position, RigError> {
+/// The position that stands at `key`: one length on a line, a pair on a plane.
+pub(super) fn place(
+    key: &'static str,
+    raw: &Spanned<RawPosition>,
+    extent: Extent,
+) -> Result<Position, RigError> {
     let plane = extent.is_plane();
-    let refuse = |found| Err(RigProblem::Coordinates { found, plane }.at(raw.span()));
-    let length = |raw: &Spanned<RawQuantity>| quantity("positions", raw, Dimension::Length);
+    let refuse = |found| Err(RigProblem::Coordinates { key, found, plane }.at(raw.span()));
+    let length = |raw: &Spanned<RawQuantity>| quantity(key, raw, Dimension::Length);
     match (raw.get_ref(), plane) {
         (RawPosition::Along(x), false) => length(&Spanned::new(raw.span(), x.clone())).map(Position::along),
         (RawPosition::Along(_), true) => refuse("a single length"),

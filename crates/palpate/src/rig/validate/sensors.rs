@@ -131,7 +131,7 @@ impl Context<'_> {
         let extent = self.surface.extent();
         let mut positions = Vec::new();
         for raw in listed.get_ref() {
-            let position = place(raw, extent)?;
+            let position = place("positions", raw, extent)?;
             if !extent.contains(position) {
                 let number = positions.len() + 1;
                 return Err(RigProblem::SensorOffSurface { number, position, extent }.at(raw.span()));
