@@ -1,5 +1,6 @@
 //! Placing 8 of 100,000 candidate sensors on the paper's beam: CPU time on one core, medians. By the limit (force unknown, 73
-//! contacts), and by QR with column pivoting on 8 modes, with the condition number of what it chooses.
+//! contacts), and by QR with column pivoting on 8 modes, with the condition number of what it chooses. What scipy takes for the
+//! same matrix of sines says `design_scipy.py` beside this file.
 
 use cpu_time::ThreadTime;
 use palpate::bench::Bench;
@@ -11,7 +12,7 @@ use palpate::sensing::SensorKind;
 const SITES: usize = 100_000;
 const SENSORS: usize = 8;
 const ROUNDS: usize = 5;
-/// scipy.linalg.qr(pivoting=True) and PySensors' QR on such a matrix, in seconds.
+/// scipy.linalg.qr(pivoting=True) and PySensors' QR on such a matrix, in seconds, as first measured.
 const SCIPY_S: f64 = 0.41;
 const PYSENSORS_S: f64 = 1.75;
 

@@ -6,7 +6,7 @@ use super::error::{DesignError, Exclusion};
 use super::pool::exclusion;
 use crate::contact::Position;
 use crate::mechanics::{Extent, Surface, SurfaceSpec};
-use crate::rig::{MustHave, SensorDesign, Sites};
+use crate::rig::{MustHave, SensorDesign, Sites, Symmetry};
 use crate::sensing::{SensorKind, even_positions};
 
 /// Places closer than this share of the length are the same.
@@ -21,7 +21,7 @@ pub struct PlacedSensor {
     pub position: Position,
 }
 
-/// Every sensor that a layout may have; those that it must have are the last.
+/// Every sensor that a layout may have.
 #[derive(Clone)]
 pub(super) struct Candidates {
     pub sensors: Vec<PlacedSensor>,
@@ -75,13 +75,23 @@ impl Candidates {
         if kept_out && kind != SensorKind::Reaction {
             return Err(DesignError::MustHaveKeptOut { kind, position, plane });
         }
-        let index = self.at(offer, position, extent);
-        let index = index.unwrap_or_else(|| {
+        let index = self.add(offer, position, extent);
+        self.must_have.push(index);
+        // Its twin need not be one of the sites either.
+        let twin = mirrored(position, extent);
+        let kept_out = design.keep_out.iter().any(|zone| zone.holds(twin, extent));
+        if design.symmetry == Symmetry::Wanted && !kept_out && reads_something(surface, model, kind, twin) {
+            self.add(offer, twin, extent);
+        }
+        Ok(())
+    }
+
+    /// The candidate of an offer at a place, which becomes one if it is none.
+    fn add(&mut self, offer: usize, position: Position, extent: Extent) -> usize {
+        self.at(offer, position, extent).unwrap_or_else(|| {
             self.sensors.push(PlacedSensor { offer, position });
             self.sensors.len() - 1
-        });
-        self.must_have.push(index);
-        Ok(())
+        })
     }
 
     /// The candidate of an offer at a place.

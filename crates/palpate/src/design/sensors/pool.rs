@@ -146,6 +146,10 @@ pub(super) fn exclusion(
     design: &SensorDesign,
     extent: Extent,
 ) -> Option<Exclusion> {
+    // Of very many candidates this is asked very often.
+    if design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden {
+        return None;
+    }
     let takes_room = |sensor: &PlacedSensor| design.offers[sensor.offer].kind != SensorKind::Reaction;
     let slack_m = 1e-9 * extent.length_m;
     let (spacing_m, distance_m) = (design.spacing_m, a.position.distance_m(b.position));
