@@ -4,7 +4,7 @@
 //! other one, until no exchange improves (Fedorov 1972 for designs of experiments; greedy choice of sensors by their
 //! information: Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008). What it ends in no single exchange
 //! improves; several starts make it likely that nothing else does either. Of very many sites a sample is searched from all
-//! starts, and the best layout is exchanged among all of them.
+//! starts, and the best layout is exchanged among their neighbours and then among all of them.
 
 use super::objective::{ForceBelief, Objective, State, score_of, state_of};
 use super::pool::Pool;
@@ -66,8 +66,21 @@ pub(super) fn search(
     if sample.len() == pool.units.len() {
         return Some(best);
     }
+    // First among the neighbours that the sample left out, so that few passes go over all.
+    let near = exchange(pool, objective, &nearby(pool, &best.selection), best.selection, keep_going)?;
     let all: Vec<usize> = (0..pool.units.len()).collect();
-    exchange(pool, objective, &all, best.selection, keep_going)
+    exchange(pool, objective, &all, near.selection, keep_going)
+}
+
+/// The units between a layout's own and the next ones of the sample.
+fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
+    let count = pool.units.len();
+    let step = count.div_ceil(SAMPLE);
+    let around = |unit: &usize| unit.saturating_sub(step)..(unit + step + 1).min(count);
+    let mut nearby: Vec<usize> = layout.iter().flat_map(around).collect();
+    nearby.sort_unstable();
+    nearby.dedup();
+    nearby
 }
 
 /// Units evenly out of all of them, with those of a layout.

@@ -67,27 +67,41 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
     }
 
     /// Folds each contact's variance of the position, and the factor by which a sensor shrinks det C there, into sums.
-    fn with<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
+    ///
+    /// Every inner loop goes over the lanes of one block, so that each becomes a few vector instructions.
+    fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
         let n = self.blocks;
-        let columns: [&[Block]; P] = std::array::from_fn(|k| &row[k * n..(k + 1) * n]);
+        let columns: [&[Block]; P] = std::array::from_fn(|k| &row[k * n..][..n]);
         let covariances: [[&[Block]; P]; P] =
-            std::array::from_fn(|i| std::array::from_fn(|j| &state.values[packed(i, j) * n..][..n]));
+            std::array::from_fn(|i| std::array::from_fn(|k| &state.values[packed(i, k) * n..][..n]));
         let (mut first, mut second) = ([0.0; LANES], [0.0; LANES]);
         for at in 0..n {
-            let j: [&Block; P] = std::array::from_fn(|k| &columns[k][at]);
-            let c: [[&Block; P]; P] =
-                std::array::from_fn(|i| std::array::from_fn(|k| &covariances[i][k][at]));
-            let weight = &self.weights[at];
-            for lane in 0..LANES {
-                let told: [f64; P] =
-                    std::array::from_fn(|i| (0..P).map(|k| c[i][k][lane] * j[k][lane]).sum());
-                let signal: f64 = (0..P).map(|k| j[k][lane] * told[k]).sum();
-                let gain: f64 = (FIRST..P).map(|i| told[i] * told[i]).sum();
-                let before: f64 = (FIRST..P).map(|i| c[i][i][lane]).sum();
-                let shrink = 1.0 + signal;
-                let variance = (before - gain / shrink).max(0.0);
-                sums.fold(&mut first[lane], &mut second[lane], weight[lane], variance, shrink);
+            // shrink = 1 + jᵀ·C·j; gain = |C·j|² of the position; before = tr C of the position.
+            let (mut shrink, mut gain, mut variance) = ([1.0; LANES], [0.0; LANES], [0.0; LANES]);
+            for i in 0..P {
+                let mut told = [0.0; LANES];
+                for k in 0..P {
+                    let (c, j) = (&covariances[i][k][at], &columns[k][at]);
+                    for lane in 0..LANES {
+                        told[lane] += c[lane] * j[lane];
+                    }
+                }
+                let j = &columns[i][at];
+                for lane in 0..LANES {
+                    shrink[lane] += j[lane] * told[lane];
+                }
+                if i >= FIRST {
+                    let before = &covariances[i][i][at];
+                    for lane in 0..LANES {
+                        gain[lane] += told[lane] * told[lane];
+                        variance[lane] += before[lane];
+                    }
+                }
             }
+            for lane in 0..LANES {
+                variance[lane] = (variance[lane] - gain[lane] / shrink[lane]).max(0.0);
+            }
+            sums.fold(&mut first, &mut second, &self.weights[at], &variance, &shrink);
         }
         [S::join(&first), second.iter().sum()]
     }
@@ -95,11 +109,11 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
     /// The sums for a sensor, or for none.
     fn sums(&self, state: &State, row: &[Block]) -> [f64; 2] {
         match self.criterion {
-            DesignCriterion::MeanLimit => self.with(state, row, &Mean),
-            DesignCriterion::WorstLimit => self.with(state, row, &Worst),
-            DesignCriterion::WithinTolerance => self.with(state, row, &Without(self.good_enough)),
+            DesignCriterion::MeanLimit => self.folded(state, row, &Mean),
+            DesignCriterion::WorstLimit => self.folded(state, row, &Worst),
+            DesignCriterion::WithinTolerance => self.folded(state, row, &Without(self.good_enough)),
             DesignCriterion::DOptimality => {
-                let [sum, _] = self.with(state, row, &Shrinking);
+                let [sum, _] = self.folded(state, row, &Shrinking);
                 [state.constant + sum, 0.0]
             }
         }
@@ -201,9 +215,9 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
     }
 }
 
-/// What is summed over the contacts. The second sum is the mean standard deviation, where ties are to be broken.
+/// What is summed over the contacts, block by block. The second sum is the mean standard deviation, where ties are to be broken.
 trait Sums {
-    fn fold(&self, first: &mut f64, second: &mut f64, weight: f64, variance: f64, shrink: f64);
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
 
     fn join(lanes: &Block) -> f64 {
         lanes.iter().sum()
@@ -221,16 +235,20 @@ struct Shrinking;
 
 impl Sums for Mean {
     #[inline(always)]
-    fn fold(&self, first: &mut f64, _: &mut f64, weight: f64, variance: f64, _: f64) {
-        *first += weight * variance.sqrt();
+    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] += weight[lane] * variance[lane].sqrt();
+        }
     }
 }
 
 impl Sums for Worst {
     #[inline(always)]
-    fn fold(&self, first: &mut f64, second: &mut f64, weight: f64, variance: f64, _: f64) {
-        *first = first.max(variance);
-        *second += weight * variance.sqrt();
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] = first[lane].max(variance[lane]);
+            second[lane] += weight[lane] * variance[lane].sqrt();
+        }
     }
 
     fn join(lanes: &Block) -> f64 {
@@ -240,16 +258,20 @@ impl Sums for Worst {
 
 impl Sums for Without {
     #[inline(always)]
-    fn fold(&self, first: &mut f64, second: &mut f64, weight: f64, variance: f64, _: f64) {
-        *first += if variance > self.0 { weight } else { 0.0 };
-        *second += weight * variance.sqrt();
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] += if variance[lane] > self.0 { weight[lane] } else { 0.0 };
+            second[lane] += weight[lane] * variance[lane].sqrt();
+        }
     }
 }
 
 impl Sums for Shrinking {
     #[inline(always)]
-    fn fold(&self, first: &mut f64, _: &mut f64, weight: f64, _: f64, shrink: f64) {
-        *first -= 0.5 * weight * shrink.ln();
+    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, _: &Block, shrink: &Block) {
+        for lane in 0..LANES {
+            first[lane] -= 0.5 * weight[lane] * shrink[lane].ln();
+        }
     }
 }
 

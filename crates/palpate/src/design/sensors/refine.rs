@@ -106,7 +106,8 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
 fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
     let pool = &problem.pool;
     let together = |a: &PlacedSensor, b: &PlacedSensor| {
-        let same = a.offer == b.offer && a.position == b.position;
+        let grain_m = 1e-6 * pool.extent.length_m;
+        let same = a.offer == b.offer && a.position.distance_m(b.position) <= grain_m;
         !same && exclusion(a, b, &pool.design, pool.extent).is_none()
     };
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;

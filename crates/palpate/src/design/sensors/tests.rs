@@ -180,7 +180,10 @@ fn what_cannot_be_met_is_named() {
         ("the same twice", must(&[0.2, 0.2])),
         ("too many must-haves", SensorDesign { count: 2, ..must(&[0.1, 0.2, 0.3]) }),
         ("mirrored must-haves", SensorDesign { count: 3, symmetry: Symmetry::Wanted, ..must(&[0.1, 0.15]) }),
-        ("a twin kept out", SensorDesign { symmetry: Symmetry::Wanted, keep_out: kept_out.clone(), ..must(&[0.08, 0.09]) }),
+        (
+            "a twin kept out",
+            SensorDesign { symmetry: Symmetry::Wanted, keep_out: kept_out.clone(), ..must(&[0.08, 0.09]) },
+        ),
         ("an odd count", odd),
         ("no twins", SensorDesign { symmetry: Symmetry::Wanted, sites: lopsided, ..base.clone() }),
         ("must-haves that mirror", SensorDesign { symmetry: Symmetry::Forbidden, ..must(&[0.1, 0.3]) }),
@@ -256,7 +259,8 @@ fn plates_are_designed_too() {
     let mut design = SensorDesign::of(&bench.layout, bench.surface.extent()).unwrap();
     design.sites = Sites::Every(0.03);
     let corner = |at_m| Position { x_m: at_m, y_m: at_m };
-    design.contacts = ContactPrior { from: corner(0.03), to: corner(0.27), every_m: 0.03, weights: Vec::new() };
+    design.contacts =
+        ContactPrior { from: corner(0.03), to: corner(0.27), every_m: 0.03, weights: Vec::new() };
     for known in [true, false] {
         design.force_is_known = Some(known);
         let problem = problem(&bench, &design);
