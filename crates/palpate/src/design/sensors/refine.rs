@@ -15,7 +15,8 @@ const HALVINGS_ON_A_PLANE: usize = 3;
 const MOST_ROUNDS: usize = 20;
 
 /// A compass search: each sensor in turn goes a step along each direction if that improves the score; when none does, the step
-/// is halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other go together. `None` when
+/// is halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other go together, and those of a
+/// kind stay as far apart as sites are. `None` when
 /// `keep_going` says no.
 pub(super) fn refine(
     problem: &SensorProblem,
@@ -105,10 +106,12 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
 
 fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
     let pool = &problem.pool;
+    // Sites keep sensors of a kind apart; without them nothing would stop them from meeting in one place.
+    let apart_m = site_distance(&pool.design.sites, pool.extent.length_m).unwrap_or(0.0);
+    let slack_m = 1e-9 * pool.extent.length_m;
     let together = |a: &PlacedSensor, b: &PlacedSensor| {
-        let grain_m = 1e-6 * pool.extent.length_m;
-        let same = a.offer == b.offer && a.position.distance_m(b.position) <= grain_m;
-        !same && exclusion(a, b, &pool.design, pool.extent).is_none()
+        let crowded = a.offer == b.offer && a.position.distance_m(b.position) < apart_m - slack_m;
+        !crowded && exclusion(a, b, &pool.design, pool.extent).is_none()
     };
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
     group.iter().enumerate().all(|(i, sensor)| {
