@@ -136,7 +136,7 @@ fn a_plate_has_maps() {
 #[test]
 fn what_cannot_be_designed_is_refused_in_words() {
     let forceless = EXAMPLE.replacen("force = \"3 N\"", "", 1);
-    let clean = EXAMPLE.replacen("noise = \"5 um\" ", "noise = \"0 um\" ", 1);
+    let clean = EXAMPLE.replacen("noise = \"5 um\"\n", "noise = \"0 um\"\n", 1);
     let cases: [(&str, &str, &[&str]); 11] = [
         ("a spacing that leaves no room", &with("spacing = \"60 mm\""), &[]),
         ("a budget too small", &with("budget = 7"), &[]),

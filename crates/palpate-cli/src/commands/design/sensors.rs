@@ -13,6 +13,7 @@ use palpate::bench::Bench;
 use palpate::design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
+use palpate::limit::LimitError;
 use palpate::report::{SensorDesignReport, sensor_design_report};
 use palpate::rig::{Rig, SensorDesign};
 use std::path::{Path, PathBuf};
@@ -111,7 +112,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Bench, SensorDesi
     let bench = Bench { force_n, ..rig.bench.clone() };
     let own = || SensorDesign::of(&bench.layout, bench.surface.extent());
     let design = rig.design.clone().or_else(own);
-    let mut design = design.ok_or_else(|| complaint(&DesignError::NothingOffered, &arguments.rig))?;
+    let mut design = design.ok_or_else(|| complaint(&LimitError::NoModel.into(), &arguments.rig))?;
     if arguments.unknown_force {
         design.force_is_known = Some(false);
     } else if design.force_is_known.is_none() {

@@ -11,9 +11,6 @@ pub enum DesignError {
     /// There is no limit to design by.
     #[error(transparent)]
     Limit(#[from] LimitError),
-    /// The rig's sensors have no model, and no others are named.
-    #[error("the rig has no sensor that a model explains, and [design] names no `kinds`")]
-    NothingOffered,
     /// A kind without noise.
     #[error(
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
@@ -180,9 +177,6 @@ impl DesignError {
                 "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
             }
             Self::Limit(_) => "check the sensors' noise and the contact force",
-            Self::NothingOffered => {
-                "add `kinds = [{ measure = \"deflection\", noise = \"5 um\" }]` to [design]"
-            }
             Self::SingularNoise { .. } => {
                 "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
             }
