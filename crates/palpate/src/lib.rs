@@ -5,6 +5,7 @@ pub mod bench;
 pub mod centroid;
 pub mod closed_form;
 pub mod contact;
+pub mod design;
 pub mod digit;
 pub mod distribution;
 pub mod estimator;

@@ -1,6 +1,7 @@
 //! One module a verb.
 
 pub mod compare;
+pub mod design;
 pub mod estimate_line;
 pub mod evaluate;
 pub mod fit;

@@ -32,6 +32,7 @@ mod chart_svg;
 mod colour_map;
 mod comparison_report;
 mod dead_areas_report;
+mod design_report;
 mod digit_figures;
 mod evaluation_report;
 mod geometry;
@@ -66,6 +67,7 @@ pub use chart::{
 pub use chart_svg::chart_to_svg;
 pub use comparison_report::{ComparisonReport, comparison_report};
 pub use dead_areas_report::dead_areas_report;
+pub use design_report::{SensorDesignReport, sensor_design_report};
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
 pub use heat_map::{HeatMap, HeatPanel, heat_map_to_svg};
 pub use limit_report::{LimitReport, limit_report};

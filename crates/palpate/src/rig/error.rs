@@ -223,6 +223,43 @@ pub enum RigProblem {
         /// Whether the surface has a width.
         plane: bool,
     },
+    /// A place of a design that is not on the surface.
+    #[error(
+        "`{key}` is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
+    )]
+    PlaceOffSurface {
+        /// The key.
+        key: &'static str,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A stretch or rectangle that ends before it begins.
+    #[error(
+        "`to` is {}; it must lie beyond `from`, {}",
+        extent.place_in_words(*to),
+        extent.place_in_words(*from)
+    )]
+    EndsBeforeItBegins {
+        /// Where it begins.
+        from: Position,
+        /// Where it ends.
+        to: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A sensor that a layout must have, of a kind that cannot be had.
+    #[error("`must_have` asks for a {kind} sensor, which is none of the kinds to choose from")]
+    NotOffered {
+        /// What it measures.
+        kind: SensorKind,
+    },
+    /// A number of candidate sites, on a plane, where it does not say where they are.
+    #[error("a number of `sites` does not say where on a plane they are")]
+    CountOfSitesOnPlane,
     /// A number of places, on a plane, where it does not say where they are.
     #[error("[{section}] `count` alone does not say where on a plane they are")]
     CountOnPlane {
@@ -306,12 +343,18 @@ impl RigError {
             RigProblem::CountOnPlane { .. } => {
                 Some("say `grid = [3, 3]`, columns and rows, or list pairs in `positions`".to_owned())
             }
+            RigProblem::CountOfSitesOnPlane => {
+                Some("say how far apart they are, as in `sites = \"10 mm\"`, or list pairs".to_owned())
+            }
             RigProblem::Coordinates { plane: true, .. } => {
                 Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
             }
             RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::NotOffered { kind } => {
+                Some(format!("add {{ measure = \"{kind}\", noise = … }} to `kinds`"))
+            }
             RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
             _ => None,
         }

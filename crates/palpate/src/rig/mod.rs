@@ -2,12 +2,16 @@
 
 mod error;
 mod sections;
+mod sensor_design;
 mod validate;
 mod value;
 
 pub use error::{RigError, RigProblem};
 pub(crate) use sections::{
     ContactSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection, TrainingSection,
+};
+pub use sensor_design::{
+    ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
 pub(crate) use validate::validate;
 pub(crate) use value::{RawQuantity, positive};
@@ -32,6 +36,8 @@ pub struct Rig {
     pub loads: Vec<UniformLoad>,
     /// How a contact moves, and what moves with it, where the rig says.
     pub motion: Option<MotionRig>,
+    /// What a sensor design may choose from, where the rig says.
+    pub design: Option<SensorDesign>,
 }
 
 /// The moving contacts of a rig.

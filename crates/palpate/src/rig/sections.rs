@@ -9,8 +9,10 @@ use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDes
 use toml::Spanned;
 
 use super::value::{RawColumn, RawPosition, RawQuantity};
+pub(crate) use design::{ContactsKeys, DesignSection, MustHaveKeys, OfferKeys, SitesKey, ZoneKeys};
 pub(crate) use supports::{BeamSectionKeys, EdgesSection, SupportKeys, SupportsKey};
 
+mod design;
 mod supports;
 
 /// A value and its place, if the key is there.
@@ -28,6 +30,7 @@ pub(crate) struct RigSections {
     pub recording: Key<RecordingSection>,
     pub motion: Key<MotionSections>,
     pub load: Option<Vec<Spanned<LoadSection>>>,
+    pub design: Key<DesignSection>,
 }
 
 /// `[surface]`

@@ -366,6 +366,7 @@ fn a_larger_document_can_embed_sections_and_keep_their_places() {
             recording: None,
             motion: None,
             load: None,
+            design: None,
         })
     });
     let rigs: Vec<Result<Rig, RigError>> = rigs.collect();

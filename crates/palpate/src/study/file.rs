@@ -208,6 +208,7 @@ impl StudyFile {
             recording: None,
             motion: None,
             load: None,
+            design: None,
         })?;
         if rig.bench.surface.model().is_none() || rig.bench.force_n.is_none() || rig.training.is_none() {
             return Err(StudyProblem::NotSimulated { arm: name }.at(arm.name.span()));

@@ -2,6 +2,7 @@
 
 mod columns;
 mod contact;
+mod design;
 mod estimator;
 mod load;
 mod motion;
@@ -47,5 +48,6 @@ pub(crate) fn validate(sections: &RigSections) -> Result<Rig, RigError> {
     let bench = Bench { surface, layout, force_n, columns };
     let motion =
         motion::validate(sections.motion.as_ref(), sections.surface.as_ref(), &bench.surface, force_n)?;
-    Ok(Rig { bench, training, estimator, loads, motion })
+    let design = design::validate(sections.design.as_ref(), &bench)?;
+    Ok(Rig { bench, training, estimator, loads, motion, design })
 }

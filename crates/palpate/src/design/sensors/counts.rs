@@ -1,0 +1,48 @@
+//! How much more sensors help.
+
+use std::ops::RangeInclusive;
+
+use super::{Assessment, DesignError, KeepGoing, SensorProblem};
+
+/// The score of so many sensors is good enough when it lies within this share of the score of the most.
+const ENOUGH: f64 = 0.1;
+
+/// Layouts of one number of sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CountPoint {
+    /// How many.
+    pub count: usize,
+    /// The even layout; `None` where there is none.
+    pub even: Option<Assessment>,
+    /// The layout by greedy choice and exchange.
+    pub designed: Assessment,
+}
+
+impl SensorProblem<'_> {
+    /// Even and designed layouts for each number of sensors. `None` when `keep_going` says no.
+    ///
+    /// # Errors
+    /// [`DesignError`] for the first number that no layout can have.
+    pub fn counts(
+        &self,
+        range: RangeInclusive<usize>,
+        seed: u64,
+        keep_going: &mut KeepGoing,
+    ) -> Result<Option<Vec<CountPoint>>, DesignError> {
+        let mut points = Vec::new();
+        for count in range {
+            let problem = self.with_count(count)?;
+            let even = problem.even()?.map(|even| even.assessment);
+            let Some(designed) = problem.greedy_exchange(seed, keep_going)? else { return Ok(None) };
+            points.push(CountPoint { count, even, designed: designed.assessment });
+        }
+        Ok(Some(points))
+    }
+}
+
+/// The least number of sensors whose score lies within 10 % of the score of the most; `None` of no points.
+pub fn enough(points: &[CountPoint]) -> Option<usize> {
+    let least = points.last()?.designed.score;
+    let bound = least + ENOUGH * least.abs();
+    points.iter().find(|point| point.designed.score <= bound).map(|point| point.count)
+}

@@ -1,0 +1,89 @@
+//! A genetic search, after Elliott et al., who chose the sensing positions of a plate so.
+//!
+//! A layout is a set of units. Two parents, each the best of a few drawn at random, have a child that takes its units from
+//! both in random order as far as the constraints let it; now and then a unit is exchanged for any other. The best layouts of
+//! a generation live on.
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::exchange::Found;
+use super::objective::Objective;
+use super::pool::Pool;
+use super::{KeepGoing, Stage, starts};
+
+const POPULATION: usize = 60;
+const GENERATIONS: usize = 120;
+/// Layouts that live on unchanged.
+const ELITE: usize = 4;
+/// Layouts of which the best becomes a parent.
+const TOURNAMENT: usize = 3;
+/// How likely a child loses one of its units for any other.
+const MUTATION: f64 = 0.4;
+
+/// The best layout after so many generations; `packed` is one that keeps all constraints. `None` when `keep_going` says no.
+pub(super) fn search(
+    pool: &Pool,
+    objective: &dyn Objective,
+    packed: &[usize],
+    seed: u64,
+    keep_going: &mut KeepGoing,
+) -> Option<Found> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let all: Vec<usize> = (0..pool.units.len()).collect();
+    let mut population: Vec<Found> = (0..POPULATION)
+        .map(|_| {
+            let layout = starts::random(pool, &all, rng.random()).unwrap_or_else(|| packed.to_vec());
+            Found::of(pool, objective, layout)
+        })
+        .collect();
+    for generation in 0..GENERATIONS {
+        if !keep_going(Stage::Genetic, generation as f64 / GENERATIONS as f64) {
+            return None;
+        }
+        population.sort_by(|a, b| a.score.total_cmp(&b.score));
+        let mut next: Vec<Found> = population[..ELITE].to_vec();
+        while next.len() < POPULATION {
+            let [one, other] = [parent(&population, &mut rng), parent(&population, &mut rng)];
+            // Children that find no way to be whole are not born.
+            let layout = child(pool, one, other, &mut rng).unwrap_or_else(|| one.selection.clone());
+            next.push(Found::of(pool, objective, layout));
+        }
+        population = next;
+    }
+    population.into_iter().min_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+fn parent<'a>(population: &'a [Found], rng: &mut impl Rng) -> &'a Found {
+    let drawn = (0..TOURNAMENT).map(|_| rng.random_range(0..population.len())).collect::<Vec<_>>();
+    let best = drawn.into_iter().min_by(|a, b| population[*a].score.total_cmp(&population[*b].score));
+    &population[best.unwrap_or(0)]
+}
+
+fn child(pool: &Pool, one: &Found, other: &Found, rng: &mut impl Rng) -> Option<Vec<usize>> {
+    let fixed = pool.fixed.len();
+    let mut inherited: Vec<usize> = [&one.selection[fixed..], &other.selection[fixed..]].concat();
+    for i in (1..inherited.len()).rev() {
+        inherited.swap(i, rng.random_range(0..=i));
+    }
+    if rng.random::<f64>() < MUTATION {
+        inherited.insert(0, rng.random_range(0..pool.units.len()));
+    }
+    let mut layout = pool.fixed.clone();
+    for unit in inherited {
+        if pool.size(&layout) < pool.design.count && pool.may_join(&layout, unit) {
+            layout.push(unit);
+        }
+    }
+    // What the parents do not fill, chance does.
+    for _ in 0..20 * pool.design.count {
+        if pool.size(&layout) == pool.design.count {
+            return Some(layout);
+        }
+        let unit = rng.random_range(0..pool.units.len());
+        if pool.may_join(&layout, unit) {
+            layout.push(unit);
+        }
+    }
+    (pool.size(&layout) == pool.design.count).then_some(layout)
+}

@@ -1,0 +1,58 @@
+//! What searches ask of a criterion: the score of a layout, and quickly that of the same with one more sensor.
+
+/// Numbers that are worked on side by side, which compilers turn into vector instructions.
+pub(super) const LANES: usize = 8;
+
+/// Values of as many contacts (or of one, padded with zeros).
+pub(super) type Block = [f64; LANES];
+
+/// Least covariances of what is unknown, for the sensors so far: what it takes to judge one sensor more.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    /// The covariance matrices, as the objective lays them out.
+    pub values: Vec<Block>,
+    /// What adding a sensor does not change of the score.
+    pub constant: f64,
+}
+
+/// How much is believed of the force before any sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ForceBelief {
+    /// Next to nothing, as for every layout that is judged.
+    Vague,
+    /// Its order of magnitude. So the first sensors of a layout are chosen: one alone tells nothing while the force is
+    /// wholly unknown.
+    Rough,
+}
+
+/// A score of layouts, the smaller the better. A sensor is a row of numbers: what it tells of each unknown.
+pub(super) trait Objective: Sync {
+    /// The row of a candidate.
+    fn row(&self, candidate: usize) -> &[Block];
+
+    /// What sensors with these rows leave unknown.
+    fn state(&self, rows: &[&[Block]], belief: ForceBelief) -> State;
+
+    /// The score by which layouts are searched.
+    fn score(&self, state: &State) -> f64;
+
+    /// The same with one more sensor.
+    fn score_with(&self, state: &State, row: &[Block]) -> f64;
+
+    /// The state with one more sensor.
+    fn with(&self, state: &State, row: &[Block]) -> State;
+
+    /// The score that people read: without what only breaks ties in a search.
+    fn value(&self, state: &State) -> f64;
+}
+
+/// The score of a layout of candidates.
+pub(super) fn score_of(objective: &dyn Objective, candidates: &[usize]) -> f64 {
+    objective.score(&state_of(objective, candidates, ForceBelief::Vague))
+}
+
+/// The state of a layout of candidates.
+pub(super) fn state_of(objective: &dyn Objective, candidates: &[usize], belief: ForceBelief) -> State {
+    let rows: Vec<&[Block]> = candidates.iter().map(|candidate| objective.row(*candidate)).collect();
+    objective.state(&rows, belief)
+}
