@@ -61,6 +61,7 @@ impl<const K: usize> ContactFit<K> {
 
     /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
     pub fn add(&mut self, residual: f64, derivatives: &[f64; K], weight: f64) {
         self.misfit += weight * residual * residual;
         for i in 0..K {

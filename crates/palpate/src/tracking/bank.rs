@@ -176,8 +176,8 @@ impl<const N: usize, const M: usize> Bank<N, M> {
 
 /// Unknowns with places on the surface and forces that press.
 fn held<const K: usize>(mut unknowns: [f64; K], length_m: f64) -> [f64; K] {
-    for k in 1..K {
-        unknowns[k] = if k % 2 == 1 { unknowns[k].clamp(0.0, length_m) } else { unknowns[k].max(0.0) };
+    for (k, unknown) in unknowns.iter_mut().enumerate().skip(1) {
+        *unknown = if k % 2 == 1 { unknown.clamp(0.0, length_m) } else { unknown.max(0.0) };
     }
     unknowns
 }

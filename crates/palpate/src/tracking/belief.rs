@@ -8,6 +8,10 @@ use crate::method::{ContactFit, Likelihood};
 
 /// A bank of a surface with as many contacts.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one contact is the rule, and a box would cost it an allocation a reading"
+)]
 pub(super) enum Belief {
     Nothing(Bank<2, 1>),
     One(Bank<6, 3>),
@@ -16,6 +20,10 @@ pub(super) enum Belief {
 
 /// A belief as one Gaussian.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one contact is the rule, and a box would cost it an allocation a reading"
+)]
 pub(super) enum Mixed {
     Nothing(Gaussian<2>),
     One(Gaussian<6>),

@@ -42,7 +42,7 @@ struct Newcomer {
 
 impl Births<'_> {
     /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
-    pub fn from_nothing(&self) -> Vec<(f64, Belief)> {
+    pub fn where_nothing_touched(&self) -> Vec<(f64, Belief)> {
         if self.alone.status == Status::NoContact {
             return Vec::new();
         }

@@ -174,7 +174,7 @@ impl<'a> Tracker<'a> {
     fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
         let births = Births { seen, config: &self.config, alone };
         let mut born: Vec<(f64, Belief)> = Vec::new();
-        for (evidence, belief) in births.from_nothing() {
+        for (evidence, belief) in births.where_nothing_touched() {
             let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };
             born.push((weight + evidence, belief));
         }

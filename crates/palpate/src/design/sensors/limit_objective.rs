@@ -189,6 +189,7 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
         self.search_score(self.sums(state, row))
     }
 
+    #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
     fn with(&self, state: &State, row: &[Block]) -> State {
         let n = self.blocks;
         let mut with = state.clone();
@@ -287,6 +288,7 @@ pub(super) fn padded(values: &[f64]) -> Vec<Block> {
 }
 
 /// The inverse of a symmetric positive definite matrix and its determinant, by Cholesky factors.
+#[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
 fn inverse<const P: usize>(matrix: &[[f64; P]; P]) -> ([[f64; P]; P], f64) {
     let mut lower = [[0.0; P]; P];
     let mut determinant = 1.0;

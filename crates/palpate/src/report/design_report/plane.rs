@@ -39,7 +39,7 @@ pub(super) fn limit_maps(report: &SensorDesignReport, width_m: f64, first: usize
         shown.iter().flat_map(|(_, values, _)| values).copied().filter(|value| value.is_finite()).collect();
     limits.sort_by(f64::total_cmp);
     let most = limits.get(limits.len() * 95 / 100).copied().unwrap_or(1.0);
-    let figure = |(i, (name, values, sensors_mm)): (usize, (&str, Vec<f64>, Vec<(f64, f64)>))| {
+    let figure = |i, (name, values, sensors_mm): (&str, Vec<f64>, Vec<(f64, f64)>)| {
         let map = HeatMap {
             title: format!("The least standard deviation of a located contact, {name} layout"),
             length_mm: extent.length_m * 1e3,
@@ -59,5 +59,5 @@ pub(super) fn limit_maps(report: &SensorDesignReport, width_m: f64, first: usize
         };
         Figure { number: first + i, alternative: map.title.clone(), svg: heat_map_to_svg(&map), caption }
     };
-    shown.into_iter().enumerate().map(figure).collect()
+    shown.into_iter().enumerate().map(|(i, layout)| figure(i, layout)).collect()
 }

@@ -32,9 +32,8 @@ pub(super) fn validate(
         density.map(|raw| Ok((positive("density", raw, Dimension::Density)?, raw.span()))).transpose()?;
     let Some(sections) = sections else { return Ok(None) };
     let listed = sections.get_ref().each(sections.span());
-    let context =
-        |(keys, span): &(_, Range<usize>)| Context { keys: *keys, span: span.clone(), known_force_n };
-    let contacts: Vec<Context> = listed.iter().map(context).collect();
+    let context = |(keys, span)| Context { keys, span, known_force_n };
+    let contacts: Vec<Context> = listed.into_iter().map(context).collect();
     let (first, second) = match contacts.as_slice() {
         [first] => (first, None),
         [first, second] => (first, Some(second)),
