@@ -166,7 +166,8 @@ mod tests {
 
     /// The example with an unknown force and a second contact that says `keys`.
     fn with_second(keys: &str) -> String {
-        let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen("[contact]\nforce = \"3 N\"", "", 1);
+        let contact = RIG.find("[contact]").unwrap()..RIG.find("[training]").unwrap();
+        let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen(&RIG[contact], "", 1);
         let second = "[[motion]]\nfrom = \"300 mm\"\nto = \"200 mm\"\nspeed = \"0.2 m/s\"\n";
         text.replacen("[training]", "[training]\nforce = \"3 N\"", 1) + second + keys
     }
