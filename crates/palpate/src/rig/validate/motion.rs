@@ -166,7 +166,7 @@ mod tests {
 
     /// The example with an unknown force and a second contact that says `keys`.
     fn with_second(keys: &str) -> String {
-        let contact = RIG.find("[contact]").unwrap()..RIG.find("[training]").unwrap();
+        let contact = RIG.find("[contact]").unwrap()..RIG.find("\n[training]\n").unwrap();
         let text = RIG.replacen("[motion]", "[[motion]]", 1).replacen(&RIG[contact], "", 1);
         let second = "[[motion]]\nfrom = \"300 mm\"\nto = \"200 mm\"\nspeed = \"0.2 m/s\"\n";
         text.replacen("[training]", "[training]\nforce = \"3 N\"", 1) + second + keys
