@@ -1,6 +1,7 @@
 //! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
 
 use crate::failure::{Complaint, Failure};
+use palpate::report::{ReportError, ReportFile};
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -50,6 +51,16 @@ fn make_readable(file: &std::fs::File) -> std::io::Result<()> {
 /// Makes a folder, with those above it.
 pub fn make_folder(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(path).map_err(|error| cannot("make the folder", path, &error))
+}
+
+/// Writes the files of a report into a folder, which is made where it is not there yet.
+pub fn write_report(folder: &Path, report: Result<Vec<ReportFile>, ReportError>) -> Result<(), Failure> {
+    let files = report.map_err(Complaint::new)?;
+    make_folder(folder)?;
+    for file in files {
+        write_file(&folder.join(&file.name), &file.bytes)?;
+    }
+    Ok(())
 }
 
 /// The complaint that a path cannot be used.

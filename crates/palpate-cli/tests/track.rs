@@ -92,15 +92,19 @@ fn two_contacts_are_followed_in_columns_of_their_own() {
     fs::write(folder.path().join("rig.toml"), rig).unwrap();
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
     said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
-    let output =
-        run(folder.path(), &["track", "locator.json", "moving.csv", "--rig", "rig.toml", "--report", "page"]);
+    let output = run(folder.path(), &["track", "locator.json", "moving.csv", "--rig", "rig.toml"]);
     let told = said(&output);
     let heading = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching,position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
     assert_eq!(told.lines().next(), Some(heading));
     assert!(told.lines().all(|line| line.split(',').count() == 13));
     let filter = row(&output.stderr, "filter");
     assert!(filter[3] >= 2.5 && filter[6] >= 95.0, "{filter:?}");
-    let json = run(folder.path(), &["track", "locator.json", "moving.csv", "--json"]);
+    // Its beginning is enough for what does not depend on the errors.
+    let moving = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    let beginning: Vec<&str> = moving.lines().take(400).collect();
+    fs::write(folder.path().join("beginning.csv"), beginning.join("\n")).unwrap();
+    let json = run(folder.path(), &["track", "locator.json", "beginning.csv", "--json", "--report", "page"]);
+    assert!(folder.path().join("page/report.html").exists());
     let last: Value = serde_json::from_str(said(&json).lines().last().unwrap()).unwrap();
     assert!(last["two_touching"].as_f64().unwrap() > 0.9, "{last}");
     assert!(last["second"]["x_mm"].as_f64().is_some(), "{last}");

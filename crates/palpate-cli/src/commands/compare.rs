@@ -121,7 +121,6 @@ fn write_report(
     left_out: &[LeftOut],
     out: &Path,
 ) -> Result<(), Failure> {
-    output::make_folder(out)?;
     let left_out: Vec<_> = left_out.iter().map(|left_out| (left_out.name, left_out.why.clone())).collect();
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
@@ -132,10 +131,7 @@ fn write_report(
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
-    for file in comparison_report(&report).map_err(Complaint::new)? {
-        output::write_file(&out.join(&file.name), &file.bytes)?;
-    }
-    Ok(())
+    output::write_report(out, comparison_report(&report))
 }
 
 /// What the estimators are tried on, what it is called, and how it is used.

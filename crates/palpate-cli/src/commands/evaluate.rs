@@ -100,7 +100,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let answers = if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
     let findings = findings(arguments, &answers)?;
     if let Some(out) = &arguments.out {
-        output::make_folder(out)?;
         let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
             title: &format!("Location errors of {}", findings.subject),
@@ -113,9 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             portions: &arguments.portion,
             tolerance_m: arguments.tolerance,
         };
-        for file in evaluation_report(&report).map_err(Complaint::new)? {
-            output::write_file(&out.join(&file.name), &file.bytes)?;
-        }
+        output::write_report(out, evaluation_report(&report))?;
     }
     if arguments.json { output::say_json(&findings) } else { print(&findings, arguments) }
 }

@@ -10,6 +10,7 @@ use palpate::limit::{
 };
 use palpate::mechanics::Extent;
 use palpate::report::{LimitReport, limit_report};
+use palpate::sensing::NoiseError;
 use palpate::units::{Quantity, format_count, format_length_mm};
 use std::path::{Path, PathBuf};
 
@@ -141,10 +142,10 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
         LimitError::NoModel => {
             "give a surface with a model, such as `kind = \"beam\"`; how far a locator is off on recordings says `palpate evaluate`"
         }
-        LimitError::SingularNoise { .. } => {
+        LimitError::Noise(NoiseError::Singular { .. }) => {
             "add `noise = \"5 um\"` to [sensors], or try one with --noise \"5 um\""
         }
-        LimitError::AllDead { .. } => "take sensors out of `dead` in [sensors]",
+        LimitError::Noise(error) => error.help(),
         LimitError::NoForce => "--force \"3 N\" gives one, or `force = \"3 N\"` in [contact]",
         LimitError::Force { .. } => "--force takes a force such as \"3 N\"",
         LimitError::Positions { .. } => "--every takes a length between two positions, such as \"10 mm\"",
@@ -209,12 +210,8 @@ fn write_report(limits: &Limits, bench: &Bench, arguments: &Arguments, out: &Pat
         warnings: &limits.warnings,
         listed: &limits.listed,
     };
-    let files = limit_report(&report).map_err(Complaint::new)?;
-    output::make_folder(out)?;
-    for file in files {
-        output::write_file(&out.join(&file.name), &file.bytes)?;
-    }
-    Ok(())
+    let files = limit_report(&report);
+    output::write_report(out, files)
 }
 
 fn findings(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Findings {

@@ -2,12 +2,12 @@
 
 use super::estimate_line;
 use crate::failure::{Complaint, Failure};
-use crate::{input, interrupt, output};
+use crate::lines::Lines;
+use crate::{input, output};
 use palpate::bench::Bench;
 use palpate::estimator::Locator;
 use palpate::recording::{Column, Columns, Header, ReadingParser};
-use std::fs::File;
-use std::io::{BufRead, BufReader, IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Locate readings: CSV in (a file, or stdin), estimates out as they come.
@@ -42,22 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
-    let (name, source) = open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
-    let mut stream =
-        Stream { locator: &locator, name, json: arguments.json, shape: arguments.shape, lost: 0, line: 0 };
-    stream.run(source, &columns(&locator.bench, arguments.no_header))
-}
-
-/// Opens readings, `-` being stdin, and says what they are called.
-pub fn open(path: &Path) -> Result<(String, Box<dyn BufRead>), Failure> {
-    if path == Path::new("-") {
-        if std::io::stdin().is_terminal() {
-            eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
-        }
-        return Ok(("stdin".to_owned(), Box::new(std::io::stdin().lock())));
-    }
-    let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
-    Ok((path.display().to_string(), Box::new(BufReader::new(file))))
+    let lines = Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
+    let mut stream = Stream { locator: &locator, json: arguments.json, shape: arguments.shape, lost: 0 };
+    stream.run(lines, &columns(&locator.bench, arguments.no_header))
 }
 
 /// Which columns of readings are the channels.
@@ -74,61 +61,49 @@ pub fn columns(bench: &Bench, no_header: bool) -> Columns {
 
 struct Stream<'a> {
     locator: &'a Locator,
-    name: String,
     json: bool,
     /// Points of the shape, where it is asked for.
     shape: Option<u16>,
     /// Rows that gave no estimate.
     lost: u64,
-    line: u64,
 }
 
 impl Stream<'_> {
-    fn run(&mut self, mut source: Box<dyn BufRead>, columns: &Columns) -> Result<(), Failure> {
+    fn run(&mut self, mut lines: Lines, columns: &Columns) -> Result<(), Failure> {
         let mut out = std::io::stdout().lock();
-        let mut line = Vec::new();
-        let mut parser = ReadingParser::new(&self.name, columns);
+        let mut parser = ReadingParser::new(&lines.name, columns);
         if !self.json {
             output::print(&mut out, estimate_line::heading(self.is_plane()).as_bytes())?;
         }
-        while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
-            match parser.parse_line(&line) {
+        while let Some(line) = lines.next()? {
+            match parser.parse_line(line) {
                 Ok(None) => {}
-                Ok(Some(reading)) => self.locate(&reading, &mut out)?,
+                Ok(Some(reading)) => self.locate(&reading, lines.count, &mut out)?,
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => self.lose(&error),
             }
         }
         if parser.awaits_columns() {
-            let complaint = Complaint::new(format!("{} holds no reading", self.name));
+            let complaint = Complaint::new(format!("{} holds no reading", lines.name));
             return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
         }
         match self.lost {
             0 => Ok(()),
-            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", self.line))),
+            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", lines.count))),
         }
     }
 
-    /// Reads the next line; false at the end.
-    fn read_line(&mut self, source: &mut Box<dyn BufRead>, line: &mut Vec<u8>) -> Result<bool, Failure> {
-        line.clear();
-        let read = source.read_until(b'\n', line);
-        let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
-        self.line += u64::from(read > 0);
-        Ok(read > 0)
-    }
-
-    fn locate(&mut self, reading: &[f64], out: &mut impl Write) -> Result<(), Failure> {
+    fn locate(&mut self, reading: &[f64], line: u64, out: &mut impl Write) -> Result<(), Failure> {
         match self.locator.locate(reading) {
             Ok(estimate) => {
-                let line = if self.json {
+                let text = if self.json {
                     let shape =
                         self.shape.and_then(|points| self.locator.shape(&estimate, usize::from(points) - 1));
-                    estimate_line::json(&estimate, self.line, self.is_plane(), shape.as_ref())?
+                    estimate_line::json(&estimate, line, self.is_plane(), shape.as_ref())?
                 } else {
                     estimate_line::csv(&estimate, self.is_plane())
                 };
-                output::print(out, line.as_bytes())?;
+                output::print(out, text.as_bytes())?;
                 // A reader at the other end of a pipe wants each estimate now.
                 out.flush().map_err(|_| Failure::NobodyReads)
             }

@@ -3,9 +3,10 @@
 mod findings;
 mod tables;
 
-use crate::commands::locate::{columns, open};
+use crate::commands::locate::columns;
 use crate::failure::{Complaint, Failure};
-use crate::{input, interrupt, output};
+use crate::lines::Lines;
+use crate::{input, output};
 use findings::Findings;
 use palpate::bench::Bench;
 use palpate::estimator::{
@@ -16,7 +17,6 @@ use palpate::recording::ReadingParser;
 use palpate::report::{ProfileReport, profile_report};
 use palpate::rig::Rig;
 use palpate::simulate::simulate_loads;
-use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 /// Tell how force is spread over the surface: total, centre of pressure and patches, with intervals and limits.
@@ -89,10 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
     let help = match error {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
-        LoadSensorsError::SingularNoise { .. } => {
-            "add `noise = \"5 um\"` to [sensors], in the unit of the readings"
-        }
-        LoadSensorsError::AllDead { .. } => "take sensors out of `dead` in [sensors]",
+        LoadSensorsError::Noise(error) => error.help(),
     };
     Complaint::new(format!("{}: {error}", path.display())).help(help)
 }
@@ -126,20 +123,14 @@ impl Printer<'_> {
     }
 
     fn stream(&mut self, path: &Path) -> Result<(), Failure> {
-        let (name, mut source) = open(path)?;
+        let mut lines = Lines::open(path)?;
         let columns = columns(self.subject.bench(), self.arguments.no_header);
-        let mut parser = ReadingParser::new(&name, &columns);
-        let (mut line, mut number, mut lost) = (Vec::new(), 0, 0);
-        while !interrupt::asked() {
-            line.clear();
-            let read = source.read_until(b'\n', &mut line);
-            if read.map_err(|error| Complaint::new(format!("cannot read {name}: {error}")))? == 0 {
-                break;
-            }
-            number += 1;
-            match parser.parse_line(&line) {
+        let mut parser = ReadingParser::new(&lines.name, &columns);
+        let mut lost = 0;
+        while let Some(line) = lines.next()? {
+            match parser.parse_line(line) {
                 Ok(None) => {}
-                Ok(Some(reading)) => self.tell(&reading, Some(number))?,
+                Ok(Some(reading)) => self.tell(&reading, Some(lines.count))?,
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => {
                     lost += 1;
@@ -148,11 +139,11 @@ impl Printer<'_> {
             }
         }
         if self.told == 0 && lost == 0 {
-            return Err(Complaint::new(format!("{name} holds no reading")).into());
+            return Err(Complaint::new(format!("{} holds no reading", lines.name)).into());
         }
         match lost {
             0 => Ok(()),
-            lost => Err(Failure::DataLost(format!("{lost} of {number} lines gave no profile"))),
+            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no profile", lines.count))),
         }
     }
 

@@ -87,11 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         claims: is_paper.then(|| claims(&outcomes, prepared.judging())),
     };
     let report = StudyReport { study: &prepared, outcomes: &outcomes, results: &results, run: &facts };
-    let files =
-        if is_paper { paper_report(&report) } else { study_report(&report) }.map_err(Complaint::new)?;
-    for report_file in files {
-        output::write_file(&out.join(&report_file.name), &report_file.bytes)?;
-    }
+    output::write_report(&out, if is_paper { paper_report(&report) } else { study_report(&report) })?;
     output::write_file(&out.join("results.json"), (output::to_json(&file)? + "\n").as_bytes())?;
     if arguments.json {
         return output::say_json(&file);

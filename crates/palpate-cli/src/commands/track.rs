@@ -1,15 +1,16 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
 use crate::failure::{Complaint, Failure};
+use crate::lines::Lines;
 use crate::table::table;
-use crate::{input, interrupt, output};
+use crate::{input, output};
 use palpate::contact::Contact;
 use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig};
 use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
+use palpate::mechanics::modal::ModalBeam;
 use palpate::recording::{CsvError, TimedParser, TimedReading};
 use palpate::report::{TrackReport, track_report};
-use std::fs::File;
-use std::io::{BufRead, BufReader, IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
@@ -48,8 +49,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let locator = input::read_locator(&arguments.locator)?;
     let rig = arguments.rig.as_deref().map(input::read_rig).transpose()?;
-    let told =
-        arguments.frequency.map(|frequency_hz| Swing { frequency_hz, damping_ratio: Swing::DAMPING_RATIO });
+    let told = arguments
+        .frequency
+        .map(|frequency_hz| Swing { frequency_hz, damping_ratio: ModalBeam::USUAL_DAMPING_RATIO });
     let beam = rig.as_ref().and_then(|rig| rig.motion).map(|moving| moving.beam);
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
@@ -68,8 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         arguments,
         follower,
         most_contacts,
-        name: String::new(),
-        lines: 0,
+        lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?,
         lost: 0,
         times: 0,
         numbers: Vec::new(),
@@ -87,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     match stream.lost {
         0 => Ok(()),
-        lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", stream.lines))),
+        lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", stream.lines.count))),
     }
 }
 
@@ -110,8 +111,7 @@ struct Stream<'a> {
     follower: Follower<'a>,
     /// How many contacts a line of CSV has room for.
     most_contacts: usize,
-    name: String,
-    lines: u64,
+    lines: Lines,
     /// Rows that gave no estimate.
     lost: u64,
     /// Readings so far, skipped ones too: --rate counts them.
@@ -123,54 +123,29 @@ struct Stream<'a> {
 
 impl Stream<'_> {
     fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
-        let mut source = self.open()?;
         let columns = locator.bench.recording_columns();
-        let mut parser = TimedParser::new(&self.name, locator.bench.schema(&columns));
+        let mut parser = TimedParser::new(&self.lines.name, locator.bench.schema(&columns));
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
             output::print(&mut out, heading(self.most_contacts).as_bytes())?;
         }
-        let mut line = Vec::new();
-        while !interrupt::asked() && self.read_line(&mut source, &mut line)? {
-            match parser.parse_line(&line) {
+        while let Some(line) = self.lines.next()? {
+            match parser.parse_line(line) {
                 Ok(None) => {}
                 Ok(Some(reading)) => self.follow(&reading, &mut out)?,
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => self.skip(&error),
             }
             if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
-                let complaint = Complaint::new(format!("{} has no column `time_s`", self.name));
+                let complaint = Complaint::new(format!("{} has no column `time_s`", self.lines.name));
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }
         if parser.awaits_columns() {
-            let complaint = Complaint::new(format!("{} holds no reading", self.name));
+            let complaint = Complaint::new(format!("{} holds no reading", self.lines.name));
             return Err(complaint.help("it must begin with a header").into());
         }
         Ok(())
-    }
-
-    fn open(&mut self) -> Result<Box<dyn BufRead>, Failure> {
-        let path = self.arguments.readings.as_deref().unwrap_or(Path::new("-"));
-        if path == Path::new("-") {
-            if std::io::stdin().is_terminal() {
-                eprintln!("palpate: reading from the keyboard; Ctrl-D ends it");
-            }
-            self.name = "stdin".to_owned();
-            return Ok(Box::new(std::io::stdin().lock()));
-        }
-        self.name = path.display().to_string();
-        let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
-        Ok(Box::new(BufReader::new(file)))
-    }
-
-    /// Reads the next line; false at the end.
-    fn read_line(&mut self, source: &mut Box<dyn BufRead>, line: &mut Vec<u8>) -> Result<bool, Failure> {
-        line.clear();
-        let read = source.read_until(b'\n', line);
-        let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
-        self.lines += u64::from(read > 0);
-        Ok(read > 0)
     }
 
     fn follow(&mut self, reading: &TimedReading, out: &mut impl Write) -> Result<(), Failure> {
@@ -185,16 +160,16 @@ impl Stream<'_> {
             Ok(track) => track,
             Err(error) => {
                 self.lost += 1;
-                eprintln!("palpate: skipped line {}: {error}", self.lines);
+                eprintln!("palpate: skipped line {}: {error}", self.lines.count);
                 return Ok(());
             }
         };
         self.seen.truths.extend(reading.truth.clone());
         let Some(track) = track else {
-            self.numbers.push(self.lines);
+            self.numbers.push(self.lines.count);
             return Ok(());
         };
-        self.print(&track, self.lines, out)?;
+        self.print(&track, self.lines.count, out)?;
         if reading.truth.is_some() {
             self.seen.tracks.push(track);
         }
@@ -277,12 +252,11 @@ impl Stream<'_> {
         (filtered, smoothed): (&[Track], &[Track]),
         sweep: &[SpeedErrors],
     ) -> Result<(), Failure> {
-        output::make_folder(folder)?;
         let (tracks, how) = if smoothed.is_empty() { (filtered, "filter") } else { (smoothed, "smoother") };
         let known = self.seen.truths.len() == tracks.len();
         let report = TrackReport {
-            title: &format!("A contact followed through {}", self.name),
-            source: &self.name,
+            title: &format!("A contact followed through {}", self.lines.name),
+            source: &self.lines.name,
             length_m: locator.bench.surface.extent().length_m,
             tracks,
             how,
@@ -290,10 +264,7 @@ impl Stream<'_> {
             errors: &self.errors(filtered, smoothed),
             sweep,
         };
-        for file in track_report(&report).map_err(Complaint::new)? {
-            output::write_file(&folder.join(&file.name), &file.bytes)?;
-        }
-        Ok(())
+        output::write_report(folder, track_report(&report))
     }
 }
 

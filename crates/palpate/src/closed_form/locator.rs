@@ -39,7 +39,7 @@ impl ClosedFormLocator {
     /// What each channel's readings are multiplied by: 1/σ where every noise is known, else 1/full scale.
     fn weights(&self, channels: &[usize]) -> Weights {
         let sensors = || channels.iter().map(|i| &self.layout.sensors[*i]);
-        let known: Vec<f64> = sensors().map(|s| 1.0 / noise_sd(s)).collect();
+        let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
         if known.iter().all(|weight| weight.is_finite()) {
             return Weights { weights: known, noise: Noise::Known };
         }
@@ -73,7 +73,7 @@ impl ClosedFormLocator {
 
     fn balance(&self, (left, right): (usize, usize), reading: &[f64], noise: Noise) -> Estimate {
         let length_m = self.beam.length_m;
-        let variances = [left, right].map(|i| noise_sd(&self.layout.sensors[i]).powi(2));
+        let variances = [left, right].map(|i| self.layout.sensors[i].channel.reading_sd().powi(2));
         let balance = Balance { length_m, left_n: reading[left], right_n: reading[right], variances };
         let balanced = match self.force_n {
             Some(force_n) => balance.known_force(force_n),
@@ -118,11 +118,6 @@ pub(super) enum Noise {
 struct Weights {
     weights: Vec<f64>,
     noise: Noise,
-}
-
-/// Standard deviation of a channel's noise and quantisation: √(σ² + step²/12).
-fn noise_sd(sensor: &Sensor) -> f64 {
-    (sensor.channel.noise_sd.powi(2) + sensor.channel.resolution.powi(2) / 12.0).sqrt()
 }
 
 impl Locate for ClosedFormLocator {

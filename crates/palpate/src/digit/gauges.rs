@@ -25,8 +25,11 @@ pub(super) fn gauges(layout: &Layout, reading: &[f64]) -> Vec<Gauge> {
     let inside = |(sensor, strain): &(&Sensor, f64)| {
         !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < *strain && *strain < high)
     };
-    let gauge =
-        |(sensor, strain): (&Sensor, f64)| Gauge { at_m: sensor.position.x_m, sd: noise_sd(sensor), strain };
+    let gauge = |(sensor, strain): (&Sensor, f64)| Gauge {
+        at_m: sensor.position.x_m,
+        sd: sensor.channel.reading_sd(),
+        strain,
+    };
     let mut gauges: Vec<Gauge> =
         layout.sensors.iter().zip(reading.iter().copied()).filter(inside).map(gauge).collect();
     gauges.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
@@ -39,9 +42,4 @@ pub(super) fn stretches(gauges: &[Gauge], length_m: f64) -> Vec<Stretch> {
     let stretch = |i: usize| Stretch { seeing: i + 1, from_m: gauges[i].at_m, to_m: end(i + 1) };
     // Gauges at one place have no stretch between them.
     (0..gauges.len()).map(stretch).filter(|it| it.to_m - it.from_m > 1e-9 * length_m).collect()
-}
-
-/// Standard deviation of a sensor's noise and quantisation.
-pub(super) fn noise_sd(sensor: &Sensor) -> f64 {
-    (sensor.channel.noise_sd.powi(2) + sensor.channel.resolution.powi(2) / 12.0).sqrt()
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::fitting::DigitTheory;
-use super::gauges::{gauges, noise_sd};
+use super::gauges::gauges;
 use super::likelihood::Likelihood;
 use super::posterior::{Piece, Posterior};
 use super::shape::DigitShape;
@@ -62,7 +62,10 @@ impl DigitLocator {
     /// The first living gauge without noise and resolution.
     pub(super) fn gauge_without_noise(&self) -> Option<usize> {
         let clean = |sd: f64| !(sd > 0.0 && sd.is_finite());
-        self.layout.sensors.iter().position(|sensor| !sensor.channel.dead && clean(noise_sd(sensor)))
+        self.layout
+            .sensors
+            .iter()
+            .position(|sensor| !sensor.channel.dead && clean(sensor.channel.reading_sd()))
     }
 
     fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
@@ -139,7 +142,12 @@ impl Locate for DigitLocator {
         let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
-        let noise = self.layout.sensors.iter().filter(|sensor| !sensor.channel.dead).map(noise_sd);
+        let noise = self
+            .layout
+            .sensors
+            .iter()
+            .filter(|sensor| !sensor.channel.dead)
+            .map(|sensor| sensor.channel.reading_sd());
         LocatorFault::check_numbers("gauge noise", noise, |sd| sd > 0.0, "a number greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
         let (needed, found) = (1 + usize::from(self.force_n.is_none()), self.living());

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::mechanics::{Extent, InfluenceFunction, Surface};
-use crate::sensing::{Layout, SensorKind};
+use crate::sensing::{Layout, NoiseError, Sensor};
 
 /// One channel of a reading.
 #[derive(Clone)]
@@ -33,27 +33,9 @@ pub enum LoadSensorsError {
         "a measured surface has no influence functions of a spread load; give a surface with a model, such as a beam"
     )]
     NoModel,
-    /// A live sensor whose noise is not a positive number.
-    #[error(
-        "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, or \
-         nothing says how closely its reading is to be followed"
-    )]
-    SingularNoise {
-        /// Which sensor, from 1.
-        number: usize,
-        /// What it measures.
-        kind: SensorKind,
-        /// Standard deviation of its noise, in its SI unit.
-        noise_sd: f64,
-        /// Its quantisation step, in its SI unit.
-        resolution: f64,
-    },
-    /// Every channel is dead.
-    #[error("all {count} sensors are dead; at least 1 must be alive")]
-    AllDead {
-        /// How many sensors there are.
-        count: usize,
-    },
+    /// A live sensor has no noise, or none is alive.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
 }
 
 impl<'a> LoadSensors<'a> {
@@ -62,23 +44,12 @@ impl<'a> LoadSensors<'a> {
     /// # Errors
     /// [`LoadSensorsError`] for a live sensor without noise, or when none is alive.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
-        let channels = layout.sensors.iter().enumerate().map(|(i, sensor)| {
-            let (noise_sd, resolution) = (sensor.channel.noise_sd, sensor.channel.resolution);
-            if sensor.channel.dead {
-                return Ok(None);
-            }
-            let sd = noise_sd.hypot(resolution / 12f64.sqrt());
-            if !(sd > 0.0 && sd.is_finite()) {
-                let (number, kind) = (i + 1, sensor.kind);
-                return Err(LoadSensorsError::SingularNoise { number, kind, noise_sd, resolution });
-            }
+        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
+            let noise_sd = sd?;
             let influence = surface.influence_function(sensor.kind, sensor.position);
-            Ok(Some(LoadChannel { influence, offset: 0.0, noise_sd: sd }))
-        });
-        let channels = channels.collect::<Result<Vec<_>, _>>()?;
-        if channels.iter().all(Option::is_none) {
-            return Err(LoadSensorsError::AllDead { count: layout.len() });
-        }
+            Some(LoadChannel { influence, offset: 0.0, noise_sd })
+        };
+        let channels = layout.sensors.iter().zip(layout.reading_sds()?).map(channel).collect();
         Ok(Self { extent: surface.extent(), channels })
     }
 

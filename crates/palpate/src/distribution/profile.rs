@@ -10,10 +10,8 @@ use super::smoothness::{Mixture, Problem};
 use super::{Cells, LoadSensors};
 use crate::contact::Position;
 use crate::method::ReadingError;
-use crate::numerics::chi_squared_bound;
+use crate::numerics::{NORMAL_95, chi_squared_bound};
 
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-pub(super) const NORMAL_95: f64 = 1.959_963_984_540_054;
 /// Readings that noise alone makes this rarely are a contact; those that a load and noise make this rarely are not of the
 /// model.
 const RARE: f64 = 1e-4;

@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::*;
 use crate::contact::Position;
 use crate::mechanics::{Beam, Extent, InfluenceFunction, Surface, UniformLoad};
-use crate::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use crate::sensing::{ChannelModel, Layout, NoiseError, Sensor, SensorKind};
 use palpate_core::Status;
 
 fn beam() -> Beam {
@@ -187,10 +187,10 @@ fn sensors_without_noise_or_life_are_refused() {
     let mut layout = layout(false);
     layout.sensors[1].channel.noise_sd = 0.0;
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("clean sensors were taken") };
-    assert!(matches!(error, LoadSensorsError::SingularNoise { number: 2, .. }), "{error}");
+    assert!(matches!(error, LoadSensorsError::Noise(NoiseError::Singular { number: 2, .. })), "{error}");
     layout.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("dead sensors were taken") };
-    assert_eq!(error, LoadSensorsError::AllDead { count: 8 });
+    assert_eq!(error, LoadSensorsError::Noise(NoiseError::AllDead { count: 8 }));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::contact::Position;
 use crate::features::Features;
 use crate::mechanics::Extent;
 use crate::method::{Locate, LocatorFault};
+use crate::numerics::NORMAL_95;
 use crate::regression::GaussianProcess;
 
 /// A Gaussian process that locates.
@@ -23,9 +24,6 @@ pub struct GaussianProcessLocator {
     pub force_n: Option<f64>,
 }
 
-/// Quantile of the standard normal distribution that 97.5 % lie below.
-const QUANTILE_975: f64 = 1.959_963_984_540_054;
-
 impl Locate for GaussianProcessLocator {
     /// The posterior mean, with the variance of the contact's position: that of the function, and the fitted error of
     /// a single row besides.
@@ -38,7 +36,7 @@ impl Locate for GaussianProcessLocator {
         let (x_m, x_m2) = coordinate(0).unwrap_or_default();
         let (y_m, y_m2) = if self.process.outputs() > 1 { coordinate(1) } else { None }.unwrap_or_default();
         let interval = |mean_m: f64, variance_m2: f64| {
-            let half_m = QUANTILE_975 * variance_m2.sqrt();
+            let half_m = NORMAL_95 * variance_m2.sqrt();
             (mean_m - half_m, mean_m + half_m)
         };
         let uncertainty = Uncertainty {

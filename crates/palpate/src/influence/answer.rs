@@ -7,15 +7,13 @@ use super::scratch::Scratch;
 use super::search::{Minimum, Search, worst_misfit};
 use super::several::{criterion, explain};
 use crate::contact::Position;
-use crate::numerics::normal_distribution;
+use crate::numerics::{NORMAL_95, normal_distribution};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 /// Another place with at least this share of the probability is said.
 const MODE_THAT_MATTERS: f64 = 0.01;
 /// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
 const MOST_SPACINGS: f64 = 1.5;
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// An estimate of nothing, to be written over.
 pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);

@@ -1,8 +1,9 @@
 //! Why a fit fails; and from presses to a table of influence functions along a line.
 
 use super::belief::ForceBelief;
+use super::channels::Channels;
 use super::config::InfluenceConfig;
-use super::learning::{Channels, Learnt, learn};
+use super::learning::{Learnt, learn};
 use super::locator::{BeamLocator, BeamParts};
 use super::measured::MeasuredError;
 use super::table::InfluenceTable;

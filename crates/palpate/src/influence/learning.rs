@@ -1,6 +1,7 @@
 //! From presses to what every sensor reads at given places, on a line as on a plane.
 
 use super::InfluenceFitError;
+use super::channels::Channels;
 use super::config::InfluenceSource;
 use super::hyperparameters::{MOST_PRESSES, most_evident};
 use super::posterior::{Posterior, SensorPresses};
@@ -10,17 +11,6 @@ use crate::contact::Position;
 use crate::mechanics::Surface;
 use crate::method::FitTask;
 use crate::sensing::{Layout, SensorKind};
-
-/// What is learnt of the channels besides their influence functions.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Channels {
-    /// Offset of each channel, in its SI unit.
-    pub offsets: Vec<f64>,
-    /// Noise of each channel, in its SI unit.
-    pub noise_sd: Vec<f64>,
-    /// Mean force of the presses, in newtons.
-    pub reference_force_n: f64,
-}
 
 /// One sensor's influence function as the presses tell it, at the places that were asked for.
 pub(super) struct Learnt<'s, 'a> {

@@ -24,8 +24,10 @@ pub struct BeamLikelihood {
     locator: BeamLocator,
     /// The channels in use.
     live: Vec<usize>,
-    /// Of those: offset and one over the noise.
-    scaling: Vec<(f64, f64)>,
+    /// Of those: the offset.
+    offsets: Vec<f64>,
+    /// Of those: one over the noise.
+    inverse_sd: Vec<f64>,
     /// f, f′ and v of those.
     table: InfluenceTable,
     /// g of those.
@@ -37,24 +39,11 @@ impl BeamLikelihood {
     pub fn new(locator: &BeamLocator) -> Self {
         let (parts, dead) = locator.parts();
         let live: Vec<usize> = (0..parts.table.sensors).filter(|s| !dead[*s]).collect();
-        let scaling: Vec<(f64, f64)> =
-            live.iter().map(|s| (parts.offsets[*s], 1.0 / parts.noise_sd[*s])).collect();
-        let whitened = |values: &[f64], power: i32| -> Vec<f64> {
-            let rows = values.chunks_exact(parts.table.sensors);
-            rows.flat_map(|row| {
-                live.iter().zip(&scaling).map(|(s, (_, inverse))| row[*s] * inverse.powi(power))
-            })
-            .collect()
-        };
-        let table = InfluenceTable {
-            sensors: live.len(),
-            length_m: parts.table.length_m,
-            values: whitened(&parts.table.values, 1),
-            slopes: whitened(&parts.table.slopes, 1),
-            variances: whitened(&parts.table.variances, 2),
-        };
+        let offsets = live.iter().map(|s| parts.offsets[*s]).collect();
+        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / parts.noise_sd[*s]).collect();
+        let table = parts.table.whitened(&live, &inverse_sd);
         let first_mode = (0..live.len()).map(|s| share_of_first_mode(&table, s)).collect();
-        Self { locator: locator.clone(), live, scaling, table, first_mode }
+        Self { locator: locator.clone(), live, offsets, inverse_sd, table, first_mode }
     }
 
     fn fit<const C: usize, const K: usize>(
@@ -112,11 +101,10 @@ fn share_of_first_mode(table: &InfluenceTable, sensor: usize) -> f64 {
 }
 
 impl Likelihood for BeamLikelihood {
-    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) -> f64 {
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
         whitened.clear();
-        let channels = self.live.iter().zip(&self.scaling);
+        let channels = self.live.iter().zip(self.offsets.iter().zip(&self.inverse_sd));
         whitened.extend(channels.map(|(s, (offset, inverse))| (reading[*s] - offset) * inverse));
-        whitened.iter().map(|d| d * d).sum()
     }
 
     fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {

@@ -3,6 +3,7 @@
 use super::answer::{locate_one, locate_several};
 use super::batch::Rows;
 use super::belief::ForceBelief;
+use super::channels;
 use super::lanes;
 use super::scratch::Scratch;
 use super::search::Search;
@@ -100,15 +101,10 @@ impl BeamLocator {
     /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
     /// nothing changes.
     pub fn leave_out(&mut self, channel: usize) -> bool {
-        let mut stored = self.stored.clone();
-        if let Some(dead) = stored.dead.get_mut(channel) {
-            *dead = true;
-        }
-        let lives = stored.dead.iter().any(|dead| !dead);
-        if lives {
-            *self = Self { search: stored.search(), stored };
-        }
-        lives
+        let Some(dead) = channels::without(&self.stored.dead, channel) else { return false };
+        let stored = Stored { dead, ..self.stored.clone() };
+        *self = Self { search: stored.search(), stored };
+        true
     }
 
     /// [`Locate::locate`] with memory of the caller's.
@@ -164,12 +160,7 @@ impl Stored {
         count("influence values", cells, table.values.len())?;
         count("influence slopes", cells, table.slopes.len())?;
         count("influence variances", cells, table.variances.len())?;
-        count("offsets", table.sensors, offsets.len())?;
-        count("noises", table.sensors, noise_sd.len())?;
-        count("marks of dead channels", table.sensors, self.dead.len())?;
-        if self.dead.iter().all(|dead| *dead) {
-            return Err(LocatorFault::Count { what: "living channels", needed: 1, found: 0 });
-        }
+        channels::check(table.sensors, offsets, noise_sd, &self.dead, self.force)?;
         if !(1..=3).contains(&self.contacts) {
             return Err(LocatorFault::Count { what: "contacts at most", needed: 1, found: self.contacts });
         }
@@ -179,12 +170,8 @@ impl Stored {
         numbers("influence value", &table.values, |_| true, "a finite number")?;
         numbers("influence slope", &table.slopes, |_| true, "a finite number")?;
         numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
-        numbers("offset", offsets, |_| true, "a finite number")?;
-        numbers("noise", noise_sd, |sd| sd > 0.0, "greater than 0")?;
         let positive = [table.length_m, self.reference_force_n];
-        numbers("length or force", &positive, |x| x > 0.0, "greater than 0")?;
-        let force = if self.force.is_usable() { 1.0 } else { f64::NAN };
-        numbers("belief about the force", &[force], |_| true, "greater than 0")
+        numbers("length or force", &positive, |x| x > 0.0, "greater than 0")
     }
 }
 

@@ -5,6 +5,7 @@ mod answer;
 mod batch;
 mod belief;
 mod bend;
+mod channels;
 mod coarse;
 mod config;
 mod fitting;

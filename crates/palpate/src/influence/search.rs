@@ -84,7 +84,7 @@ impl Search {
     ) -> Self {
         let live: Vec<usize> = (0..table.sensors).filter(|s| !dead[*s]).collect();
         let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
-        let table = whiten_table(table, &live, &inverse_sd);
+        let table = table.whitened(&live, &inverse_sd);
         let offsets: Vec<f64> = live.iter().map(|s| offsets[*s]).collect();
         let weight_force_n = match force {
             ForceBelief::Known(force_n) => force_n.max(reference_force_n),
@@ -239,24 +239,6 @@ fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
         _ => 0.0,
     };
     [kept(0, 1), table.length_m - kept(last, last - 1)]
-}
-
-/// The channels `live` of a table, over their noise.
-fn whiten_table(table: &InfluenceTable, live: &[usize], inverse_sd: &[f64]) -> InfluenceTable {
-    let whiten = |values: &[f64], power: i32| {
-        let rows = values.chunks_exact(table.sensors);
-        let row = |row: &[f64]| -> Vec<f64> {
-            live.iter().zip(inverse_sd).map(|(s, inverse)| row[*s] * inverse.powi(power)).collect()
-        };
-        rows.flat_map(row).collect::<Vec<f64>>()
-    };
-    InfluenceTable {
-        sensors: live.len(),
-        length_m: table.length_m,
-        values: whiten(&table.values, 1),
-        slopes: whiten(&table.slopes, 1),
-        variances: whiten(&table.variances, 2),
-    }
 }
 
 /// 1/(1 + v) in every cell of a whitened table, for a contact of a force.

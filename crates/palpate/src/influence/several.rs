@@ -9,15 +9,12 @@ use super::coarse::{COARSE, STRIDE};
 use super::scratch::Scratch;
 use super::search::Search;
 use crate::contact::Position;
-use crate::numerics::Cholesky;
+use crate::numerics::{Cholesky, NORMAL_95};
 use ndarray::{Array1, Array2};
 use palpate_core::{ContactEstimate, Uncertainty};
 
 /// The most contacts that are told apart.
 pub(super) const MOST_CONTACTS: usize = 3;
-
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Contacts that explain a reading together.
 #[derive(Clone, Debug, PartialEq)]

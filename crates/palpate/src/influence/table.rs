@@ -64,6 +64,24 @@ impl Spacing {
 }
 
 impl InfluenceTable {
+    /// The channels `live` of it, multiplied by `inverse_sd`, one over the noise of each.
+    pub(super) fn whitened(&self, live: &[usize], inverse_sd: &[f64]) -> Self {
+        let whiten = |values: &[f64], power: i32| {
+            let rows = values.chunks_exact(self.sensors);
+            let row = |row: &[f64]| -> Vec<f64> {
+                live.iter().zip(inverse_sd).map(|(s, inverse)| row[*s] * inverse.powi(power)).collect()
+            };
+            rows.flat_map(row).collect::<Vec<f64>>()
+        };
+        Self {
+            sensors: live.len(),
+            length_m: self.length_m,
+            values: whiten(&self.values, 1),
+            slopes: whiten(&self.slopes, 1),
+            variances: whiten(&self.variances, 2),
+        }
+    }
+
     /// Nodes of a table: eight sensors' influence functions are then interpolated to 10⁻⁷ of full scale.
     pub const NODES: usize = 129;
 

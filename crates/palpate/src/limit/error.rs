@@ -1,6 +1,6 @@
 //! Why there is no limit.
 
-use crate::sensing::SensorKind;
+use crate::sensing::NoiseError;
 
 /// Why a bench has no limit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -8,27 +8,9 @@ pub enum LimitError {
     /// The surface has no model.
     #[error("a measured surface has no model, and without influence functions there is no limit to compute")]
     NoModel,
-    /// A live sensor has neither noise nor resolution: the noise is singular, and the limit would be 0.
-    #[error(
-        "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, or \
-         nothing limits what it tells"
-    )]
-    SingularNoise {
-        /// Which sensor, from 1.
-        number: usize,
-        /// What it measures.
-        kind: SensorKind,
-        /// Standard deviation of its noise, in its SI unit.
-        noise_sd: f64,
-        /// Its quantisation step, in its SI unit.
-        resolution: f64,
-    },
-    /// Every channel is dead.
-    #[error("all {count} sensors are dead; at least 1 must be alive")]
-    AllDead {
-        /// How many sensors there are.
-        count: usize,
-    },
+    /// The noise is singular, and the limit would be 0; or no sensor is alive.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
     /// The contact force is not a positive, finite number.
     #[error("the contact force is {force_n} N; it must be greater than 0 and finite")]
     Force {

@@ -30,7 +30,7 @@ use std::sync::Arc;
 use crate::bench::Bench;
 use crate::contact::Contact;
 use crate::mechanics::{ResponseFunction, ResponseGradient, Surface};
-use crate::sensing::{Layout, SensorKind};
+use crate::sensing::{Layout, Sensor, SensorKind};
 
 /// What is known of the contact force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -73,27 +73,14 @@ impl<'a> Limit<'a> {
     /// The limit of a surface read by `layout`; dead channels are left out.
     ///
     /// # Errors
-    /// [`LimitError::SingularNoise`] for the first live sensor with neither noise nor resolution, [`LimitError::AllDead`].
+    /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
-        let alive = layout.sensors.iter().enumerate().filter(|(_, sensor)| !sensor.channel.dead);
-        let channels = alive.map(|(i, sensor)| {
-            let (noise_sd, resolution) = (sensor.channel.noise_sd, sensor.channel.resolution);
-            let sd = noise_sd.hypot(resolution / 12f64.sqrt());
-            if !(sd > 0.0 && sd.is_finite()) {
-                return Err(LimitError::SingularNoise {
-                    number: i + 1,
-                    kind: sensor.kind,
-                    noise_sd,
-                    resolution,
-                });
-            }
+        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
+            let sd = sd?;
             let response = surface.response_function(sensor.kind, sensor.position);
-            Ok(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
-        });
-        let channels = channels.collect::<Result<Vec<_>, _>>()?;
-        if channels.is_empty() {
-            return Err(LimitError::AllDead { count: layout.len() });
-        }
+            Some(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
+        };
+        let channels = layout.sensors.iter().zip(layout.reading_sds()?).filter_map(channel).collect();
         Ok(Self { surface, channels })
     }
 

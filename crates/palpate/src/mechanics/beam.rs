@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, Surface};
+use super::{Extent, InfluenceFunction, NothingToRead, Surface, first_not_positive};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
@@ -54,10 +54,8 @@ impl Beam {
             ("thickness", self.thickness_m),
             ("youngs_modulus", self.youngs_modulus_pa),
         ];
-        for (name, value) in dimensions {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(BeamError::NotPositive { name, value });
-            }
+        if let Some((name, value)) = first_not_positive(&dimensions) {
+            return Err(BeamError::NotPositive { name, value });
         }
         let compliance_m_per_n = self.full_scale(SensorKind::Deflection);
         if compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite() {
@@ -189,8 +187,10 @@ impl Surface for Beam {
     }
 
     /// Supports hold the deflection, and leave nothing to bend.
-    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
-        matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor)
+    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
+        let held =
+            matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor);
+        held.then_some(NothingToRead::Held { kind })
     }
 
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Elastica, Extent, ForceDirection, InfluenceFunction, ResponseFunction, ResponseGradient, Surface,
+    first_not_positive,
 };
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
@@ -64,10 +65,8 @@ impl Digit {
             ("thickness", self.thickness_m),
             ("youngs_modulus", self.youngs_modulus_pa),
         ];
-        for (name, value) in dimensions {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DigitError::NotPositive { name, value });
-            }
+        if let Some((name, value)) = first_not_positive(&dimensions) {
+            return Err(DigitError::NotPositive { name, value });
         }
         let force_n = self.characteristic_force_n();
         let compliance = 1.0 / force_n;

@@ -7,6 +7,7 @@ mod extent;
 mod load;
 pub mod modal;
 mod motion;
+mod nothing_to_read;
 pub mod plate;
 mod response;
 mod supported_beam;
@@ -18,6 +19,7 @@ pub use elastica::{Elastica, ForceDirection};
 pub use extent::Extent;
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
+pub use nothing_to_read::NothingToRead;
 pub use plate::{Plate, PlateError};
 pub use response::{Proportional, ResponseFunction, ResponseGradient};
 pub use supported_beam::{
@@ -66,10 +68,9 @@ pub trait Surface: Send + Sync {
         Vec::new()
     }
 
-    /// Whether a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched, because a support holds what it
-    /// measures.
-    fn never_moves(&self, _kind: SensorKind, _sensor: Position) -> bool {
-        false
+    /// Why a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
+    fn nothing_to_read(&self, _kind: SensorKind, _sensor: Position) -> Option<NothingToRead> {
+        None
     }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.
@@ -98,6 +99,11 @@ pub trait InfluenceFunction: Send + Sync {
     /// How fast it changes as the contact moves along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
+}
+
+/// The first of some dimensions, by name and value, that is not a positive, finite number.
+fn first_not_positive(dimensions: &[(&'static str, f64)]) -> Option<(&'static str, f64)> {
+    dimensions.iter().copied().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
 }
 
 #[cfg(test)]

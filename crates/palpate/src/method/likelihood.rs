@@ -9,8 +9,8 @@ use palpate_core::Estimate;
 /// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
 /// faster modes are taken to be in balance.
 pub trait Likelihood: Send + Sync {
-    /// A reading as the fits want it, written over `whitened`; the misfit |d|² of no contact at all, in balance.
-    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) -> f64;
+    /// A reading as the fits want it, written over `whitened`.
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
 
     /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u.
     fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;

@@ -8,7 +8,7 @@ mod random_order;
 mod sparse_cholesky;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
-pub use distributions::{chi_squared_bound, normal_distribution, normal_quantile};
+pub use distributions::{NORMAL_95, chi_squared_bound, normal_distribution, normal_quantile};
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use random_order::random_order;

@@ -7,6 +7,7 @@ mod csv_in;
 mod csv_out;
 mod fields;
 mod folds;
+mod lines;
 mod reading_parser;
 mod timed;
 mod warnings;

@@ -10,7 +10,8 @@ use super::columns::{Column, Columns, Header};
 use super::csv_error::CsvError;
 use super::csv_in::{ContactFields, Schema};
 use super::csv_out::{header, record};
-use super::reading_parser::{ChannelFields, is_passed_over, utf8, without_mark};
+use super::lines::Lines;
+use super::reading_parser::ChannelFields;
 use crate::contact::{Contact, Position};
 use crate::mechanics::Extent;
 use crate::sensing::SensorKind;
@@ -84,10 +85,9 @@ pub struct TimedReading {
 
 /// Turns lines of CSV into readings in time; only the channel columns need to be there.
 pub struct TimedParser<'a> {
-    source: String,
+    lines: Lines,
     schema: Schema<'a>,
     found: Option<Found>,
-    line: usize,
 }
 
 /// What the first line told.
@@ -103,7 +103,7 @@ struct Found {
 impl<'a> TimedParser<'a> {
     /// A parser for the lines of `source`, from the first one.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
-        Self { source: source.to_owned(), schema, found: None, line: 0 }
+        Self { lines: Lines::new(source), schema, found: None }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
@@ -123,13 +123,7 @@ impl<'a> TimedParser<'a> {
     /// [`CsvError`] with line and column, as [`ReadingParser::parse_line`](super::ReadingParser::parse_line) has them, and
     /// for a time or a contact that is no number, or a contact off the surface.
     pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
-        self.line += 1;
-        let text = utf8(&self.source, self.line, line)?;
-        let text = if self.line == 1 { without_mark(text) } else { text };
-        if is_passed_over(text) {
-            return Ok(None);
-        }
-        let cells = Cells::parse(&self.source, self.line, text)?;
+        let Some(cells) = self.lines.cells(line)? else { return Ok(None) };
         let header = self.schema.columns.header;
         let found = match &mut self.found {
             Some(found) => found,

@@ -1,38 +1,29 @@
 //! A beam bench as SVG text: supports, sensors, load and the deflected shape.
 
+mod frame;
+mod supports;
+
 use super::canvas::{self, Anchor, Canvas, GRID, INK, Label, QUIET_INK, REFERENCE};
 use super::geometry::{Point, Rect};
 use super::text;
 use super::ticks::plain;
+use frame::{BEAM_Y, Frame, MARGIN, NUMBER_LINE, NUMBER_TOP, NumberRows};
 use plotters::style::{Color, RGBColor};
+use supports::draw_support;
 
-const MARGIN: f64 = 40.0;
 const FONT_SIZE: f64 = 12.0;
 /// Middle of the force label, and the tail of its arrow.
 const LOAD_LABEL_Y: f64 = 20.0;
 const ARROW_TAIL_Y: f64 = 34.0;
-/// Middle of the undeflected beam.
-const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
 /// The same of the thickest stretch of a stepped beam, and of any stretch at least.
 const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
-/// Room beneath the beam for the deflected shape, at its deepest.
-const DEFLECTION_ROOM: f64 = 56.0;
 const PROBE_TOP: f64 = 164.0;
 const PROBE_HEIGHT: f64 = 18.0;
 const PROBE_HALF_WIDTH: f64 = 4.5;
-const SUPPORT_HEIGHT: f64 = 22.0;
-const SUPPORT_HALF_WIDTH: f64 = 12.0;
-/// What springs stand on: beneath the beam at its deepest.
-const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
-const NUMBER_TOP: f64 = 186.0;
-const NUMBER_LINE: f64 = 16.0;
-const NUMBER_SIZE: f64 = 11.0;
 /// Room for the dimension line, and for the remark beneath it.
 const DIMENSION_LINE: f64 = 30.0;
 const REMARK_LINE: f64 = 26.0;
-/// Exaggerations are one of these times a power of ten.
-const ROUND: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 
 /// What a bench drawing shows. Positions are from the left end of the beam.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,99 +165,6 @@ fn validate(bench: &BenchDrawing) -> Result<(), BenchDrawingError> {
     }
 }
 
-/// From millimetres to pixels.
-struct Frame {
-    width: f64,
-    px_per_mm: f64,
-    exaggeration: f64,
-    /// The point of the largest deflection in millimetres; none for a beam that is not deflected.
-    deepest: Option<(f64, f64)>,
-    /// The stretches of the deflected shape in pixels.
-    shape: Vec<Vec<Point>>,
-}
-
-impl Frame {
-    fn new(bench: &BenchDrawing, width: f64) -> Self {
-        let px_per_mm = (width - 2.0 * MARGIN) / bench.length_mm;
-        let finite = |&(x, y): &(f64, f64)| (0.0..=bench.length_mm).contains(&x) && y.is_finite();
-        let deepest = bench
-            .deflection_mm
-            .iter()
-            .copied()
-            .filter(finite)
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-            .filter(|&(_, y)| (y * px_per_mm).abs() > 1e-9);
-        let exaggeration = deepest.map_or(1.0, |(_, y)| round_below(DEFLECTION_ROOM / (y.abs() * px_per_mm)));
-        let mut frame = Frame { width, px_per_mm, exaggeration, deepest, shape: Vec::new() };
-        let stretches = bench.deflection_mm.split(|point| !finite(point)).filter(|stretch| stretch.len() > 1);
-        frame.shape =
-            stretches.map(|points| points.iter().map(|&(x, y)| frame.deflected(x, y)).collect()).collect();
-        frame
-    }
-
-    fn across(&self, position_mm: f64) -> f64 {
-        MARGIN + position_mm * self.px_per_mm
-    }
-
-    fn deflected(&self, position_mm: f64, deflection_mm: f64) -> Point {
-        (self.across(position_mm), BEAM_Y - deflection_mm * self.px_per_mm * self.exaggeration)
-    }
-
-    /// Height of the deflected shape there, or of the straight beam where no shape is given.
-    fn surface_y(&self, across: f64) -> f64 {
-        let ends = self.shape.iter().flat_map(|stretch| stretch.windows(2)).find(|ends| {
-            let (left, right) = (ends[0].0.min(ends[1].0), ends[0].0.max(ends[1].0));
-            left < right && (left..=right).contains(&across)
-        });
-        ends.map_or(BEAM_Y, |ends| {
-            let share = (across - ends[0].0) / (ends[1].0 - ends[0].0);
-            ends[0].1 + share * (ends[1].1 - ends[0].1)
-        })
-    }
-
-    /// A text in one line around `middle`, moved and cut so that it stays inside the image.
-    fn centred(&self, text: &str, (middle, y): Point, size: f64, colour: RGBColor) -> Label {
-        let text = text::fit(text, size, self.width - 16.0);
-        let half = text::width(&text, size) / 2.0;
-        let middle = middle.min(self.width - 8.0 - half).max(8.0 + half);
-        Label { text, at: (middle, y), anchor: Anchor::Middle, size, colour }
-    }
-}
-
-/// The largest round factor that is not above `most`.
-fn round_below(most: f64) -> f64 {
-    let decade = 10_f64.powf(most.log10().floor());
-    ROUND.into_iter().rev().map(|factor| factor * decade).find(|&factor| factor <= most).unwrap_or(decade)
-}
-
-/// The sensors' numbers, in as many rows as keep them apart.
-struct NumberRows {
-    labels: Vec<Label>,
-    count: usize,
-}
-
-impl NumberRows {
-    fn new(bench: &BenchDrawing, frame: &Frame) -> Self {
-        let mut taken: Vec<Vec<(f64, f64)>> = Vec::new();
-        let mut labels = Vec::new();
-        for (index, &position_mm) in bench.sensors_mm.iter().enumerate() {
-            let number = (index + 1).to_string();
-            let middle = frame.across(position_mm);
-            let half = text::width(&number, NUMBER_SIZE) / 2.0 + 2.0;
-            let (left, right) = (middle - half, middle + half);
-            let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| right <= start || end <= left);
-            let row = taken.iter().position(free).unwrap_or(taken.len());
-            if row == taken.len() {
-                taken.push(Vec::new());
-            }
-            taken[row].push((left, right));
-            let y = NUMBER_TOP + (row as f64 + 0.5) * NUMBER_LINE;
-            labels.push(frame.centred(&number, (middle, y), NUMBER_SIZE, QUIET_INK));
-        }
-        NumberRows { labels, count: taken.len() }
-    }
-}
-
 /// Probes that stand beneath the beam and touch it.
 fn draw_sensors(canvas: &Canvas<'_>, bench: &BenchDrawing, frame: &Frame) {
     let colour = canvas::palette(2);
@@ -310,66 +208,6 @@ fn draw_beam(canvas: &Canvas<'_>, bench: &BenchDrawing, frame: &Frame) {
         stretch(from, to, half_thickness(bench, Some(step)));
         from = to;
     }
-}
-
-fn draw_support(canvas: &Canvas<'_>, bench: &BenchDrawing, support: &BenchSupport, frame: &Frame) {
-    let across = frame.across(support.position_mm);
-    let over = bench.steps.iter().find(|step| step.to_mm >= support.position_mm);
-    let top = BEAM_Y + half_thickness(bench, over);
-    let block = |left: f64, right: f64, half_height: f64| {
-        let (top, bottom) = (BEAM_Y - half_height, BEAM_Y + half_height);
-        canvas.rectangle(Rect { left, right, top, bottom }, QUIET_INK.to_rgba());
-    };
-    match support.kind {
-        BenchSupportKind::Simple => {
-            let base = top + SUPPORT_HEIGHT;
-            let wedge =
-                [(across, top), (across + SUPPORT_HALF_WIDTH, base), (across - SUPPORT_HALF_WIDTH, base)];
-            canvas.polygon(&wedge, QUIET_INK.to_rgba());
-        }
-        BenchSupportKind::Clamped => {
-            // An end is held from beyond it, the beam between its ends from both sides.
-            let (left, right) = if support.position_mm <= 0.0 {
-                (across - SUPPORT_HALF_WIDTH, across)
-            } else if support.position_mm >= bench.length_mm {
-                (across, across + SUPPORT_HALF_WIDTH)
-            } else {
-                (across - 0.5 * SUPPORT_HALF_WIDTH, across + 0.5 * SUPPORT_HALF_WIDTH)
-            };
-            block(left, right, SUPPORT_HEIGHT);
-        }
-        BenchSupportKind::Guided => {
-            let at = frame.surface_y(across);
-            let half = 0.4 * SUPPORT_HALF_WIDTH;
-            let (top, bottom) = (at - 0.5 * SUPPORT_HEIGHT, at + 0.5 * SUPPORT_HEIGHT);
-            canvas.rectangle(
-                Rect { left: across - half, right: across + half, top, bottom },
-                QUIET_INK.to_rgba(),
-            );
-            for guide in [across - 0.75 * SUPPORT_HALF_WIDTH, across + 0.75 * SUPPORT_HALF_WIDTH] {
-                let ends = [(guide, top.min(BEAM_Y) - 8.0), (guide, bottom.max(BEAM_Y) + 8.0)];
-                canvas.line(&ends, 2.0, QUIET_INK);
-            }
-        }
-        BenchSupportKind::Elastic => draw_spring(canvas, (across, frame.surface_y(across))),
-    }
-}
-
-/// A zigzag that stands on the ground and carries the point.
-fn draw_spring(canvas: &Canvas<'_>, (across, top): Point) {
-    const TURNS: usize = 6;
-    let foot = SPRING_GROUND_Y;
-    let head = top + 0.2 * (foot - top);
-    let turn = |i: usize| {
-        let side = if i.is_multiple_of(2) { 0.6 } else { -0.6 };
-        let share = (i as f64 + 0.5) / TURNS as f64;
-        (across + side * SUPPORT_HALF_WIDTH, head + share * (foot - 4.0 - head))
-    };
-    let mut points = vec![(across, top), (across, head)];
-    points.extend((0..TURNS).map(turn));
-    points.extend([(across, foot - 4.0), (across, foot)]);
-    canvas.line(&points, 1.6, QUIET_INK);
-    canvas.line(&[(across - SUPPORT_HALF_WIDTH, foot), (across + SUPPORT_HALF_WIDTH, foot)], 2.0, QUIET_INK);
 }
 
 /// The deflected shape and its largest deflection.

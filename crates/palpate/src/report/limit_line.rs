@@ -3,7 +3,7 @@
 use super::{Chart, Series, SeriesKind, Stroke};
 use crate::bench::Bench;
 use crate::limit::{Bound, Force, Limit, LimitCurve, LimitError, LimitPoint};
-use crate::sensing::{Layout, Sensor, SensorKind};
+use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
 /// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
 /// the noise that a plain displacement sensor has, as in `examples/paper.toml`.
@@ -21,7 +21,7 @@ pub(super) fn limit_line(bench: &Bench) -> Option<Series> {
 pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(bench, &bench.layout) {
-        Err(LimitError::SingularNoise { .. }) if bench.layout.sensors.iter().all(clean) => {
+        Err(LimitError::Noise(NoiseError::Singular { .. })) if bench.layout.sensors.iter().all(clean) => {
             let mut layout = bench.layout.clone();
             layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
             Some(line(&curve(bench, &layout).ok()?, assumed_label()))

@@ -5,10 +5,9 @@ use std::ops::Range;
 use crate::arrangement::ArrangementError;
 use crate::contact::Position;
 use crate::mechanics::modal::ModalBeamError;
-use crate::mechanics::plate::NothingToRead;
-use crate::mechanics::{BeamError, DigitError, Extent, PlateError, SupportedBeamError};
+use crate::mechanics::{BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError};
 use crate::sensing::SensorKind;
-use crate::units::{UnitError, format_length_mm};
+use crate::units::UnitError;
 
 /// A rig file, or a section of one in a study, that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -94,30 +93,25 @@ pub enum RigProblem {
     #[error(transparent)]
     Plate(PlateError),
     /// A sensor that reads nothing, wherever the surface is touched.
-    #[error("sensor {number} would read nothing: {reason}")]
+    #[error(
+        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        extent.place_in_words(*position)
+    )]
     NothingToRead {
         /// Which sensor of its section, from 1.
         number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
         /// Why.
         reason: NothingToRead,
     },
     /// A beam whose motion cannot be computed.
     #[error(transparent)]
     ModalBeam(ModalBeamError),
-    /// A moving contact that leaves the surface.
-    #[error(
-        "`{key}` is at {}, off the surface; it must be within 0 and {}",
-        format_length_mm(*x_m),
-        format_length_mm(*length_m)
-    )]
-    MotionOffSurface {
-        /// The key.
-        key: &'static str,
-        /// Where it is, in metres.
-        x_m: f64,
-        /// The surface's length, in metres.
-        length_m: f64,
-    },
     /// A moving contact that is read too often to be held.
     #[error("the motion takes {readings} readings; at most {most} can be held")]
     TooManyReadings {
@@ -164,22 +158,6 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
-    /// A load that is not a stretch of the surface, or not a rectangle of it.
-    #[error(
-        "the load goes from {} to {}; it must go from left to right{}, within {}",
-        extent.place_in_words(*from),
-        extent.place_in_words(*to),
-        if extent.is_plane() { " and upward" } else { "" },
-        extent.bounds_in_words()
-    )]
-    LoadStretch {
-        /// Its left end, or lower left corner, as given.
-        from: Position,
-        /// Its right end, or upper right corner, as given.
-        to: Position,
-        /// The surface.
-        extent: Extent,
-    },
     /// A reaction sensor where nothing supports the surface.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
@@ -196,20 +174,6 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
-    /// A sensor that reads 0 wherever the surface is touched.
-    #[error(
-        "{kind} sensor {number} is at {}, where {}: it would read 0 wherever the surface is touched",
-        format_length_mm(*x_m),
-        stillness(*kind)
-    )]
-    NeverMoves {
-        /// Which sensor of its section, from 1.
-        number: usize,
-        /// What it measures.
-        kind: SensorKind,
-        /// Where it is, in metres.
-        x_m: f64,
-    },
     /// A position with one coordinate on a plane, or with more than one on a line.
     #[error(
         "`{key}` has {found} where {} is expected",
@@ -223,7 +187,7 @@ pub enum RigProblem {
         /// Whether the surface has a width.
         plane: bool,
     },
-    /// A place of a design that is not on the surface.
+    /// A place that is not on the surface.
     #[error(
         "`{key}` is at {}, off the surface; it must be within {}",
         extent.place_in_words(*position),
@@ -351,7 +315,7 @@ impl RigError {
             }
             RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
-            RigProblem::NeverMoves { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::NothingToRead { .. } => Some("move it off the support, or leave it out".to_owned()),
             RigProblem::NotOffered { kind } => {
                 Some(format!("add {{ measure = \"{kind}\", noise = … }} to `kinds`"))
             }
@@ -390,16 +354,6 @@ fn force_takers(extent: Extent, supports: &[Position]) -> String {
         [] => "none of the supports does".to_owned(),
         [only] => format!("the only one that does is at {only}"),
         [first @ .., last] => format!("those that do are at {} and {last}", first.join(", ")),
-    }
-}
-
-/// Why a sensor of this kind reads nothing.
-fn stillness(kind: SensorKind) -> &'static str {
-    match kind {
-        SensorKind::Deflection => "a support holds the surface",
-        SensorKind::Slope => "a support holds the slope",
-        SensorKind::Strain => "nothing bends the surface",
-        SensorKind::Reaction | SensorKind::Raw => "nothing acts",
     }
 }
 

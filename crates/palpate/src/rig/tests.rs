@@ -1,3 +1,5 @@
+mod digits;
+mod loads;
 mod planes;
 mod plates;
 
@@ -101,34 +103,6 @@ fn refused(base: &str, changes: &[(&str, &str)]) -> String {
         pointed(&base.replace(from, to))
     });
     shown.collect::<Vec<_>>().join("\n\n")
-}
-
-/// The flexible digit's bench.
-const DIGIT: &str = include_str!("../../../../examples/digit.toml");
-
-#[test]
-fn a_bad_digit_is_refused_with_a_caret() {
-    let shown = refused(
-        DIGIT,
-        &[
-            ("\"0.5 mm\"", "\"0 mm\""),
-            ("\"0.5 mm\"", "\"1e-120 mm\""),
-            ("\"80 mm\"", "\"121 mm\""),
-            ("\"normal\"", "\"norml\""),
-            ("\"normal\"", "\"sideways\""),
-            ("direction = ", "supports = \"simple\"\ndirection = "),
-            ("measure = \"strain\"", "measure = \"deflection\""),
-            ("measure = \"strain\"", "measure = \"raw\""),
-            ("\"4 N\"", "\"40 N\""),
-            ("[training]", "[contact]\nforce = \"15 N\"\n[training]"),
-            ("[estimator]", "[estimator]\ntheory = \"lineal\""),
-            ("[estimator]", "[estimator]\nfrom = \"mechanics\""),
-        ],
-    );
-    let without = pointed(&DIGIT.replacen("direction", "#", 1));
-    let on_a_beam = pointed(&BENCH.replacen("[sensors]", "direction = \"normal\"\n[sensors]", 1));
-    let of_a_network = pointed(&BENCH.replacen("[estimator]", "[estimator]\ntheory = \"exact\"", 1));
-    insta::assert_snapshot!([shown, without, on_a_beam, of_a_network].join("\n\n"));
 }
 
 #[test]
@@ -252,22 +226,6 @@ fn a_bad_recording_section_is_refused_with_a_caret() {
             ("position = \"X\"", "position = \"X\"\nheader = false"),
             ("position = \"X\"", "position = \"X\"\nchannel_unit = \"mm\""),
             ("force = \"F\"\n", ""),
-        ],
-    );
-    insta::assert_snapshot!(shown);
-}
-
-#[test]
-fn a_bad_load_is_refused_with_a_caret() {
-    let loaded = format!("{BENCH}[[load]]\nfrom = \"130 mm\"\nto = \"150 mm\"\nforce = \"2 N\"\n");
-    let shown = refused(
-        &loaded,
-        &[
-            ("from = \"130 mm\"\n", ""),
-            ("to = \"150 mm\"", "to = \"130 mm\""),
-            ("to = \"150 mm\"", "to = \"450 mm\""),
-            ("force = \"2 N\"", "force = \"0 N\""),
-            ("force = \"2 N\"", "force = \"2 N\"\npressure = 1"),
         ],
     );
     insta::assert_snapshot!(shown);

@@ -121,6 +121,24 @@ impl Layout {
         self.sensors.is_empty()
     }
 
+    /// Where the sensors of each kind sit, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
+    /// "reaction (10, 20), (10, 180) mm" on a plane.
+    pub fn places_in_words(&self, plane: bool) -> String {
+        let mm = |length_m: f64| {
+            let text = format!("{:.2}", length_m * 1e3);
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        };
+        let place = |at: Position| {
+            if plane { format!("({}, {})", mm(at.x_m), mm(at.y_m)) } else { mm(at.x_m) }
+        };
+        let of = |kind: SensorKind| {
+            let sensors = self.sensors.iter().filter(|sensor| sensor.kind == kind);
+            let places: Vec<String> = sensors.map(|sensor| place(sensor.position)).collect();
+            (!places.is_empty()).then(|| format!("{kind} {} mm", places.join(", ")))
+        };
+        SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
+    }
+
     /// What each sensor measures.
     pub fn kinds(&self) -> Vec<SensorKind> {
         self.sensors.iter().map(|sensor| sensor.kind).collect()

@@ -2,10 +2,12 @@
 
 mod channel;
 mod layout;
+mod noise;
 
 pub use channel::{ChannelErrors, ChannelModel, measure};
 pub(crate) use layout::even_positions;
 pub use layout::{Layout, Sensor, SensorKind};
+pub use noise::NoiseError;
 
 #[cfg(test)]
 mod tests;

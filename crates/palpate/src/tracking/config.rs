@@ -30,11 +30,6 @@ pub struct Swing {
     pub damping_ratio: f64,
 }
 
-impl Swing {
-    /// The damping ratio of thin metal on wedges, where nobody measured it.
-    pub const DAMPING_RATIO: f64 = 0.01;
-}
-
 impl Default for TrackerConfig {
     /// For hands, robots and wheels up to some metres a second.
     fn default() -> Self {

@@ -2,13 +2,11 @@
 
 use super::belief::Moments;
 use crate::method::Likelihood;
-use crate::numerics::normal_distribution;
+use crate::numerics::{NORMAL_95, normal_distribution};
 use palpate_core::Estimate;
 
 /// Below this share of the probability, one hypothesis does not speak for all.
 const SURE: f64 = 0.98;
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// What is known at one reading.
 #[derive(Clone, Debug, PartialEq)]

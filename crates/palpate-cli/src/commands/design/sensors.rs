@@ -176,12 +176,8 @@ fn write_report(outcome: &Outcome, bench: &Bench, out: &Path) -> Result<(), Fail
         counts: &outcome.counts,
         seed: outcome.seed,
     };
-    let files = sensor_design_report(&report).map_err(Complaint::new)?;
-    output::make_folder(out)?;
-    for file in files {
-        output::write_file(&out.join(&file.name), &file.bytes)?;
-    }
-    Ok(())
+    let files = sensor_design_report(&report);
+    output::write_report(out, files)
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {

@@ -31,10 +31,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
     let findings = findings.ok_or_else(stopped)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from("palpate-out").join(NAME));
-    output::make_folder(&out)?;
-    for file in dead_areas_report(&study, &findings).map_err(Complaint::new)? {
-        output::write_file(&out.join(&file.name), &file.bytes)?;
-    }
+    output::write_report(&out, dead_areas_report(&study, &findings))?;
     output::write_file(&out.join("results.json"), (output::to_json(&findings)? + "\n").as_bytes())?;
     if arguments.json {
         return output::say_json(&findings);

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::error::{DesignError, Exclusion};
 use super::pool::exclusion;
 use crate::contact::Position;
-use crate::mechanics::{Extent, Surface, SurfaceSpec};
+use crate::mechanics::{Extent, Surface};
 use crate::rig::{MustHave, SensorDesign, Sites, Symmetry};
 use crate::sensing::{SensorKind, even_positions};
 
@@ -31,19 +31,15 @@ pub(super) struct Candidates {
 
 impl Candidates {
     /// All offers at all sites where they read something and nothing forbids them, and what every layout has.
-    pub fn of(
-        surface: &SurfaceSpec,
-        model: &dyn Surface,
-        design: &SensorDesign,
-    ) -> Result<Self, DesignError> {
-        let extent = model.extent();
+    pub fn of(surface: &dyn Surface, design: &SensorDesign) -> Result<Self, DesignError> {
+        let extent = surface.extent();
         let sites = sites(&design.sites, extent);
         let mut sensors = Vec::new();
         for (offer, kind) in design.offers.iter().map(|offer| offer.kind).enumerate() {
-            let reads = |position: &Position| reads_something(surface, model, kind, *position);
+            let reads = |position: &Position| reads_something(surface, kind, *position);
             let at = |position: Position| PlacedSensor { offer, position };
             if kind == SensorKind::Reaction {
-                sensors.extend(model.force_supports().into_iter().filter(reads).map(at));
+                sensors.extend(surface.force_supports().into_iter().filter(reads).map(at));
             } else {
                 let free =
                     |position: &Position| design.keep_out.iter().all(|zone| !zone.holds(*position, extent));
@@ -52,7 +48,7 @@ impl Candidates {
         }
         let mut candidates = Self { sensors, must_have: Vec::new() };
         for wanted in &design.must_have {
-            candidates.must_have(wanted, surface, model, design)?;
+            candidates.must_have(wanted, surface, design)?;
         }
         check_must_haves(&candidates, design, extent)?;
         Ok(candidates)
@@ -61,14 +57,13 @@ impl Candidates {
     fn must_have(
         &mut self,
         wanted: &MustHave,
-        surface: &SurfaceSpec,
-        model: &dyn Surface,
+        surface: &dyn Surface,
         design: &SensorDesign,
     ) -> Result<(), DesignError> {
         let MustHave { offer, position } = *wanted;
-        let (kind, extent) = (design.offers[offer].kind, model.extent());
+        let (kind, extent) = (design.offers[offer].kind, surface.extent());
         let plane = extent.is_plane();
-        if !reads_something(surface, model, kind, position) {
+        if !reads_something(surface, kind, position) {
             return Err(DesignError::MustHaveReadsNothing { kind, position, plane });
         }
         let kept_out = design.keep_out.iter().any(|zone| zone.holds(position, extent));
@@ -80,7 +75,7 @@ impl Candidates {
         // Its twin need not be one of the sites either.
         let twin = mirrored(position, extent);
         let kept_out = design.keep_out.iter().any(|zone| zone.holds(twin, extent));
-        if design.symmetry == Symmetry::Wanted && !kept_out && reads_something(surface, model, kind, twin) {
+        if design.symmetry == Symmetry::Wanted && !kept_out && reads_something(surface, kind, twin) {
             self.add(offer, twin, extent);
         }
         Ok(())
@@ -145,17 +140,9 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
 }
 
 /// Whether a sensor reads anything at a place, wherever the surface is touched.
-pub(super) fn reads_something(
-    surface: &SurfaceSpec,
-    model: &dyn Surface,
-    kind: SensorKind,
-    position: Position,
-) -> bool {
-    let still = match surface {
-        SurfaceSpec::Plate(plate) => plate.nothing_to_read(kind, position).is_some(),
-        _ => model.never_moves(kind, position),
-    };
-    let carried = kind != SensorKind::Reaction || model.is_supported_at(position);
+pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
+    let still = surface.nothing_to_read(kind, position).is_some();
+    let carried = kind != SensorKind::Reaction || surface.is_supported_at(position);
     !still && carried && kind != SensorKind::Raw
 }
 

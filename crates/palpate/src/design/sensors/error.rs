@@ -176,7 +176,8 @@ impl DesignError {
             Self::Limit(LimitError::NoForce | LimitError::Force { .. }) => {
                 "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
             }
-            Self::Limit(_) => "check the sensors' noise and the contact force",
+            Self::Limit(LimitError::Noise(error)) => error.help(),
+            Self::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
             Self::SingularNoise { .. } => {
                 "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
             }

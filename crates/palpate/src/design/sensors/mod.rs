@@ -40,7 +40,7 @@ use std::sync::Arc;
 use crate::arrangement::inner_grid;
 use crate::bench::Bench;
 use crate::limit::{Force, LimitError};
-use crate::mechanics::{Extent, SurfaceSpec};
+use crate::mechanics::Extent;
 use crate::rig::{DesignCriterion, SensorDesign};
 use crate::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
 use candidates::Candidates;
@@ -48,7 +48,7 @@ use exchange::Found;
 use objective::{Block, Objective};
 use pool::Pool;
 use principal::{PrincipalComponents, Reconstruction};
-use rows::{Touches, standard_deviation};
+use rows::Touches;
 
 /// What a design is busy with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,7 +151,7 @@ impl<'a> SensorProblem<'a> {
     ) -> Result<Option<Self>, DesignError> {
         let surface = bench.surface.model().ok_or(LimitError::NoModel)?;
         let force_n = bench.force_n.ok_or(LimitError::NoForce)?;
-        let silent = design.offers.iter().find(|offer| standard_deviation(&offer.channel) <= 0.0);
+        let silent = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
         if let Some(offer) = silent {
             return Err(DesignError::SingularNoise { kind: offer.kind });
         }
@@ -159,7 +159,7 @@ impl<'a> SensorProblem<'a> {
         let force = if known { Force::Known } else { Force::Unknown };
         let contacts = WeightedContacts::of(&design.contacts, surface.extent());
         let touches = Touches { surface, contacts, force_n, force };
-        let candidates = Candidates::of(&bench.surface, surface, design)?;
+        let candidates = Candidates::of(surface, design)?;
         let Some(table) = touches.table(&candidates.sensors, design, keep_going)? else { return Ok(None) };
         Self::with_table(bench, touches, candidates, Arc::new(table), design).map(Some)
     }
@@ -353,10 +353,6 @@ impl<'a> SensorProblem<'a> {
     fn row(&self, sensor: &PlacedSensor) -> Vec<Block> {
         let offer = &self.pool.design.offers[sensor.offer];
         self.touches.row(offer.kind, sensor.position, &offer.channel)
-    }
-
-    fn surface_spec(&self) -> &SurfaceSpec {
-        &self.bench.surface
     }
 }
 

@@ -116,7 +116,7 @@ fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedS
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
     group.iter().enumerate().all(|(i, sensor)| {
         pool.design.keep_out.iter().all(|zone| !zone.holds(sensor.position, pool.extent))
-            && reads_something(problem.surface_spec(), problem.touches.surface, kind(sensor), sensor.position)
+            && reads_something(problem.touches.surface, kind(sensor), sensor.position)
             && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
     })
 }

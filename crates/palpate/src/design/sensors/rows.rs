@@ -46,7 +46,7 @@ impl Touches<'_> {
     /// Where the sensor is saturated it tells nothing.
     pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
         let response = self.surface.response_function(kind, position);
-        let sd = standard_deviation(channel);
+        let sd = channel.reading_sd();
         let mut columns = vec![Vec::with_capacity(self.contacts.len()); self.unknowns()];
         for &position in &self.contacts.positions {
             let contact = Contact { position, force_n: self.force_n };
@@ -127,14 +127,9 @@ impl Touches<'_> {
             for (row, i) in kept.iter().enumerate() {
                 let contact = Contact { position: self.contacts.positions[*i], force_n: self.force_n };
                 let weight = (self.contacts.weights[*i] / share).sqrt();
-                readings[[row, column]] = weight * response.at(contact) / standard_deviation(&offer.channel);
+                readings[[row, column]] = weight * response.at(contact) / offer.channel.reading_sd();
             }
         }
         readings
     }
-}
-
-/// √(σ² + q²/12), as of the limit.
-pub(super) fn standard_deviation(channel: &ChannelModel) -> f64 {
-    channel.noise_sd.hypot(channel.resolution / 12f64.sqrt())
 }

@@ -5,6 +5,7 @@ use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
 use crate::contact::Position;
+use crate::numerics::NORMAL_95;
 
 /// Squared residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
 const CUT: f64 = 20.0;
@@ -164,7 +165,6 @@ impl<'a> Posterior<'a> {
 
     /// The contact that some of the probability describes, its intervals those of a normal distribution.
     fn contact(&self, sums: Sums) -> ContactEstimate {
-        const QUANTILE_975: f64 = 1.959_963_984_540_054;
         let (position, force_n, covariance) = sums.moments();
         let known = self.locator.locates_force();
         let covariance = match known {
@@ -172,7 +172,7 @@ impl<'a> Posterior<'a> {
             false => [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0],
         };
         let around = |mean_m: f64, variance_m2: f64| {
-            let half_m = QUANTILE_975 * variance_m2.sqrt();
+            let half_m = NORMAL_95 * variance_m2.sqrt();
             (mean_m - half_m, mean_m + half_m)
         };
         let uncertainty = Uncertainty {

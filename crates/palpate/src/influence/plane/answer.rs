@@ -3,10 +3,8 @@
 use super::modes::{MODE_THAT_MATTERS, Mode};
 use super::search::{Scratch, Search, Unknowns};
 use crate::contact::Position;
+use crate::numerics::NORMAL_95;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
-
-/// Half the width of a normal distribution's 95 % interval, in standard deviations.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// The estimate of one contact.
 ///

@@ -5,7 +5,7 @@ use super::search::{Scratch, Search};
 use super::table::PlaneTable;
 use crate::bench::Bench;
 use crate::influence::belief::ForceBelief;
-use crate::influence::learning::Channels;
+use crate::influence::channels::{self, Channels};
 use crate::method::{Locate, LocatorFault};
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
@@ -59,15 +59,10 @@ impl PlaneLocator {
     /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
     /// nothing changes.
     pub fn leave_out(&mut self, channel: usize) -> bool {
-        let mut stored = self.stored.clone();
-        if let Some(dead) = stored.dead.get_mut(channel) {
-            *dead = true;
-        }
-        let lives = stored.dead.iter().any(|dead| !dead);
-        if lives {
-            *self = Self { search: stored.search(), stored };
-        }
-        lives
+        let Some(dead) = channels::without(&self.stored.dead, channel) else { return false };
+        let stored = Stored { dead, ..self.stored.clone() };
+        *self = Self { search: stored.search(), stored };
+        true
     }
 
     /// [`Locate::locate`] with memory of the caller's.
@@ -99,12 +94,7 @@ impl Stored {
         let cells = table.sensors.saturating_mul(table.columns).saturating_mul(table.rows);
         count("influence values", cells, table.values.len())?;
         count("influence variances", cells, table.variances.len())?;
-        count("offsets", table.sensors, offsets.len())?;
-        count("noises", table.sensors, noise_sd.len())?;
-        count("marks of dead channels", table.sensors, dead.len())?;
-        if dead.iter().all(|dead| *dead) {
-            return Err(LocatorFault::Count { what: "living channels", needed: 1, found: 0 });
-        }
+        channels::check(table.sensors, offsets, noise_sd, dead, *force)?;
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
         };
@@ -113,12 +103,8 @@ impl Stored {
         numbers("side of the grid", &sides, is_side, "odd and at least 9")?;
         numbers("influence value", &table.values, |_| true, "a finite number")?;
         numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
-        numbers("offset", offsets, |_| true, "a finite number")?;
-        numbers("noise", noise_sd, |sd| sd > 0.0, "greater than 0")?;
         let positive = [table.length_m, table.width_m, *reference_force_n];
-        numbers("length, width or force", &positive, |x| x > 0.0, "greater than 0")?;
-        let force = if force.is_usable() { 1.0 } else { f64::NAN };
-        numbers("belief about the force", &[force], |_| true, "greater than 0")
+        numbers("length, width or force", &positive, |x| x > 0.0, "greater than 0")
     }
 }
 

@@ -42,7 +42,7 @@ impl Surroundings {
 /// Another place with at least this share of the probability is said.
 pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
 /// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
-const ELLIPSE_95: f64 = 5.991_464_547_107_979;
+pub(super) const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 /// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
 const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.

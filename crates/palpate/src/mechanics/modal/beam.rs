@@ -41,6 +41,9 @@ pub enum ModalBeamError {
 }
 
 impl ModalBeam {
+    /// The damping ratio of thin metal on wedges, where nobody measured it.
+    pub const USUAL_DAMPING_RATIO: f64 = 0.01;
+
     /// Checks density, damping and the frequency that follows.
     ///
     /// # Errors

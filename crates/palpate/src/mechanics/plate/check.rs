@@ -1,10 +1,11 @@
 //! What is checked of a plate before anything is computed.
 
 use super::dissection::coupled_pairs;
-use super::error::{NothingToRead, PlateError};
+use super::error::PlateError;
 use super::mesh::{Mesh, NODE_DEGREES};
 use super::spec::{Edge, PlateSpec, PointSupport, PointSupportKind};
 use crate::contact::Position;
+use crate::mechanics::{NothingToRead, first_not_positive};
 use crate::sensing::SensorKind;
 
 /// The fewest and the most elements along the longer side.
@@ -41,10 +42,8 @@ fn check_numbers(spec: &PlateSpec) -> Result<(), PlateError> {
         ("thickness", spec.thickness_m),
         ("youngs_modulus", spec.youngs_modulus_pa),
     ];
-    for (name, value) in dimensions {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(PlateError::NotPositive { name, value });
-        }
+    if let Some((name, value)) = first_not_positive(&dimensions) {
+        return Err(PlateError::NotPositive { name, value });
     }
     let value = spec.poissons_ratio;
     if !(value > -1.0 && value <= 0.5) {

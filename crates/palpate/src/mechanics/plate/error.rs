@@ -146,27 +146,6 @@ pub enum Unsolvable {
     Supports(#[from] crate::numerics::NotPositiveDefinite),
 }
 
-/// Why a sensor reads nothing, wherever the plate is touched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NothingToRead {
-    /// The edge cannot move so.
-    #[error("the {edge} edge, which is {held}, has no {kind} wherever the plate is touched")]
-    AtEdge {
-        /// Which edge.
-        edge: &'static str,
-        /// How it is held.
-        held: &'static str,
-        /// What the sensor measures.
-        kind: crate::sensing::SensorKind,
-    },
-    /// The deflection of a support that does not give.
-    #[error("simple support {number} keeps the plate from deflecting there")]
-    AtSupport {
-        /// Which support, from 1.
-        number: usize,
-    },
-}
-
 /// A position for people.
 struct Point(Position);
 

@@ -15,7 +15,7 @@ mod spec;
 mod stiffness;
 mod unknowns;
 
-pub use error::{NothingToRead, PlateError, Unsolvable};
+pub use error::{PlateError, Unsolvable};
 pub use spec::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
 
 use std::fmt;
@@ -23,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, Surface};
+use super::{Extent, InfluenceFunction, NothingToRead, Surface};
 use crate::contact::Position;
 use crate::numerics::EliminationOrder;
 use crate::sensing::SensorKind;
@@ -62,12 +62,6 @@ impl Plate {
     /// What it is.
     pub fn spec(&self) -> &PlateSpec {
         &self.spec
-    }
-
-    /// Why a sensor of this `kind` at `position` reads nothing, wherever the plate is touched; `None` when it reads
-    /// something.
-    pub fn nothing_to_read(&self, kind: SensorKind, position: Position) -> Option<NothingToRead> {
-        check::nothing_to_read(&self.spec, kind, position)
     }
 
     /// Bytes that solving it needs at most, by an estimate.
@@ -126,8 +120,8 @@ impl Surface for Plate {
         places
     }
 
-    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
-        self.nothing_to_read(kind, sensor).is_some()
+    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
+        check::nothing_to_read(&self.spec, kind, sensor)
     }
 
     /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force

@@ -2,6 +2,7 @@
 
 use super::error::{RigidMotion, SupportedBeamError};
 use super::spec::{BeamSection, BeamSupport, BeamSupportKind, SupportedBeamSpec};
+use crate::mechanics::first_not_positive;
 
 /// More sections, and more supports, than a bench has.
 const MOST: usize = 100;
@@ -15,10 +16,9 @@ impl SupportedBeamSpec {
     /// # Errors
     /// [`SupportedBeamError`], for the first thing that is wrong.
     pub fn check(&self) -> Result<(), SupportedBeamError> {
-        for (name, value) in [("length", self.length_m), ("youngs_modulus", self.youngs_modulus_pa)] {
-            if !is_positive(value) {
-                return Err(SupportedBeamError::NotPositive { name, value });
-            }
+        let dimensions = [("length", self.length_m), ("youngs_modulus", self.youngs_modulus_pa)];
+        if let Some((name, value)) = first_not_positive(&dimensions) {
+            return Err(SupportedBeamError::NotPositive { name, value });
         }
         self.check_sections()?;
         self.check_supports()?;
@@ -34,10 +34,9 @@ impl SupportedBeamSpec {
         let mut from_m = 0.0;
         for (i, &BeamSection { to_m, width_m, thickness_m }) in self.sections.iter().enumerate() {
             let number = i + 1;
-            for (name, value) in [("width", width_m), ("thickness", thickness_m)] {
-                if !is_positive(value) {
-                    return Err(SupportedBeamError::Section { number, name, value });
-                }
+            if let Some((name, value)) = first_not_positive(&[("width", width_m), ("thickness", thickness_m)])
+            {
+                return Err(SupportedBeamError::Section { number, name, value });
             }
             if to_m.is_nan() || to_m <= from_m + slack_m {
                 return Err(SupportedBeamError::SectionsOverlap { number, from_m, to_m });

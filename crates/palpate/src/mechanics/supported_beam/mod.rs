@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, Surface};
+use super::{Extent, InfluenceFunction, NothingToRead, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use check::SAME_PLACE;
@@ -149,9 +149,10 @@ impl Surface for SupportedBeam {
         places
     }
 
-    fn never_moves(&self, kind: SensorKind, sensor: Position) -> bool {
+    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
         let negligible = ROUNDING * self.full_scale(kind);
-        kind != SensorKind::Raw && self.shape(kind, sensor).peak() <= negligible
+        let held = kind != SensorKind::Raw && self.shape(kind, sensor).peak() <= negligible;
+        held.then_some(NothingToRead::Held { kind })
     }
 
     /// Over contact positions exact, as the extremes of cubics; over sensor positions by a scan of every element and golden

@@ -56,7 +56,7 @@ impl NetworkInputs {
             .iter()
             .map(|scale| {
                 let channel = &layout.sensors[scale.channel].channel;
-                (channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0).sqrt() / scale.divisor
+                channel.reading_sd() / scale.divisor
             })
             .collect();
         if scaled.contains(&0.0) {

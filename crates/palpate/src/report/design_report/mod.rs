@@ -13,7 +13,6 @@ use crate::design::sensors::{
     CountPoint, Designed, Method, SensorProblem, Verification, best_design, enough,
 };
 use crate::rig::{DesignCriterion, Symmetry};
-use crate::sensing::{Layout, SensorKind};
 
 /// What a sensor design's report is made from.
 #[derive(Clone, Copy)]
@@ -108,7 +107,7 @@ impl<'a> SensorDesignReport<'a> {
                     li {
                         "Best of " (counted(self.designed.len(), "layout", "layouts")) " of "
                         (counted(best.layout.len(), "sensor", "sensors")) ": " b { (best.method.name()) } ", "
-                        (places_in_words(&best.layout, self.problem.is_plane())) "."
+                        (best.layout.places_in_words(self.problem.is_plane())) "."
                     }
                     li {
                         "Its mean limit is " b { (number(limit(best))) " mm" }
@@ -176,9 +175,10 @@ impl<'a> SensorDesignReport<'a> {
 
     fn places(&self, table: usize) -> Markup {
         let plane = self.problem.is_plane();
-        let rows = self.designed.iter().map(|designed| {
-            vec![text(designed.method.name()), text(places_in_words(&designed.layout, plane))]
-        });
+        let rows = self
+            .designed
+            .iter()
+            .map(|designed| vec![text(designed.method.name()), text(designed.layout.places_in_words(plane))]);
         Table {
             number: table,
             caption: html! { "Where their sensors sit." },
@@ -250,23 +250,6 @@ fn score_in_words(criterion: DesignCriterion) -> &'static str {
         DesignCriterion::WithinTolerance => "the share of contacts whose limit exceeds the tolerance, in %",
         DesignCriterion::DOptimality => "the mean of ½·ln det of a contact's least covariance",
     }
-}
-
-/// "deflection 35, 40 mm; strain 200 mm"
-fn places_in_words(layout: &Layout, plane: bool) -> String {
-    let of = |kind: SensorKind| {
-        let places: Vec<String> = layout
-            .sensors
-            .iter()
-            .filter(|sensor| sensor.kind == kind)
-            .map(|sensor| {
-                let x = mm(sensor.position.x_m);
-                if plane { format!("({x}, {})", mm(sensor.position.y_m)) } else { x }
-            })
-            .collect();
-        (!places.is_empty()).then(|| format!("{kind} {} mm", places.join(", ")))
-    };
-    SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
 }
 
 fn meaning() -> Markup {

@@ -2,13 +2,12 @@
 
 use toml::Spanned;
 
-use super::places::place;
+use super::places::{in_order, on_surface};
 use crate::bench::Bench;
-use crate::contact::Position;
 use crate::mechanics::{Extent, SurfaceSpec};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{ContactsKeys, DesignSection, MustHaveKeys, OfferKeys, SitesKey, ZoneKeys};
-use crate::rig::value::{RawPosition, RawQuantity, choice, count, not_negative, number, positive};
+use crate::rig::value::{RawQuantity, choice, count, not_negative, number, positive};
 use crate::rig::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
@@ -224,23 +223,6 @@ fn must_have(
     Ok(MustHave { offer, position })
 }
 
-fn on_surface(key: &'static str, raw: &Spanned<RawPosition>, extent: Extent) -> Result<Position, RigError> {
-    let position = place(key, raw, extent)?;
-    if extent.contains(position) {
-        Ok(position)
-    } else {
-        Err(RigProblem::PlaceOffSurface { key, position, extent }.at(raw.span()))
-    }
-}
-
-fn in_order(from: Position, to: Position, extent: Extent) -> Result<(), RigProblem> {
-    if from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m) {
-        Ok(())
-    } else {
-        Err(RigProblem::EndsBeforeItBegins { from, to, extent })
-    }
-}
-
 fn missing<T>(key: &'static str, section: &Spanned<T>) -> RigError {
     RigProblem::MissingKey { section: SECTION, key }.at(section.span())
 }
@@ -248,6 +230,7 @@ fn missing<T>(key: &'static str, section: &Spanned<T>) -> RigError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Position;
     use crate::rig::Rig;
 
     const RIG: &str = include_str!("../../../../../examples/sensor-design.toml");

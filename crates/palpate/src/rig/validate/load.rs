@@ -2,7 +2,7 @@
 
 use toml::Spanned;
 
-use super::places::place;
+use super::places::{in_order, on_surface};
 use crate::mechanics::{Extent, SurfaceSpec, UniformLoad};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::LoadSection;
@@ -25,16 +25,12 @@ pub(super) fn validate(
 
 fn load(section: &Spanned<LoadSection>, extent: Extent) -> Result<UniformLoad, RigError> {
     let keys = section.get_ref();
-    let written = need("from", keys.from.as_ref(), section)?;
-    let from = place("from", written, extent)?;
-    let to = place("to", need("to", keys.to.as_ref(), section)?, extent)?;
+    let from = on_surface("from", need("from", keys.from.as_ref(), section)?, extent)?;
+    let end = need("to", keys.to.as_ref(), section)?;
+    let to = on_surface("to", end, extent)?;
+    in_order(from, to, extent).map_err(|problem| problem.at(end.span()))?;
     let force_n = positive("force", need("force", keys.force.as_ref(), section)?, Dimension::Force)?;
-    let rises = from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m);
-    if rises && extent.contains(from) && extent.contains(to) {
-        Ok(UniformLoad { from, to, force_n })
-    } else {
-        Err(RigProblem::LoadStretch { from, to, extent }.at(written.span()))
-    }
+    Ok(UniformLoad { from, to, force_n })
 }
 
 fn need<'a, T>(

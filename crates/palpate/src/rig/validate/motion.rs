@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use crate::contact::Position;
 use crate::mechanics::modal::ModalBeam;
-use crate::mechanics::{Motion, SurfaceSpec};
+use crate::mechanics::{Extent, Motion, SurfaceSpec};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{MotionSection, MotionSections, SurfaceSection};
 use crate::rig::value::{RawQuantity, bounded, count, not_negative, positive, quantity};
@@ -18,8 +19,6 @@ const MOST_READINGS: f64 = 1e7;
 /// A turn takes this share of the way, and a touch this long, unless the rig says otherwise.
 const TURN: f64 = 0.2;
 const TOUCH_S: f64 = 0.1;
-/// Of the critical damping, as of a thin steel beam on wedges.
-const DAMPING: f64 = 0.01;
 
 pub(super) fn validate(
     sections: Option<&Spanned<MotionSections>>,
@@ -51,7 +50,7 @@ pub(super) fn validate(
         RigProblem::MissingKey { section: "surface", key: "density" }.at(first.span.clone())
     })?;
     let below_1 = |ratio: f64| (0.0..1.0).contains(&ratio);
-    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(DAMPING), |raw| {
+    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(ModalBeam::USUAL_DAMPING_RATIO), |raw| {
         bounded("damping", raw, Dimension::Ratio, below_1, "at least 0 and below 1")
     })?;
     let beam = ModalBeam { beam: *beam, density_kg_per_m3, damping_ratio };
@@ -108,7 +107,8 @@ impl<'a> Context<'a> {
             if inside {
                 Ok(x_m)
             } else {
-                Err(RigProblem::MotionOffSurface { key, x_m, length_m }.at(raw.span()))
+                let (position, extent) = (Position::along(x_m), Extent { length_m, width_m: None });
+                Err(RigProblem::PlaceOffSurface { key, position, extent }.at(raw.span()))
             }
         };
         let (from_m, to_m) = (place("from", &keys.from)?, place("to", &keys.to)?);

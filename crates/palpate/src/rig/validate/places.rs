@@ -29,6 +29,29 @@ pub(super) fn place(
     }
 }
 
+/// The same, refused beside the surface.
+pub(super) fn on_surface(
+    key: &'static str,
+    raw: &Spanned<RawPosition>,
+    extent: Extent,
+) -> Result<Position, RigError> {
+    let position = place(key, raw, extent)?;
+    if extent.contains(position) {
+        Ok(position)
+    } else {
+        Err(RigProblem::PlaceOffSurface { key, position, extent }.at(raw.span()))
+    }
+}
+
+/// Whether a stretch or rectangle goes from left to right, and upward on a plane.
+pub(super) fn in_order(from: Position, to: Position, extent: Extent) -> Result<(), RigProblem> {
+    if from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m) {
+        Ok(())
+    } else {
+        Err(RigProblem::EndsBeforeItBegins { from, to, extent })
+    }
+}
+
 /// Columns and rows as `grid` lists them, at most `most` places in all, which `bound` says in words.
 pub(super) fn grid_sides(
     raw: &Spanned<Vec<Spanned<i64>>>,

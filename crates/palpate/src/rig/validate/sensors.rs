@@ -151,24 +151,17 @@ impl Context<'_> {
         positions: &[Position],
         span: impl Fn(usize) -> std::ops::Range<usize>,
     ) -> Result<(), RigError> {
-        if let SurfaceSpec::Plate(plate) = self.surface {
-            let nothing = |at: &Position| plate.nothing_to_read(kind, *at);
-            if let Some((i, reason)) =
-                positions.iter().enumerate().find_map(|(i, at)| Some((i, nothing(at)?)))
-            {
-                return Err(RigProblem::NothingToRead { number: i + 1, reason }.at(span(i)));
-            }
-        }
         let Some(surface) = self.surface.model() else { return Ok(()) };
         for (i, position) in positions.iter().enumerate() {
-            let (number, x_m, extent) = (i + 1, position.x_m, surface.extent());
+            let (number, extent) = (i + 1, surface.extent());
             if kind == SensorKind::Reaction && !surface.is_supported_at(*position) {
                 let supports = surface.force_supports();
                 let problem = RigProblem::NoSupport { number, position: *position, supports, extent };
                 return Err(problem.at(span(i)));
             }
-            if surface.never_moves(kind, *position) {
-                return Err(RigProblem::NeverMoves { number, kind, x_m }.at(span(i)));
+            if let Some(reason) = surface.nothing_to_read(kind, *position) {
+                let position = *position;
+                return Err(RigProblem::NothingToRead { number, kind, position, extent, reason }.at(span(i)));
             }
         }
         Ok(())

@@ -6,7 +6,6 @@ use crate::output;
 use crate::table::table;
 use palpate::design::sensors::{CountPoint, Designed, best_design, enough};
 use palpate::rig::DesignCriterion;
-use palpate::sensing::{Layout, SensorKind};
 use palpate::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
@@ -27,7 +26,11 @@ pub fn print(outcome: &Outcome) -> Result<(), Failure> {
     }
     output::say("")?;
     for designed in &outcome.designed {
-        output::say(format!("{}: {}", designed.method.name(), places(&designed.layout, outcome)))?;
+        output::say(format!(
+            "{}: {}",
+            designed.method.name(),
+            designed.layout.places_in_words(outcome.problem.is_plane())
+        ))?;
     }
     if let Some(best) = best_design(&outcome.designed) {
         output::say(format!("\nBest: {}", gain(outcome, best)))?;
@@ -78,28 +81,6 @@ fn designs(outcome: &Outcome) -> String {
         row
     });
     table(&heading, rows)
-}
-
-/// "deflection 35, 40 mm; strain 200 mm"
-fn places(layout: &Layout, outcome: &Outcome) -> String {
-    let plane = outcome.problem.is_plane();
-    let of = |kind: SensorKind| {
-        let sensors = layout.sensors.iter().filter(|sensor| sensor.kind == kind);
-        let places: Vec<String> = sensors
-            .map(|sensor| {
-                let x = millimetres(sensor.position.x_m);
-                if plane { format!("({x}, {})", millimetres(sensor.position.y_m)) } else { x }
-            })
-            .collect();
-        (!places.is_empty()).then(|| format!("{kind} {} mm", places.join(", ")))
-    };
-    SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
-}
-
-/// A length without its unit, two decimals at most.
-fn millimetres(length_m: f64) -> String {
-    let text = format!("{:.2}", length_m * 1e3);
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// How much better than the even layout.
