@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 pub struct RecordingFiles {
     /// The recording [default: simulated, where the rig has a model]
     #[arg(long, value_name = "FILE.csv")]
-    data: Option<PathBuf>,
+    pub data: Option<PathBuf>,
     /// The recording's contacts, where --data has the readings alone; row by row
     #[arg(long, value_name = "FILE.csv", requires = "data")]
-    contacts: Option<PathBuf>,
+    pub contacts: Option<PathBuf>,
 }
 
 impl RecordingFiles {

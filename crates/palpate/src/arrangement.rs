@@ -3,7 +3,7 @@
 mod grid;
 
 pub use grid::{EveryError, all_over, every};
-pub(crate) use grid::{cells, inner_grid};
+pub(crate) use grid::{cells, chebyshev, inner_grid, squarest, warped_cells};
 
 use crate::contact::Position;
 use crate::mechanics::Extent;
@@ -23,6 +23,8 @@ pub enum Arrangement {
         /// Start and end of the middle portion as shares of the length; 0 < start < end < 1.
         portion: (f64, f64),
     },
+    /// At Chebyshev's nodes, dense towards both ends: a_i = l·(1 − cos(π·(i + ½)/n))/2 for i = 0…n−1.
+    Chebyshev,
     /// In the middles of equal cells of a plane: x_i = (i + ½)·length/columns and y_j = (j + ½)·width/rows.
     Grid {
         /// Positions along the length.
@@ -129,10 +131,11 @@ impl Arrangement {
             return Err(ArrangementError::NoPositions);
         }
         match self {
-            Self::Even | Self::EdgeDense { .. } if extent.is_plane() => {
+            Self::Even | Self::EdgeDense { .. } | Self::Chebyshev if extent.is_plane() => {
                 Err(ArrangementError::LineOnPlane { count })
             }
             Self::Even => Ok(cells(extent, count, 1)),
+            Self::Chebyshev => Ok(warped_cells(extent, count, 1, chebyshev)),
             Self::EdgeDense { middle, portion } => edge_dense(count, *middle, *portion, extent.length_m),
             Self::Grid { columns, rows } => grid(count, *columns, *rows, extent),
             Self::Explicit(positions) => explicit(positions, count, extent),

@@ -117,6 +117,7 @@ fn training_words(training: &Training) -> String {
     use palpate::arrangement::Arrangement;
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
+        Arrangement::Chebyshev => "at Chebyshev's nodes".to_owned(),
         Arrangement::Grid { columns, rows } => format!("a grid of {columns} × {rows}"),
         Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
         Arrangement::Explicit(_) => "as listed".to_owned(),

@@ -51,9 +51,38 @@ pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> 
 
 /// The middles of equal cells: x_i = (i + ½)·length/columns, and y_j = (j + ½)·width/rows on a plane.
 pub(crate) fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
-    let middle = |i: usize, size_m: f64, count: usize| (i as f64 + 0.5) * size_m / count as f64;
+    warped_cells(extent, columns, rows, |share| share)
+}
+
+/// The same with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
+pub(crate) fn warped_cells(
+    extent: Extent,
+    columns: usize,
+    rows: usize,
+    warp: impl Fn(f64) -> f64,
+) -> Vec<Position> {
+    let middle = |i: usize, size_m: f64, count: usize| size_m * warp((i as f64 + 0.5) / count as f64);
     let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
     rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
+}
+
+/// (1 − cos πu)/2, which takes even shares to Chebyshev's: dense towards both ends.
+pub(crate) fn chebyshev(share: f64) -> f64 {
+    0.5 * (1.0 - (std::f64::consts::PI * share).cos())
+}
+
+/// The grid of `count` positions whose cells are the closest to squares: columns and rows.
+pub(crate) fn squarest(extent: Extent, count: usize) -> (usize, usize) {
+    let Some(width_m) = extent.width_m else { return (count, 1) };
+    let elongation = |columns: usize| {
+        let (columns, rows) = (columns as f64, (count / columns) as f64);
+        ((extent.length_m / columns) / (width_m / rows)).ln().abs()
+    };
+    let columns = (1..=count)
+        .filter(|columns| count.is_multiple_of(*columns))
+        .min_by(|a, b| elongation(*a).total_cmp(&elongation(*b)))
+        .unwrap_or(count);
+    (columns, count / columns)
 }
 
 /// The inner crossings of a grid: x_i = i·length/(columns + 1) from i = 1, and y_j = j·width/(rows + 1) on a plane.

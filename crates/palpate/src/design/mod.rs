@@ -1,3 +1,5 @@
-//! Where to put the sensors, scored by the location error that follows.
+//! Where to put the sensors and where to press, scored by the location error that follows.
 
+mod calibration;
+pub mod positions;
 pub mod sensors;

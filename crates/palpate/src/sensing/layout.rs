@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::ChannelModel;
-use crate::contact::Position;
+use crate::contact::{Position, in_words};
 use crate::units::{Dimension, Unit};
 
 /// What a sensor measures.
@@ -124,17 +124,10 @@ impl Layout {
     /// Where the sensors of each kind sit, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
     /// "reaction (10, 20), (10, 180) mm" on a plane.
     pub fn places_in_words(&self, plane: bool) -> String {
-        let mm = |length_m: f64| {
-            let text = format!("{:.2}", length_m * 1e3);
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        };
-        let place = |at: Position| {
-            if plane { format!("({}, {})", mm(at.x_m), mm(at.y_m)) } else { mm(at.x_m) }
-        };
         let of = |kind: SensorKind| {
             let sensors = self.sensors.iter().filter(|sensor| sensor.kind == kind);
-            let places: Vec<String> = sensors.map(|sensor| place(sensor.position)).collect();
-            (!places.is_empty()).then(|| format!("{kind} {} mm", places.join(", ")))
+            let positions: Vec<Position> = sensors.map(|sensor| sensor.position).collect();
+            (!positions.is_empty()).then(|| format!("{kind} {}", in_words(&positions, plane)))
         };
         SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
     }

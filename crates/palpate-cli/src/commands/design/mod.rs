@@ -1,10 +1,12 @@
-//! `palpate design`: what to build before it is built.
+//! `palpate design`: what to build before it is built, and where to press before it is pressed.
 
+pub mod positions;
 pub mod sensors;
+mod watch;
 
 use crate::failure::Failure;
 
-/// Where to put the sensors.
+/// Where to put the sensors, and where to press.
 #[derive(clap::Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -14,10 +16,12 @@ pub struct Arguments {
 #[derive(clap::Subcommand)]
 enum What {
     Sensors(sensors::Arguments),
+    Positions(positions::Arguments),
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.what {
         What::Sensors(arguments) => sensors::run(arguments),
+        What::Positions(arguments) => positions::run(arguments),
     }
 }

@@ -4,20 +4,19 @@ mod counts;
 mod findings;
 mod rig_file;
 mod tables;
-mod watch;
 
+use super::watch::Watch;
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
 use counts::{Counts, counts};
 use palpate::bench::Bench;
 use palpate::design::sensors::{
-    CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
+    CountPoint, DesignError, Designed, Method, SensorProblem, Stage, Verification, best_design,
 };
 use palpate::limit::LimitError;
 use palpate::report::{SensorDesignReport, sensor_design_report};
 use palpate::rig::{Rig, SensorDesign};
 use std::path::{Path, PathBuf};
-use watch::Watch;
 
 /// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
 ///
@@ -82,9 +81,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let (bench, design) = what_to_design(arguments, &rig)?;
     let mut watch = Watch::new();
-    let problem = SensorProblem::new(&bench, &design, &mut |stage, share| watch.keep_going(stage, share))
-        .map_err(|error| complaint(&error, &arguments.rig))?
-        .ok_or_else(stopped)?;
+    let problem =
+        SensorProblem::new(&bench, &design, &mut |stage, share| watch.keep_going(words(stage), share))
+            .map_err(|error| complaint(&error, &arguments.rig))?
+            .ok_or_else(stopped)?;
     let outcome = outcome(arguments, &rig, &problem, &mut watch)?;
     drop(watch);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
@@ -131,13 +131,14 @@ fn outcome<'a>(
     watch: &mut Watch,
 ) -> Result<Outcome<'a>, Failure> {
     let complain = |error: DesignError| complaint(&error, &arguments.rig);
-    let designed = problem.all(arguments.seed, &mut |stage, share| watch.keep_going(stage, share));
+    let designed = problem.all(arguments.seed, &mut |stage, share| watch.keep_going(words(stage), share));
     let designed = designed.map_err(complain)?.ok_or_else(stopped)?;
     let counts = match &arguments.counts {
         None => Vec::new(),
         Some(range) => {
-            let curve = problem
-                .counts(range.clone(), arguments.seed, &mut |stage, share| watch.keep_going(stage, share));
+            let curve = problem.counts(range.clone(), arguments.seed, &mut |stage, share| {
+                watch.keep_going(words(stage), share)
+            });
             curve.map_err(complain)?.ok_or_else(stopped)?
         }
     };
@@ -150,7 +151,7 @@ fn outcome<'a>(
                 &rig.estimator,
                 usize::from(calibrations),
                 arguments.seed,
-                &mut |stage, share| watch.keep_going(stage, share),
+                &mut |stage, share| watch.keep_going(words(stage), share),
             );
             let complain =
                 |error| Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display()));
@@ -182,6 +183,17 @@ fn write_report(outcome: &Outcome, bench: &Bench, out: &Path) -> Result<(), Fail
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
+}
+
+fn words(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Candidates => "what each site tells",
+        Stage::Exchange => "exchanging",
+        Stage::Exhaustive => "all layouts",
+        Stage::Genetic => "breeding",
+        Stage::Refinement => "refining",
+        Stage::Verification => "verifying",
+    }
 }
 
 fn stopped() -> Failure {

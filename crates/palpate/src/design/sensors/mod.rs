@@ -27,18 +27,19 @@ mod rows;
 mod starts;
 mod verification;
 
+pub use super::calibration::{CalibrationError, Verification};
 pub use assessment::Assessment;
 pub use candidates::PlacedSensor;
 pub use contacts::WeightedContacts;
 pub use counts::{CountPoint, enough};
 pub use error::{DesignError, Exclusion};
 pub use pivoting::{condition_number, pivoted_columns};
-pub use verification::{Verification, VerificationError};
 
 use std::sync::Arc;
 
-use crate::arrangement::inner_grid;
+use crate::arrangement::{inner_grid, squarest};
 use crate::bench::Bench;
+use crate::contact::Position;
 use crate::limit::{Force, LimitError};
 use crate::mechanics::Extent;
 use crate::rig::{DesignCriterion, SensorDesign};
@@ -362,18 +363,13 @@ pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
     searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
 }
 
-/// i·l/(k+1) on a line; on a plane, of the grids with k places, the one whose cells are closest to squares.
-fn even_places(count: usize, extent: Extent) -> Vec<crate::contact::Position> {
-    let Some(width_m) = extent.width_m else { return even_positions(count, extent.length_m).collect() };
-    let elongation = |columns: usize| {
-        let (columns, rows) = (columns as f64, (count / columns) as f64);
-        ((extent.length_m / columns) / (width_m / rows)).ln().abs()
-    };
-    let columns = (1..=count)
-        .filter(|columns| count.is_multiple_of(*columns))
-        .min_by(|a, b| elongation(*a).total_cmp(&elongation(*b)))
-        .unwrap_or(count);
-    inner_grid(extent, columns, count / columns)
+/// i·l/(k+1) on a line; on a plane the inner crossings of the grid whose cells are closest to squares.
+fn even_places(count: usize, extent: Extent) -> Vec<Position> {
+    if !extent.is_plane() {
+        return even_positions(count, extent.length_m).collect();
+    }
+    let (columns, rows) = squarest(extent, count);
+    inner_grid(extent, columns, rows)
 }
 
 #[cfg(test)]

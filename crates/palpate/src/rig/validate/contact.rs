@@ -48,6 +48,7 @@ pub(super) fn check_forces(
 enum Rule {
     Even,
     EdgeDense,
+    Chebyshev,
     Grid,
     Explicit,
 }
@@ -61,6 +62,7 @@ pub(super) fn validate_training(
     let words = [
         ("even", Rule::Even),
         ("edge-dense", Rule::EdgeDense),
+        ("chebyshev", Rule::Chebyshev),
         ("grid", Rule::Grid),
         ("explicit", Rule::Explicit),
     ];
@@ -74,6 +76,7 @@ pub(super) fn validate_training(
     refuse_unused(keys, rule)?;
     let arrangement = match rule {
         Rule::Even => Arrangement::Even,
+        Rule::Chebyshev => Arrangement::Chebyshev,
         Rule::EdgeDense => edge_dense(section)?,
         Rule::Grid => grid(section, extent)?,
         Rule::Explicit => explicit(section, extent)?,
@@ -117,6 +120,7 @@ fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
     let with = match rule {
         Rule::Even => "arrangement = \"even\"",
         Rule::EdgeDense => "arrangement = \"edge-dense\"",
+        Rule::Chebyshev => "arrangement = \"chebyshev\"",
         Rule::Grid => "arrangement = \"grid\"",
         Rule::Explicit => "arrangement = \"explicit\"",
     };

@@ -2,7 +2,6 @@
 
 use crate::{interrupt, progress};
 use indicatif::ProgressBar;
-use palpate::design::sensors::Stage;
 use std::time::Instant;
 
 /// Steps of the bar for a whole stage.
@@ -11,21 +10,22 @@ const STEPS: f64 = 1000.0;
 /// A bar that begins anew with every stage.
 pub struct Watch {
     bar: ProgressBar,
-    stage: Option<Stage>,
+    stage: &'static str,
     start: Instant,
 }
 
 impl Watch {
     pub fn new() -> Self {
-        Self { bar: progress::bar(STEPS as u64, "designing"), stage: None, start: Instant::now() }
+        Self { bar: progress::bar(STEPS as u64, "designing"), stage: "", start: Instant::now() }
     }
 
-    /// Shows how far a stage is; false once somebody pressed Ctrl-C.
-    pub fn keep_going(&mut self, stage: Stage, share: f64) -> bool {
-        if self.stage != Some(stage) {
-            self.stage = Some(stage);
+    /// Shows how far a stage, in words, has come; false once somebody pressed Ctrl-C.
+    pub fn keep_going(&mut self, stage: &'static str, share: f64) -> bool {
+        if self.stage != stage {
+            self.stage = stage;
             self.start = Instant::now();
-            self.bar.set_message(words(stage));
+            self.bar.set_message(stage);
+            self.bar.set_prefix("");
         }
         if share > 0.0 {
             self.bar.set_position((share * STEPS) as u64);
@@ -39,16 +39,5 @@ impl Watch {
 impl Drop for Watch {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
-    }
-}
-
-fn words(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Candidates => "what each site tells",
-        Stage::Exchange => "exchanging",
-        Stage::Exhaustive => "all layouts",
-        Stage::Genetic => "breeding",
-        Stage::Refinement => "refining",
-        Stage::Verification => "verifying",
     }
 }

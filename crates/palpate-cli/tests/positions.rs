@@ -1,0 +1,113 @@
+//! `palpate design positions` from outside: arrangements against the even one, the next press, and what is refused.
+#![forbid(unsafe_code)]
+
+mod support {
+    pub mod command;
+}
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use support::command::{complained, run, said};
+use tempfile::TempDir;
+
+/// A rig whose estimator is fitted in milliseconds.
+const NOISY: &str = include_str!("../../../examples/sensor-design.toml");
+const NETWORK: &str = include_str!("../../../examples/training-positions.toml");
+const PLATE: &str = include_str!("../../../examples/plate.toml");
+const FSI: &str = include_str!("../../../examples/fsi-water.toml");
+
+const QUICK: [&str; 6] = ["--trials", "20", "--calibrations", "2", "--verify", "3"];
+
+fn folder(rig: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    folder
+}
+
+fn design(folder: &Path, arguments: &[&str]) -> std::process::Output {
+    run(folder, &[&["design", "positions", "rig.toml"], arguments].concat())
+}
+
+#[test]
+fn people_get_a_table_of_arrangements_a_rig_and_a_report() {
+    let folder = folder(NOISY);
+    let arguments = ["--count", "6", "-o", "pressed.toml", "--out", "page"];
+    let output = design(folder.path(), &[&QUICK[..], &arguments].concat());
+    let told = said(&output);
+    let start = "rig.toml: 6 training positions, 5 presses each, for the `influence` estimator; 73 contacts, force unknown";
+    assert!(told.starts_with(start), "{told}");
+    for name in ["even ", "edge-dense ", "chebyshev ", "variance-optimal ", "optimal "] {
+        assert!(told.lines().any(|line| line.starts_with(name)), "{name}: {told}");
+    }
+    assert!(told.contains("\neven: 33.33, 100, 166.67, 233.33, 300, 366.67 mm\n"), "{told}");
+    assert!(folder.path().join("page/report.html").exists());
+    let rig = fs::read_to_string(folder.path().join("pressed.toml")).unwrap();
+    assert!(rig.contains("arrangement = \"explicit\"\n") && rig.contains("repeats = 5"), "{rig}");
+    said(&run(folder.path(), &["fit", "pressed.toml", "-o", "locator.json"]));
+}
+
+#[test]
+fn the_papers_network_gains_by_chebyshevs_nodes_alone() {
+    let folder = folder(NETWORK);
+    let output = design(folder.path(), &["--trials", "1", "--calibrations", "1", "--verify", "8", "--json"]);
+    let found: Value = serde_json::from_str(&said(&output)).unwrap();
+    let median = |method: &str| {
+        let designs = found["designs"].as_array().unwrap();
+        let design = designs.iter().find(|design| design["method"] == method).unwrap();
+        design["median_error_mm"].as_f64().unwrap()
+    };
+    assert!(median("chebyshev") < 0.7 * median("even"), "{found}");
+}
+
+#[test]
+fn a_plate_is_pressed_on_a_grid_or_better() {
+    // An estimator that is fitted at once.
+    let folder = folder(&PLATE.replace("kind = \"influence\"", "kind = \"neighbours\""));
+    let arguments = ["--count", "9", "--trials", "1", "--calibrations", "1", "--verify", "1", "--json"];
+    let found: Value = serde_json::from_str(&said(&design(folder.path(), &arguments))).unwrap();
+    let designs = found["designs"].as_array().unwrap();
+    let names: Vec<&str> = designs.iter().map(|design| design["method"].as_str().unwrap()).collect();
+    assert_eq!(names, ["even", "chebyshev", "variance-optimal", "optimal"]);
+    assert!(designs.iter().all(|design| design["positions"].as_array().unwrap().len() == 9), "{found}");
+}
+
+#[test]
+fn a_recording_begun_tells_the_next_press_and_when_to_stop() {
+    let folder = folder(NOISY);
+    said(&run(folder.path(), &["simulate", "rig.toml", "-o", "all.csv"]));
+    let all = fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    let begun: Vec<&str> = all.lines().take(32).collect();
+    fs::write(folder.path().join("begun.csv"), begun.join("\n")).unwrap();
+    let told = said(&design(folder.path(), &["--data", "begun.csv"]));
+    assert!(told.starts_with("30 presses at 6 positions: expected error "), "{told}");
+    assert!(told.contains("press next at, mm"), "{told}");
+    let json = design(folder.path(), &["--data", "all.csv", "--stop-below", "90", "--json"]);
+    let found: Value = serde_json::from_str(&said(&json)).unwrap();
+    assert_eq!((&found["enough"], &found["presses_to_go"]), (&Value::from(true), &Value::from(0)), "{found}");
+}
+
+#[test]
+fn what_cannot_be_designed_is_refused_in_words() {
+    let refused = |rig: &str, arguments: &[&str]| {
+        let folder = folder(rig);
+        fs::write(folder.path().join("few.csv"), "position_mm,force_n\n1,2\n").unwrap();
+        complained(&design(folder.path(), arguments), 2)
+    };
+    let cases: [(&str, &[&str]); 9] = [
+        (FSI, &[]),
+        (NETWORK, &["--count", "1"]),
+        (NETWORK, &["--count", "0"]),
+        (NETWORK, &["--stop-below", "3"]),
+        (NETWORK, &["--data", "few.csv", "--stop-below", "0"]),
+        (NETWORK, &["--data", "few.csv"]),
+        (NETWORK, &["--data", "nowhere.csv"]),
+        (NETWORK, &["-o", "no/such/rig.toml"]),
+        (
+            &NETWORK.replace("\"network\"", "\"auto\"").replace("hidden = [10]\noutput = \"normalized\"", ""),
+            &[],
+        ),
+    ];
+    let shown: Vec<String> = cases.iter().map(|(rig, arguments)| refused(rig, arguments)).collect();
+    insta::assert_snapshot!(shown.join("\n"));
+}

@@ -1,0 +1,335 @@
+//! Where to press: training positions for an estimator and a budget of presses.
+//!
+//! Rules (even, edge-dense, Chebyshev's nodes) stand beside two optima: positions that leave the least variance of
+//! influence functions learnt as Gaussian processes, and positions that give the least error after simulated calibrations of
+//! the estimator itself. All are judged alike, by calibrations with noise that no search has seen. With a recording begun,
+//! [`next_press`] says where to press next, and when to stop.
+
+mod error;
+mod forward;
+mod knowledge;
+mod next;
+mod search;
+mod variance;
+
+pub use super::calibration::{CalibrationError, Verification};
+pub use error::PositionError;
+pub use next::{Advice, NextPress, next_press};
+
+use crate::arrangement::{Arrangement, cells, chebyshev, squarest, warped_cells};
+use crate::bench::Bench;
+use crate::contact::Position;
+use crate::design::calibration::{Seeds, Trial};
+use crate::design::sensors::WeightedContacts;
+use crate::estimator::EstimatorConfig;
+use crate::limit::Force;
+use crate::mechanics::Extent;
+use crate::rig::{ContactPrior, Rig};
+use crate::sensing::ChannelModel;
+use forward::Forward;
+use search::{PatternSearch, evaluate};
+
+/// Readings that a calibration is judged by, about: while searching, and when verifying.
+const READINGS_IN_SEARCH: usize = 1000;
+const READINGS: usize = 4000;
+/// Positions in the middle portion of the edge-dense arrangement, the founding paper's better choice.
+const IN_THE_MIDDLE: usize = 4;
+/// Steps from even positions to Chebyshev's and beyond that searches start from.
+const DENSITIES: [f64; 4] = [0.4, 0.8, 1.2, 1.6];
+/// The seeds of searches lie so far from those that verify.
+const SEARCH_SEEDS: u64 = 1 << 32;
+
+/// What a design of training positions is busy with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// How smooth the influence functions are, and the positions that leave the least variance.
+    Variance,
+    /// Simulated calibrations of positions that are moved about.
+    Search,
+    /// Calibrations with noise that the search has not seen.
+    Verification,
+}
+
+/// Is told the stage and the share of it that is done, from several threads, and says whether to go on.
+pub type Watch<'a> = dyn Fn(Stage, f64) -> bool + Sync + 'a;
+
+/// How training positions came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Placement {
+    /// As the rig has them.
+    Rig,
+    /// Evenly: what the others are compared with.
+    Even,
+    /// More of them towards the ends, as the founding paper has it.
+    EdgeDense,
+    /// Chebyshev's nodes; on a plane a grid of them.
+    Chebyshev,
+    /// The least variance of influence functions that are learnt as Gaussian processes.
+    VarianceOptimal,
+    /// The least error of the estimator after simulated calibrations.
+    Optimal,
+}
+
+impl Placement {
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rig => "rig",
+            Self::Even => "even",
+            Self::EdgeDense => "edge-dense",
+            Self::Chebyshev => "chebyshev",
+            Self::VarianceOptimal => "variance-optimal",
+            Self::Optimal => "optimal",
+        }
+    }
+}
+
+/// Training positions and what they are worth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// How they came about.
+    pub placement: Placement,
+    /// Where to press; on a line from left to right.
+    pub positions: Vec<Position>,
+    /// What calibrations with fresh noise give.
+    pub verification: Verification,
+    /// Their mean error at each contact, in metres.
+    pub errors_m: Vec<f64>,
+}
+
+/// How much may be pressed, and how long is searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    /// Training positions; at least 1.
+    pub count: usize,
+    /// Presses at each; at least 1.
+    pub repeats: usize,
+    /// Simulated calibrations that an arrangement is judged by while searching; at least 1.
+    pub calibrations: usize,
+    /// Arrangements that the search may try.
+    pub trials: usize,
+    /// Calibrations with fresh noise that verify each arrangement; at least 1.
+    pub verifications: usize,
+    /// Fixes all noise and every network's first weights.
+    pub seed: u64,
+}
+
+/// A rig whose training positions are designed.
+pub struct PositionProblem<'a> {
+    rig: &'a Rig,
+    budget: Budget,
+    extent: Extent,
+    contacts: WeightedContacts,
+    tolerance_m: f64,
+}
+
+impl<'a> PositionProblem<'a> {
+    /// Checks that the rig can be simulated and fitted with so many presses.
+    ///
+    /// # Errors
+    /// [`PositionError`], with what is missing.
+    pub fn new(rig: &'a Rig, budget: Budget) -> Result<Self, PositionError> {
+        if rig.bench.surface.model().is_none() {
+            return Err(PositionError::NoModel);
+        }
+        if rig.pressed_bench().force_n.is_none() {
+            return Err(PositionError::NoForce);
+        }
+        if rig.estimator == EstimatorConfig::Auto {
+            return Err(PositionError::Auto);
+        }
+        let needed = rig.estimator.positions_needed();
+        if budget.count < needed {
+            return Err(PositionError::TooFew { count: budget.count, needed, kind: rig.estimator.kind() });
+        }
+        let extent = rig.bench.surface.extent();
+        let prior = rig.design.as_ref().map(|design| design.contacts.clone());
+        let contacts = WeightedContacts::of(&prior.unwrap_or_else(|| ContactPrior::all_over(extent)), extent);
+        let tolerance_m = rig.design.as_ref().map_or(Self::TOLERANCE_M, |design| design.tolerance_m);
+        Ok(Self { rig, budget, extent, contacts, tolerance_m })
+    }
+
+    /// An error up to this is good enough unless the rig's `[design]` says otherwise.
+    const TOLERANCE_M: f64 = 2e-3;
+
+    /// The contacts that are located after calibrating.
+    pub fn contacts(&self) -> &WeightedContacts {
+        &self.contacts
+    }
+
+    /// What the locator knows of their force: as `[design]` says, or else `[contact]`.
+    pub fn force(&self) -> Force {
+        let design = self.rig.design.as_ref().and_then(|design| design.force_is_known);
+        if design.unwrap_or(true) && self.rig.bench.force_n.is_some() { Force::Known } else { Force::Unknown }
+    }
+
+    /// An error up to this is good enough, in metres.
+    pub fn tolerance_m(&self) -> f64 {
+        self.tolerance_m
+    }
+
+    /// What may be pressed.
+    pub fn budget(&self) -> Budget {
+        self.budget
+    }
+
+    /// Whether contacts have two coordinates.
+    pub fn is_plane(&self) -> bool {
+        self.extent.is_plane()
+    }
+
+    /// Every arrangement, by rule and by search, each verified. `None` when `watch` says no.
+    ///
+    /// # Errors
+    /// [`PositionError`] when the estimator cannot be fitted to such presses.
+    pub fn all(&self, watch: &Watch) -> Result<Option<Vec<Placed>>, PositionError> {
+        let mut arrangements = self.by_rule()?;
+        let Some(least) = self.variance_optimal(watch)? else { return Ok(None) };
+        arrangements.push((Placement::VarianceOptimal, least));
+        let by_rule = arrangements.iter().map(|(_, positions)| positions.clone());
+        let starts: Vec<_> = by_rule.chain(self.densities()).collect();
+        let Some(found) = self.search(&starts, watch)? else { return Ok(None) };
+        arrangements.push((Placement::Optimal, found));
+        let of = arrangements.len() as f64;
+        let mut placed = Vec::new();
+        for (done, (placement, positions)) in arrangements.into_iter().enumerate() {
+            let Some(one) = self.verified(placement, positions, done as f64 / of, watch)? else {
+                return Ok(None);
+            };
+            placed.push(one);
+        }
+        Ok(Some(placed))
+    }
+
+    /// The arrangements that rules give, the even one first.
+    fn by_rule(&self) -> Result<Vec<(Placement, Vec<Position>)>, PositionError> {
+        let (extent, count) = (self.extent, self.budget.count);
+        let (columns, rows) = squarest(extent, count);
+        let even = cells(extent, columns, rows);
+        let mut arrangements = Vec::new();
+        if let Some(training) = self.rig.training.as_ref().filter(|training| training.count == count) {
+            let own = training.positions(extent)?;
+            if own != even {
+                arrangements.push((Placement::Rig, own));
+            }
+        }
+        arrangements.insert(0, (Placement::Even, even));
+        if !extent.is_plane() && count > IN_THE_MIDDLE && count.is_multiple_of(2) {
+            let dense = Arrangement::EdgeDense { middle: IN_THE_MIDDLE, portion: Arrangement::PAPER_PORTION };
+            arrangements.push((Placement::EdgeDense, dense.positions(count, extent)?));
+        }
+        arrangements.push((Placement::Chebyshev, warped_cells(extent, columns, rows, chebyshev)));
+        Ok(arrangements)
+    }
+
+    /// Between even positions and Chebyshev's, and denser yet towards the ends.
+    fn densities(&self) -> impl Iterator<Item = Vec<Position>> {
+        let (extent, (columns, rows)) = (self.extent, squarest(self.extent, self.budget.count));
+        DENSITIES.into_iter().map(move |density| {
+            warped_cells(extent, columns, rows, |share| {
+                let once = chebyshev(share);
+                if density <= 1.0 {
+                    share + density * (once - share)
+                } else {
+                    once + (density - 1.0) * (chebyshev(once) - once)
+                }
+            })
+        })
+    }
+
+    fn variance_optimal(&self, watch: &Watch) -> Result<Option<Vec<Position>>, PositionError> {
+        let keep_going = &mut || watch(Stage::Variance, f64::NAN);
+        let Some(forward) = Forward::of_model(&self.rig.pressed_bench(), self.force(), keep_going)? else {
+            return Ok(None);
+        };
+        Ok(variance::least(&forward, &self.contacts, self.extent, &self.budget, keep_going))
+    }
+
+    /// The best of some arrangements by simulated calibrations, and then with its positions moved about.
+    fn search(
+        &self,
+        starts: &[Vec<Position>],
+        watch: &Watch,
+    ) -> Result<Option<Vec<Position>>, PositionError> {
+        let trial = self.trial(READINGS_IN_SEARCH);
+        let seeds =
+            Seeds { first: self.budget.seed.wrapping_add(SEARCH_SEEDS), count: self.budget.calibrations };
+        let score = |positions: &[Position], share: f64| -> Result<Option<f64>, PositionError> {
+            let keep_going = &mut || watch(Stage::Search, share);
+            let calibrated = trial.calibrate(positions, self.budget.repeats, seeds, keep_going)?;
+            Ok(calibrated.map(|all| Verification::of(&all, &self.contacts).mean_error_m))
+        };
+        let Some(scores) = evaluate(&score, starts, 0.0)? else { return Ok(None) };
+        let best = (0..starts.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
+        let search = PatternSearch {
+            extent: self.extent,
+            mirrored: self.is_mirrored(),
+            most_trials: self.budget.trials.saturating_sub(starts.len()),
+        };
+        search.run(&score, starts[best].clone(), scores[best])
+    }
+
+    /// Whether the bench reads the same, sensors in reverse, when the contact is mirrored.
+    fn is_mirrored(&self) -> bool {
+        let bench = self.rig.pressed_bench();
+        let (Some(surface), Some(force_n)) = (bench.surface.model(), bench.force_n) else { return false };
+        !self.extent.is_plane() && search::reads_mirrored(surface, &bench.layout, force_n)
+    }
+
+    /// What calibrations with fresh noise give.
+    fn verified(
+        &self,
+        placement: Placement,
+        positions: Vec<Position>,
+        share: f64,
+        watch: &Watch,
+    ) -> Result<Option<Placed>, PositionError> {
+        let trial = self.trial(READINGS);
+        let seeds = Seeds { first: self.budget.seed, count: self.budget.verifications };
+        let keep_going = &mut || watch(Stage::Verification, share);
+        let Some(all) = trial.calibrate(&positions, self.budget.repeats, seeds, keep_going)? else {
+            return Ok(None);
+        };
+        let mean =
+            |contact: usize| all.iter().map(|one| one.errors_m[contact]).sum::<f64>() / all.len() as f64;
+        Ok(Some(Placed {
+            placement,
+            positions,
+            verification: Verification::of(&all, &self.contacts),
+            errors_m: (0..self.contacts.len()).map(mean).collect(),
+        }))
+    }
+
+    fn trial(&self, readings: usize) -> Trial<'_> {
+        let pressed = self.rig.pressed_bench();
+        let touched = Bench { force_n: self.rig.bench.force_n.or(pressed.force_n), ..pressed.clone() };
+        let clean = pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
+        let draws = if clean { 1 } else { readings.div_ceil(self.contacts.len()) };
+        let known_n = self.rig.bench.force_n.filter(|_| self.force() == Force::Known);
+        Trial {
+            pressed,
+            touched,
+            used: Bench { force_n: known_n, ..self.rig.bench.clone() },
+            estimator: &self.rig.estimator,
+            contacts: &self.contacts,
+            draws,
+            tolerance_m: self.tolerance_m,
+        }
+    }
+}
+
+/// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that
+/// noise decides nothing.
+pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
+    let error = |placed: &Placed| placed.verification.mean_error_m;
+    let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
+    let as_good = |one: &&Placed| {
+        let apart = one.verification.standard_error_m.hypot(least.verification.standard_error_m);
+        error(one) - error(least) <= 2.0 * apart
+    };
+    placed.iter().find(as_good)
+}
+
+#[cfg(test)]
+mod tests;
