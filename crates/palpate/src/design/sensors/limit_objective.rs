@@ -14,10 +14,14 @@
 //!
 //! which for P ≤ 3 is some twenty multiplications a contact, so that all candidates are judged in one pass over their rows.
 
+mod lanes;
+mod sums;
+
 use std::sync::Arc;
 
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use crate::rig::DesignCriterion;
+use sums::{Mean, Shrinking, Sums, Without, Worst};
 
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
@@ -66,44 +70,9 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
         }
     }
 
-    /// Folds each contact's variance of the position, and the factor by which a sensor shrinks det C there, into sums.
-    ///
-    /// Every inner loop goes over the lanes of one block, so that each becomes a few vector instructions.
+    /// See [`lanes::folded`].
     fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
-        let n = self.blocks;
-        let columns: [&[Block]; P] = std::array::from_fn(|k| &row[k * n..][..n]);
-        let covariances: [[&[Block]; P]; P] =
-            std::array::from_fn(|i| std::array::from_fn(|k| &state.values[packed(i, k) * n..][..n]));
-        let (mut first, mut second) = ([0.0; LANES], [0.0; LANES]);
-        for at in 0..n {
-            // shrink = 1 + jᵀ·C·j; gain = |C·j|² of the position; before = tr C of the position.
-            let (mut shrink, mut gain, mut variance) = ([1.0; LANES], [0.0; LANES], [0.0; LANES]);
-            for i in 0..P {
-                let mut told = [0.0; LANES];
-                for k in 0..P {
-                    let (c, j) = (&covariances[i][k][at], &columns[k][at]);
-                    for lane in 0..LANES {
-                        told[lane] += c[lane] * j[lane];
-                    }
-                }
-                let j = &columns[i][at];
-                for lane in 0..LANES {
-                    shrink[lane] += j[lane] * told[lane];
-                }
-                if i >= FIRST {
-                    let before = &covariances[i][i][at];
-                    for lane in 0..LANES {
-                        gain[lane] += told[lane] * told[lane];
-                        variance[lane] += before[lane];
-                    }
-                }
-            }
-            for lane in 0..LANES {
-                variance[lane] = (variance[lane] - gain[lane] / shrink[lane]).max(0.0);
-            }
-            sums.fold(&mut first, &mut second, &self.weights[at], &variance, &shrink);
-        }
-        [S::join(&first), second.iter().sum()]
+        lanes::folded::<P, FIRST, S>(&state.values, row, &self.weights, sums)
     }
 
     /// The sums for a sensor, or for none.
@@ -213,66 +182,6 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
     fn value(&self, state: &State) -> f64 {
         let [sum, _] = self.sums(state, &self.silent_row());
         if self.criterion == DesignCriterion::WorstLimit { sum.sqrt() } else { sum }
-    }
-}
-
-/// What is summed over the contacts, block by block. The second sum is the mean standard deviation, where ties are to be broken.
-trait Sums {
-    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
-
-    fn join(lanes: &Block) -> f64 {
-        lanes.iter().sum()
-    }
-}
-
-/// The mean standard deviation.
-struct Mean;
-/// The largest variance.
-struct Worst;
-/// The share of contacts whose variance is above this one.
-struct Without(f64);
-/// The mean of −½·ln of the factors by which det C shrinks.
-struct Shrinking;
-
-impl Sums for Mean {
-    #[inline(always)]
-    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, variance: &Block, _: &Block) {
-        for lane in 0..LANES {
-            first[lane] += weight[lane] * variance[lane].sqrt();
-        }
-    }
-}
-
-impl Sums for Worst {
-    #[inline(always)]
-    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
-        for lane in 0..LANES {
-            first[lane] = first[lane].max(variance[lane]);
-            second[lane] += weight[lane] * variance[lane].sqrt();
-        }
-    }
-
-    fn join(lanes: &Block) -> f64 {
-        lanes.iter().copied().fold(0.0, f64::max)
-    }
-}
-
-impl Sums for Without {
-    #[inline(always)]
-    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
-        for lane in 0..LANES {
-            first[lane] += if variance[lane] > self.0 { weight[lane] } else { 0.0 };
-            second[lane] += weight[lane] * variance[lane].sqrt();
-        }
-    }
-}
-
-impl Sums for Shrinking {
-    #[inline(always)]
-    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, _: &Block, shrink: &Block) {
-        for lane in 0..LANES {
-            first[lane] -= 0.5 * weight[lane] * shrink[lane].ln();
-        }
     }
 }
 

@@ -80,13 +80,16 @@ impl Pool {
 
     /// Whether a layout may have both units.
     pub fn go_together(&self, a: usize, b: usize) -> bool {
+        // Of very many candidates this is asked very often.
+        if a == b || excludes_nothing(&self.design) {
+            return a != b;
+        }
         let (first, second) = (self.units[a], self.units[b]);
-        a != b
-            && first.members().all(|i| {
-                second.members().all(|j| {
-                    exclusion(&self.sensors[i], &self.sensors[j], &self.design, self.extent).is_none()
-                })
-            })
+        first.members().all(|i| {
+            second
+                .members()
+                .all(|j| exclusion(&self.sensors[i], &self.sensors[j], &self.design, self.extent).is_none())
+        })
     }
 
     /// Whether a unit may join a selection that is to become a whole layout.
@@ -139,6 +142,11 @@ impl Pool {
     }
 }
 
+/// Whether any two different sensors may be in one layout.
+fn excludes_nothing(design: &SensorDesign) -> bool {
+    design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden
+}
+
 /// Why two different sensors cannot both be there, if so.
 pub(super) fn exclusion(
     a: &PlacedSensor,
@@ -146,8 +154,7 @@ pub(super) fn exclusion(
     design: &SensorDesign,
     extent: Extent,
 ) -> Option<Exclusion> {
-    // Of very many candidates this is asked very often.
-    if design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden {
+    if excludes_nothing(design) {
         return None;
     }
     let takes_room = |sensor: &PlacedSensor| design.offers[sensor.offer].kind != SensorKind::Reaction;

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::candidates::PlacedSensor;
 use super::contacts::WeightedContacts;
 use super::error::DesignError;
-use super::limit_objective::{LimitObjective, padded};
+use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
 use super::{KeepGoing, Stage};
 use crate::contact::{Contact, Position};
@@ -42,13 +42,27 @@ impl Touches<'_> {
         usize::from(self.force == Force::Unknown) + if self.extent().is_plane() { 2 } else { 1 }
     }
 
+    /// How many blocks the row of a sensor has.
+    fn row_size(&self) -> usize {
+        self.unknowns() * self.contacts.len().div_ceil(LANES)
+    }
+
     /// The row of a sensor: derivatives of its whitened reading by ln W where the force is unknown, by x, and by y on a plane.
     /// Where the sensor is saturated it tells nothing.
     pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
+        let mut row = vec![[0.0; LANES]; self.row_size()];
+        self.fill(&mut row, kind, position, channel);
+        row
+    }
+
+    /// Writes the row of a sensor where zeros are.
+    fn fill(&self, row: &mut [Block], kind: SensorKind, position: Position, channel: &ChannelModel) {
         let response = self.surface.response_function(kind, position);
         let sd = channel.reading_sd();
-        let mut columns = vec![Vec::with_capacity(self.contacts.len()); self.unknowns()];
-        for &position in &self.contacts.positions {
+        let blocks = self.contacts.len().div_ceil(LANES);
+        let first = usize::from(self.force == Force::Known);
+        let unknown = first..first + self.unknowns();
+        for (i, &position) in self.contacts.positions.iter().enumerate() {
             let contact = Contact { position, force_n: self.force_n };
             let free = channel.range.is_none_or(|(low, high)| {
                 let reading = response.at(contact);
@@ -56,12 +70,11 @@ impl Touches<'_> {
             });
             let weight = if free { 1.0 / sd } else { 0.0 };
             let ResponseGradient { position: [along, across], force } = response.gradient(contact);
-            let by_force = (self.force == Force::Unknown).then_some(self.force_n * force);
-            let across = self.extent().is_plane().then_some(across);
-            let told = [by_force, Some(along), across].into_iter().flatten();
-            columns.iter_mut().zip(told).for_each(|(column, value)| column.push(weight * value));
+            let told = [self.force_n * force, along, across];
+            for (column, value) in told[unknown.clone()].iter().enumerate() {
+                row[column * blocks + i / LANES][i % LANES] = weight * value;
+            }
         }
-        columns.iter().flat_map(|column| padded(column)).collect()
     }
 
     /// The rows of all candidates, one after the other; `None` when `keep_going` says no.
@@ -72,18 +85,18 @@ impl Touches<'_> {
         keep_going: &mut KeepGoing,
     ) -> Result<Option<Vec<Block>>, DesignError> {
         let (sites, contacts) = (sensors.len(), self.contacts.len());
-        let size = self.unknowns() * contacts.div_ceil(LANES);
+        let size = self.row_size();
         let bytes = (sites * size * LANES * 8) as f64;
         if bytes > MOST_BYTES {
             return Err(DesignError::TooLarge { sites, contacts, bytes, most: MOST_BYTES });
         }
-        let mut table = Vec::with_capacity(sites * size);
-        for (done, sensor) in sensors.iter().enumerate() {
+        let mut table = vec![[0.0; LANES]; sites * size];
+        for (done, (sensor, row)) in sensors.iter().zip(table.chunks_exact_mut(size.max(1))).enumerate() {
             if done.is_multiple_of(ASK_EVERY) && !keep_going(Stage::Candidates, done as f64 / sites as f64) {
                 return Ok(None);
             }
             let offer = &design.offers[sensor.offer];
-            table.extend(self.row(offer.kind, sensor.position, &offer.channel));
+            self.fill(row, offer.kind, sensor.position, &offer.channel);
         }
         Ok(Some(table))
     }
