@@ -97,6 +97,9 @@ fn a_report_verifies_what_it_claims() {
     for name in ["report.html", "figure-1.svg", "figure-2.png", "figure-3.png", "figure-4.png"] {
         assert!(folder.path().join("deep/report").join(name).is_file(), "{name}");
     }
+    let page = fs::read_to_string(folder.path().join("deep/report/report.html")).unwrap();
+    let figures: Vec<_> = (1..=4).map(|number| page.find(&format!("Figure {number}."))).collect();
+    assert!(figures.iter().all(Option::is_some) && figures.is_sorted(), "{figures:?}");
     let told: Vec<f64> = found["designs"]
         .as_array()
         .unwrap()
@@ -130,7 +133,11 @@ fn a_plate_has_maps() {
     let told =
         said(&run(folder.path(), &["design", "sensors", "rig.toml", "--out", "report", "--verify", "1"]));
     assert!(told.contains("greedy-exchange: deflection (") && told.contains("Report:"), "{told}");
-    assert!(folder.path().join("report/figure-3.png").is_file());
+    for name in ["figure-1.png", "figure-2.png"] {
+        assert!(folder.path().join("report").join(name).is_file(), "{name}");
+    }
+    let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.find("Figure 1.") < page.find("Figure 2.") && page.contains("Figure 1."));
 }
 
 #[test]

@@ -32,6 +32,8 @@ fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
     let mut last = None;
     let mut times: Vec<f64> = (0..ROUNDS)
         .map(|_| {
+            // What the round before gave is let go untimed.
+            last = None;
             let start = ThreadTime::now();
             last = Some(std::hint::black_box(work()));
             start.elapsed().as_secs_f64()

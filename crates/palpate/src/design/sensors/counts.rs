@@ -22,13 +22,17 @@ impl SensorProblem<'_> {
     /// Even and designed layouts for each number of sensors. `None` when `keep_going` says no.
     ///
     /// # Errors
-    /// [`DesignError`] for the first number that no layout can have.
+    /// [`DesignError`] for the largest number or else the first that no layout can have.
     pub fn counts(
         &self,
         range: RangeInclusive<usize>,
         seed: u64,
         keep_going: &mut KeepGoing,
     ) -> Result<Option<Vec<CountPoint>>, DesignError> {
+        // What no layout can have is told before the work, not in its midst.
+        if !range.is_empty() {
+            self.with_count(*range.end())?;
+        }
         let mut points = Vec::new();
         for count in range {
             let problem = self.with_count(count)?;

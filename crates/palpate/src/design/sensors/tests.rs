@@ -244,6 +244,37 @@ fn many_sites_are_searched_as_few_are() {
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }
 
+/// What the samples left out is found all the same: exchanged one by one, no unit of all gains a millionth of the score.
+#[test]
+fn no_exchange_for_one_of_very_many_matters() {
+    let (bench, mut design) = rig();
+    design.offers = four_kinds();
+    design.contacts.every_m = 0.02;
+    design.spacing_m = 0.002;
+    for (symmetry, sites) in [(Symmetry::Any, 1000), (Symmetry::Wanted, 1500), (Symmetry::Forbidden, 1000)] {
+        let design = SensorDesign { sites: Sites::Count(sites), symmetry, count: 4, ..design.clone() };
+        let problem = problem(&bench, &design);
+        let (pool, objective) = (&problem.pool, &*problem.objective);
+        assert!(pool.units.len() > 2000, "{}", pool.units.len());
+        let found = problem.exchanged(objective, 0, &mut |_, _| true).unwrap();
+        assert_eq!(pool.size(&found.selection), 4);
+        for slot in 0..found.selection.len() {
+            let mut others = found.selection.clone();
+            let leaving = others.remove(slot);
+            assert!(pool.may_join(&others, leaving), "{symmetry:?}");
+            for unit in pool.joinable(&others, &(0..pool.units.len()).collect::<Vec<_>>(), None) {
+                let selection = others.iter().copied().chain([unit]).collect();
+                let other = Found::of(pool, objective, selection);
+                let whole = pool.size(&other.selection) == 4;
+                assert!(
+                    !whole || other.score > found.score * (1.0 - 1.1e-6),
+                    "{symmetry:?}: {unit} for {leaving}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn more_sensors_never_tell_less() {
     let (bench, design) = rig();
@@ -251,6 +282,8 @@ fn more_sensors_never_tell_less() {
     assert!(points.windows(2).all(|pair| pair[1].designed.score < pair[0].designed.score));
     assert_eq!(points.iter().map(|point| point.count).collect::<Vec<_>>(), [2, 3, 4, 5, 6]);
     assert!(enough(&points).is_some_and(|count| count > 2));
+    let beyond = problem(&bench, &design).counts(2..=80, 0, &mut |_, _| panic!("nothing is searched"));
+    assert_eq!(beyond.unwrap_err(), DesignError::TooFewSites { count: 80, sites: 79 });
 }
 
 #[test]

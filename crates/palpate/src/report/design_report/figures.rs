@@ -153,10 +153,9 @@ pub(super) fn sites_figure(report: &SensorDesignReport, number: usize) -> Figure
         .designed
         .iter()
         .enumerate()
-        .rev()
-        .map(|(row, designed)| format!("{}: {}", rows - row, designed.method.name()))
+        .map(|(row, designed)| format!("{} {}", rows - row, designed.method.name()))
         .collect();
-    let caption = html! { "The sensors of every layout, a row each. " (names.join(", ")) "." };
+    let caption = html! { "The sensors of every layout, a row each; from the top: " (names.join(", ")) "." };
     Figure { number, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
 }
 

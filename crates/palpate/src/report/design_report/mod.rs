@@ -39,27 +39,33 @@ pub struct SensorDesignReport<'a> {
 /// [`ReportError`] when the bench cannot be drawn or a figure does not become a picture.
 pub fn sensor_design_report(report: &SensorDesignReport) -> Result<Vec<ReportFile>, ReportError> {
     let mut figures = Vec::new();
-    figures.extend(figures::bench_figure(report, 1)?);
-    if let Some(width_m) = report.bench.surface.extent().width_m {
-        figures.extend(plane::limit_maps(report, width_m, 2));
+    // Numbered as they come: the layouts' sites along a line, the limit with the best of them, the counts.
+    let limits = if let Some(width_m) = report.bench.surface.extent().width_m {
+        figures.extend(plane::limit_maps(report, width_m, 1));
+        1..3
     } else {
-        figures.extend(figures::limit_figure(report, 2));
-        figures.push(figures::sites_figure(report, 3));
-    }
-    let counted = figures::counts_figure(report, 4);
+        figures.push(figures::sites_figure(report, 1));
+        figures.extend(figures::bench_figure(report, 2)?);
+        figures.extend(figures::limit_figure(report, 3));
+        2..4
+    };
+    let sites = 1..limits.start;
+    let counted = figures::counts_figure(report, limits.end);
     let has_counts = counted.is_some();
+    let counts = limits.end;
     figures.extend(counted);
     let figures = Figures(figures);
+    let shown = |numbers: std::ops::Range<usize>| html! { @for number in numbers { (figures.show(number)) } };
     let section = |id, heading, body| Section { id, heading, body };
     let mut sections = vec![
-        section("layouts", "The layouts", html! { (report.table(1)) (report.places(2)) (figures.show(3)) }),
-        section("limit", "The limit with the best of them", html! { (figures.show(1)) (figures.show(2)) }),
+        section("layouts", "The layouts", html! { (report.table(1)) (report.places(2)) (shown(sites)) }),
+        section("limit", "The limit with the best of them", shown(limits)),
     ];
     if has_counts {
         sections.push(section(
             "counts",
             "How many sensors are enough",
-            html! { (report.counts_in_words()) (figures.show(4)) },
+            html! { (report.counts_in_words()) (figures.show(counts)) },
         ));
     }
     sections.push(section("given", "What was given", report.given()));
@@ -134,7 +140,7 @@ impl<'a> SensorDesignReport<'a> {
             let star = if worth.keeps_constraints { "" } else { " *" };
             let told = self.verification(designed.method);
             let error = told.map_or("–".to_owned(), |told| {
-                format!("{} ± {}", number(told.mean_error_m * 1e3), number(told.standard_error_m * 1e3))
+                format!("{:.3} ± {:.3}", told.mean_error_m * 1e3, told.standard_error_m * 1e3)
             });
             vec![
                 text(format!("{}{star}", designed.method.name())),
