@@ -32,8 +32,8 @@ fn pages() -> [Vec<ReportFile>; 2] {
     let study = PreparedStudy::new(Study::from_toml(&toml).unwrap()).unwrap();
     let seeds = 2;
     let options = RunOptions { seeds, threads: 1, set: InstructionSet::best() };
-    let outcomes = study.run(options, Vec::new(), &Unwatched);
-    let results = StudyResults::of(&outcomes, study.judging());
+    let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
+    let results = StudyResults::of(&outcomes, &study);
     let run = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
         study: study.study.name.clone(),

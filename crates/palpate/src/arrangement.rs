@@ -13,6 +13,12 @@ use crate::mechanics::Extent;
 pub enum Arrangement {
     /// Equally spaced: a_i = (i + ½)·l/n for i = 0…n−1 (sets 1 to 3 of the founding paper's Table 1).
     Even,
+    /// Equally spaced over a portion of the length, its ends included: a_i = s + i·(e − s)/(n − 1) for i = 0…n−1; a single one lies
+    /// in the middle.
+    EvenOver {
+        /// Start s and end e of the portion as shares of the length; 0 ≤ start < end ≤ 1.
+        portion: (f64, f64),
+    },
     /// Fewer positions in the middle portion and more towards the edges (the founding paper's Table 3).
     ///
     /// The `middle` ones are equally spaced over the portion, its ends included. The other n − `middle` split evenly over
@@ -77,6 +83,14 @@ pub enum ArrangementError {
         /// Its end, as a share of the length.
         end: f64,
     },
+    /// The portion of even positions is empty or reaches beyond the surface.
+    #[error("the portion goes from {start} to {end} of the length; 0 ≤ start < end ≤ 1 must hold")]
+    EvenPortion {
+        /// Its start, as a share of the length.
+        start: f64,
+        /// Its end, as a share of the length.
+        end: f64,
+    },
     /// The explicit positions are not as many as was said.
     #[error("{listed} training positions are listed, but their count is given as {count}")]
     CountDiffers {
@@ -131,11 +145,12 @@ impl Arrangement {
             return Err(ArrangementError::NoPositions);
         }
         match self {
-            Self::Even | Self::EdgeDense { .. } | Self::Chebyshev if extent.is_plane() => {
+            Self::Even | Self::EvenOver { .. } | Self::EdgeDense { .. } | Self::Chebyshev if extent.is_plane() => {
                 Err(ArrangementError::LineOnPlane { count })
             }
             Self::Even => Ok(cells(extent, count, 1)),
             Self::Chebyshev => Ok(warped_cells(extent, count, 1, chebyshev)),
+            Self::EvenOver { portion } => even_over(count, *portion, extent.length_m),
             Self::EdgeDense { middle, portion } => edge_dense(count, *middle, *portion, extent.length_m),
             Self::Grid { columns, rows } => grid(count, *columns, *rows, extent),
             Self::Explicit(positions) => explicit(positions, count, extent),
@@ -145,6 +160,18 @@ impl Arrangement {
 
 fn at(x_m: f64) -> Position {
     Position::along(x_m)
+}
+
+fn even_over(
+    count: usize,
+    (start, end): (f64, f64),
+    length_m: f64,
+) -> Result<Vec<Position>, ArrangementError> {
+    if !(0.0 <= start && start < end && end <= 1.0) {
+        return Err(ArrangementError::EvenPortion { start, end });
+    }
+    let share = |i: usize| if count == 1 { 0.5 } else { i as f64 / (count - 1) as f64 };
+    Ok((0..count).map(|i| at((start + share(i) * (end - start)) * length_m)).collect())
 }
 
 fn edge_dense(

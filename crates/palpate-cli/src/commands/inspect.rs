@@ -118,6 +118,9 @@ fn training_words(training: &Training) -> String {
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
         Arrangement::Chebyshev => "at Chebyshev's nodes".to_owned(),
+        Arrangement::EvenOver { portion: (start, end) } => {
+            format!("evenly from {:.4} to {:.4} of the length", start, end)
+        }
         Arrangement::Grid { columns, rows } => format!("a grid of {columns} × {rows}"),
         Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),
         Arrangement::Explicit(_) => "as listed".to_owned(),

@@ -1,5 +1,7 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
+use crate::commands::design::sensors::words;
+use crate::commands::design::watch::Watch as DesignWatch;
 use crate::failure::{Complaint, Failure};
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
@@ -8,7 +10,8 @@ use palpate::network::InstructionSet;
 use palpate::report::{StudyReport, paper_report, study_report};
 use palpate::study::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate::study::{
-    ArmOutcome, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults, Trained,
+    ArmOutcome, ArmResults, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults,
+    StudyRunError, Trained,
 };
 use palpate::units::format_count;
 use std::path::{Path, PathBuf};
@@ -26,16 +29,16 @@ use watch::Watch;
 pub struct Arguments {
     /// A study file, `paper`, or `dead-areas`: what lies between sensors
     study: PathBuf,
-    /// Networks that each arm trains [default: what the study says]
+    /// Fits of each arm [default: what the study says]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: Option<u64>,
-    /// Threads that train [default: one a core]
+    /// Threads that fit [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Folder for results and report [default: palpate-out/<study>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on from an earlier run that was stopped
+    /// Go on from an earlier run that was stopped: networks on perfect sensors are kept, what else there is is fitted again
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     /// Throw an earlier, unfinished run away
@@ -64,22 +67,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return dead_areas::run(arguments);
     }
     let is_paper = arguments.study == Path::new("paper");
-    let study = if is_paper {
-        input::parse_study("studies/paper.toml", STUDY_TOML)?
+    let (name, text) = if is_paper {
+        ("studies/paper.toml".to_owned(), STUDY_TOML.to_owned())
     } else {
-        let text = input::read_text(&arguments.study)?;
-        input::parse_study(&arguments.study.display().to_string(), &text)?
+        (arguments.study.display().to_string(), input::read_text(&arguments.study)?)
     };
+    let study = input::parse_study(&name, &text)?;
     let options = RunOptions {
         seeds: arguments.seeds.unwrap_or(study.seeds),
         threads: arguments.threads.map_or_else(cores, usize::from),
         set: InstructionSet::best(),
     };
     let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(&study.name));
-    let prepared = PreparedStudy::new(study).map_err(Complaint::new)?;
+    let mut watch = DesignWatch::new();
+    let prepared = PreparedStudy::watched(study, &mut |stage, share| watch.keep_going(words(stage), share));
+    drop(watch);
+    let prepared = prepared.map_err(|error| complaint(&error, &name, &text))?;
+    let prepared = prepared.ok_or_else(|| Failure::Interrupted("stopped; nothing was written".to_owned()))?;
     let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
 
-    let results = StudyResults::of(&outcomes, prepared.judging());
+    let results = StudyResults::of(&outcomes, &prepared);
     let file = ResultsFile {
         run: &facts,
         results: &results,
@@ -95,11 +102,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     print_tables(&file, &out)
 }
 
+/// With a caret where the study file asks for what cannot be had.
+fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
+    let complaint = Complaint::new(error);
+    match error {
+        StudyRunError::Design { place, error, .. } => {
+            complaint.help(error.help()).at_span(name, text, place.clone()).into()
+        }
+        _ => complaint.into(),
+    }
+}
+
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Trains what an earlier run has not, keeping `networks.csv` up to date; leaves it sorted.
+/// Fits what an earlier run has not, keeping `networks.csv` up to date where networks are kept; leaves it sorted.
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
@@ -108,23 +126,36 @@ fn train(
 ) -> Result<(Vec<ArmOutcome>, RunFacts), Failure> {
     let table = NetworksCsv::new(prepared);
     output::make_folder(out)?;
-    let (file, done) = CheckpointFile::open(out, &table, arguments.resume, arguments.overwrite)?;
+    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_in_lanes(arm));
+    let (file, done) = if keeps {
+        let (file, done) = CheckpointFile::open(out, &table, arguments.resume, arguments.overwrite)?;
+        (Some(file), done)
+    } else {
+        (None, Vec::new())
+    };
     let resumed: Vec<(usize, u64)> = done.iter().map(|trained| (trained.arm, trained.fit.seed)).collect();
     let watch = Watch::new(prepared, options, &table, file, &done);
     let start = Instant::now();
     let outcomes = prepared.run(options, done, &watch);
     let seconds = start.elapsed().as_secs_f64();
     watch.finish()?;
+    let outcomes = outcomes.map_err(Complaint::new)?;
 
     let wanted = prepared.study.arms.len() as u64 * options.seeds;
     let finished: u64 = outcomes.iter().map(|outcome| outcome.fits.len() as u64).sum();
     if finished < wanted {
-        return Err(Failure::Interrupted(format!(
-            "stopped; {finished} of {wanted} networks are in {}; --resume goes on from them",
-            out.join(checkpoint::NAME).display()
-        )));
+        return Err(Failure::Interrupted(if keeps {
+            let kept = outcomes.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
+            let kept: usize = kept.map(|(_, outcome)| outcome.fits.len()).sum();
+            let path = out.join(checkpoint::NAME);
+            format!("stopped; {kept} of {wanted} networks are in {}; --resume goes on from them", path.display())
+        } else {
+            format!("stopped after {finished} of {wanted} fits; nothing was written")
+        }));
     }
-    checkpoint::write_sorted(out, &table, &outcomes)?;
+    if keeps {
+        checkpoint::write_sorted(out, &table, prepared, &outcomes)?;
+    }
     Ok((outcomes.clone(), facts(prepared, options, &outcomes, &resumed, seconds)))
 }
 
@@ -157,17 +188,8 @@ fn facts(
 }
 
 fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
-    let spread =
-        |s: &Spread, digits: usize| format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95);
-    let arms = file.results.arms.iter().map(|arm| {
-        let epochs = [arm.epochs.median, arm.epochs.p05, arm.epochs.p95].map(whole);
-        let epochs = format!("{} ({}–{})", epochs[0], epochs[1], epochs[2]);
-        let converged = format!("{}/{}", arm.converged, arm.seeds);
-        let effective = spread(&arm.effective_length_percent, 1);
-        vec![arm.name.clone(), converged, epochs, spread(&arm.error_percent, 2), effective]
-    });
     output::say("Medians over the seeds (5th to 95th percentile)\n")?;
-    output::say(table(&["arm", "converged", "epochs", "average error, %", "effective length, %"], arms))?;
+    output::say(arms_table(&file.results.arms))?;
     if let Some(figures) = &file.published {
         let rows = figures.iter().map(|figure| {
             let digits = if figure.median >= 1000.0 { 0 } else { 2 };
@@ -190,12 +212,71 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
         output::say(table(&["claim", "verdict", "seeds"], rows))?;
     }
     let run = file.run;
-    let (seconds, rate) = (progress::duration(run.seconds), run.presentations_per_second / 1e6);
-    output::say(format!(
-        "\n{seconds} on {} threads, {rate:.1} M presentations/s ({})",
-        run.threads, run.arithmetic
-    ))?;
+    let seconds = progress::duration(run.seconds);
+    output::say(if run.presentations > 0 {
+        let rate = run.presentations_per_second / 1e6;
+        format!("\n{seconds} on {} threads, {rate:.1} M presentations/s ({})", run.threads, run.arithmetic)
+    } else {
+        format!("\n{seconds} on {} threads", run.threads)
+    })?;
     output::say(format!("Report: {}", out.join("report.html").display()))
+}
+
+/// Every arm a row; a column only where some arm fills it.
+fn arms_table(arms: &[ArmResults]) -> String {
+    let columns = arm_columns(arms);
+    let filled = || columns.iter().filter(|(_, of)| arms.iter().any(|arm| of(arm).is_some()));
+    let headings: Vec<&str> = filled().map(|(heading, _)| heading.as_str()).collect();
+    let rows = arms.iter().map(|arm| {
+        let cells = filled().map(|(_, of)| of(arm).unwrap_or_else(|| "–".to_owned()));
+        cells.collect::<Vec<String>>()
+    });
+    table(&headings, rows)
+}
+
+/// A heading, and what an arm has to say under it.
+type ArmColumn = (String, Box<dyn Fn(&ArmResults) -> Option<String>>);
+
+fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
+    fn column(heading: &str, of: impl Fn(&ArmResults) -> Option<String> + 'static) -> ArmColumn {
+        (heading.to_owned(), Box::new(of))
+    }
+    let spread =
+        |s: &Spread, digits: usize| format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95);
+    let mut columns = vec![
+        column("arm", |arm| Some(arm.name.clone())),
+        column("converged", |arm| Some(format!("{}/{}", arm.converged?, arm.seeds))),
+        column("epochs", |arm| {
+            let epochs = arm.epochs?;
+            let [median, low, high] = [epochs.median, epochs.p05, epochs.p95].map(whole);
+            Some(format!("{median} ({low}–{high})"))
+        }),
+        column("average error, %", move |arm| Some(spread(&arm.error_percent, 2))),
+        column("between training, %", move |arm| {
+            Some(spread(&arm.training_span.as_ref()?.error_percent_within_training?, 2))
+        }),
+        column("beyond, %", move |arm| {
+            Some(spread(&arm.training_span.as_ref()?.error_percent_beyond_training?, 2))
+        }),
+        column("effective length, %", move |arm| Some(spread(&arm.effective_length_percent, 1))),
+        column("limit, %", |arm| Some(format!("{:.3}", arm.limit.as_ref()?.limit_error_percent))),
+    ];
+    // Blind ends outweigh all else in the average; with noise, the portions are told beside it.
+    let limited = arms.iter().find(|arm| arm.limit.is_some());
+    for (i, portion) in limited.iter().flat_map(|arm| &arm.portions).map(|p| p.portion).enumerate() {
+        let key = portion.key().replace('_', "–");
+        columns.push(column(&format!("{key} mm: error, %"), move |arm| {
+            Some(spread(&arm.portions.get(i)?.error_percent, 3))
+        }));
+        columns.push(column("limit, %", move |arm| {
+            Some(format!("{:.3}", arm.portions.get(i)?.limit_error_percent?))
+        }));
+    }
+    columns.push(column("over the limit", move |arm| {
+        Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))
+    }));
+    columns.push(column("95 % hold, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
+    columns
 }
 
 /// A count, or a spread of counts, rounded.

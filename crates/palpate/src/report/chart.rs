@@ -65,6 +65,11 @@ impl Axis {
         Axis { range: AxisRange::Fixed { low, high }, ..self }
     }
 
+    /// The same axis with names instead of numbers.
+    pub fn named(self, names: Vec<(f64, String)>) -> Self {
+        Axis { ticks: Ticks::Named(names), ..self }
+    }
+
     /// The same axis with ticks at `values` only.
     pub fn ticks_at(self, values: impl Into<Vec<f64>>) -> Self {
         Axis { ticks: Ticks::At(values.into()), ..self }
@@ -103,6 +108,8 @@ pub enum Ticks {
     /// Round numbers, as many as are readable.
     #[default]
     Automatic,
+    /// These values, each with its name, where they lie in the range; one whose name would touch its neighbour's is left out.
+    Named(Vec<(f64, String)>),
     /// These values where they lie in the range; one whose label would touch its neighbour's is left out.
     At(Vec<f64>),
 }

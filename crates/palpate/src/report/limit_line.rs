@@ -30,6 +30,15 @@ pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
     }
 }
 
+/// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` where there is none. The locator knows the force,
+/// or does not; contacts have `force_n` newtons either way.
+pub(super) fn limit_line_of_arm(bench: &Bench, force_n: f64, colour: usize, label: String) -> Option<Series> {
+    let limit = Limit::of(bench).ok()?;
+    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let curve = LimitCurve::over(&limit, force_n, force).ok()?;
+    Some(Series { colour, ..line(&curve, label) })
+}
+
 /// What to say of the line in the caption of a chart that has it; else nothing.
 pub(super) fn limit_in_words(chart: &Chart) -> String {
     let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {

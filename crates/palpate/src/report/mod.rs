@@ -50,6 +50,8 @@ mod position_report;
 mod profile_report;
 mod report_file;
 mod scale;
+mod sites;
+mod study_figures;
 mod study_parts;
 mod study_report;
 mod text;

@@ -153,11 +153,6 @@ impl Figures {
     pub fn show(&self, number: usize) -> Markup {
         html! { @for figure in self.0.iter().filter(|figure| figure.number == number) { (figure.markup()) } }
     }
-
-    /// Every figure.
-    pub fn show_all(&self) -> Markup {
-        html! { @for figure in &self.0 { (figure.markup()) } }
-    }
 }
 
 impl Table {

@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::limit_line::limit_in_words;
 use super::numbers::{counted, mm, number};
-use super::page::{Figure, Figures, Page, Section};
-use super::study_parts::{Drawn, arms_table, error_chart, footer, glossary, run_table};
-use super::{ReportError, ReportFile, chart_to_svg};
+use super::page::{Figure, Figures, Page, Section, Table, text, wide};
+use super::study_figures::{along_the_surface, layouts, layouts_figure, overview};
+use super::study_parts::{arms_table, footer, glossary, run_table};
+use super::{ReportError, ReportFile};
 use crate::study::{ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
 /// What a study's report is made from.
@@ -27,45 +27,59 @@ pub struct StudyReport<'a> {
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
 pub fn study_report(report: &StudyReport) -> Result<Vec<ReportFile>, ReportError> {
-    let figures = Figures(figures(report));
+    let overview = overview(report, 1);
+    let layouts_drawn = layouts_figure(report, 1 + usize::from(overview.is_some()));
+    let before = usize::from(overview.is_some()) + usize::from(layouts_drawn.is_some());
+    let mut figures: Vec<Figure> = overview.into_iter().chain(layouts_drawn).collect();
+    figures.extend(along_the_surface(report, before + 1));
+    let figures = Figures(figures);
     let section = |id, heading, body| Section { id, heading, body };
+    let has_layouts = layouts(report).len() > 1;
+    let overview_number = if has_layouts { before - 1 } else { before };
+    let mut sections =
+        vec![section("arms", "All arms", html! { (figures.show(overview_number)) (arms_table(report, 1)) })];
+    if has_layouts {
+        let body = html! { (figures.show(before)) (layouts_table(report, 2)) };
+        sections.push(section("layouts", "The layouts", body));
+    }
+    let errors = html! { @for i in before + 1..=figures.0.len() { (figures.show(i)) } };
+    let tables = if has_layouts { 3 } else { 2 };
+    sections.push(section("errors", "Errors along the surface", errors));
+    sections.push(section("words", "What the words mean", glossary(report)));
+    sections.push(section("run", "The run", run_table(report, tables)));
     let page = Page {
         title: format!("Study {}", report.run.study),
         opening: summary(report),
-        sections: vec![
-            section("arms", "All arms", arms_table(report, 1)),
-            section("errors", "Errors along the surface", figures.show_all()),
-            section("words", "What the words mean", glossary(report)),
-            section("run", "The run", run_table(report, 2)),
-        ],
+        sections,
         footer: footer(report),
     };
     page.into_files(figures)
 }
 
-fn figures(report: &StudyReport) -> Vec<Figure> {
-    let drawn = report.results.arms.iter().enumerate().filter_map(|(i, arm)| {
-        let title = format!("Location error of {}", arm.name);
-        let label = if arm.seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
-        let chart = error_chart(report, &title, &[Drawn { arm: &arm.name, label, colour: i }])?;
-        let caption = html! {
-            "Location error of " b { (arm.name) } " by load position, over "
-            (counted(arm.seeds, "seed", "seeds")) "." (limit_in_words(&chart))
-        };
-        Some(Figure { number: i + 1, alternative: title, svg: chart_to_svg(&chart), caption })
+/// Which arms have which layout.
+fn layouts_table(report: &StudyReport, table: usize) -> Markup {
+    let rows = layouts(report).into_iter().map(|(arms, layout)| {
+        vec![text(arms.join(", ")), text(layout.places_in_words(false))]
     });
-    drawn.collect()
+    Table {
+        number: table,
+        caption: html! { "Where the sensors of every arm sit." },
+        columns: vec![wide("arms"), wide("sensors")],
+        rows: rows.collect(),
+    }
+    .markup()
 }
 
 fn summary(report: &StudyReport) -> Markup {
     let arms = report.results.arms.len();
     let positions = report.study.judging().positions.len();
+    let [one, many] = report.noun();
     html! {
         div.summary {
             ul {
                 li {
-                    (counted(report.networks(), "network", "networks")) " trained: "
-                    (counted(arms, "arm", "arms")) ", " (report.seeds_in_words()) " each. Every network was asked for "
+                    (counted(report.networks(), one, many)) (if one == "network" { " trained: " } else { " fitted: " })
+                    (counted(arms, "arm", "arms")) ", " (report.seeds_in_words()) " each. Every " (one) " was asked for "
                     (counted(positions, "contact position", "contact positions")) "."
                 }
                 @if let Some(sentence) = report.not_converged() { li { (sentence) } }

@@ -18,7 +18,14 @@ pub(crate) struct Tick {
 /// The finest round ticks that `fits` accepts; `fits` must accept a single tick.
 pub(crate) fn choose(axis: &AxisScale, ticks: &Ticks, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
     match (ticks, axis.scale) {
-        (Ticks::At(values), _) => at_values(axis, values, fits),
+        (Ticks::At(values), _) => {
+            let tick = |&value: &f64| Tick { value, label: plain(value) };
+            chosen(axis, values.iter().map(tick).collect(), fits)
+        }
+        (Ticks::Named(names), _) => {
+            let tick = |(value, name): &(f64, String)| Tick { value: *value, label: name.clone() };
+            chosen(axis, names.iter().map(tick).collect(), fits)
+        }
         (Ticks::Automatic, Scale::Linear) => linear(axis, fits),
         (Ticks::Automatic, Scale::Log10) => logarithmic(axis, fits),
     }
@@ -35,13 +42,14 @@ pub(crate) fn minor(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     multiples_of_decades(axis, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1)
 }
 
-fn at_values(axis: &AxisScale, values: &[f64], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|&value| within(axis, value)).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup();
+/// Those on the axis that leave each other room.
+fn chosen(axis: &AxisScale, mut asked: Vec<Tick>, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
+    asked.retain(|tick| within(axis, tick.value));
+    asked.sort_by(|a, b| a.value.total_cmp(&b.value));
+    asked.dedup_by(|a, b| a.value == b.value);
     let mut kept: Vec<Tick> = Vec::new();
-    for value in sorted {
-        kept.push(Tick { value, label: plain(value) });
+    for tick in asked {
+        kept.push(tick);
         if !fits(&kept) {
             kept.pop();
         }

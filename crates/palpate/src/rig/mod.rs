@@ -8,13 +8,13 @@ mod value;
 
 pub use error::{RigError, RigProblem};
 pub(crate) use sections::{
-    ContactSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection, TrainingSection,
+    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection, TrainingSection,
 };
 pub use sensor_design::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
 pub(crate) use validate::validate;
-pub(crate) use value::{RawQuantity, positive};
+pub(crate) use value::{RawQuantity, choice, count, positive};
 
 use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;

@@ -103,7 +103,7 @@ pub(super) fn number(
 }
 
 /// A whole number within `bounds`, which `bound` says in words.
-pub(super) fn count(
+pub(crate) fn count(
     key: &'static str,
     raw: &Spanned<i64>,
     bounds: RangeInclusive<usize>,
@@ -125,7 +125,7 @@ pub(super) fn out_of_range<T: fmt::Display>(
 }
 
 /// One of the words that `key` can be, and what it stands for.
-pub(super) fn choice<T: Copy>(
+pub(crate) fn choice<T: Copy>(
     key: &'static str,
     raw: &Spanned<String>,
     words: &[(&'static str, T)],

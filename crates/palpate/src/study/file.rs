@@ -6,13 +6,14 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 
-use super::{Arm, Judging, Study};
+use super::{Arm, AskedLayout, Judging, Study};
 use crate::contact::Position;
+use crate::design::sensors::Method;
 use crate::evaluation::Portion;
 use crate::network::Precision;
 use crate::rig::{
-    ContactSection, EstimatorSection, RawQuantity, RigError, RigSections, SensorsSections, SurfaceSection,
-    TrainingSection, positive, validate,
+    ContactSection, DesignSection, EstimatorSection, RawQuantity, RigError, RigProblem, RigSections,
+    SensorsSections, SurfaceSection, TrainingSection, choice, count, positive, validate,
 };
 use crate::units::{Dimension, format_length_mm};
 
@@ -87,6 +88,9 @@ pub enum StudyProblem {
     /// A portion that is not two lengths in rising order.
     #[error("a portion is two lengths, the smaller one first")]
     Portion,
+    /// A surface with two coordinates.
+    #[error("a study judges along a line; this surface has a width as well")]
+    Plane,
     /// A surface without a model.
     #[error(
         "arm `{arm}` cannot be simulated: a study needs a surface with a model, a force and training positions"
@@ -114,6 +118,8 @@ impl StudyProblem {
 const MOST_SEEDS: u64 = 1_000_000;
 /// The most contact positions a study judges at.
 const MOST_POSITIONS: usize = 100_000;
+/// The most readings at each of them.
+const MOST_READINGS: usize = 1000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -126,6 +132,7 @@ struct StudyFile {
     contact: Option<Spanned<ContactSection>>,
     training: Option<Spanned<TrainingSection>>,
     estimator: Option<Spanned<EstimatorSection>>,
+    design: Option<Spanned<DesignSection>>,
     evaluation: Option<Spanned<EvaluationSection>>,
     #[serde(default)]
     arm: Vec<ArmSection>,
@@ -137,15 +144,22 @@ struct EvaluationSection {
     from: Spanned<RawQuantity>,
     to: Spanned<RawQuantity>,
     step: Spanned<RawQuantity>,
+    readings: Option<Spanned<i64>>,
     tolerance: Option<Spanned<RawQuantity>>,
     #[serde(default)]
     portions: Vec<Spanned<Vec<Spanned<RawQuantity>>>>,
+    #[serde(default)]
+    training_span: bool,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ArmSection {
     name: Spanned<String>,
+    figure: Option<String>,
+    layout: Option<Spanned<String>>,
+    sensors: Option<Spanned<SensorsSections>>,
+    contact: Option<Spanned<ContactSection>>,
     training: Option<Spanned<TrainingSection>>,
     estimator: Option<Spanned<EstimatorSection>>,
 }
@@ -166,7 +180,11 @@ impl Study {
                 return Err(StudyProblem::SameName { name: arm.name.clone() }.at(file.arm[i].name.span()));
             }
         }
-        let length_m = first.rig.bench.surface.extent().length_m;
+        let extent = first.rig.bench.surface.extent();
+        if let (true, Some(surface)) = (extent.is_plane(), &file.surface) {
+            return Err(StudyProblem::Plane.at(surface.span()));
+        }
+        let length_m = extent.length_m;
         Ok(Self {
             name: checked_name(&file.name)?,
             seeds: file.seeds()?,
@@ -196,24 +214,26 @@ impl StudyFile {
         }
     }
 
-    /// The base's sections; the arm's training takes the place of the base's, its estimator's keys that of single keys.
+    /// The base's sections; those of the arm take the place of the base's, its estimator's keys that of single keys.
     fn arm(&self, arm: &ArmSection) -> Result<Arm, StudyError> {
         let name = checked_name(&arm.name)?;
+        let layout = arm.asked_layout()?;
         let rig = validate(&RigSections {
             surface: self.surface.clone(),
-            sensors: self.sensors.clone(),
-            contact: self.contact.clone(),
+            sensors: arm.sensors.clone().or_else(|| self.sensors.clone()),
+            contact: arm.contact.clone().or_else(|| self.contact.clone()),
             training: arm.training.clone().or_else(|| self.training.clone()),
             estimator: self.estimator_of(arm),
             recording: None,
             motion: None,
             load: None,
-            design: None,
+            design: self.design.clone(),
         })?;
-        if rig.bench.surface.model().is_none() || rig.bench.force_n.is_none() || rig.training.is_none() {
+        let pressed_n = rig.pressed_bench().force_n;
+        if rig.bench.surface.model().is_none() || pressed_n.is_none() || rig.training.is_none() {
             return Err(StudyProblem::NotSimulated { arm: name }.at(arm.name.span()));
         }
-        Ok(Arm { name, rig })
+        Ok(Arm { name, rig, layout, figure: arm.figure.clone() })
     }
 
     /// The arm's keys, and the base's where the arm is silent.
@@ -222,6 +242,24 @@ impl StudyFile {
             (Some(own), Some(base)) => Some(Spanned::new(own.span(), own.into_inner().over(base.get_ref()))),
             (own, base) => own.or_else(|| base.clone()),
         }
+    }
+}
+
+impl ArmSection {
+    /// The layout by its method, which leaves nothing for positions to say.
+    fn asked_layout(&self) -> Result<Option<AskedLayout>, RigError> {
+        let Some(layout) = &self.layout else { return Ok(None) };
+        let method = choice("layout", layout, &Method::NAMED.map(|method| (method.name(), method)))?;
+        for (sensors, _) in self.sensors.iter().flat_map(|all| all.get_ref().each(all.span())) {
+            let places = [
+                sensors.positions.as_ref().map(|key| ("positions", key.span())),
+                sensors.grid.as_ref().map(|key| ("grid", key.span())),
+            ];
+            if let Some((key, span)) = places.into_iter().flatten().next() {
+                return Err(RigProblem::UnusedKey { key, with: "`layout`" }.at(span));
+            }
+        }
+        Ok(Some(AskedLayout { method, place: layout.span() }))
     }
 }
 
@@ -239,19 +277,35 @@ fn checked_name(name: &Spanned<String>) -> Result<String, StudyError> {
     Ok(text.clone())
 }
 
-/// Without an `[evaluation]`: 399 positions, tolerance 2 mm, no portions.
+/// Without an `[evaluation]`: 399 positions, 5 readings at each, tolerance 2 mm, no portions.
 fn judging(section: Option<&Spanned<EvaluationSection>>, length_m: f64) -> Result<Judging, StudyError> {
     const TOLERANCE_M: f64 = 2e-3;
+    const READINGS: usize = 5;
     let Some(section) = section.map(Spanned::get_ref) else {
         let positions = (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
-        return Ok(Judging { positions, tolerance_m: TOLERANCE_M, portions: Vec::new() });
+        return Ok(Judging {
+            positions,
+            readings: READINGS,
+            tolerance_m: TOLERANCE_M,
+            portions: Vec::new(),
+            training_span: false,
+        });
     };
+    let readings = section.readings.as_ref().map_or(Ok(READINGS), |raw| {
+        count("readings", raw, 1..=MOST_READINGS, "at least 1 and at most 1000")
+    })?;
     let tolerance_m = match &section.tolerance {
         Some(tolerance) => positive_length("tolerance", tolerance)?,
         None => TOLERANCE_M,
     };
     let portions = section.portions.iter().map(portion).collect::<Result<_, _>>()?;
-    Ok(Judging { positions: positions(section, length_m)?, tolerance_m, portions })
+    Ok(Judging {
+        positions: positions(section, length_m)?,
+        readings,
+        tolerance_m,
+        portions,
+        training_span: section.training_span,
+    })
 }
 
 fn positions(section: &EvaluationSection, length_m: f64) -> Result<Vec<Position>, StudyError> {

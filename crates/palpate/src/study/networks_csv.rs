@@ -1,4 +1,4 @@
-//! `networks.csv`: a row per fitted seed, written as it is finished; a study resumes from it.
+//! `networks.csv`: a row per network that was trained in lanes, written as it is finished; a study resumes from it.
 
 use super::results::percent;
 use super::{PreparedStudy, Study, Trained};
@@ -133,9 +133,8 @@ impl<'a> NetworksCsv<'a> {
         };
         let weights = weights.split(' ').map(str::parse).collect::<Result<Vec<f64>, _>>();
         let weights = weights.map_err(|_| "a weight is not a number")?;
-        let locator = self.study.fitting(arm).restore(seed, weights, outcome);
-        let locator = locator.ok_or("the number of weights is not the network's")?;
-        self.study.judge(arm, seed, locator).map_err(|_| "the locator does not suit the study")
+        let trained = self.study.restore(arm, seed, weights, outcome);
+        trained.ok_or("the number of weights is not the network's")
     }
 }
 

@@ -1,60 +1,14 @@
 //! Running a study: every arm's seeds, in lanes and threads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::{Judging, Study};
-use crate::estimator::{EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError};
+use super::prepare::PreparedArm;
+use super::seed_by_seed::SeedBySeed;
+use super::{PreparedStudy, StudyRunError};
+use crate::estimator::{Locator, LocatorQueue};
 use crate::evaluation::Evaluation;
 use crate::network::{InstructionSet, TrainingOutcome};
-use crate::recording::Recording;
-use crate::simulate::{SimulateError, simulate, simulate_at};
-
-/// Why a study cannot be run.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PrepareError {
-    /// An arm's bench cannot be simulated.
-    #[error("arm `{arm}`: {error}")]
-    Simulate {
-        /// The arm.
-        arm: String,
-        /// Why.
-        error: SimulateError,
-    },
-    /// An arm's estimator is not trained from seeds.
-    #[error(
-        "arm `{arm}` is of kind `{kind}`; a study trains networks: `palpate compare` puts methods side by side"
-    )]
-    NotANetwork {
-        /// The arm.
-        arm: String,
-        /// The kind of its estimator.
-        kind: &'static str,
-    },
-    /// An arm's estimator cannot be fitted.
-    #[error("arm `{arm}`: {error}")]
-    Fit {
-        /// The arm.
-        arm: String,
-        /// Why.
-        error: FitError,
-    },
-}
-
-/// A study whose recordings are made, ready to be run.
-#[derive(Clone, Debug)]
-pub struct PreparedStudy {
-    /// The study.
-    pub study: Study,
-    arms: Vec<PreparedArm>,
-}
-
-#[derive(Clone, Debug)]
-struct PreparedArm {
-    fitting: Fitting,
-    /// Clean readings at the positions where locators are judged.
-    judged: Recording,
-}
 
 /// One fitted seed of an arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,58 +66,17 @@ pub trait Observer: Sync {
 }
 
 impl PreparedStudy {
-    /// Makes every arm's training recording and the clean one that judges it.
-    ///
-    /// # Errors
-    /// [`PrepareError`], naming the arm.
-    pub fn new(study: Study) -> Result<Self, PrepareError> {
-        let arms = study.arms.iter().map(|arm| {
-            if !matches!(arm.rig.estimator, EstimatorConfig::Network(_)) {
-                let kind = arm.rig.estimator.kind();
-                return Err(PrepareError::NotANetwork { arm: arm.name.clone(), kind });
-            }
-            let simulated = |error| PrepareError::Simulate { arm: arm.name.clone(), error };
-            let mut clean = arm.rig.bench.clone();
-            for sensor in &mut clean.layout.sensors {
-                sensor.channel = crate::sensing::ChannelModel::default();
-            }
-            let judged = simulate_at(&clean, &study.judging.positions, 1, 0).map_err(simulated)?;
-            let recording = simulate(&arm.rig, 0).map_err(simulated)?;
-            let fitting = Fitting::prepare(&arm.rig.bench, &arm.rig.estimator, &recording)
-                .map_err(|error| PrepareError::Fit { arm: arm.name.clone(), error })?;
-            Ok(PreparedArm { fitting, judged })
-        });
-        let arms = arms.collect::<Result<_, _>>()?;
-        Ok(Self { study, arms })
-    }
-
-    /// Patterns that an epoch of each arm presents.
-    pub fn patterns(&self, arm: usize) -> usize {
-        self.arms[arm].fitting.patterns()
-    }
-
-    /// Judges a locator as the study's arm `arm` is judged.
-    ///
-    /// # Errors
-    /// [`ReadingError`] when the locator has other channels.
-    pub fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Result<Trained, ReadingError> {
-        let evaluation = Evaluation::of(&locator, &self.arms[arm].judged)?;
-        Ok(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
-    }
-
-    /// The fitting of an arm, to restore locators by.
-    pub fn fitting(&self, arm: usize) -> &Fitting {
-        &self.arms[arm].fitting
-    }
-
-    /// How the study judges.
-    pub fn judging(&self) -> &Judging {
-        &self.study.judging
-    }
-
-    /// Fits every seed of every arm but those in `done`, and answers with all of them. A seed gives the same locator
+    /// Fits every seed of every arm but those in `done`, which may hold networks trained in lanes only, and answers with all of them. A seed gives the same locator
     /// whatever the number of threads and whatever was done before.
-    pub fn run(&self, options: RunOptions, done: Vec<Trained>, observer: &dyn Observer) -> Vec<ArmOutcome> {
+    ///
+    /// # Errors
+    /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read.
+    pub fn run(
+        &self,
+        options: RunOptions,
+        done: Vec<Trained>,
+        observer: &dyn Observer,
+    ) -> Result<Vec<ArmOutcome>, StudyRunError> {
         let is_done = |arm: usize, seed: u64| done.iter().any(|t| t.arm == arm && t.fit.seed == seed);
         let work: Vec<ArmWork> = (0..self.arms.len())
             .map(|arm| {
@@ -172,25 +85,36 @@ impl PreparedStudy {
             })
             .collect();
         let finished = Mutex::new(done);
+        let failed = Mutex::new(None);
         std::thread::scope(|scope| {
             for _ in 0..options.threads.max(1) {
                 scope.spawn(|| {
-                    let mut group =
-                        LaneGroup { study: self, arm: 0, work: &work, observer, finished: &finished };
-                    // The costliest arms first, so that the ends of the threads lie close together.
+                    let mut queue =
+                        Queue { study: self, arm: 0, work: &work, observer, finished: &finished };
                     for arm in self.arms_by_cost() {
-                        group.arm = arm;
-                        self.arms[arm].fitting.fit_many(options.set, self.study.precision, &mut group);
+                        queue.arm = arm;
+                        match &self.arms[arm] {
+                            PreparedArm::InLanes { fitting, .. } => {
+                                fitting.fit_many(options.set, self.study.precision, &mut queue);
+                            }
+                            PreparedArm::SeedBySeed(prepared) => queue.fit_each(prepared, &failed),
+                        }
                     }
                 });
             }
         });
-        self.by_arm(finished.into_inner().unwrap_or_else(PoisonError::into_inner), options.seeds)
+        match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => {
+                Ok(self.by_arm(finished.into_inner().unwrap_or_else(PoisonError::into_inner), options.seeds))
+            }
+        }
     }
 
+    /// Arms in lanes first, the costliest of them first; the seeds of others fill the ends of the threads.
     fn arms_by_cost(&self) -> Vec<usize> {
         let mut arms: Vec<usize> = (0..self.arms.len()).collect();
-        arms.sort_by_key(|arm| std::cmp::Reverse(self.patterns(*arm)));
+        arms.sort_by_key(|arm| std::cmp::Reverse((self.is_in_lanes(*arm), self.patterns(*arm))));
         arms
     }
 
@@ -219,8 +143,8 @@ struct ArmWork {
     taken: AtomicU64,
 }
 
-/// One thread's lanes.
-struct LaneGroup<'a> {
+/// Where one thread takes the seeds of an arm from, and leaves its fits.
+struct Queue<'a> {
     study: &'a PreparedStudy,
     arm: usize,
     work: &'a [ArmWork],
@@ -228,7 +152,35 @@ struct LaneGroup<'a> {
     finished: &'a Mutex<Vec<Trained>>,
 }
 
-impl LocatorQueue for LaneGroup<'_> {
+impl Queue<'_> {
+    /// Fits seed after seed of an arm, until none is left, the observer says no, or some thread has failed.
+    fn fit_each(&mut self, prepared: &SeedBySeed, failed: &Mutex<Option<StudyRunError>>) {
+        let arm = &self.study.study.arms[self.arm];
+        let observer = self.observer;
+        let mut keep_going = || observer.keep_going() && lock(failed).is_none();
+        while keep_going() {
+            let Some(seed) = self.next_seed() else { return };
+            match prepared.fit((&arm.name, &arm.rig), seed, &mut keep_going) {
+                Ok(None) => return,
+                Ok(Some(fit)) => self.finish(Trained { arm: self.arm, fit }),
+                Err(error) => {
+                    lock(failed).get_or_insert(error);
+                }
+            }
+        }
+    }
+
+    fn finish(&self, trained: Trained) {
+        self.observer.trained(&trained);
+        lock(self.finished).push(trained);
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl LocatorQueue for Queue<'_> {
     fn next_seed(&mut self) -> Option<u64> {
         let work = &self.work[self.arm];
         let next = work.taken.fetch_add(1, Ordering::Relaxed);
@@ -237,9 +189,8 @@ impl LocatorQueue for LaneGroup<'_> {
 
     fn fitted(&mut self, seed: u64, locator: Locator) {
         // A locator of the study's own fitting has the study's channels.
-        if let Ok(trained) = self.study.judge(self.arm, seed, locator) {
-            self.observer.trained(&trained);
-            self.finished.lock().unwrap_or_else(PoisonError::into_inner).push(trained);
+        if let Some(trained) = self.study.judge(self.arm, seed, locator) {
+            self.finish(trained);
         }
     }
 

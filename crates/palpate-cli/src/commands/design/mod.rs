@@ -2,7 +2,7 @@
 
 pub mod positions;
 pub mod sensors;
-mod watch;
+pub mod watch;
 
 use crate::failure::Failure;
 

@@ -185,7 +185,8 @@ fn complaint(error: &DesignError, rig: &Path) -> Failure {
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
 }
 
-fn words(stage: Stage) -> &'static str {
+/// A stage as progress names it.
+pub fn words(stage: Stage) -> &'static str {
     match stage {
         Stage::Candidates => "what each site tells",
         Stage::Exchange => "exchanging",

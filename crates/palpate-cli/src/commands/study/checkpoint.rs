@@ -1,8 +1,8 @@
-//! `networks.csv` on disk: grows as networks are finished, survives Ctrl-C, is sorted at the end.
+//! `networks.csv` on disk: grows as networks that are trained in lanes are finished, survives Ctrl-C, is sorted at the end.
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::study::{ArmOutcome, CheckpointError, NetworksCsv, Trained};
+use palpate::study::{ArmOutcome, CheckpointError, NetworksCsv, PreparedStudy, Trained};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -77,9 +77,14 @@ fn read(path: &Path, table: &NetworksCsv) -> Result<Vec<Trained>, Failure> {
 }
 
 /// Replaces the file by one whose rows are in the order of the arms and seeds, whatever the threads did.
-pub fn write_sorted(out: &Path, table: &NetworksCsv, outcomes: &[ArmOutcome]) -> Result<(), Failure> {
+pub fn write_sorted(
+    out: &Path,
+    table: &NetworksCsv,
+    prepared: &PreparedStudy,
+    outcomes: &[ArmOutcome],
+) -> Result<(), Failure> {
     let mut rows = table.heading();
-    for (arm, outcome) in outcomes.iter().enumerate() {
+    for (arm, outcome) in outcomes.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm)) {
         for fit in &outcome.fits {
             rows.push_str(&table.row(&Trained { arm, fit: fit.clone() }));
         }

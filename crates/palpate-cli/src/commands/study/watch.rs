@@ -1,4 +1,4 @@
-//! Watches a study as it trains: a row and a step of the bar for every network.
+//! Watches a study as it runs: a row for every network that is kept, and a step of the bar for every fit.
 
 use super::checkpoint::CheckpointFile;
 use crate::failure::{Complaint, Failure};
@@ -23,11 +23,14 @@ pub struct Watch<'a> {
 }
 
 struct State {
-    file: CheckpointFile,
+    /// `None` where no network is kept.
+    file: Option<CheckpointFile>,
     error: Option<std::io::Error>,
     arms: Vec<ArmTally>,
     /// Presentations of this run.
     presented: u64,
+    /// Fits of this run.
+    fitted: u64,
 }
 
 /// What is known of an arm's cost.
@@ -45,7 +48,7 @@ impl<'a> Watch<'a> {
         prepared: &'a PreparedStudy,
         options: RunOptions,
         table: &'a NetworksCsv<'a>,
-        file: CheckpointFile,
+        file: Option<CheckpointFile>,
         done: &[Trained],
     ) -> Self {
         let mut arms: Vec<ArmTally> = (0..prepared.study.arms.len())
@@ -58,26 +61,27 @@ impl<'a> Watch<'a> {
         for trained in done.iter().filter(|trained| trained.fit.seed < options.seeds) {
             arms[trained.arm].count(presentations(prepared, trained.arm, &trained.fit) as f64);
         }
-        let bar = progress::bar(arms.len() as u64 * options.seeds, "training");
+        let bar = progress::bar(arms.len() as u64 * options.seeds, "fitting");
         bar.set_position(arms.iter().map(|arm| arm.finished as u64).sum());
-        let state = Mutex::new(State { file, error: None, arms, presented: 0 });
+        let state = Mutex::new(State { file, error: None, arms, presented: 0, fitted: 0 });
         Self { prepared, table, bar, start: Instant::now(), state }
     }
 
-    /// A network is finished: its row goes to the file, and the bar goes on.
+    /// A fit is finished: the row of a network that is kept goes to the file, and the bar goes on.
     pub fn note(&self, trained: &Trained) {
-        let row = self.table.row(trained);
+        let row = self.prepared.is_in_lanes(trained.arm).then(|| self.table.row(trained));
         let presented = presentations(self.prepared, trained.arm, &trained.fit);
         let mut state = self.state();
-        if let Err(error) = state.file.add(&row) {
+        if let (Some(file), Some(row)) = (&mut state.file, row)
+            && let Err(error) = file.add(&row)
+        {
             state.error.get_or_insert(error);
         }
         state.presented += presented;
+        state.fitted += 1;
         state.arms[trained.arm].count(presented as f64);
-        let rate = state.presented as f64 / self.start.elapsed().as_secs_f64();
-        let left = progress::duration(state.presentations_left() / rate);
+        self.bar.set_prefix(state.rate_in_words(self.start.elapsed().as_secs_f64()));
         drop(state);
-        self.bar.set_prefix(format!("{:.1} M presentations/s, {left} left", rate / 1e6));
         self.bar.inc(1);
     }
 
@@ -109,10 +113,22 @@ impl ArmTally {
 }
 
 impl State {
+    /// "12.3 M presentations/s, 40 s left"; where no estimator is trained by epochs, "8.1 fits/s, 40 s left".
+    fn rate_in_words(&self, seconds: f64) -> String {
+        if self.arms.iter().any(|arm| arm.patterns > 0.0) {
+            let rate = self.presented as f64 / seconds;
+            let left = progress::duration(self.presentations_left() / rate);
+            return format!("{:.1} M presentations/s, {left} left", rate / 1e6);
+        }
+        let rate = self.fitted as f64 / seconds;
+        let left = self.arms.iter().map(|arm| arm.left).sum::<f64>();
+        format!("{rate:.1} fits/s, {} left", progress::duration(left / rate))
+    }
+
     /// An arm's networks cost what its finished ones did. Where none is finished, they cost what the others did, in
     /// proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
     fn presentations_left(&self) -> f64 {
-        let known: Vec<&ArmTally> = self.arms.iter().filter(|arm| arm.finished > 0.0).collect();
+        let known: Vec<&ArmTally> = self.arms.iter().filter(|arm| arm.finished * arm.patterns > 0.0).collect();
         let per_square = known.iter().map(|arm| arm.presentations / arm.finished / arm.patterns.powi(2));
         let per_square = per_square.sum::<f64>() / known.len().max(1) as f64;
         let cost = |arm: &ArmTally| match arm.finished {

@@ -123,6 +123,12 @@ pub enum DesignError {
         /// Sites in the middle.
         middle: usize,
     },
+    /// A method that has no layout to give.
+    #[error("the method `{method}` has no layout for these sensors and constraints")]
+    NoLayout {
+        /// Its name.
+        method: &'static str,
+    },
     /// More candidates and contacts than fit into memory.
     #[error("{sites} candidate sites and {contacts} contacts need {:.1} GB; at most {:.1} GB can be held", bytes / 1e9, most / 1e9)]
     TooLarge {
@@ -194,6 +200,9 @@ impl DesignError {
             Self::MustHaveWithoutTwin { .. } => "move it, or leave `symmetry` out",
             Self::Symmetry { .. } => {
                 "choose `sites` that mirror each other, such as a distance that divides the length, or an even `count`"
+            }
+            Self::NoLayout { .. } => {
+                "ask for another method, relax the constraints, or offer sensors other than reactions"
             }
             Self::TooLarge { .. } => "set `sites` or the contacts' `every` wider apart",
         }

@@ -10,6 +10,7 @@
 //! [`Assessment`] has are those of the limit itself.
 
 mod assessment;
+mod by_method;
 mod candidates;
 mod contacts;
 mod counts;
@@ -110,6 +111,17 @@ impl Method {
             Self::QrPivoting => "qr-pivoting",
         }
     }
+
+    /// What can be asked for by name, in the order that messages list them.
+    pub const NAMED: [Self; 7] = [
+        Self::Even,
+        Self::GreedyExchange,
+        Self::Genetic,
+        Self::Refined,
+        Self::DOptimal,
+        Self::PrincipalComponents,
+        Self::QrPivoting,
+    ];
 
     /// Whether it searches by the design's criterion, so that its best layout is the design.
     pub const fn is_search(self) -> bool {

@@ -12,8 +12,8 @@ use crate::report::digit_figures::shapes_figure;
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
+use crate::report::sites::sites_chart;
 use crate::report::{Axis, Chart, Mark, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
-use crate::sensing::SensorKind;
 
 /// Values whose largest is this many times the smallest are drawn on a logarithmic axis.
 const LOGARITHMIC_FROM: f64 = 10.0;
@@ -115,47 +115,12 @@ fn kept_out(report: &SensorDesignReport) -> Vec<Mark> {
     report.problem.design().keep_out.iter().map(mark).collect()
 }
 
-/// Every layout a row, the first uppermost; a marker a kind.
+/// Every layout a row.
 pub(super) fn sites_figure(report: &SensorDesignReport, number: usize) -> Figure {
-    let rows = report.designed.len();
-    let y = |row: usize| (rows - row) as f64;
-    let marker = |kind: SensorKind| match kind {
-        SensorKind::Deflection | SensorKind::Raw => Marker::Circle,
-        SensorKind::Slope => Marker::Triangle,
-        SensorKind::Strain => Marker::Square,
-        SensorKind::Reaction => Marker::Cross,
-    };
-    let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
-        let points: Vec<(f64, f64)> = report
-            .designed
-            .iter()
-            .enumerate()
-            .flat_map(|(row, designed)| {
-                let sensors = designed.layout.sensors.iter().filter(move |sensor| sensor.kind == kind);
-                sensors.map(move |sensor| (sensor.position.x_m * 1e3, y(row)))
-            })
-            .collect();
-        let kind_series = SeriesKind::Points { points: points.clone(), marker: marker(kind) };
-        (!points.is_empty()).then(|| Series { label: kind.name().to_owned(), colour, kind: kind_series })
-    });
-    let chart = Chart {
-        title: "Where the layouts have their sensors".to_owned(),
-        x: Axis::linear("position, mm").from_to(0.0, report.bench.surface.extent().length_m * 1e3),
-        y: Axis::linear("layout")
-            .from_to(0.4, rows as f64 + 0.6)
-            .ticks_at((0..rows).map(y).collect::<Vec<_>>()),
-        series: kinds.collect(),
-        marks: kept_out(report),
-        height_px: (150 + 32 * rows) as u32,
-        ..Chart::default()
-    };
-    let names: Vec<String> = report
-        .designed
-        .iter()
-        .enumerate()
-        .map(|(row, designed)| format!("{} {}", rows - row, designed.method.name()))
-        .collect();
-    let caption = html! { "The sensors of every layout, a row each; from the top: " (names.join(", ")) "." };
+    let row = |designed: &'_ Designed| designed.method.name().to_owned();
+    let rows: Vec<_> = report.designed.iter().map(|designed| (row(designed), &designed.layout)).collect();
+    let chart = sites_chart(&rows, report.bench.surface.extent().length_m, kept_out(report));
+    let caption = html! { "The sensors of every layout, a row each." };
     Figure { number, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
 }
 

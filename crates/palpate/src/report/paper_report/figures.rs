@@ -35,7 +35,7 @@ const MIDDLE_4: Family =
 struct Measure {
     title: &'static str,
     axis: Axis,
-    of: fn(&ArmResults) -> Spread,
+    of: fn(&ArmResults) -> Option<Spread>,
     /// Key of the published figures.
     key: &'static str,
 }
@@ -133,7 +133,7 @@ impl Paper<'_> {
         let measure = Measure {
             title: "Effective length",
             axis: Axis::linear("effective length, % of the beam"),
-            of: |arm| arm.effective_length_percent,
+            of: |arm| Some(arm.effective_length_percent),
             key: "effective_length_percent",
         };
         let caption = html! {
@@ -202,7 +202,7 @@ impl Paper<'_> {
             .iter()
             .filter_map(|&count| {
                 let arm = self.report.results.arm(&format!("{}-{count}", family.name))?;
-                let Spread { median, p05, p95 } = (measure.of)(arm);
+                let Spread { median, p05, p95 } = (measure.of)(arm)?;
                 Some(ErrorPoint { x: f64::from(count) + shift, y: median, low: p05, high: p95 })
             })
             .collect();
@@ -253,7 +253,7 @@ fn average_error() -> Measure {
     Measure {
         title: "Average error over the whole beam",
         axis: Axis::linear("average error, % of the length"),
-        of: |arm| arm.error_percent,
+        of: |arm| Some(arm.error_percent),
         key: "error_percent",
     }
 }

@@ -35,8 +35,8 @@ impl Observer for Unwatched {
 fn run(toml: &str, seeds: u64) -> Run {
     let study = PreparedStudy::new(Study::from_toml(toml).unwrap()).unwrap();
     let options = RunOptions { seeds, threads: 1, set: InstructionSet::Portable };
-    let outcomes = study.run(options, Vec::new(), &Unwatched);
-    let results = StudyResults::of(&outcomes, study.judging());
+    let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
+    let results = StudyResults::of(&outcomes, &study);
     let facts = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
         study: study.study.name.clone(),
@@ -187,7 +187,7 @@ fn a_part_of_the_papers_arms_gives_the_figures_that_they_allow() {
 fn a_run_that_was_given_up_at_once_still_has_a_report() {
     let mut run = run(&with_arms(&[("only", "{ arrangement = \"even\", count = 5 }")]), 1);
     run.outcomes.iter_mut().for_each(|outcome| outcome.fits.clear());
-    run.results = StudyResults::of(&run.outcomes, run.study.judging());
+    run.results = StudyResults::of(&run.outcomes, &run.study);
     assert_sound(&paper_report(&run.report()).unwrap(), &[1]);
     assert_sound(&study_report(&run.report()).unwrap(), &[]);
 }

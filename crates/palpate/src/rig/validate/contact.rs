@@ -75,7 +75,7 @@ pub(super) fn validate_training(
     };
     refuse_unused(keys, rule)?;
     let arrangement = match rule {
-        Rule::Even => Arrangement::Even,
+        Rule::Even => even(keys)?,
         Rule::Chebyshev => Arrangement::Chebyshev,
         Rule::EdgeDense => edge_dense(section)?,
         Rule::Grid => grid(section, extent)?,
@@ -110,7 +110,9 @@ fn culprit(section: &Spanned<TrainingSection>, error: &ArrangementError) -> Rang
             listed.and_then(|listed| listed.get_ref().get(number.saturating_sub(1))).map(Spanned::span)
         }
         ArrangementError::MiddleTooSmall { .. } => keys.middle.as_ref().map(Spanned::span),
-        ArrangementError::Portion { .. } => keys.portion.as_ref().map(Spanned::span),
+        ArrangementError::Portion { .. } | ArrangementError::EvenPortion { .. } => {
+            keys.portion.as_ref().map(Spanned::span)
+        }
         _ => keys.count.as_ref().map(Spanned::span),
     };
     key.unwrap_or_else(|| section.span())
@@ -126,9 +128,10 @@ fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
     };
     let unused = |key, span| Err(RigProblem::UnusedKey { key, with }.at(span));
     let edge_dense = matches!(rule, Rule::EdgeDense);
+    let has_portion = matches!(rule, Rule::Even | Rule::EdgeDense);
     match (&keys.middle, &keys.portion, &keys.positions, &keys.grid) {
         (Some(middle), ..) if !edge_dense => unused("middle", middle.span()),
-        (_, Some(portion), ..) if !edge_dense => unused("portion", portion.span()),
+        (_, Some(portion), ..) if !has_portion => unused("portion", portion.span()),
         (_, _, Some(positions), _) if !matches!(rule, Rule::Explicit) => {
             unused("positions", positions.span())
         }
@@ -137,23 +140,29 @@ fn refuse_unused(keys: &TrainingSection, rule: Rule) -> Result<(), RigError> {
     }
 }
 
+fn even(keys: &TrainingSection) -> Result<Arrangement, RigError> {
+    let portion = keys.portion.as_ref().map(portion).transpose()?;
+    Ok(portion.map_or(Arrangement::Even, |portion| Arrangement::EvenOver { portion }))
+}
+
 fn edge_dense(section: &Spanned<TrainingSection>) -> Result<Arrangement, RigError> {
     let keys = section.get_ref();
     let middle = keys.middle.as_ref().ok_or_else(|| missing("middle", section))?;
     let middle = count("middle", middle, 2..=MOST, "at least 2 and at most 100000")?;
-    let portion = match &keys.portion {
-        None => Arrangement::PAPER_PORTION,
-        Some(portion) => match portion.get_ref().as_slice() {
-            [start, end] => {
-                (quantity("portion", start, Dimension::Ratio)?, quantity("portion", end, Dimension::Ratio)?)
-            }
-            listed => {
-                let (value, bound) = (format!("a list of {}", listed.len()), "a list of 2, start and end");
-                return Err(RigProblem::OutOfRange { key: "portion", value, bound }.at(portion.span()));
-            }
-        },
-    };
+    let portion = keys.portion.as_ref().map_or(Ok(Arrangement::PAPER_PORTION), portion)?;
     Ok(Arrangement::EdgeDense { middle, portion })
+}
+
+/// Start and end, as shares of the length.
+fn portion(raw: &Spanned<Vec<Spanned<RawQuantity>>>) -> Result<(f64, f64), RigError> {
+    let share = |end| quantity("portion", end, Dimension::Ratio);
+    match raw.get_ref().as_slice() {
+        [start, end] => Ok((share(start)?, share(end)?)),
+        listed => {
+            let (value, bound) = (format!("a list of {}", listed.len()), "a list of 2, start and end");
+            Err(RigProblem::OutOfRange { key: "portion", value, bound }.at(raw.span()))
+        }
+    }
 }
 
 fn grid(section: &Spanned<TrainingSection>, extent: Extent) -> Result<Arrangement, RigError> {

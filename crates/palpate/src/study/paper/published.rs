@@ -42,7 +42,7 @@ enum Figure {
 impl Figure {
     fn of(self, arm: &ArmResults) -> Option<Spread> {
         Some(match self {
-            Self::Epochs => arm.epochs,
+            Self::Epochs => arm.epochs?,
             Self::Error => arm.error_percent,
             Self::PortionError(index) => arm.portions.get(index)?.error_percent,
             Self::PortionMaxError(index) => arm.portions.get(index)?.max_error_percent,

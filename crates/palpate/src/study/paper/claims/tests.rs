@@ -21,8 +21,7 @@ fn judged(made_up: MadeUp) -> Vec<Claim> {
                 epochs,
                 aggregate_error: 0.0,
             };
-            let locator = prepared.fitting(index).restore(seed, weights, outcome).unwrap();
-            let mut fit: TrainedSeed = prepared.judge(index, seed, locator).unwrap().fit;
+            let mut fit: TrainedSeed = prepared.restore(index, seed, weights, outcome).unwrap().fit;
             for located in &mut fit.evaluation.located {
                 // Twice as far off outside the good portion, and to the right, so that the right end is overshot.
                 let edge = if GOOD.contains(located.truth) { 1.0 } else { 2.0 };
