@@ -113,6 +113,34 @@ fn locators_of_another_kind_are_refused() {
 }
 
 #[test]
+fn arms_are_refused_at_the_place() {
+    let kinds = include_str!("../../../studies/sensor-kinds.toml");
+    let refined = "layout = \"refined\"";
+    let own = "layout = \"even\"\nsensors = { measure = \"deflection\", positions = [\"50 mm\"], noise = \"5 um\" }";
+    let plate = include_str!("../../../examples/plate.toml");
+    let cases = [
+        ("an unknown layout", kinds.replacen(refined, "layout = \"qr-pivotting\"", 1)),
+        ("a layout and positions", kinds.replacen(refined, own, 1)),
+        (
+            "a layout without room",
+            kinds.replacen("sites = \"5 mm\"", "sites = \"5 mm\"\nspacing = \"80 mm\"", 1),
+        ),
+        (
+            "a layout without noise",
+            kinds.replacen("{ measure = \"strain\", noise = \"1 ue\" },", "{ measure = \"slope\" },", 1),
+        ),
+        ("no force at all", kinds.replacen("force = \"3 N\"", "", 1)),
+        ("a force that is none", kinds.replacen("{ force = \"3 N\" }", "{ force = \"3 mm\" }", 1)),
+        ("no readings", kinds.replacen("readings = 5", "readings = 0", 1)),
+        ("an arm's key that no arm has", kinds.replacen(refined, "layuot = \"even\"", 1)),
+        ("a plane", format!("name = \"plate\"\n{plate}\n[[arm]]\nname = \"only\"\n")),
+    ];
+    let run = |text: &str| complaint(&[("study.toml", text.as_bytes())], &["study", "study.toml"]);
+    let messages: Vec<String> = cases.iter().map(|(what, text)| format!("{what}:\n{}", run(text))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
 fn studies_are_refused_at_the_place() {
     let cases = [
         ("no arms", STUDY.split("[[arm]]").next().unwrap().to_owned()),

@@ -100,6 +100,72 @@ fn without_biases_the_papers_iterations_come_out() {
     assert!(median("no-biases-30", "error_percent") < median("as-replicated-30", "error_percent"));
 }
 
+/// A study with those of its arms whose name is wanted.
+fn cut_down(study: &str, wanted: &[&str]) -> String {
+    let (base, arms) = study.split_at(study.find("[[arm]]").unwrap());
+    let kept =
+        arms.split("[[arm]]").filter(|arm| wanted.iter().any(|name| arm.contains(&format!("\"{name}\""))));
+    base.to_owned() + &kept.map(|arm| format!("[[arm]]{arm}")).collect::<String>()
+}
+
+/// Runs such a study with one seed an arm, and gives a figure's median of each wanted arm.
+fn medians(name: &str, study: &str, wanted: &[&str], figure: &str) -> Vec<f64> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("study.toml"), cut_down(study, wanted)).unwrap();
+    let json = said(&run(folder.path(), &["study", "study.toml", "--seeds", "1", "--json"]));
+    assert!(folder.path().join("palpate-out").join(name).join("report.html").exists());
+    let results: Value = serde_json::from_str(&json).unwrap();
+    let arm = |name: &&str| {
+        let arm = results["arms"].as_array().unwrap().iter().find(|arm| arm["name"] == **name).unwrap();
+        assert_eq!(arm["seeds"], 1);
+        arm[figure]["median"].as_f64().unwrap()
+    };
+    wanted.iter().map(arm).collect()
+}
+
+#[test]
+fn narrow_training_positions_lose_the_rest_of_the_beam() {
+    let study = include_str!("../../../studies/spread.toml");
+    let wanted = ["n10-from-80", "n10-from-20"];
+    let errors = medians("spread", study, &wanted, "error_percent");
+    assert!(errors[0] > 1.5 * errors[1], "{errors:?}");
+    let between = medians("spread", study, &wanted, "error_percent_within_training");
+    assert!(between.iter().all(|error| *error < 2.0), "{between:?}");
+}
+
+#[test]
+fn designed_positions_are_better_than_even_ones() {
+    let study = include_str!("../../../studies/sensing-positions.toml");
+    let wanted = ["influence-unknown-even", "influence-unknown-qr"];
+    let errors = medians("sensing-positions", study, &wanted, "error_percent_20_380");
+    assert!(errors[1] < errors[0], "{errors:?}");
+}
+
+#[test]
+fn reactions_cure_the_blind_edges() {
+    let study = include_str!("../../../studies/sensor-kinds.toml");
+    let wanted = ["unknown-deflection-8", "unknown-deflection-6-reaction-2", "known-deflection-8"];
+    let errors = medians("sensor-kinds", study, &wanted, "error_percent");
+    assert!(errors[1] < 0.2 * errors[0] && errors[2] < 0.2 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn a_study_without_networks_keeps_none_and_gives_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = cut_down(
+        include_str!("../../../studies/sensor-kinds.toml"),
+        &["unknown-deflection-8", "known-reaction-2"],
+    );
+    fs::write(folder.path().join("kinds.toml"), study).unwrap();
+    let arguments = ["study", "kinds.toml", "--seeds", "2", "--threads"];
+    let table = said(&run(folder.path(), &[&arguments[..], &["1", "--out", "one"]].concat()));
+    let head = table.split("\n\n").take(2).collect::<Vec<_>>().join("\n\n");
+    insta::assert_snapshot!(head);
+    assert!(!folder.path().join("one/networks.csv").exists());
+    said(&run(folder.path(), &[&arguments[..], &["2", "--out", "two", "--resume"]].concat()));
+    assert_eq!(results(folder.path(), "one")["arms"], results(folder.path(), "two")["arms"]);
+}
+
 #[test]
 fn single_precision_trains_too() {
     let folder = tempfile::tempdir().unwrap();

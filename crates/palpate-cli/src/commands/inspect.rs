@@ -142,7 +142,9 @@ fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     }
     for arm in &study.arms {
         let training = arm.rig.training.as_ref().map_or_else(String::new, training_words);
-        lines.push(format!("arm {}: {training}", arm.name));
+        let asked = arm.layout.as_ref().map(|layout| format!(", layout {}", layout.method.name()));
+        let (kind, asked) = (arm.rig.estimator.kind(), asked.unwrap_or_default());
+        lines.push(format!("arm {}: {training}, {kind}{asked}", arm.name));
     }
     Ok(lines)
 }

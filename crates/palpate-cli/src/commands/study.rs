@@ -148,7 +148,10 @@ fn train(
             let kept = outcomes.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
             let kept: usize = kept.map(|(_, outcome)| outcome.fits.len()).sum();
             let path = out.join(checkpoint::NAME);
-            format!("stopped; {kept} of {wanted} networks are in {}; --resume goes on from them", path.display())
+            format!(
+                "stopped; {kept} of {wanted} networks are in {}; --resume goes on from them",
+                path.display()
+            )
         } else {
             format!("stopped after {finished} of {wanted} fits; nothing was written")
         }));
@@ -272,9 +275,8 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
             Some(format!("{:.3}", arm.portions.get(i)?.limit_error_percent?))
         }));
     }
-    columns.push(column("over the limit", move |arm| {
-        Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))
-    }));
+    columns
+        .push(column("over the limit", move |arm| Some(spread(&arm.limit.as_ref()?.error_over_limit?, 2))));
     columns.push(column("95 % hold, %", move |arm| Some(spread(&arm.coverage_percent?, 1))));
     columns
 }

@@ -34,7 +34,10 @@ pub(super) fn overview(report: &StudyReport, number: usize) -> Option<Figure> {
         series.extend(spreads().map(|(i, spread)| Series {
             label: String::new(),
             colour: k,
-            kind: SeriesKind::Line { points: vec![(spread.p05, y(i)), (spread.p95, y(i))], stroke: Stroke::Solid },
+            kind: SeriesKind::Line {
+                points: vec![(spread.p05, y(i)), (spread.p95, y(i))],
+                stroke: Stroke::Solid,
+            },
         }));
         let medians = spreads().map(|(i, spread)| (spread.median, y(i))).collect();
         series.push(points(shown.label.clone(), k, medians, [Marker::Circle, Marker::Square][k % 2]));
@@ -128,7 +131,8 @@ pub(super) fn layouts_figure(report: &StudyReport, number: usize) -> Option<Figu
     let rows: Vec<(String, &Layout)> = layouts.iter().map(|(arms, layout)| (row(arms), *layout)).collect();
     (rows.len() > 1).then(|| {
         let chart = sites_chart(&rows, report.length_m(), Vec::new());
-        let caption = html! { "The sensors of every layout, a row each; “+ 2” are two more arms with the same." };
+        let caption =
+            html! { "The sensors of every layout, a row each; “+ 2” are two more arms with the same." };
         figure(number, &chart, caption)
     })
 }
@@ -148,10 +152,7 @@ pub(super) fn along_the_surface(report: &StudyReport, first_number: usize) -> Ve
         (None, [arm]) => single(report, arm, colour),
         (title, arms) => shared(report, title.unwrap_or_default(), arms),
     });
-    drawn
-        .enumerate()
-        .map(|(i, (chart, caption))| figure(first_number + i, &chart, caption))
-        .collect()
+    drawn.enumerate().map(|(i, (chart, caption))| figure(first_number + i, &chart, caption)).collect()
 }
 
 fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<(Chart, maud::Markup)> {

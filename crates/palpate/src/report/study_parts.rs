@@ -147,8 +147,10 @@ const LEAST_ERROR_MM: f64 = 0.05;
 /// Every arm with its figures; a column only where some arm fills it.
 pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     let arms = &report.results.arms;
-    let columns: Vec<ArmColumn> =
-        arm_columns(report).into_iter().filter(|column| arms.iter().any(|arm| (column.of)(arm).is_some())).collect();
+    let columns: Vec<ArmColumn> = arm_columns(report)
+        .into_iter()
+        .filter(|column| arms.iter().any(|arm| (column.of)(arm).is_some()))
+        .collect();
     let row = |arm: &ArmResults| {
         let cells = columns.iter().map(|column| (column.of)(arm).unwrap_or_else(|| text(NOTHING)));
         std::iter::once(text(&arm.name)).chain(cells).collect()
@@ -187,9 +189,9 @@ fn arm_columns<'a>(report: &StudyReport) -> Vec<ArmColumn<'a>> {
         }),
         column("iterations", |arm| Some(stacked(arm.epochs?, whole))),
     ];
-    columns.extend(report.judged_portion().map(|all| {
-        column(error(all), |arm| Some(stacked(arm.error_percent, number)))
-    }));
+    columns.extend(
+        report.judged_portion().map(|all| column(error(all), |arm| Some(stacked(arm.error_percent, number)))),
+    );
     columns.extend(report.study.judging().portions.iter().enumerate().map(|(i, portion)| {
         column(error(*portion), move |arm| Some(stacked(arm.portions.get(i)?.error_percent, number)))
     }));

@@ -58,9 +58,9 @@ pub fn study_report(report: &StudyReport) -> Result<Vec<ReportFile>, ReportError
 
 /// Which arms have which layout.
 fn layouts_table(report: &StudyReport, table: usize) -> Markup {
-    let rows = layouts(report).into_iter().map(|(arms, layout)| {
-        vec![text(arms.join(", ")), text(layout.places_in_words(false))]
-    });
+    let rows = layouts(report)
+        .into_iter()
+        .map(|(arms, layout)| vec![text(arms.join(", ")), text(layout.places_in_words(false))]);
     Table {
         number: table,
         caption: html! { "Where the sensors of every arm sit." },

@@ -8,7 +8,8 @@ mod value;
 
 pub use error::{RigError, RigProblem};
 pub(crate) use sections::{
-    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection, TrainingSection,
+    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection,
+    TrainingSection,
 };
 pub use sensor_design::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,

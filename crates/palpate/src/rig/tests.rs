@@ -179,6 +179,8 @@ fn bad_contacts_and_training_positions_are_refused_with_a_caret() {
             ("count = 10", "arrangement = \"explicit\""),
             ("count = 10", "positions = []"),
             ("count = 10", "positions = [\"20 mm\", \"401 mm\"]"),
+            ("count = 10", "count = 10\nportion = [\"90 %\", \"10 %\"]"),
+            ("count = 10", "positions = [\"20 mm\"]\nportion = [0.1, 0.9]"),
             ("count = 10", "arrangement = \"edgedense\"\ncount = 10"),
             ("count = 10", ""),
         ],

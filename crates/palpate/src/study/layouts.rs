@@ -11,10 +11,7 @@ const SEED: u64 = 0;
 
 /// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same. `None`
 /// when `keep_going` says no.
-pub(super) fn lay_out(
-    mut study: Study,
-    keep_going: &mut KeepGoing,
-) -> Result<Option<Study>, StudyRunError> {
+pub(super) fn lay_out(mut study: Study, keep_going: &mut KeepGoing) -> Result<Option<Study>, StudyRunError> {
     let mut found: Vec<(Wish, Layout)> = Vec::new();
     for arm in &mut study.arms {
         let Some((asked, wish)) = wish(arm) else { continue };

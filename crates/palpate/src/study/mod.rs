@@ -23,6 +23,9 @@ pub use results::{
 };
 pub use run::{ArmOutcome, Observer, RunOptions, Trained, TrainedSeed};
 
+#[cfg(test)]
+mod tests;
+
 use std::ops::Range;
 
 use crate::contact::Position;

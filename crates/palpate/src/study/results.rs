@@ -165,9 +165,8 @@ impl StudyResults {
     pub fn of(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
         let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::of).collect();
         // What is the same for all arms, the study file says once.
-        let same = |a: &SetUp, b: &SetUp| {
-            (a.estimator, a.force, &a.sensors) == (b.estimator, b.force, &b.sensors)
-        };
+        let same =
+            |a: &SetUp, b: &SetUp| (a.estimator, a.force, &a.sensors) == (b.estimator, b.force, &b.sensors);
         let differ = set_ups.windows(2).any(|pair| !same(&pair[0], &pair[1]));
         let results = |outcome: &ArmOutcome| {
             let arm = study.study.arms.iter().position(|arm| arm.name == outcome.name)?;
@@ -263,9 +262,9 @@ fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
 fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults> {
     let training = arm.rig.training.as_ref()?;
     let positions = training.positions(arm.rig.bench.surface.extent()).ok()?;
-    let (low, high) = positions.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
-        (low.min(at.x_m), high.max(at.x_m))
-    });
+    let (low, high) = positions
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at.x_m), high.max(at.x_m)));
     let span = Portion { from_m: low, to_m: high };
     let error = |inside: bool| {
         let part = |fit: &TrainedSeed| {

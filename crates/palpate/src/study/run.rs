@@ -89,8 +89,7 @@ impl PreparedStudy {
         std::thread::scope(|scope| {
             for _ in 0..options.threads.max(1) {
                 scope.spawn(|| {
-                    let mut queue =
-                        Queue { study: self, arm: 0, work: &work, observer, finished: &finished };
+                    let mut queue = Queue { study: self, arm: 0, work: &work, observer, finished: &finished };
                     for arm in self.arms_by_cost() {
                         queue.arm = arm;
                         match &self.arms[arm] {

@@ -52,8 +52,7 @@ impl SeedBySeed {
         let training = recorded(&rig.pressed_bench())?.subset(training);
         let judged = recorded(&touched_bench(rig))?.subset(judged);
         let unfitted = |error| StudyRunError::Fit { arm: arm(), error };
-        let fitting =
-            Fitting::prepare(&rig.bench, &rig.estimator, &training).map_err(unfitted)?;
+        let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &training).map_err(unfitted)?;
         let Some(locator) = fitting.fit(seed, keep_going).map_err(unfitted)? else { return Ok(None) };
         let evaluation = Evaluation::of(&locator, &judged)
             .map_err(|error| StudyRunError::Reading { arm: arm(), error })?;

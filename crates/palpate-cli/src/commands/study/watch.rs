@@ -128,7 +128,8 @@ impl State {
     /// An arm's networks cost what its finished ones did. Where none is finished, they cost what the others did, in
     /// proportion to the square of the number of patterns, which is roughly how the paper's arms grow.
     fn presentations_left(&self) -> f64 {
-        let known: Vec<&ArmTally> = self.arms.iter().filter(|arm| arm.finished * arm.patterns > 0.0).collect();
+        let known: Vec<&ArmTally> =
+            self.arms.iter().filter(|arm| arm.finished * arm.patterns > 0.0).collect();
         let per_square = known.iter().map(|arm| arm.presentations / arm.finished / arm.patterns.powi(2));
         let per_square = per_square.sum::<f64>() / known.len().max(1) as f64;
         let cost = |arm: &ArmTally| match arm.finished {

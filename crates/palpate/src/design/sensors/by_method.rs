@@ -36,7 +36,9 @@ impl SensorProblem<'_> {
             }
             Method::Genetic => self.bred(seed, keep_going),
             Method::Refined => {
-                let Some(exchanged) = self.exchanged(&*self.objective, seed, keep_going) else { return Ok(None) };
+                let Some(exchanged) = self.exchanged(&*self.objective, seed, keep_going) else {
+                    return Ok(None);
+                };
                 let Some(bred) = self.bred(seed, keep_going) else { return Ok(None) };
                 let best = exchanged.or_better(Some(bred));
                 let refined = refine::refine(self, &best.selection, keep_going);

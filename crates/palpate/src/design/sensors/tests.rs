@@ -330,3 +330,31 @@ fn a_search_can_be_stopped() {
     assert!(SensorProblem::new(&bench, &design, &mut |_, _| false).unwrap().is_none());
     assert_eq!(problem(&bench, &design).all(0, &mut |stage, _| stage != Stage::Genetic).unwrap(), None);
 }
+
+/// One method alone has the layout that it has among all.
+#[test]
+fn a_method_that_is_asked_for_gives_its_own_layout() {
+    let (bench, mut design) = rig();
+    design.sites = Sites::Every(0.02);
+    let problem = problem(&bench, &design);
+    let all = problem.all(0, &mut |_, _| true).unwrap().unwrap();
+    for method in Method::NAMED {
+        let asked = problem.by_method(method, 0, &mut |_, _| true).unwrap().unwrap();
+        let among = all.iter().find(|designed| designed.method == method).unwrap();
+        if method == Method::Refined {
+            // Where there are few sites, the refined one of all starts from the exhaustive search.
+            assert!(asked.assessment.score < 1.01 * among.assessment.score, "{asked:?}");
+        } else {
+            assert_eq!((asked.method, &asked.layout), (method, &among.layout));
+        }
+    }
+    design.criterion = DesignCriterion::DOptimality;
+    let informed = SensorProblem::new(&bench, &design, &mut |_, _| true).unwrap().unwrap();
+    let asked = informed.by_method(Method::DOptimal, 0, &mut |_, _| true).unwrap().unwrap();
+    assert_eq!(asked.layout, all.iter().find(|d| d.method == Method::DOptimal).unwrap().layout);
+    design.offers = vec![offer(SensorKind::Reaction, 5e-3, 1.0)];
+    design.count = 2;
+    let reactions = SensorProblem::new(&bench, &design, &mut |_, _| true).unwrap().unwrap();
+    let refused = reactions.by_method(Method::Even, 0, &mut |_, _| true).map(|_| ()).unwrap_err();
+    assert_eq!(refused, DesignError::NoLayout { method: "even" });
+}

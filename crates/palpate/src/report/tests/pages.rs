@@ -206,6 +206,25 @@ fn another_study_has_a_figure_for_each_arm() {
 }
 
 #[test]
+fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
+    let text = include_str!("../../../../../studies/sensor-kinds.toml");
+    let (base, arms) = text.split_once("[[arm]]").unwrap();
+    let wanted = ["unknown-deflection-8", "unknown-reaction-2", "known-deflection-8", "known-strain-8"];
+    let kept =
+        arms.split("[[arm]]").filter(|arm| wanted.iter().any(|name| arm.contains(&format!("\"{name}\""))));
+    let run = run(&(base.to_owned() + &kept.map(|arm| format!("[[arm]]{arm}")).collect::<String>()), 2);
+    let files = study_report(&run.report()).unwrap();
+    // All arms, their layouts, and errors with the force unknown and known.
+    assert_sound(&files, &[1, 2, 3, 4]);
+    let text = shown_text(page(&files));
+    for said in ["8 locators fitted", "limit's average error", "error over the limit's", "reaction 0, 400 mm"]
+    {
+        assert!(text.contains(said), "{said} is missing in {text}");
+    }
+    assert!(!text.contains("iterations") && !text.contains("did not converge"), "{text}");
+}
+
+#[test]
 fn an_evaluation_says_whose_answers_it_holds() {
     let rig = Rig::from_toml(&include_str!("../../../../../examples/paper.toml").replace("1_000_000", "50"))
         .unwrap();
