@@ -161,16 +161,18 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<(Chart, maud
     let title = format!("Location error of {}", arm.name);
     let label = if seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
     let drawn = Drawn { arm: &arm.name, label, colour };
-    let chart = if arm.rig.bench.force_n.is_some() {
-        error_chart(report, &title, &[drawn])?
+    let (chart, limit) = if arm.rig.bench.force_n.is_some() {
+        let chart = error_chart(report, &title, &[drawn])?;
+        let words = limit_in_words(&chart);
+        (chart, words)
     } else {
-        let mut series = errors(report, drawn, true);
-        series.extend(limit_of(arm, 6, "limit: what physics allows, force unknown"));
-        error_chart_of(report, &title, series)
+        let limit = limit_of(arm, 6, "limit: what physics allows");
+        let words = limit.as_ref().map_or("", |_| " Black dashes: the limit for a force that is not known.");
+        let series = errors(report, drawn, true).into_iter().chain(limit).collect();
+        (error_chart_of(report, &title, series), words.to_owned())
     };
     let caption = html! {
-        "Location error of " b { (arm.name) } " by load position, over " (counted(seeds, "seed", "seeds")) "."
-        (limit_in_words(&chart))
+        "Location error of " b { (arm.name) } " by load position, over " (counted(seeds, "seed", "seeds")) "." (limit)
     };
     Some((chart, caption))
 }
