@@ -165,7 +165,8 @@ fn errors_are_told_apart_between_the_training_positions_and_beyond() {
     let results = StudyResults::of(&run(&prepared, 1, 1), &prepared);
     let arm = &results.arms[0];
     let span = arm.training_span.as_ref().unwrap();
-    assert_eq!(span.training_span, Portion { from_m: 0.1, to_m: 0.3 });
+    let Portion { from_m, to_m } = span.training_span;
+    assert!((from_m - 0.1).abs() < 1e-12 && (to_m - 0.3).abs() < 1e-12);
     let [within, beyond] =
         [span.error_percent_within_training, span.error_percent_beyond_training].map(|s| s.unwrap().median);
     // 201 of the 399 positions lie between them.
