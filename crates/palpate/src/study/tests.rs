@@ -144,7 +144,7 @@ fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
 #[test]
 fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
     let few = beam(
-        "[[arm]]\nname = \"few\"\ntraining = { count = 2, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
+        "[[arm]]\nname = \"few\"\ntraining = { count = 1, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
     );
     let prepared = PreparedStudy::new(few).unwrap();
     let options = RunOptions { seeds: 2, threads: 2, set: InstructionSet::Portable };
