@@ -4,7 +4,7 @@ mod held_out;
 mod likelihood;
 
 pub use held_out::HeldOutSpread;
-pub use likelihood::{ContactFit, Likelihood};
+pub use likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
 
 use crate::bench::Bench;
 use crate::recording::Recording;

@@ -1,14 +1,14 @@
 //! Which locators can follow moving contacts.
 
 use super::{Locator, Method};
-use crate::influence::{BeamLikelihood, InfluenceLocator};
+use crate::influence::{BeamLikelihood, InfluenceLocator, PlateLikelihood};
 use crate::mechanics::SurfaceSpec;
 use crate::method::Likelihood;
 use crate::tracking::TrackerConfig;
 
 /// What a tracker needs of a locator.
 pub struct Tracking {
-    likelihood: BeamLikelihood,
+    likelihood: Box<dyn Likelihood>,
 }
 
 /// A locator by which moving contacts cannot be followed, or not in that way.
@@ -32,7 +32,7 @@ pub enum NotTrackable {
 impl Tracking {
     /// The likelihood to follow contacts by.
     pub fn likelihood(&self) -> &dyn Likelihood {
-        &self.likelihood
+        &*self.likelihood
     }
 }
 
@@ -47,7 +47,10 @@ impl Locator {
         }
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                Ok(Tracking { likelihood: BeamLikelihood::new(beam) })
+                Ok(Tracking { likelihood: Box::new(BeamLikelihood::new(beam)) })
+            }
+            Method::Influence(InfluenceLocator::Plane(plane)) => {
+                Ok(Tracking { likelihood: Box::new(PlateLikelihood::new(plane)) })
             }
             method => Err(NotTrackable::Kind {
                 kind: self.kind(),

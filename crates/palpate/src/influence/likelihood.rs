@@ -13,7 +13,8 @@ use super::belief::ForceBelief;
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
 use crate::contact::Contact;
-use crate::method::{ContactFit, Likelihood, Locate};
+use crate::mechanics::Extent;
+use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood, Locate};
 use crate::numerics::Cholesky;
 use ndarray::Array2;
 use palpate_core::Estimate;
@@ -100,17 +101,7 @@ fn share_of_first_mode(table: &InfluenceTable, sensor: usize) -> f64 {
     2.0 / (3.0 * last as f64) * sum
 }
 
-impl Likelihood for BeamLikelihood {
-    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
-        whitened.clear();
-        let channels = self.live.iter().zip(self.offsets.iter().zip(&self.inverse_sd));
-        whitened.extend(channels.map(|(s, (offset, inverse))| (reading[*s] - offset) * inverse));
-    }
-
-    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
-        self.fit(whitened, [], Some(mode_n))
-    }
-
+impl LineLikelihood for BeamLikelihood {
     fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3> {
         self.fit(whitened, [contact], mode_n)
     }
@@ -124,6 +115,22 @@ impl Likelihood for BeamLikelihood {
         let (sin, cos) = (wave * x_m).sin_cos();
         [sin, wave * cos]
     }
+}
+
+impl Likelihood for BeamLikelihood {
+    fn geometry(&self) -> Geometry<'_> {
+        Geometry::Line(self)
+    }
+
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+        whitened.clear();
+        let channels = self.live.iter().zip(self.offsets.iter().zip(&self.inverse_sd));
+        whitened.extend(channels.map(|(s, (offset, inverse))| (reading[*s] - offset) * inverse));
+    }
+
+    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
+        self.fit(whitened, [], Some(mode_n))
+    }
 
     fn signal(&self, contact: Contact) -> f64 {
         let cell = self.table.cell(contact.position.x_m);
@@ -133,7 +140,7 @@ impl Likelihood for BeamLikelihood {
 
     /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
     /// and var = Σ W²·v.
-    fn calibration_m2(&self, contacts: &[Contact]) -> [f64; 2] {
+    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
         let free = if self.known_force_n().is_some() { 1 } else { 2 };
         let unknowns = free * contacts.len();
         let cells: Vec<_> = contacts.iter().map(|contact| self.table.cell(contact.position.x_m)).collect();
@@ -157,11 +164,11 @@ impl Likelihood for BeamLikelihood {
                 }
             }
         }
-        let mut left = [0.0; 2];
+        let mut left = [[0.0; 3]; 2];
         if let Ok(cholesky) = Cholesky::factor(a) {
             let inverse = cholesky.inverse();
             let spread = inverse.dot(&b).dot(&inverse);
-            left.iter_mut().zip(0..contacts.len()).for_each(|(left, k)| *left = spread[[free * k, free * k]]);
+            left.iter_mut().zip(0..contacts.len()).for_each(|(left, k)| left[0] = spread[[free * k, free * k]]);
         }
         left
     }
@@ -170,8 +177,8 @@ impl Likelihood for BeamLikelihood {
         self.locator.locate(reading)
     }
 
-    fn length_m(&self) -> f64 {
-        self.table.length_m
+    fn extent(&self) -> Extent {
+        Extent { length_m: self.table.length_m, width_m: None }
     }
 
     fn known_force_n(&self) -> Option<f64> {

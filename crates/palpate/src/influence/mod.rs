@@ -32,7 +32,7 @@ pub use config::{InfluenceConfig, InfluenceSource};
 pub use fitting::InfluenceFitError;
 pub use likelihood::BeamLikelihood;
 pub use locator::BeamLocator;
-pub use plane::{PlaneLocator, PlaneScratch, PlaneTable};
+pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 pub use scratch::Scratch;
 pub use table::InfluenceTable;
 pub use table_function::FittedInfluence;

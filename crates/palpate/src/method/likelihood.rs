@@ -1,20 +1,56 @@
 //! How probable a reading is under contacts: what a filter over time asks of a locator.
 
 use crate::contact::Contact;
+use crate::mechanics::Extent;
 use palpate_core::Estimate;
 
-/// A fitted method that can say how well contacts explain a reading, on a one-dimensional surface.
+/// A fitted method that can say how well contacts explain a reading.
+pub trait Likelihood: Send + Sync {
+    /// What contacts on this surface are fitted by.
+    fn geometry(&self) -> Geometry<'_>;
+
+    /// A reading as the fits want it, written over `whitened`.
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
+
+    /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u
+    /// (see [`LineLikelihood`]), which a plane does not have.
+    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
+
+    /// How far a contact moves the reading in balance: the sum of (W·f)² over the noise's variance, of all channels.
+    fn signal(&self, contact: Contact) -> f64;
+
+    /// Covariance of the position of each contact, xx, xy and yy in m², that calibration leaves and no further reading takes
+    /// away; on a line xx alone.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2];
+
+    /// The contacts that explain a reading by itself: the best estimate, and its other modes.
+    fn locate_alone(&self, reading: &[f64]) -> Estimate;
+
+    /// How far the surface reaches.
+    fn extent(&self) -> Extent;
+
+    /// The force of every contact in newtons, where it is known exactly.
+    fn known_force_n(&self) -> Option<f64>;
+
+    /// The most contacts that may touch at once.
+    fn most_contacts(&self) -> usize;
+}
+
+/// Whether contacts lie on a line or on a plane, with the fits that go with that.
+#[derive(Clone, Copy)]
+pub enum Geometry<'a> {
+    /// Contacts have one coordinate.
+    Line(&'a dyn LineLikelihood),
+    /// Contacts have two.
+    Plane(&'a dyn PlaneLikelihood),
+}
+
+/// How well contacts on a line explain a reading.
 ///
 /// A surface that swings is bent by its first mode's force u = m·ω²·q where one in balance is bent by the contacts' share
 /// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
 /// faster modes are taken to be in balance.
-pub trait Likelihood: Send + Sync {
-    /// A reading as the fits want it, written over `whitened`.
-    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
-
-    /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u.
-    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
-
+pub trait LineLikelihood {
     /// How well a contact explains it; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
     fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
 
@@ -23,24 +59,12 @@ pub trait Likelihood: Send + Sync {
 
     /// The first mode's shape φ at a place, and its slope per metre.
     fn first_mode(&self, x_m: f64) -> [f64; 2];
+}
 
-    /// How far a contact moves the reading in balance: the sum of (W·f)² over the noise's variance, of all channels.
-    fn signal(&self, contact: Contact) -> f64;
-
-    /// Variance of the position of each contact, in m², that calibration leaves and no further reading takes away.
-    fn calibration_m2(&self, contacts: &[Contact]) -> [f64; 2];
-
-    /// The contacts that explain a reading by itself: the best estimate, and its other modes.
-    fn locate_alone(&self, reading: &[f64]) -> Estimate;
-
-    /// Length of the surface, in metres.
-    fn length_m(&self) -> f64;
-
-    /// The force of every contact in newtons, where it is known exactly.
-    fn known_force_n(&self) -> Option<f64>;
-
-    /// The most contacts that may touch at once.
-    fn most_contacts(&self) -> usize;
+/// How well a contact on a plane in balance explains a reading.
+pub trait PlaneLikelihood {
+    /// The unknowns are x, y and force.
+    fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3>;
 }
 
 /// The misfit χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about

@@ -1,8 +1,28 @@
 //! A surface and its contacts under several motions, which mix.
 
-use super::gaussian::Gaussian;
-use super::step::{MOTIONS, OF_CONTACT, Step, U, W, X, contact, contacts, motion_of};
-use crate::method::{ContactFit, Likelihood};
+use super::gaussian::{Change, Gaussian};
+use super::step::{MOTIONS, OF_CONTACT, contact};
+use crate::method::ContactFit;
+
+/// What a step of time does to the M members of a bank, states of N numbers.
+pub(super) trait Dynamics<const N: usize, const M: usize> {
+    /// The probability that member `from` becomes member `to`.
+    fn passes(&self, from: usize, to: usize) -> f64;
+
+    /// What the step does to a belief that moves as member `member` says.
+    fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N>;
+}
+
+/// The K numbers of a state that a reading sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SeenNumbers<const K: usize> {
+    /// Which entries of the state they are.
+    pub entries: [usize; K],
+    /// The least and the greatest that each can be: places lie on the surface, forces press.
+    pub bounds: [(f64, f64); K],
+    /// Which of them are places.
+    pub is_place: [bool; K],
+}
 
 /// A Gaussian for each choice of motions, with its share of the probability: N numbers of a state, M = 3^C choices for its
 /// C contacts.
@@ -24,40 +44,37 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 
     /// After a step and before its reading.
-    pub fn predicted(&self, step: &Step, likelihood: &dyn Likelihood) -> Self {
+    pub fn predicted(&self, dynamics: &impl Dynamics<N, M>) -> Self {
         let mut shares = [0.0; M];
         let members = std::array::from_fn(|to| {
-            let joint: [f64; M] =
-                std::array::from_fn(|from| step.passes(contacts(N), from, to) * self.shares[from]);
+            let joint: [f64; M] = std::array::from_fn(|from| dynamics.passes(from, to) * self.shares[from]);
             shares[to] = joint.iter().sum();
             let parts = joint.iter().map(|joint| joint / shares[to]).zip(self.members);
             let belief = Gaussian::mixed(parts);
-            let motions = |k: usize| step.motion(motion_of(to, k));
-            belief.predicted(&step.change(&belief, motions, likelihood))
+            belief.predicted(&dynamics.change(&belief, to))
         });
         Self { shares, members }
     }
 
     /// After a reading; and the logarithm of how probable it was. The misfit is expanded about `start`, or else the mean,
     /// and again about where that leads if it leads farther than the reading itself can tell.
-    ///
-    /// The unknowns are u, then place and force of each contact: K = 1 + 2·C.
     pub fn updated<const K: usize>(
         &self,
+        numbers: &SeenNumbers<K>,
         expand: impl Fn(&[f64; K]) -> ContactFit<K>,
         start: Option<[f64; K]>,
-        length_m: f64,
     ) -> Option<(Self, f64)> {
         const MOST_ROUNDS: usize = 3;
-        let mut about = start.unwrap_or_else(|| held(self.seen(), length_m));
+        let mut about = start.unwrap_or_else(|| self.seen(numbers));
         let mut round = 1;
         loop {
             let fit = expand(&about);
-            let (after, evidence) = self.updated_about(&fit, &about)?;
-            let next = held(after.seen(), length_m);
-            let moved = (1..K).step_by(2).map(|k| fit.information[k][k] * (next[k] - about[k]).powi(2));
+            let (after, evidence) = self.updated_about(numbers, &fit, &about)?;
+            let next = after.seen(numbers);
+            let places = (0..K).filter(|k| numbers.is_place[*k]);
+            let moved = places.map(|k| fit.information[k][k] * (next[k] - about[k]).powi(2));
             if moved.sum::<f64>() < 0.1 || round == MOST_ROUNDS {
-                return Some((after.held_to(length_m), evidence));
+                return Some((after.held(numbers), evidence));
             }
             (about, round) = (next, round + 1);
         }
@@ -68,16 +85,14 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     /// What came later says of the state before, whatever motion it was under, L_j = N_j(x | all)/N_j(x | so far), where
     /// N_j, of motion j in the step, is from Rauch, Tung and Striebel's recursion on the mixture that motion j began with. Each
     /// member is moved and weighed by L_j as by a reading, so that a variance never grows.
-    pub fn smoothed(&self, step: &Step, likelihood: &dyn Likelihood, later: &Self) -> Self {
+    pub fn smoothed(&self, dynamics: &impl Dynamics<N, M>, later: &Self) -> Self {
         let mut weights = [[0.0; M]; M];
         let mut before = [[Gaussian::default(); M]; M];
         for to in 0..M {
-            let joint: [f64; M] =
-                std::array::from_fn(|from| step.passes(contacts(N), from, to) * self.shares[from]);
+            let joint: [f64; M] = std::array::from_fn(|from| dynamics.passes(from, to) * self.shares[from]);
             let sum: f64 = joint.iter().sum();
             let began = Gaussian::mixed(joint.iter().map(|joint| joint / sum).zip(self.members));
-            let motions = |k: usize| step.motion(motion_of(to, k));
-            let whole = began.smoothed(&step.change(&began, motions, likelihood), &later.members[to]);
+            let whole = began.smoothed(&dynamics.change(&began, to), &later.members[to]);
             let (fit, about) = whole.less(&began);
             let results: [(Gaussian<N>, f64); M] =
                 self.members.map(|member| member.updated(&fit, &about, &std::array::from_fn(|i| i)));
@@ -138,19 +153,24 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    fn seen<const K: usize>(&self) -> [f64; K] {
+    /// What is believed of the numbers that a reading sees, held to their bounds.
+    fn seen<const K: usize>(&self, numbers: &SeenNumbers<K>) -> [f64; K] {
         let mut seen = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
-            seen.iter_mut().zip(entries::<K>()).for_each(|(seen, entry)| *seen += share * member.mean[entry]);
+            seen.iter_mut().zip(numbers.entries).for_each(|(seen, entry)| *seen += share * member.mean[entry]);
         }
-        seen
+        std::array::from_fn(|k| numbers.held(k, seen[k]))
     }
 
     /// `None` where the reading is too improbable for numbers.
-    fn updated_about<const K: usize>(&self, fit: &ContactFit<K>, about: &[f64; K]) -> Option<(Self, f64)> {
-        let entries = entries::<K>();
+    fn updated_about<const K: usize>(
+        &self,
+        numbers: &SeenNumbers<K>,
+        fit: &ContactFit<K>,
+        about: &[f64; K],
+    ) -> Option<(Self, f64)> {
         let results: [(Gaussian<N>, f64); M] =
-            self.members.map(|member| member.updated(fit, about, &entries));
+            self.members.map(|member| member.updated(fit, about, &numbers.entries));
         let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             return None;
@@ -162,31 +182,20 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         (sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
-    /// With positions on the surface and forces that press.
-    fn held_to(mut self, length_m: f64) -> Self {
+    /// With all that a reading sees within its bounds.
+    fn held<const K: usize>(mut self, numbers: &SeenNumbers<K>) -> Self {
         for member in &mut self.members {
-            for at in (0..contacts(N)).map(contact) {
-                member.mean[at + X] = member.mean[at + X].clamp(0.0, length_m);
-                member.mean[at + W] = member.mean[at + W].max(0.0);
+            for (k, entry) in numbers.entries.into_iter().enumerate() {
+                member.mean[entry] = numbers.held(k, member.mean[entry]);
             }
         }
         self
     }
 }
 
-/// Unknowns with places on the surface and forces that press.
-fn held<const K: usize>(mut unknowns: [f64; K], length_m: f64) -> [f64; K] {
-    for (k, unknown) in unknowns.iter_mut().enumerate().skip(1) {
-        *unknown = if k % 2 == 1 { unknown.clamp(0.0, length_m) } else { unknown.max(0.0) };
+impl<const K: usize> SeenNumbers<K> {
+    fn held(&self, k: usize, value: f64) -> f64 {
+        let (least, most) = self.bounds[k];
+        value.max(least).min(most)
     }
-    unknowns
-}
-
-/// Which entries of a state the unknowns of a fit are.
-fn entries<const K: usize>() -> [usize; K] {
-    std::array::from_fn(|k| match k {
-        0 => U,
-        k if k % 2 == 1 => contact(k / 2) + X,
-        k => contact(k / 2 - 1) + W,
-    })
 }

@@ -8,23 +8,25 @@ use super::bank::Bank;
 use super::belief::{Belief, Seen};
 use super::config::TrackerConfig;
 use super::gaussian::Gaussian;
-use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact};
+use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact, seen_on_line};
 use crate::contact::{Contact, Position};
+use crate::method::LineLikelihood;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use std::f64::consts::PI;
 
 /// A valley of a reading's misfit that is wider than this share of the length is born in parts no wider, since its force
 /// changes along it.
-const WIDEST: f64 = 1.0 / 40.0;
+pub(super) const WIDEST: f64 = 1.0 / 40.0;
 /// The most parts of a valley.
-const MOST_PARTS: f64 = 16.0;
+pub(super) const MOST_PARTS: f64 = 16.0;
 /// A force that is not known lies anywhere between 0 and this many times the one that explains a reading.
-const FORCES: f64 = 10.0;
+pub(super) const FORCES: f64 = 10.0;
 /// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
 const UNREST: f64 = 0.02;
 
-/// What can come in one reading.
+/// What can come in one reading on a line.
 pub(super) struct Births<'a> {
+    pub line: &'a dyn LineLikelihood,
     pub seen: Seen<'a>,
     pub config: &'a TrackerConfig,
     pub alone: &'a Estimate,
@@ -70,8 +72,8 @@ impl Births<'_> {
         let Contact { position, force_n } = newcomer.contact;
         let born: Bank<6, 1> = Bank::of(self.joined(&Gaussian::<2>::default(), newcomer));
         let start = [self.balance_n(newcomer.contact), position.x_m, force_n];
-        let length_m = self.seen.likelihood.length_m();
-        let (bank, evidence) = born.updated(|about| self.seen.fit_one(about), Some(start), length_m)?;
+        let expand = |about: &[f64; 3]| self.seen.fit_one(self.line, about);
+        let (bank, evidence) = born.updated(&seen_on_line(self.length_m()), expand, Some(start))?;
         Some((evidence + newcomer.room.ln(), Belief::One(Bank::of(bank.members[0]))))
     }
 
@@ -92,7 +94,8 @@ impl Births<'_> {
     ) -> Option<(Bank<10, M>, f64)> {
         let mode_n = self.balance_n(first) + self.balance_n(second);
         let start = [mode_n, first.position.x_m, first.force_n, second.position.x_m, second.force_n];
-        born.updated(|about| self.seen.fit_two(about), Some(start), self.seen.likelihood.length_m())
+        let expand = |about: &[f64; 5]| self.seen.fit_two(self.line, about);
+        born.updated(&seen_on_line(self.length_m()), expand, Some(start))
     }
 
     /// A belief with a newcomer, under which the first mode is nearly in balance: u grows by W·φ(x) and its unrest.
@@ -119,7 +122,7 @@ impl Births<'_> {
         }
         debug_assert_eq!(N2, N + OF_CONTACT);
         if let Some(swing) = self.config.swing {
-            let [shape, slope] = self.seen.likelihood.first_mode(position.x_m);
+            let [shape, slope] = self.line.first_mode(position.x_m);
             let unrest = (UNREST * force_n).powi(2);
             let omega = 2.0 * PI * swing.frequency_hz;
             joined.mean[U] += force_n * shape;
@@ -135,13 +138,17 @@ impl Births<'_> {
         joined
     }
 
+    fn length_m(&self) -> f64 {
+        self.seen.likelihood.extent().length_m
+    }
+
     fn balance_n(&self, contact: Contact) -> f64 {
-        contact.force_n * self.seen.likelihood.first_mode(contact.position.x_m)[0]
+        contact.force_n * self.line.first_mode(contact.position.x_m)[0]
     }
 
     /// The two contacts that the reading by itself shows, from left to right.
     fn pair(&self) -> Option<(Newcomer, Newcomer)> {
-        let length_m = self.seen.likelihood.length_m();
+        let length_m = self.length_m();
         let anywhere = |contact: &ContactEstimate| {
             self.newcomer(contact.position.x_m, contact.force_n?, length_m.powi(2) / 12.0, 1.0)
         };
@@ -157,7 +164,7 @@ impl Births<'_> {
         let (Some(force_n), Some(uncertainty)) = (contact.force_n, contact.uncertainty) else {
             return Vec::new();
         };
-        let length_m = self.seen.likelihood.length_m();
+        let length_m = self.length_m();
         let (low, high) = uncertainty.x_95_m;
         let count = ((high - low) / (WIDEST * length_m)).ceil().clamp(1.0, MOST_PARTS);
         if count == 1.0 {
@@ -175,7 +182,7 @@ impl Births<'_> {
     /// The force that fits a place, from one that fits near it.
     fn best_force_n(&self, x_m: f64, near_n: f64) -> f64 {
         let contact = Contact { position: Position::along(x_m), force_n: near_n };
-        let fit = self.seen.likelihood.fit_one(self.seen.whitened, contact, None);
+        let fit = self.line.fit_one(self.seen.whitened, contact, None);
         let information = fit.information[2][2];
         if information > 0.0 { (near_n + fit.pull[2] / information).max(0.0) } else { near_n }
     }

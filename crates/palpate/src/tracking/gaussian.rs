@@ -26,6 +26,13 @@ pub(super) struct Change<const N: usize> {
 }
 
 impl<const N: usize> Change<N> {
+    /// A step that leaves a belief as it is.
+    pub fn nothing(belief: &Gaussian<N>) -> Self {
+        let mut change = Self { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
+        (0..N).for_each(|i| change.forward[i][i] = 1.0);
+        change
+    }
+
     /// F·P.
     fn carried(&self, p: &Matrix<N>) -> Matrix<N> {
         let mut carried = [[0.0; N]; N];

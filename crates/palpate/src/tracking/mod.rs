@@ -16,6 +16,9 @@
 //! A grid of positions and speeds that resolves what a track reaches would have some 10⁵ cells; within a valley of the
 //! likelihood a Gaussian says the same to good approximation, as soon as a contact has been seen for some readings.
 //!
+//! On a plane ([`on_plane`]) there is one contact, whose motions along and across are alike and independent, and the surface
+//! is taken to be in balance; the rest is the same.
+//!
 //! The smoother goes back over a hypothesis with what came later, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA
 //! Journal 3, 1965) for each motion.
 
@@ -24,6 +27,7 @@ mod belief;
 mod birth;
 mod config;
 mod gaussian;
+mod on_plane;
 mod smoother;
 mod step;
 mod track;
@@ -31,7 +35,7 @@ mod tracker;
 
 pub use config::{Swing, TrackerConfig};
 pub use smoother::SmoothTracker;
-pub use track::{Track, TrackError, Tracked};
+pub use track::{Across, Track, TrackError, Tracked};
 pub use tracker::Tracker;
 
 #[cfg(test)]

@@ -89,6 +89,6 @@ impl<'a> SmoothTracker<'a> {
     fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
         let remembered = self.past[k].iter().find(|remembered| remembered.id == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
-        remembered.belief.smoothed(&step, self.likelihood, later).map(|belief| (id, belief))
+        remembered.belief.smoothed(&step, self.likelihood.geometry(), later).map(|belief| (id, belief))
     }
 }

@@ -1,13 +1,14 @@
 //! What a step of time does to a surface and its contacts.
 //!
-//! The state of a surface with C contacts is (u, u̇) and then (x, v, v̇, W) of each contact: N = 2 + 4·C numbers. u = m·ω²·q
+//! The state of a line with C contacts is (u, u̇) and then (x, v, v̇, W) of each contact: N = 2 + 4·C numbers. u = m·ω²·q
 //! is the force of the surface's first mode, whose share of the contacts' force is p = Σ W·φ(x) with φ its shape:
 //! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not look at it.
 
+use super::bank::{Dynamics, SeenNumbers};
 use super::config::TrackerConfig;
 use super::gaussian::{Change, Gaussian, Matrix};
 use crate::mechanics::modal::Oscillator;
-use crate::method::Likelihood;
+use crate::method::LineLikelihood;
 use std::f64::consts::PI;
 
 /// Force of the first mode, and how fast it changes.
@@ -18,6 +19,8 @@ pub(super) const X: usize = 0;
 pub(super) const V: usize = 1;
 pub(super) const A: usize = 2;
 pub(super) const W: usize = 3;
+/// Position, speed and acceleration.
+const OF_MOTION: usize = 3;
 /// Numbers of a contact.
 pub(super) const OF_CONTACT: usize = 4;
 
@@ -32,6 +35,23 @@ pub(super) const fn contact(k: usize) -> usize {
 /// How many contacts a state of N numbers has.
 pub(super) const fn contacts(numbers: usize) -> usize {
     (numbers - 2) / OF_CONTACT
+}
+
+/// What a reading sees of a state on a line: u, then place and force of each contact, K = 1 + 2·C numbers.
+pub(super) fn seen_on_line<const K: usize>(length_m: f64) -> SeenNumbers<K> {
+    SeenNumbers {
+        entries: std::array::from_fn(|k| match k {
+            0 => U,
+            k if k % 2 == 1 => contact(k / 2) + X,
+            k => contact(k / 2 - 1) + W,
+        }),
+        bounds: std::array::from_fn(|k| match k {
+            0 => (f64::NEG_INFINITY, f64::INFINITY),
+            k if k % 2 == 1 => (0.0, length_m),
+            _ => (0.0, f64::INFINITY),
+        }),
+        is_place: std::array::from_fn(|k| k % 2 == 1),
+    }
 }
 
 /// The motion of contact `k` in member `member` of a bank, whose number has a digit to the base 3 for each contact.
@@ -87,55 +107,59 @@ impl Step {
         (0..contacts).map(passes).product()
     }
 
-    /// What the step does to a belief whose contacts move as `motions` says, contact by contact.
-    pub fn change<const N: usize>(
-        &self,
-        belief: &Gaussian<N>,
-        motions: impl Fn(usize) -> Motion,
-        likelihood: &dyn Likelihood,
-    ) -> Change<N> {
-        let mut change = Change { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
-        (0..N).for_each(|i| change.forward[i][i] = 1.0);
+    /// The motion that a member's digit says.
+    pub fn motion(&self, number: usize) -> &Motion {
+        &self.motions[number]
+    }
+
+    /// Variance that a force of `force_n` gains.
+    pub fn drift_n2(&self, force_n: f64) -> f64 {
+        self.drift * force_n.powi(2)
+    }
+}
+
+/// A step of contacts on a line.
+#[derive(Clone, Copy)]
+pub(super) struct OnLine<'a> {
+    pub step: &'a Step,
+    pub likelihood: &'a dyn LineLikelihood,
+}
+
+impl<const N: usize, const M: usize> Dynamics<N, M> for OnLine<'_> {
+    fn passes(&self, from: usize, to: usize) -> f64 {
+        self.step.passes(contacts(N), from, to)
+    }
+
+    fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N> {
+        let mut change = Change::nothing(belief);
         for k in 0..contacts(N) {
             let at = contact(k);
-            let motion = motions(k);
-            for i in 0..OF_CONTACT - 1 {
-                for j in 0..OF_CONTACT - 1 {
-                    change.forward[at + i][at + j] = motion.forward[i][j];
-                    change.noise[at + i][at + j] = motion.noise[i][j];
-                }
-                change.mean[at + i] =
-                    (0..OF_CONTACT - 1).map(|j| motion.forward[i][j] * belief.mean[at + j]).sum();
-            }
-            change.noise[at + W][at + W] = self.drift * belief.mean[at + W].powi(2);
+            self.step.motion(motion_of(member, k)).move_along(at, belief, &mut change);
+            change.noise[at + W][at + W] = self.step.drift_n2(belief.mean[at + W]);
         }
-        if let Some(swing) = &self.swing {
-            self.swing(swing, belief, &mut change, likelihood);
+        if let Some(swing) = &self.step.swing {
+            self.swing(swing, belief, &mut change);
         }
         change
     }
+}
 
-    /// The motion that a member's digit says.
-    pub fn motion(&self, number: usize) -> Motion {
-        self.motions[number]
-    }
-
+impl OnLine<'_> {
     /// The first mode swings under the force that it has halfway: (u − p, u̇) swings freely.
     fn swing<const N: usize>(
         &self,
         swing: &FreeSwing,
         belief: &Gaussian<N>,
         change: &mut Change<N>,
-        likelihood: &dyn Likelihood,
     ) {
-        let half_s = 0.5 * self.duration_s;
+        let half_s = 0.5 * self.step.duration_s;
         let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
         let follows = [(U, 1.0 - uu), (U_RATE, -su)];
         let (mut balance_n, mut force_n) = (0.0, 0.0);
         for k in 0..contacts(N) {
             let at = contact(k);
             let halfway_m = mean[at + X] + half_s * (mean[at + V] + 0.5 * half_s * mean[at + A]);
-            let ([shape, slope], own_n) = (likelihood.first_mode(halfway_m), mean[at + W]);
+            let ([shape, slope], own_n) = (self.likelihood.first_mode(halfway_m), mean[at + W]);
             balance_n += own_n * shape;
             force_n += own_n;
             for (row, share) in follows {
@@ -168,6 +192,17 @@ pub(super) struct Motion {
 }
 
 impl Motion {
+    /// Writes into `change` what it does to the position, speed and acceleration that begin at entry `at` of a state.
+    pub fn move_along<const N: usize>(&self, at: usize, belief: &Gaussian<N>, change: &mut Change<N>) {
+        for i in 0..OF_MOTION {
+            for j in 0..OF_MOTION {
+                change.forward[at + i][at + j] = self.forward[i][j];
+                change.noise[at + i][at + j] = self.noise[i][j];
+            }
+            change.mean[at + i] = (0..OF_MOTION).map(|j| self.forward[i][j] * belief.mean[at + j]).sum();
+        }
+    }
+
     /// A contact whose acceleration has standard deviation `sd` and a correlation that falls by e in `lasts_s` (R. Singer,
     /// IEEE Trans. Aerosp. Electron. Syst. 6, 1970).
     fn new(duration_s: f64, lasts_s: f64, sd: f64) -> Self {

@@ -8,7 +8,7 @@ use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::influence::{BeamLikelihood, InfluenceConfig};
 use crate::mechanics::Motion;
-use crate::method::{FitTask, Likelihood};
+use crate::method::{FitTask, Likelihood, LineLikelihood};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, measure};
 use crate::simulate::{clean_reading, simulate};

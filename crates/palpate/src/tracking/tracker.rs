@@ -3,9 +3,10 @@
 use super::belief::{Belief, Mixed, Moments, Seen};
 use super::birth::Births;
 use super::config::TrackerConfig;
+use super::on_plane::PlaneBirths;
 use super::step::Step;
 use super::track::{Track, TrackError, Tracked};
-use crate::method::Likelihood;
+use crate::method::{Geometry, Likelihood};
 use palpate_core::Estimate;
 
 /// The most hypotheses that are held possible at once.
@@ -19,7 +20,7 @@ const MOST_CONTACTS: usize = 2;
 /// likely as not to be gone with the next one: it could be anything anywhere.
 const UNSEEN: f64 = 9.0;
 
-/// Follows contacts on a one-dimensional surface through readings in time.
+/// Follows contacts through readings in time: up to two on a line, one on a plane.
 pub struct Tracker<'a> {
     likelihood: &'a dyn Likelihood,
     config: TrackerConfig,
@@ -119,7 +120,7 @@ impl<'a> Tracker<'a> {
         for hypothesis in &mut self.hypotheses {
             let contacts = hypothesis.belief.contacts();
             with[contacts] += hypothesis.weight.exp();
-            hypothesis.belief = hypothesis.belief.predicted(&step, self.likelihood);
+            hypothesis.belief = hypothesis.belief.predicted(&step, self.likelihood.geometry());
             let ends = hypothesis.unseen.map(|unseen| if unseen { 0.5f64 } else { changes });
             for (k, ends) in ends.into_iter().enumerate().take(contacts) {
                 let rest = hypothesis.belief.without(k);
@@ -172,7 +173,24 @@ impl<'a> Tracker<'a> {
 
     /// What comes with this reading, weighed by it.
     fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
-        let births = Births { seen, config: &self.config, alone };
+        let born = match self.likelihood.geometry() {
+            Geometry::Line(line) => {
+                self.births_on_line(newborn, Births { line, seen, config: &self.config, alone })
+            }
+            Geometry::Plane(plane) => {
+                let births = PlaneBirths { plane, seen, config: &self.config, alone };
+                let weighed = |(evidence, belief)| (newborn.one + evidence, belief);
+                births.where_nothing_touched().into_iter().map(weighed).collect()
+            }
+        };
+        let first = self.next_id;
+        self.next_id += born.len() as u64;
+        let numbered = born.into_iter().zip(first..);
+        let unseen = [false; MOST_CONTACTS];
+        numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
+    }
+
+    fn births_on_line(&self, newborn: Newborn, births: Births) -> Vec<(f64, Belief)> {
         let mut born: Vec<(f64, Belief)> = Vec::new();
         for (evidence, belief) in births.where_nothing_touched() {
             let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };
@@ -184,11 +202,7 @@ impl<'a> Tracker<'a> {
                 born.extend(births.beside(bank).map(|(evidence, belief)| (weight + evidence, belief)));
             }
         }
-        let first = self.next_id;
-        self.next_id += born.len() as u64;
-        let numbered = born.into_iter().zip(first..);
-        let unseen = [false; MOST_CONTACTS];
-        numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
+        born
     }
 
     /// Makes the weights probabilities again, drops what is improbable, and lets the more probable of two that are one

@@ -65,6 +65,11 @@ impl PlaneLocator {
         true
     }
 
+    /// What is searched, with something else known of the force.
+    pub(super) fn search_with(&self, force: ForceBelief) -> Search {
+        Stored { force, ..self.stored.clone() }.search()
+    }
+
     /// [`Locate::locate`] with memory of the caller's.
     pub fn locate_with(&self, reading: &[f64], scratch: &mut PlaneScratch) -> Estimate {
         locate(&self.search, reading, &mut scratch.0)

@@ -4,6 +4,7 @@
 mod answer;
 mod coarse;
 mod fitting;
+mod likelihood;
 mod locator;
 mod modes;
 mod patches;
@@ -11,6 +12,7 @@ mod refine;
 mod search;
 mod table;
 
+pub use likelihood::PlateLikelihood;
 pub use locator::{PlaneLocator, PlaneScratch};
 pub use table::PlaneTable;
 

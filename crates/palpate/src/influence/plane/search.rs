@@ -8,6 +8,7 @@ use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::modes::{Block, Leaf};
 use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
+use crate::contact::{Contact, Position};
 use crate::influence::belief::ForceBelief;
 use crate::numerics::chi_squared_bound;
 
@@ -130,10 +131,15 @@ impl Search {
 
     /// Puts d into the scratch; |d|².
     pub fn whiten(&self, reading: &[f64], scratch: &mut Scratch) -> f64 {
-        scratch.whitened.clear();
-        let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
-        scratch.whitened.extend(channels.map(|((s, offset), inverse)| (reading[*s] - offset) * inverse));
+        self.whiten_into(reading, &mut scratch.whitened);
         scratch.whitened.iter().map(|d| d * d).sum()
+    }
+
+    /// Writes d over `whitened`.
+    pub fn whiten_into(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+        whitened.clear();
+        let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
+        whitened.extend(channels.map(|((s, offset), inverse)| (reading[*s] - offset) * inverse));
     }
 
     /// The minima that matter, best first, of a reading that was whitened to length `square`.
@@ -227,6 +233,36 @@ impl Search {
     #[inline]
     fn near<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
         &groups[self.patches.nearest(x_m, y_m) * self.patches.groups..][..self.patches.groups]
+    }
+
+    /// Σ (W·f)² at a contact.
+    pub fn signal(&self, contact: Contact) -> f64 {
+        let place = self.patches.place(contact.position.x_m, contact.position.y_m);
+        let squares = (0..self.patches.groups).flat_map(|group| self.patches.value(&place, group));
+        contact.force_n.powi(2) * squares.map(|f| f * f).sum::<f64>()
+    }
+
+    /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
+    pub fn calibration(&self, contact: Contact) -> [[[f64; 3]; 3]; 2] {
+        let Contact { position: Position { x_m, y_m }, force_n } = contact;
+        let place = self.patches.place(x_m, y_m);
+        let variances = self.near(&self.variances, [x_m, y_m]);
+        let scale = force_n.max(self.weights_force_n).powi(2);
+        let mut sums = [[[0.0; 3]; 3]; 2];
+        for group in 0..self.patches.groups {
+            let values = self.patches.values(&place, group);
+            for lane in 0..8 {
+                let variance = scale * variances[group][lane];
+                let weight = 1.0 / (1.0 + variance);
+                let j = [force_n * values.along[lane], force_n * values.across[lane], values.f[lane]];
+                for (sum, factor) in sums.iter_mut().zip([weight, weight * weight * variance]) {
+                    for p in 0..3 {
+                        (0..3).for_each(|q| sum[p][q] += factor * j[p] * j[q]);
+                    }
+                }
+            }
+        }
+        sums
     }
 
     /// The normal equations; the calibration's variances are those `near` some place, or where the contact is.
