@@ -36,10 +36,9 @@ fn measure(locator: &Locator, rig: &Rig) {
     let timed = simulate_moving(rig, 2).expect("the example can be moved");
     let rows = &timed.recording.rows;
     let truths = timed.truths();
-    let own = rig.motion.map(|moving| Swing {
-        frequency_hz: moving.beam.frequency_hz(1),
-        damping_ratio: moving.beam.damping_ratio,
-    });
+    let beam = rig.motion.and_then(|moving| moving.beam);
+    let own = beam
+        .map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
     for (name, swing) in [("in balance", None), ("with inertia", own)] {
         let config = TrackerConfig { swing, ..TrackerConfig::default() };
         let tracking = locator.tracking(&config).expect("an influence locator");
@@ -55,7 +54,7 @@ fn measure(locator: &Locator, rig: &Rig) {
             .collect();
         rates.sort_by(f64::total_cmp);
         let followed = follow(locator, config, &timed).expect("an influence locator");
-        let errors = |tracks| TrackErrors::of(tracks, &truths).expect("something was tracked");
+        let errors = |tracks| TrackErrors::of(tracks, &truths, rig.bench.surface.extent()).expect("something was tracked");
         let (filter, smoother) = (errors(&followed.filtered), errors(&followed.smoothed));
         println!(
             "    {name}: single {:.3} mm; filter {:.3} mm, {:.2} times, covers {:.1} %; smoother {:.3} mm, {:.2} times, covers {:.1} %; {:.0} thousand readings/s",

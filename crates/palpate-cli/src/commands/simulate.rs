@@ -20,7 +20,7 @@ pub struct Arguments {
     /// Press every so far, on a plane both ways, instead of at the training positions, as in `--every "1 mm"`
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
     every: Option<f64>,
-    /// Move the contact as the rig's [motion] says, over a beam that swings, and write the time of each reading
+    /// Move the contact as the rig's [motion] says, over a beam that swings or a plate in balance, and write the time of each reading
     #[arg(long, conflicts_with = "every")]
     moving: bool,
     /// Seed of noise and faults
@@ -63,18 +63,24 @@ fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
     let timed = simulate_moving(rig, arguments.seed)
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
     let mut csv = Vec::new();
-    recording::write_timed(&timed, rig.bench.surface.extent(), &comment(arguments), &mut csv)
+    let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());
+    let how = if swings { "" } else { ", in balance at every reading, without inertia" };
+    let comment = comment(arguments) + how;
+    recording::write_timed(&timed, rig.bench.surface.extent(), &comment, &mut csv)
         .map_err(|error| output::cannot("write", &arguments.out, &error))?;
     output::write_file(&arguments.out, &csv)?;
     let rows = format_count(timed.recording.rows.len() as u64);
     let seconds = timed.times_s.last().copied().unwrap_or(0.0);
     let mut told = format!("{rows} rows in {seconds:.3} s: {}", arguments.out.display());
-    if let Some(moving) = &rig.motion {
-        told += &format!(
-            "\nfirst natural frequency {:.2} Hz, critical speed {:.2} m/s",
-            moving.beam.frequency_hz(1),
-            moving.beam.critical_speed_m_per_s()
-        );
+    match rig.motion.and_then(|moving| moving.beam) {
+        Some(beam) => {
+            told += &format!(
+                "\nfirst natural frequency {:.2} Hz, critical speed {:.2} m/s",
+                beam.frequency_hz(1),
+                beam.critical_speed_m_per_s()
+            );
+        }
+        None => told += "\nthe plate is in balance at every reading: its inertia is left out",
     }
     output::say(told)
 }

@@ -1,12 +1,16 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
+mod track_line;
+
 use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
 use crate::table::table;
 use crate::{input, output};
+use track_line::Columns;
 use palpate::contact::Contact;
-use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig};
+use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
 use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
+use palpate::mechanics::Extent;
 use palpate::mechanics::modal::ModalBeam;
 use palpate::recording::{CsvError, TimedParser, TimedReading};
 use palpate::report::{TrackReport, track_report};
@@ -15,8 +19,8 @@ use std::path::{Path, PathBuf};
 
 /// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
 ///
-/// Two are followed by a locator whose estimator has `contacts = 2`. Time comes from a column `time_s` or from --rate. Where the file has the true contacts, the errors are said at the
-/// end, on stderr.
+/// Two are followed on a line by a locator whose estimator has `contacts = 2`; on a plane, one. Time comes from a column `time_s`
+/// or from --rate. Where the file has the true contacts, the errors are said at the end, on stderr.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// An influence locator of a surface with a model
@@ -32,7 +36,7 @@ pub struct Arguments {
     /// The first natural frequency of a beam on two simple supports: reckon with its inertia, and 1 % of the critical damping
     #[arg(long, value_name = "FREQUENCY", value_parser = input::frequency)]
     frequency: Option<f64>,
-    /// A rig with [motion]: its natural frequency and damping are taken, and a report shows the errors of its motion at other speeds
+    /// A rig with [motion]: its beam's natural frequency and damping are taken, and a report shows the errors of its motion at other speeds
     #[arg(long, value_name = "RIG", conflicts_with = "frequency")]
     rig: Option<PathBuf>,
     /// Seed of the simulations with other speeds
@@ -52,14 +56,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let told = arguments
         .frequency
         .map(|frequency_hz| Swing { frequency_hz, damping_ratio: ModalBeam::USUAL_DAMPING_RATIO });
-    let beam = rig.as_ref().and_then(|rig| rig.motion).map(|moving| moving.beam);
+    let beam = rig.as_ref().and_then(|rig| rig.motion).and_then(|moving| moving.beam);
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
     let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
     let tracking = locator
         .tracking(&config)
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
-    let most_contacts = tracking.likelihood().most_contacts();
+    let extent = tracking.likelihood().extent();
+    let columns = match tracking.likelihood().most_contacts() {
+        _ if extent.is_plane() => Columns::OfPlane,
+        1 => Columns::OfOne,
+        _ => Columns::OfTwo,
+    };
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {
         Follower::Smoother(SmoothTracker::new(tracking.likelihood(), config))
@@ -69,7 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut stream = Stream {
         arguments,
         follower,
-        most_contacts,
+        extent,
+        columns,
         lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?,
         lost: 0,
         times: 0,
@@ -80,11 +90,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (filtered, smoothed) = stream.finish()?;
     stream.say_errors(&filtered, &smoothed);
     if let Some(folder) = &arguments.report {
-        let sweep = match &rig {
-            Some(rig) => sweep_speeds(&locator, config, rig, arguments.seed).map_err(Complaint::new)?,
-            None => Vec::new(),
+        let sweep = match (&rig, beam) {
+            (Some(rig), Some(_)) => {
+                sweep_speeds(&locator, config, rig, arguments.seed).map_err(Complaint::new)?
+            }
+            _ => Vec::new(),
         };
-        stream.report(folder, &locator, (&filtered, &smoothed), &sweep)?;
+        stream.report(folder, (&filtered, &smoothed), &sweep)?;
     }
     match stream.lost {
         0 => Ok(()),
@@ -109,8 +121,9 @@ struct Seen {
 struct Stream<'a> {
     arguments: &'a Arguments,
     follower: Follower<'a>,
-    /// How many contacts a line of CSV has room for.
-    most_contacts: usize,
+    extent: Extent,
+    /// What a line of CSV has room for.
+    columns: Columns,
     lines: Lines,
     /// Rows that gave no estimate.
     lost: u64,
@@ -127,7 +140,7 @@ impl Stream<'_> {
         let mut parser = TimedParser::new(&self.lines.name, locator.bench.schema(&columns));
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
-            output::print(&mut out, heading(self.most_contacts).as_bytes())?;
+            output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;
         }
         while let Some(line) = self.lines.next()? {
             match parser.parse_line(line) {
@@ -193,8 +206,8 @@ impl Stream<'_> {
     }
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
-        let line = if self.arguments.json { json(track, line)? } else { csv(track, self.most_contacts) };
-        output::print(out, line.as_bytes())
+        let line = if self.arguments.json { track_line::json(track, line, self.extent.is_plane())? } else { self.columns.csv(track) };
+        output::print(out, (line + "\n").as_bytes())
     }
 
     fn skip(&mut self, error: &CsvError) {
@@ -207,7 +220,7 @@ impl Stream<'_> {
         let truths = &self.seen.truths;
         let of = |name, tracks: &[Track]| {
             let known = !tracks.is_empty() && tracks.len() == truths.len();
-            let errors = if known { TrackErrors::of(tracks, truths) } else { None };
+            let errors = if known { TrackErrors::of(tracks, truths, self.extent) } else { None };
             errors.map(|errors| (name, errors))
         };
         [of("filter", filtered), of("smoother", smoothed)].into_iter().flatten().collect()
@@ -248,7 +261,6 @@ impl Stream<'_> {
     fn report(
         &self,
         folder: &Path,
-        locator: &Locator,
         (filtered, smoothed): (&[Track], &[Track]),
         sweep: &[SpeedErrors],
     ) -> Result<(), Failure> {
@@ -257,7 +269,7 @@ impl Stream<'_> {
         let report = TrackReport {
             title: &format!("A contact followed through {}", self.lines.name),
             source: &self.lines.name,
-            length_m: locator.bench.surface.extent().length_m,
+            extent: self.extent,
             tracks,
             how,
             truths: if known { &self.seen.truths } else { &[] },
@@ -266,88 +278,4 @@ impl Stream<'_> {
         };
         output::write_report(folder, track_report(&report))
     }
-}
-
-/// The columns of [`csv`] for as many contacts; those of a contact that does not touch are empty.
-fn heading(most_contacts: usize) -> String {
-    let mut heading = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching".to_owned();
-    if most_contacts > 1 {
-        heading += ",position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
-    }
-    heading + "\n"
-}
-
-fn csv(track: &Track, most_contacts: usize) -> String {
-    let mut line =
-        format!("{},{},{:.4}", track.time_s, csv_contact(track.contacts.first()), track.touching());
-    if most_contacts > 1 {
-        line += &format!(",{},{:.4}", csv_contact(track.contacts.get(1)), track.numbers[2]);
-    }
-    line + "\n"
-}
-
-fn csv_contact(contact: Option<&Tracked>) -> String {
-    let Some(tracked) = contact else { return ",,,,".to_owned() };
-    let (low_m, high_m) = tracked.x_95_m;
-    format!(
-        "{:.4},{:.4},{:.4},{:.4},{:.4}",
-        tracked.x_m * 1e3,
-        tracked.speed_m_per_s,
-        tracked.force_n,
-        low_m * 1e3,
-        high_m * 1e3
-    )
-}
-
-/// A track as JSON.
-#[derive(serde::Serialize)]
-struct JsonTrack {
-    line: u64,
-    time_s: f64,
-    touching: f64,
-    /// The first contact, or the only one.
-    #[serde(flatten)]
-    contact: Option<JsonContact>,
-    two_touching: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    second: Option<JsonContact>,
-    single_mm: f64,
-    single_status: &'static str,
-}
-
-#[derive(serde::Serialize)]
-struct JsonContact {
-    x_mm: f64,
-    speed_m_per_s: f64,
-    force_n: f64,
-    x_95_mm: [f64; 2],
-    sd_mm: f64,
-    sd_speed_m_per_s: f64,
-    sd_force_n: f64,
-}
-
-fn json(track: &Track, line: u64) -> Result<String, Failure> {
-    let contact = |tracked: &Tracked| {
-        let ([sd_m, sd_speed_m_per_s, sd_force_n], (low_m, high_m)) = (tracked.sd, tracked.x_95_m);
-        JsonContact {
-            x_mm: tracked.x_m * 1e3,
-            speed_m_per_s: tracked.speed_m_per_s,
-            force_n: tracked.force_n,
-            x_95_mm: [low_m * 1e3, high_m * 1e3],
-            sd_mm: sd_m * 1e3,
-            sd_speed_m_per_s,
-            sd_force_n,
-        }
-    };
-    let object = JsonTrack {
-        line,
-        time_s: track.time_s,
-        touching: track.touching(),
-        contact: track.contacts.first().map(contact),
-        two_touching: track.numbers[2],
-        second: track.contacts.get(1).map(contact),
-        single_mm: track.alone.contact.position.x_m * 1e3,
-        single_status: track.alone.status.name(),
-    };
-    serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
 }

@@ -1,10 +1,12 @@
 //! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
 
-use crate::contact::Contact;
+use super::covered;
+use crate::contact::{Contact, Position};
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
     TrackerConfig,
 };
+use crate::mechanics::Extent;
 use crate::recording::TimedRecording;
 use crate::rig::Rig;
 use crate::simulate::{SimulateError, simulate_moving};
@@ -41,15 +43,15 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds a reading's contacts, each found one with its interval.
-    fn add(&mut self, truths_m: &[f64], found: &[(f64, (f64, f64))]) {
-        self.numbers_right += usize::from(truths_m.len() == found.len());
-        let places_m: Vec<f64> = found.iter().map(|(x_m, _)| *x_m).collect();
-        for (truth, mate) in pairs(truths_m, &places_m) {
-            let (x_m, (low, high)) = found[mate];
+    /// Adds a reading's contacts, and those that were found.
+    fn add(&mut self, truths: &[Position], found: &[ContactEstimate], extent: Extent) {
+        self.numbers_right += usize::from(truths.len() == found.len());
+        let places: Vec<Position> = found.iter().map(|contact| contact.position).collect();
+        for (truth, mate) in pairs(truths, &places) {
+            let (truth, contact) = (truths[truth], found[mate]);
             self.contacts += 1;
-            self.error_m += (x_m - truths_m[truth]).abs();
-            self.covered += usize::from((low..=high).contains(&truths_m[truth]));
+            self.error_m += contact.position.distance_m(truth);
+            self.covered += usize::from(covered(&contact, truth, extent) == Some(true));
         }
     }
 
@@ -61,15 +63,15 @@ impl Sums {
 impl TrackErrors {
     /// Compares tracks with the true contacts of each, whose force is 0 where they do not touch; `None` where nothing ever
     /// did, or nothing was tracked.
-    pub fn of(tracks: &[Track], truths: &[Vec<Contact>]) -> Option<Self> {
+    pub fn of(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
         let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
         for (one, truths) in tracks.iter().zip(truths) {
             let touching = truths.iter().filter(|truth| truth.force_n > 0.0);
-            let truths_m: Vec<f64> = touching.map(|truth| truth.position.x_m).collect();
-            readings += usize::from(!truths_m.is_empty());
-            let tracked: Vec<_> = one.contacts.iter().map(|tracked| (tracked.x_m, tracked.x_95_m)).collect();
-            track.add(&truths_m, &tracked);
-            single.add(&truths_m, &alone(&one.alone, !truths_m.is_empty()));
+            let truths: Vec<Position> = touching.map(|truth| truth.position).collect();
+            readings += usize::from(!truths.is_empty());
+            let tracked: Vec<ContactEstimate> = one.contacts.iter().map(Tracked::estimate).collect();
+            track.add(&truths, &tracked, extent);
+            single.add(&truths, &alone(&one.alone, !truths.is_empty()), extent);
         }
         let all = tracks.len().min(truths.len()) as f64;
         (track.contacts > 0).then(|| Self {
@@ -91,32 +93,28 @@ impl TrackErrors {
 }
 
 /// The contacts of a reading by itself; while something touches, its best guess at least.
-fn alone(estimate: &Estimate, touched: bool) -> Vec<(f64, (f64, f64))> {
+fn alone(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
     if !touched && estimate.status == Status::NoContact {
         return Vec::new();
     }
-    let contacts = std::iter::once(&estimate.contact).chain(estimate.further.as_slice());
-    let found = |contact: &ContactEstimate| {
-        let interval = contact.uncertainty.map_or((f64::NAN, f64::NAN), |uncertainty| uncertainty.x_95_m);
-        (contact.position.x_m, interval)
-    };
-    contacts.map(found).collect()
+    std::iter::once(&estimate.contact).chain(estimate.further.as_slice()).copied().collect()
 }
 
 /// For each true contact, the tracked one that is it; none for those that do not touch or were not found.
 pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
     let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
-    let truths_m: Vec<f64> = touching.iter().map(|i| truths[*i].position.x_m).collect();
-    let found_m: Vec<f64> = track.contacts.iter().map(|tracked| tracked.x_m).collect();
+    let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
+    let found: Vec<Position> =
+        track.contacts.iter().map(|tracked| tracked.estimate().position).collect();
     let mut tracked = vec![None; truths.len()];
-    for (truth, mate) in pairs(&truths_m, &found_m) {
+    for (truth, mate) in pairs(&places, &found) {
         tracked[touching[truth]] = Some(track.contacts[mate]);
     }
     tracked
 }
 
 /// As many pairs of indices as the shorter list has, with the least sum of distances.
-fn pairs(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
+fn pairs(a: &[Position], b: &[Position]) -> Vec<(usize, usize)> {
     if b.len() < a.len() {
         return pairs(b, a).into_iter().map(|(i, j)| (j, i)).collect();
     }
@@ -126,7 +124,7 @@ fn pairs(a: &[f64], b: &[f64]) -> Vec<(usize, usize)> {
 }
 
 /// Goes through every choice of one of `b` for each of `a`, none twice; `chosen` is the choice so far.
-fn choose(a: &[f64], b: &[f64], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
+fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
     if chosen.len() == a.len() {
         if sum < best.0 {
             *best = (sum, chosen.clone());
@@ -135,7 +133,7 @@ fn choose(a: &[f64], b: &[f64], chosen: &mut Vec<usize>, sum: f64, best: &mut (f
     }
     for j in 0..b.len() {
         if !chosen.contains(&j) {
-            let distance = (a[chosen.len()] - b[j]).abs();
+            let distance = a[chosen.len()].distance_m(b[j]);
             chosen.push(j);
             choose(a, b, chosen, sum + distance, best);
             chosen.pop();
@@ -202,6 +200,9 @@ pub enum SweepError {
     /// The rig cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// The surface does not swing.
+    #[error("a sweep over speeds needs a beam that swings; this surface is in balance at any speed")]
+    NoCriticalSpeed,
 }
 
 /// Speeds of a sweep, over the critical one.
@@ -211,7 +212,7 @@ pub const SPEED_RATIOS: [f64; 8] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.95
 /// nothing is tracked is left out.
 ///
 /// # Errors
-/// [`SweepError`] when the rig has no motion or the locator cannot follow.
+/// [`SweepError`] when the rig has no motion, its surface no critical speed, or the locator cannot follow.
 pub fn sweep_speeds(
     locator: &Locator,
     config: TrackerConfig,
@@ -219,14 +220,16 @@ pub fn sweep_speeds(
     seed: u64,
 ) -> Result<Vec<SpeedErrors>, SweepError> {
     let moving = rig.motion.ok_or(SimulateError::NoMotion)?;
+    let beam = moving.beam.ok_or(SweepError::NoCriticalSpeed)?;
+    let extent = rig.bench.surface.extent();
     let mut sweep = Vec::new();
     for ratio in SPEED_RATIOS {
-        let speed_m_per_s = ratio * moving.beam.critical_speed_m_per_s();
+        let speed_m_per_s = ratio * beam.critical_speed_m_per_s();
         let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s)), ..rig.clone() };
         let recording = simulate_moving(&rig, seed)?;
         let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
-        let errors = TrackErrors::of(&filtered, &truths).zip(TrackErrors::of(&smoothed, &truths));
+        let errors = TrackErrors::of(&filtered, &truths, extent).zip(TrackErrors::of(&smoothed, &truths, extent));
         sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
             ratio,
             speed_m_per_s,
@@ -239,10 +242,14 @@ pub fn sweep_speeds(
 
 #[cfg(test)]
 mod tests {
-    use super::pairs;
+    use crate::contact::Position;
 
     #[test]
     fn contacts_are_paired_so_that_the_distances_are_least() {
+        let pairs = |a: &[f64], b: &[f64]| {
+            let places = |list: &[f64]| list.iter().copied().map(Position::along).collect::<Vec<_>>();
+            super::pairs(&places(a), &places(b))
+        };
         assert_eq!(pairs(&[0.1, 0.3], &[0.31, 0.12]), [(0, 1), (1, 0)]);
         assert_eq!(pairs(&[0.1, 0.3], &[0.25]), [(1, 0)]);
         assert_eq!(pairs(&[0.1], &[0.5, 0.2, 0.0]), [(0, 1)]);

@@ -4,17 +4,17 @@ use std::f64::consts::PI;
 
 use crate::contact::{Contact, Position};
 
-/// A contact that moves between two places of a line and back, as often as is said.
+/// A contact that moves between two places and back, straight, as often as is said.
 ///
 /// A pass starts and ends at rest. Its speed builds up and falls as (1 − cos)/2 over `turn_m` at either end, so that it has
 /// no jump in the acceleration, and is constant between: a turn of length s at speed v takes 2s/v and accelerates by
 /// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`, and lets go and comes down over `touch_s` each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Where the first pass starts, in metres.
-    pub from_m: f64,
-    /// Where it ends, in metres; not where it starts.
-    pub to_m: f64,
+    /// Where the first pass starts.
+    pub from: Position,
+    /// Where it ends; not where it starts.
+    pub to: Position,
     /// The constant speed between the turns, in m/s; greater than 0.
     pub speed_m_per_s: f64,
     /// Length of the turn at either end, in metres; greater than 0, at most half the way.
@@ -43,13 +43,16 @@ impl Motion {
         let way = self.way_m(since_s.min(self.pass_s())) / self.length_m();
         let share = if pass.is_multiple_of(2) { way } else { 1.0 - way };
         Contact {
-            position: Position::along(self.from_m + share * (self.to_m - self.from_m)),
+            position: Position {
+                x_m: self.from.x_m + share * (self.to.x_m - self.from.x_m),
+                y_m: self.from.y_m + share * (self.to.y_m - self.from.y_m),
+            },
             force_n: force_n * self.pressed(since_s - self.pass_s()),
         }
     }
 
     fn length_m(&self) -> f64 {
-        (self.to_m - self.from_m).abs()
+        self.from.distance_m(self.to)
     }
 
     /// How long a turn takes.
@@ -93,8 +96,8 @@ mod tests {
     use super::*;
 
     const MOTION: Motion = Motion {
-        from_m: 0.35,
-        to_m: 0.05,
+        from: Position::along(0.35),
+        to: Position::along(0.05),
         speed_m_per_s: 0.5,
         turn_m: 0.05,
         passes: 3,
@@ -112,6 +115,20 @@ mod tests {
         };
         let told = [-1.0, 0.2, 0.4, 0.8, 0.85, 1.05, 1.3, 1.5, 2.1, 9.0].map(at);
         insta::assert_snapshot!(told.join(", "), @"350.0 mm 3.00 N, 300.0 mm 3.00 N, 200.0 mm 3.00 N, 50.0 mm 3.00 N, 50.0 mm 1.50 N, 50.0 mm 0.00 N, 50.0 mm 3.00 N, 100.0 mm 3.00 N, 350.0 mm 3.00 N, 50.0 mm 3.00 N");
+    }
+
+    #[test]
+    fn on_a_plane_it_goes_straight_at_the_same_speed() {
+        // 300 mm long, as along the line.
+        let (from, to) = (Position { x_m: 0.3, y_m: 0.25 }, Position { x_m: 0.06, y_m: 0.07 });
+        let plane = Motion { from, to, ..MOTION };
+        for time_s in [0.1, 0.2, 0.35, 0.7, 1.45] {
+            let (along, on_plane) = (MOTION.contact_at(time_s, 3.0), plane.contact_at(time_s, 3.0));
+            let way_m = on_plane.position.distance_m(from);
+            assert!((way_m - (0.35 - along.position.x_m)).abs() < 1e-12);
+            let Position { x_m, y_m } = on_plane.position;
+            assert!(((0.3 - x_m) * 0.18 - (0.25 - y_m) * 0.24).abs() < 1e-15);
+        }
     }
 
     #[test]

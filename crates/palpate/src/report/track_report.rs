@@ -7,9 +7,10 @@ use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text};
 use super::{
     Axis, BandPoint, Chart, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
 };
-use crate::contact::Contact;
-use crate::estimator::{Track, Tracked};
+use crate::contact::{Contact, Position};
+use crate::estimator::Track;
 use crate::evaluation::{SpeedErrors, TrackErrors, tracked_of};
+use crate::mechanics::Extent;
 
 /// What a track's report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +19,8 @@ pub struct TrackReport<'a> {
     pub title: &'a str,
     /// The readings' source.
     pub source: &'a str,
-    /// Length of the surface, in metres.
-    pub length_m: f64,
+    /// The surface.
+    pub extent: Extent,
     /// What is shown: of the filter or of the smoother.
     pub tracks: &'a [Track],
     /// Which of the two.
@@ -36,13 +37,17 @@ pub struct TrackReport<'a> {
 const MOST_POINTS: usize = 60;
 /// More points of a line than this cannot be told apart.
 const MOST_OF_LINE: usize = 2000;
+/// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
+const PLOT_WIDTH_PX: f64 = 630.0;
+const AROUND_PLOT_PX: f64 = 130.0;
 
 /// Reports a track: `report.html`, one self-contained page, and its figures as SVG and PNG files.
 ///
 /// # Errors
 /// [`ReportError`] when a figure does not become a picture.
 pub fn track_report(report: &TrackReport) -> Result<Vec<ReportFile>, ReportError> {
-    let mut figures = vec![report.track_figure(), report.errors_figure()];
+    let track = if report.extent.is_plane() { report.path_figure() } else { report.track_figure() };
+    let mut figures = vec![track, report.errors_figure()];
     if !report.sweep.is_empty() {
         figures.push(report.sweep_figure());
     }
@@ -83,26 +88,8 @@ impl TrackReport<'_> {
     }
 
     fn track_figure(&self) -> Figure {
-        let mut series = Vec::new();
-        let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
         let alone = |track: &Track| (track.time_s, track.alone.contact.position.x_m * 1e3);
-        series.push(Series {
-            label: if stride > 1 {
-                format!("single readings, every {stride}th")
-            } else {
-                "single readings".to_owned()
-            },
-            colour: 4,
-            kind: SeriesKind::Points {
-                points: self.tracks.iter().step_by(stride).map(alone).collect(),
-                marker: Marker::Cross,
-            },
-        });
-        let line = |label: String, colour, stroke, points| Series {
-            label,
-            colour,
-            kind: SeriesKind::Line { points, stroke },
-        };
+        let mut series = vec![self.single_readings(alone)];
         for k in 0..self.most_contacts() {
             let place = |track: &Track| {
                 (track.time_s, track.contacts.get(k).map_or(f64::NAN, |tracked| tracked.x_m * 1e3))
@@ -122,7 +109,7 @@ impl TrackReport<'_> {
         let chart = Chart {
             title: "The contact over time".to_owned(),
             x: Axis::linear("time, s"),
-            y: Axis::linear("position, mm").from_to(0.0, self.length_m * 1e3),
+            y: Axis::linear("position, mm").from_to(0.0, self.extent.length_m * 1e3),
             series,
             height_px: 520,
             ..Chart::default()
@@ -131,33 +118,75 @@ impl TrackReport<'_> {
         Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
     }
 
+    /// The way over a plane, drawn to scale.
+    fn path_figure(&self) -> Figure {
+        let mm = |position: Position| (position.x_m * 1e3, position.y_m * 1e3);
+        let mut series = vec![self.single_readings(|track: &Track| mm(track.alone.contact.position))];
+        let place = |track: &Track| {
+            let tracked = track.contacts.first();
+            tracked.map_or((f64::NAN, f64::NAN), |tracked| mm(tracked.estimate().position))
+        };
+        let path = self.tracks.iter().map(place).collect();
+        series.push(line(format!("track, {}", self.how), 0, Stroke::Solid, path));
+        let truth = |truths: &Vec<Contact>| {
+            let touching = truths.first().filter(|truth| truth.force_n > 0.0);
+            touching.map_or((f64::NAN, f64::NAN), |truth| mm(truth.position))
+        };
+        if !self.truths.is_empty() {
+            let path = self.truths.iter().map(truth).collect();
+            series.push(line("true position".to_owned(), 6, Stroke::Dashed, path));
+        }
+        let [length_mm, width_mm] =
+            [self.extent.length_m, self.extent.width_m.unwrap_or_default()].map(|side_m| side_m * 1e3);
+        let chart = Chart {
+            title: "The contact on the plane".to_owned(),
+            x: Axis::linear("x, mm").from_to(0.0, length_mm),
+            y: Axis::linear("y, mm").from_to(0.0, width_mm),
+            series,
+            height_px: (PLOT_WIDTH_PX * width_mm / length_mm + AROUND_PLOT_PX) as u32,
+            ..Chart::default()
+        };
+        let caption =
+            html! { "The contact's way over the plane, where readings by themselves see it, and the track." };
+        Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+    }
+
+    /// Some of the estimates by single readings.
+    fn single_readings(&self, alone: impl Fn(&Track) -> (f64, f64)) -> Series {
+        let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
+        Series {
+            label: if stride > 1 {
+                format!("single readings, every {stride}th")
+            } else {
+                "single readings".to_owned()
+            },
+            colour: 4,
+            kind: SeriesKind::Points {
+                points: self.tracks.iter().step_by(stride).map(alone).collect(),
+                marker: Marker::Cross,
+            },
+        }
+    }
+
     /// The track less the true position, with its 95 % band; where the truth is not known, the band alone, about the track.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
         let known = !self.truths.is_empty();
         let mut series = Vec::new();
-        for k in 0..self.most_contacts() {
+        for (colour, coordinate) in self.coordinates().into_iter().enumerate() {
             let off = |i: usize| {
-                let track = &self.tracks[i];
-                let shown = match self.truths.get(i) {
-                    Some(truths) => {
-                        let tracked = tracked_of(track, truths).get(k).copied().flatten();
-                        tracked.zip(truths.get(k)).map(|(tracked, truth)| (tracked, truth.position.x_m))
-                    }
-                    None => track.contacts.get(k).map(|tracked| (*tracked, tracked.x_m)),
-                };
-                let mm = |end: fn(&Tracked) -> f64| {
-                    shown.map_or(f64::NAN, |(tracked, from_m)| (end(&tracked) - from_m) * 1e3)
-                };
-                (track.time_s, mm(|one| one.x_m), mm(|one| one.x_95_m.0), mm(|one| one.x_95_m.1))
+                let time_s = self.tracks[i].time_s;
+                match self.off_mm(i, &coordinate) {
+                    Some([off, low, high]) => (time_s, off, low, high),
+                    None => (time_s, f64::NAN, f64::NAN, f64::NAN),
+                }
             };
             let points: Vec<_> = (0..self.tracks.len()).step_by(stride).map(off).collect();
             let band = points.iter().map(|(x, _, low, high)| BandPoint { x: *x, low: *low, high: *high });
             let kind = SeriesKind::Band { points: band.collect() };
-            series.push(Series { label: format!("its 95 %{}", of_two(k, self)), colour: k, kind });
-            let line = points.iter().map(|(x, off, ..)| (*x, *off)).collect();
-            let kind = SeriesKind::Line { points: line, stroke: Stroke::Solid };
-            series.push(Series { label: format!("track{}", of_two(k, self)), colour: k, kind });
+            series.push(Series { label: format!("its 95 %{}", coordinate.name), colour, kind });
+            let off = points.iter().map(|(x, off, ..)| (*x, *off)).collect();
+            series.push(line(format!("track{}", coordinate.name), colour, Stroke::Solid, off));
         }
         let (title, y, caption) = if known {
             (
@@ -182,6 +211,36 @@ impl TrackReport<'_> {
         };
         let caption = html! { (caption) };
         Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+    }
+
+    /// What the figure of errors has a line for: each contact, or both coordinates of a plane.
+    fn coordinates(&self) -> Vec<Coordinate> {
+        if self.extent.is_plane() {
+            let named = |name, across| Coordinate { name, contact: 0, across };
+            return vec![named(" in x", false), named(" in y", true)];
+        }
+        let of = |contact| Coordinate { name: of_two(contact, self), contact, across: false };
+        (0..self.most_contacts()).map(of).collect()
+    }
+
+    /// The track at reading `i` and both ends of its 95 % interval in mm, less the truth, or less the track where that is not known.
+    fn off_mm(&self, i: usize, coordinate: &Coordinate) -> Option<[f64; 3]> {
+        let track = &self.tracks[i];
+        let (tracked, truth) = match self.truths.get(i) {
+            Some(truths) => {
+                let tracked = *tracked_of(track, truths).get(coordinate.contact)?;
+                (tracked?, Some(truths.get(coordinate.contact)?.position))
+            }
+            None => (*track.contacts.get(coordinate.contact)?, None),
+        };
+        let (place_m, (low_m, high_m)) = if coordinate.across {
+            tracked.across.map(|across| (across.y_m, across.y_95_m))?
+        } else {
+            (tracked.x_m, tracked.x_95_m)
+        };
+        let of_truth = |truth: Position| if coordinate.across { truth.y_m } else { truth.x_m };
+        let from_m = truth.map_or(place_m, of_truth);
+        Some([place_m, low_m, high_m].map(|end_m| (end_m - from_m) * 1e3))
     }
 
     /// How many contacts were followed at most.
@@ -279,6 +338,18 @@ impl TrackReport<'_> {
         }
         .markup()
     }
+}
+
+/// What an error is of.
+struct Coordinate {
+    /// As it goes on after "track".
+    name: &'static str,
+    contact: usize,
+    across: bool,
+}
+
+fn line(label: String, colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Series {
+    Series { label, colour, kind: SeriesKind::Line { points, stroke } }
 }
 
 /// Which of two contacts is meant; nothing where there is but one.

@@ -48,8 +48,8 @@ pub struct MotionRig {
     pub first: MovingContact,
     /// The other one.
     pub second: Option<MovingContact>,
-    /// The beam with its inertia and damping.
-    pub beam: ModalBeam,
+    /// The beam with its inertia and damping; nothing for a plate, which is in balance at every reading.
+    pub beam: Option<ModalBeam>,
     /// Readings a second, in hertz; greater than 0.
     pub rate_hz: f64,
 }

@@ -138,8 +138,8 @@ pub(crate) struct TrainingSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionSection {
-    pub from: Key<RawQuantity>,
-    pub to: Key<RawQuantity>,
+    pub from: Key<RawPosition>,
+    pub to: Key<RawPosition>,
     pub speed: Key<RawQuantity>,
     pub turn: Key<RawQuantity>,
     pub passes: Key<i64>,

@@ -102,7 +102,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
     let likelihood = likelihood(&rig, Some(3.0));
     let load = |x_m: f64| Contact { position: Position::along(x_m), force_n: 3.0 };
     // Bent as by a load in the middle, which has just jumped elsewhere.
-    let mut response = rig.motion.unwrap().beam.at_rest(1, &[load(0.2)]);
+    let mut response = rig.motion.unwrap().beam.unwrap().at_rest(1, &[load(0.2)]);
     response.change_loads(&[load(0.1)]);
     let sensors = &rig.bench.layout.sensors;
     let reading: Vec<f64> =

@@ -4,14 +4,15 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use crate::contact::Position;
 use crate::mechanics::modal::ModalBeam;
-use crate::mechanics::{Extent, Motion, SurfaceSpec};
+use crate::mechanics::{Beam, Extent, Motion, SurfaceSpec};
 use crate::rig::error::{RigError, RigProblem};
 use crate::rig::sections::{MotionSection, MotionSections, SurfaceSection};
-use crate::rig::value::{RawQuantity, bounded, count, not_negative, positive, quantity};
+use crate::rig::value::{bounded, count, not_negative, positive};
 use crate::rig::{MotionRig, MovingContact};
 use crate::units::Dimension;
+
+use super::places::on_surface;
 
 const SECTION: &str = "motion";
 /// More readings than a recording should hold in memory.
@@ -42,23 +43,27 @@ pub(super) fn validate(
             return Err(RigProblem::OutOfRange { key: SECTION, value, bound: "one, or a list of two" }.at(at));
         }
     };
-    let SurfaceSpec::Beam(beam) = surface else {
-        let with = "a surface other than a beam";
-        return Err(RigProblem::UnusedKey { key: SECTION, with }.at(first.span.clone()));
+    let extent = surface.extent();
+    let beam = match surface {
+        SurfaceSpec::Beam(beam) => Some(modal_beam(*beam, first, density)?),
+        SurfaceSpec::Plate(_) => None,
+        _ => {
+            let with = "a surface other than a beam on two supports or a plate";
+            return Err(RigProblem::UnusedKey { key: SECTION, with }.at(first.span.clone()));
+        }
     };
-    let (density_kg_per_m3, span) = density.ok_or_else(|| {
-        RigProblem::MissingKey { section: "surface", key: "density" }.at(first.span.clone())
-    })?;
-    let below_1 = |ratio: f64| (0.0..1.0).contains(&ratio);
-    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(ModalBeam::USUAL_DAMPING_RATIO), |raw| {
-        bounded("damping", raw, Dimension::Ratio, below_1, "at least 0 and below 1")
-    })?;
-    let beam = ModalBeam { beam: *beam, density_kg_per_m3, damping_ratio };
-    beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(span))?;
+    if let (None, Some(damping)) = (beam, &first.keys.damping) {
+        let with = "a plate, which is in balance at every reading";
+        return Err(RigProblem::UnusedKey { key: "damping", with }.at(damping.span()));
+    }
+    if let (true, Some(second)) = (extent.is_plane(), second) {
+        let (value, bound) = ("a list of two".to_owned(), "one on a plane");
+        return Err(RigProblem::OutOfRange { key: SECTION, value, bound }.at(second.span.clone()));
+    }
     let rate_hz = positive("rate", first.need("rate", first.keys.rate.as_ref())?, Dimension::Frequency)?;
     let moving = MotionRig {
-        first: first.contact(beam.beam.length_m)?,
-        second: second.map(|second| second.further(beam.beam.length_m)).transpose()?,
+        first: first.contact(extent)?,
+        second: second.map(|second| second.further(extent)).transpose()?,
         beam,
         rate_hz,
     };
@@ -67,6 +72,24 @@ pub(super) fn validate(
         return Err(RigProblem::TooManyReadings { readings, most: MOST_READINGS }.at(sections.span()));
     }
     Ok(Some(moving))
+}
+
+/// The beam that swings under its first contact; its density is the surface's.
+fn modal_beam(
+    beam: Beam,
+    first: &Context,
+    density: Option<(f64, Range<usize>)>,
+) -> Result<ModalBeam, RigError> {
+    let (density_kg_per_m3, span) = density.ok_or_else(|| {
+        RigProblem::MissingKey { section: "surface", key: "density" }.at(first.span.clone())
+    })?;
+    let below_1 = |ratio: f64| (0.0..1.0).contains(&ratio);
+    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(ModalBeam::USUAL_DAMPING_RATIO), |raw| {
+        bounded("damping", raw, Dimension::Ratio, below_1, "at least 0 and below 1")
+    })?;
+    let beam = ModalBeam { beam, density_kg_per_m3, damping_ratio };
+    beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(span))?;
+    Ok(beam)
 }
 
 /// One section.
@@ -78,46 +101,36 @@ struct Context<'a> {
 
 impl<'a> Context<'a> {
     /// A contact beside another one, which says what both share.
-    fn further(&self, length_m: f64) -> Result<MovingContact, RigError> {
+    fn further(&self, extent: Extent) -> Result<MovingContact, RigError> {
         for (key, value) in [("rate", &self.keys.rate), ("damping", &self.keys.damping)] {
             if let Some(value) = value {
                 let with = "a second [[motion]]; the first says it for both";
                 return Err(RigProblem::UnusedKey { key, with }.at(value.span()));
             }
         }
-        self.contact(length_m)
+        self.contact(extent)
     }
 
-    fn contact(&self, length_m: f64) -> Result<MovingContact, RigError> {
+    fn contact(&self, extent: Extent) -> Result<MovingContact, RigError> {
         let force = self.keys.force.as_ref();
         if let (Some(raw), Some(_)) = (force, self.known_force_n) {
             let with = "a [contact] whose force is known";
             return Err(RigProblem::UnusedKey { key: "force", with }.at(raw.span()));
         }
         let force_n = force.map(|raw| positive("force", raw, Dimension::Force)).transpose()?;
-        Ok(MovingContact { motion: self.motion(length_m)?, force_n })
+        Ok(MovingContact { motion: self.motion(extent)?, force_n })
     }
 
-    fn motion(&self, length_m: f64) -> Result<Motion, RigError> {
+    fn motion(&self, extent: Extent) -> Result<Motion, RigError> {
         let keys = self.keys;
-        let place = |key, raw: &'a Option<Spanned<RawQuantity>>| {
-            let raw = self.need(key, raw.as_ref())?;
-            let x_m = quantity(key, raw, Dimension::Length)?;
-            let inside = (0.0..=length_m).contains(&x_m);
-            if inside {
-                Ok(x_m)
-            } else {
-                let (position, extent) = (Position::along(x_m), Extent { length_m, width_m: None });
-                Err(RigProblem::PlaceOffSurface { key, position, extent }.at(raw.span()))
-            }
-        };
-        let (from_m, to_m) = (place("from", &keys.from)?, place("to", &keys.to)?);
-        let way_m = (to_m - from_m).abs();
+        let (raw_from, raw_to) =
+            (self.need("from", keys.from.as_ref())?, self.need("to", keys.to.as_ref())?);
+        let (from, to) = (on_surface("from", raw_from, extent)?, on_surface("to", raw_to, extent)?);
+        let way_m = from.distance_m(to);
         if way_m == 0.0 {
-            let to = self.need("to", keys.to.as_ref())?;
-            let value = to.get_ref().to_string();
+            let value = extent.place_in_words(to);
             let bound = "elsewhere than `from`";
-            return Err(RigProblem::OutOfRange { key: "to", value, bound }.at(to.span()));
+            return Err(RigProblem::OutOfRange { key: "to", value, bound }.at(raw_to.span()));
         }
         let half_way = |turn_m: f64| turn_m > 0.0 && turn_m <= 0.5 * way_m;
         let turn_m = keys.turn.as_ref().map_or(Ok(TURN * way_m), |raw| {
@@ -136,14 +149,14 @@ impl<'a> Context<'a> {
             return Err(RigProblem::UnusedKey { key: "touch", with }.at(touch.span()));
         }
         let speed_m_per_s = positive("speed", self.need("speed", keys.speed.as_ref())?, Dimension::Speed)?;
-        Ok(Motion { from_m, to_m, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
+        Ok(Motion { from, to, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
     }
 
-    fn need(
+    fn need<T>(
         &self,
         key: &'static str,
-        value: Option<&'a Spanned<RawQuantity>>,
-    ) -> Result<&'a Spanned<RawQuantity>, RigError> {
+        value: Option<&'a Spanned<T>>,
+    ) -> Result<&'a Spanned<T>, RigError> {
         value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(self.span.clone()))
     }
 }
@@ -158,10 +171,40 @@ mod tests {
     fn a_motion_is_read_with_its_beam() {
         let moving = Rig::from_toml(RIG).unwrap().motion.unwrap();
         assert_eq!(
-            (moving.first.motion.passes, moving.rate_hz, moving.beam.damping_ratio),
+            (moving.first.motion.passes, moving.rate_hz, moving.beam.unwrap().damping_ratio),
             (4, 1000.0, 0.01)
         );
-        assert!((moving.first.motion.speed_m_per_s, moving.beam.density_kg_per_m3) == (0.5, 7850.0));
+        assert!((moving.first.motion.speed_m_per_s, moving.beam.unwrap().density_kg_per_m3) == (0.5, 7850.0));
+    }
+
+    const PLATE: &str = include_str!("../../../../../examples/moving-plate.toml");
+
+    #[test]
+    fn a_motion_on_a_plate_is_between_two_points_of_it() {
+        let moving = Rig::from_toml(PLATE).unwrap().motion.unwrap();
+        assert_eq!((moving.beam, moving.second), (None, None));
+        let motion = moving.first.motion;
+        assert_eq!((motion.from.x_m, motion.from.y_m), (0.05, 0.08));
+        assert_eq!((motion.to.x_m, motion.to.y_m), (0.25, 0.21));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_motion_on_a_plate_is_said_with_its_place() {
+        let from = "from = [\"50 mm\", \"80 mm\"]";
+        let cases = [
+            (from, "from = \"50 mm\"".to_owned()),
+            (from, "from = [\"50 mm\", \"310 mm\"]".to_owned()),
+            (from, "from = [\"250 mm\", \"210 mm\"]".to_owned()),
+            (from, format!("{from}\ndamping = 0.01")),
+        ];
+        let told = cases.map(|(good, bad)| {
+            assert!(PLATE.contains(good));
+            let text = PLATE.replacen(good, &bad, 1);
+            let error = Rig::from_toml(&text).unwrap_err();
+            let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));
+            format!("{error} | {place}")
+        });
+        insta::assert_snapshot!(told.join("\n"));
     }
 
     /// The example with an unknown force and a second contact that says `keys`.
