@@ -120,3 +120,44 @@ fn inertia_is_refused_where_the_mode_is_not_known() {
     let complaint = complained(&output, 2);
     assert!(complaint.contains("half a sine"), "{complaint}");
 }
+
+const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
+
+#[test]
+fn a_contact_is_followed_over_a_plate() {
+    let folder = tempfile::tempdir().unwrap();
+    // A mesh that is solved at once, and a short way.
+    let rig = PLATE.replacen("edges =", "elements = 24\nedges =", 1).replacen("passes = 4", "passes = 1", 1);
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let simulate = ["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"];
+    let told = said(&run(folder.path(), &simulate));
+    assert!(told.contains("its inertia is left out"), "{told}");
+    let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    assert!(csv.lines().next().unwrap().contains("without inertia"), "{csv}");
+
+    let track = ["track", "locator.json", "moving.csv", "--smooth", "--report", "page"];
+    let output = run(folder.path(), &track);
+    let told = said(&output);
+    let heading = "time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching";
+    assert_eq!(told.lines().next(), Some(heading));
+    assert_eq!(told.lines().count() - 1, csv.lines().count() - 2);
+    assert!(told.lines().all(|line| line.split(',').count() == 11));
+    let (filter, smoother) = (row(&output.stderr, "filter"), row(&output.stderr, "smoother"));
+    assert!(filter[3] >= 2.5, "{filter:?}");
+    assert!(smoother[3] >= 4.0, "{smoother:?}");
+    assert!((88.0..=100.0).contains(&filter[4]), "{filter:?}");
+    for name in ["report.html", "figure-1.png", "figure-2.png"] {
+        assert!(folder.path().join("page").join(name).is_file(), "{name}");
+    }
+
+    let json = run(folder.path(), &["track", "locator.json", "moving.csv", "--json"]);
+    let last: Value = serde_json::from_str(said(&json).lines().last().unwrap()).unwrap();
+    let number = |key: &str| last[key].as_f64().unwrap();
+    let near = |key: &str, sd: &str, mm: f64| (number(key) - mm).abs() < 3.0 * number(sd) && number(sd) < 5.0;
+    assert!(near("x_mm", "sd_mm", 250.0) && near("y_mm", "sd_y_mm", 210.0), "{last}");
+    assert_eq!(last["single_mm"].as_array().map(Vec::len), Some(2));
+    let inertia = run(folder.path(), &["track", "locator.json", "moving.csv", "--frequency", "40 Hz"]);
+    let complaint = complained(&inertia, 2);
+    assert!(complaint.contains("follow it in balance"), "{complaint}");
+}

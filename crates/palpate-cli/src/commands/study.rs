@@ -19,6 +19,7 @@ use std::time::Instant;
 
 mod checkpoint;
 mod dead_areas;
+mod elliott;
 mod watch;
 
 use checkpoint::CheckpointFile;
@@ -27,7 +28,7 @@ use watch::Watch;
 /// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// A study file, `paper`, or `dead-areas`: what lies between sensors
+    /// A study file, `paper`, `dead-areas`: what lies between sensors, or `elliott`: components of a plate's readings and a network
     study: PathBuf,
     /// Fits of each arm [default: what the study says]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
@@ -65,6 +66,9 @@ struct ResultsFile<'a> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.study == Path::new(dead_areas::NAME) {
         return dead_areas::run(arguments);
+    }
+    if arguments.study == Path::new(elliott::NAME) {
+        return elliott::run(arguments);
     }
     let is_paper = arguments.study == Path::new("paper");
     let (name, text) = if is_paper {

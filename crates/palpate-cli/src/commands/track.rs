@@ -6,7 +6,6 @@ use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
 use crate::table::table;
 use crate::{input, output};
-use track_line::Columns;
 use palpate::contact::Contact;
 use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
 use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
@@ -16,6 +15,7 @@ use palpate::recording::{CsvError, TimedParser, TimedReading};
 use palpate::report::{TrackReport, track_report};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use track_line::Columns;
 
 /// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
 ///
@@ -206,7 +206,11 @@ impl Stream<'_> {
     }
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
-        let line = if self.arguments.json { track_line::json(track, line, self.extent.is_plane())? } else { self.columns.csv(track) };
+        let line = if self.arguments.json {
+            track_line::json(track, line, self.extent.is_plane())?
+        } else {
+            self.columns.csv(track)
+        };
         output::print(out, (line + "\n").as_bytes())
     }
 

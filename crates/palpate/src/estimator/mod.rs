@@ -13,9 +13,7 @@ pub use crate::distribution::{
     patch_limits,
 };
 pub use crate::method::ReadingError;
-pub use crate::tracking::{
-    Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig,
-};
+pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use config::EstimatorConfig;
 pub use fitting::{FitError, Fitting, LocatorQueue};
 pub use load_sensors::bench_load_sensors;

@@ -104,8 +104,7 @@ fn alone(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
 pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
     let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
     let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
-    let found: Vec<Position> =
-        track.contacts.iter().map(|tracked| tracked.estimate().position).collect();
+    let found: Vec<Position> = track.contacts.iter().map(|tracked| tracked.estimate().position).collect();
     let mut tracked = vec![None; truths.len()];
     for (truth, mate) in pairs(&places, &found) {
         tracked[touching[truth]] = Some(track.contacts[mate]);
@@ -229,7 +228,8 @@ pub fn sweep_speeds(
         let recording = simulate_moving(&rig, seed)?;
         let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
-        let errors = TrackErrors::of(&filtered, &truths, extent).zip(TrackErrors::of(&smoothed, &truths, extent));
+        let errors =
+            TrackErrors::of(&filtered, &truths, extent).zip(TrackErrors::of(&smoothed, &truths, extent));
         sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
             ratio,
             speed_m_per_s,

@@ -168,7 +168,9 @@ impl Likelihood for BeamLikelihood {
         if let Ok(cholesky) = Cholesky::factor(a) {
             let inverse = cholesky.inverse();
             let spread = inverse.dot(&b).dot(&inverse);
-            left.iter_mut().zip(0..contacts.len()).for_each(|(left, k)| left[0] = spread[[free * k, free * k]]);
+            left.iter_mut()
+                .zip(0..contacts.len())
+                .for_each(|(left, k)| left[0] = spread[[free * k, free * k]]);
         }
         left
     }

@@ -4,6 +4,8 @@ use std::f64::consts::FRAC_2_PI;
 
 use serde::Serialize;
 
+use super::information::inverse_information;
+
 /// The Cramér–Rao bound at one contact: what no unbiased estimator can beat there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
@@ -20,6 +22,12 @@ pub struct Bound {
 }
 
 impl Bound {
+    /// The bound of readings with independent noise of variance 1, from their derivatives along and across, per metre; the
+    /// force is known. `None` where they do not tell the place.
+    pub fn of_columns(columns: [Vec<f64>; 2]) -> Option<Self> {
+        Some(Self::new(inverse_information(columns)?, None))
+    }
+
     pub(super) fn new(position: [[f64; 2]; 2], force: Option<f64>) -> Self {
         let [[xx, xy], [_, yy]] = position;
         Self {

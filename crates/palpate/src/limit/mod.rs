@@ -111,9 +111,7 @@ impl<'a> Limit<'a> {
                 let [[xx]] = information::inverse_information([along])?;
                 Some(Bound::new([[xx, 0.0], [0.0, 0.0]], None))
             }
-            (Force::Known, Some(across)) => {
-                Some(Bound::new(information::inverse_information([along, across])?, None))
-            }
+            (Force::Known, Some(across)) => Bound::of_columns([along, across]),
             (Force::Unknown, None) => {
                 let [[ff, _], [_, xx]] = information::inverse_information([by_force, along])?;
                 Some(Bound::new([[xx, 0.0], [0.0, 0.0]], Some(ff)))

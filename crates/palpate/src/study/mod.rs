@@ -5,6 +5,7 @@
 //! its own, with fresh noise, to which the estimator is fitted and by which it is judged.
 
 pub mod dead_areas;
+pub mod elliott;
 mod file;
 mod layouts;
 mod limits;

@@ -157,7 +157,9 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     fn seen<const K: usize>(&self, numbers: &SeenNumbers<K>) -> [f64; K] {
         let mut seen = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
-            seen.iter_mut().zip(numbers.entries).for_each(|(seen, entry)| *seen += share * member.mean[entry]);
+            seen.iter_mut()
+                .zip(numbers.entries)
+                .for_each(|(seen, entry)| *seen += share * member.mean[entry]);
         }
         std::array::from_fn(|k| numbers.held(k, seen[k]))
     }

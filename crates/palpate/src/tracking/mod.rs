@@ -16,7 +16,7 @@
 //! A grid of positions and speeds that resolves what a track reaches would have some 10⁵ cells; within a valley of the
 //! likelihood a Gaussian says the same to good approximation, as soon as a contact has been seen for some readings.
 //!
-//! On a plane ([`on_plane`]) there is one contact, whose motions along and across are alike and independent, and the surface
+//! On a plane there is one contact, whose motions along and across are alike and independent, and the surface
 //! is taken to be in balance; the rest is the same.
 //!
 //! The smoother goes back over a hypothesis with what came later, by the recursion of H. Rauch, F. Tung and C. Striebel (AIAA

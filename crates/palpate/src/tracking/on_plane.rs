@@ -178,3 +178,6 @@ impl PlaneBirths<'_> {
 fn sides_m(extent: Extent) -> [f64; 2] {
     [extent.length_m, extent.width_m.unwrap_or(0.0)]
 }
+
+#[cfg(test)]
+mod tests;

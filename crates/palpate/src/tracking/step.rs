@@ -146,12 +146,7 @@ impl<const N: usize, const M: usize> Dynamics<N, M> for OnLine<'_> {
 
 impl OnLine<'_> {
     /// The first mode swings under the force that it has halfway: (u − p, u̇) swings freely.
-    fn swing<const N: usize>(
-        &self,
-        swing: &FreeSwing,
-        belief: &Gaussian<N>,
-        change: &mut Change<N>,
-    ) {
+    fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, change: &mut Change<N>) {
         let half_s = 0.5 * self.step.duration_s;
         let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
         let follows = [(U, 1.0 - uu), (U_RATE, -su)];

@@ -3,6 +3,7 @@
 mod bench;
 mod charts;
 mod dead_areas;
+mod elliott;
 mod pages;
 mod parts;
 

@@ -123,8 +123,7 @@ impl<'a> Context<'a> {
 
     fn motion(&self, extent: Extent) -> Result<Motion, RigError> {
         let keys = self.keys;
-        let (raw_from, raw_to) =
-            (self.need("from", keys.from.as_ref())?, self.need("to", keys.to.as_ref())?);
+        let (raw_from, raw_to) = (self.need("from", keys.from.as_ref())?, self.need("to", keys.to.as_ref())?);
         let (from, to) = (on_surface("from", raw_from, extent)?, on_surface("to", raw_to, extent)?);
         let way_m = from.distance_m(to);
         if way_m == 0.0 {
@@ -152,11 +151,7 @@ impl<'a> Context<'a> {
         Ok(Motion { from, to, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
     }
 
-    fn need<T>(
-        &self,
-        key: &'static str,
-        value: Option<&'a Spanned<T>>,
-    ) -> Result<&'a Spanned<T>, RigError> {
+    fn need<T>(&self, key: &'static str, value: Option<&'a Spanned<T>>) -> Result<&'a Spanned<T>, RigError> {
         value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(self.span.clone()))
     }
 }
