@@ -145,7 +145,9 @@ impl Arrangement {
             return Err(ArrangementError::NoPositions);
         }
         match self {
-            Self::Even | Self::EvenOver { .. } | Self::EdgeDense { .. } | Self::Chebyshev if extent.is_plane() => {
+            Self::Even | Self::EvenOver { .. } | Self::EdgeDense { .. } | Self::Chebyshev
+                if extent.is_plane() =>
+            {
                 Err(ArrangementError::LineOnPlane { count })
             }
             Self::Even => Ok(cells(extent, count, 1)),

@@ -119,7 +119,7 @@ fn training_words(training: &Training) -> String {
         Arrangement::Even => "evenly".to_owned(),
         Arrangement::Chebyshev => "at Chebyshev's nodes".to_owned(),
         Arrangement::EvenOver { portion: (start, end) } => {
-            format!("evenly from {:.4} to {:.4} of the length", start, end)
+            format!("evenly from {start:.4} to {end:.4} of the length")
         }
         Arrangement::Grid { columns, rows } => format!("a grid of {columns} × {rows}"),
         Arrangement::EdgeDense { middle, .. } => format!("edge-dense, {middle} in the middle"),

@@ -65,9 +65,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
     let extent = tracking.likelihood().extent();
     let columns = match tracking.likelihood().most_contacts() {
-        _ if extent.is_plane() => Columns::OfPlane,
-        1 => Columns::OfOne,
-        _ => Columns::OfTwo,
+        _ if extent.is_plane() => Columns::Plane,
+        1 => Columns::One,
+        _ => Columns::Two,
     };
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {

@@ -67,8 +67,8 @@ pub(super) fn overview(report: &StudyReport, number: usize) -> Option<Figure> {
 /// One of the figures that arms are compared by.
 struct Shown {
     label: String,
-    error: Box<dyn Fn(&ArmResults) -> Option<Spread>>,
-    limit: Box<dyn Fn(&ArmResults) -> Option<f64>>,
+    error: fn(&ArmResults) -> Option<Spread>,
+    limit: fn(&ArmResults) -> Option<f64>,
 }
 
 /// The error over all positions and in the first portion; or, where a study tells them apart, between training positions and
@@ -77,8 +77,8 @@ fn shown(report: &StudyReport) -> Vec<Shown> {
     if report.study.judging().training_span {
         let span = |label: &str, error: fn(&ArmResults) -> Option<Spread>| Shown {
             label: label.to_owned(),
-            error: Box::new(error),
-            limit: Box::new(|_| None),
+            error,
+            limit: |_| None,
         };
         return vec![
             span("between the training positions", |arm| {
@@ -89,13 +89,13 @@ fn shown(report: &StudyReport) -> Vec<Shown> {
     }
     let all = report.judged_portion().map(|portion| Shown {
         label: portion_in_words(portion),
-        error: Box::new(|arm| Some(arm.error_percent)),
-        limit: Box::new(|arm| Some(arm.limit.as_ref()?.limit_error_percent)),
+        error: |arm| Some(arm.error_percent),
+        limit: |arm| Some(arm.limit.as_ref()?.limit_error_percent),
     });
     let first = report.study.judging().portions.first().map(|portion| Shown {
         label: portion_in_words(*portion),
-        error: Box::new(|arm| Some(arm.portions.first()?.error_percent)),
-        limit: Box::new(|arm| arm.portions.first()?.limit_error_percent),
+        error: |arm| Some(arm.portions.first()?.error_percent),
+        limit: |arm| arm.portions.first()?.limit_error_percent,
     });
     all.into_iter().chain(first).collect()
 }

@@ -168,10 +168,13 @@ pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
     .markup()
 }
 
+/// What a column says of an arm; nothing where it has nothing to say.
+type Cell<'a> = dyn Fn(&ArmResults) -> Option<Markup> + 'a;
+
 /// A column of the arms' table.
 struct ArmColumn<'a> {
     heading: String,
-    of: Box<dyn Fn(&ArmResults) -> Option<Markup> + 'a>,
+    of: Box<Cell<'a>>,
 }
 
 fn arm_columns<'a>(report: &StudyReport) -> Vec<ArmColumn<'a>> {

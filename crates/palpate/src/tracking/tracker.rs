@@ -175,7 +175,7 @@ impl<'a> Tracker<'a> {
     fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
         let born = match self.likelihood.geometry() {
             Geometry::Line(line) => {
-                self.births_on_line(newborn, Births { line, seen, config: &self.config, alone })
+                self.births_on_line(newborn, &Births { line, seen, config: &self.config, alone })
             }
             Geometry::Plane(plane) => {
                 let births = PlaneBirths { plane, seen, config: &self.config, alone };
@@ -190,7 +190,7 @@ impl<'a> Tracker<'a> {
         numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
     }
 
-    fn births_on_line(&self, newborn: Newborn, births: Births) -> Vec<(f64, Belief)> {
+    fn births_on_line(&self, newborn: Newborn, births: &Births) -> Vec<(f64, Belief)> {
         let mut born: Vec<(f64, Belief)> = Vec::new();
         for (evidence, belief) in births.where_nothing_touched() {
             let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };

@@ -7,11 +7,11 @@ use palpate::estimator::{Across, Track, Tracked};
 #[derive(Clone, Copy)]
 pub enum Columns {
     /// One contact on a line.
-    OfOne,
+    One,
     /// Two contacts on a line.
-    OfTwo,
+    Two,
     /// One contact on a plane.
-    OfPlane,
+    Plane,
 }
 
 impl Columns {
@@ -19,22 +19,22 @@ impl Columns {
         let one = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching";
         let second = "position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
         match self {
-            Self::OfOne => one.to_owned(),
-            Self::OfTwo => format!("{one},{second}"),
-            Self::OfPlane => "time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
+            Self::One => one.to_owned(),
+            Self::Two => format!("{one},{second}"),
+            Self::Plane => "time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
         }
     }
 
     pub fn csv(self, track: &Track) -> String {
         let (first, second) = (track.contacts.first(), track.contacts.get(1));
         let contact = match self {
-            Self::OfOne | Self::OfTwo => csv_on_line(first),
-            Self::OfPlane => csv_on_plane(first),
+            Self::One | Self::Two => csv_on_line(first),
+            Self::Plane => csv_on_plane(first),
         };
         let one = format!("{},{contact},{:.4}", track.time_s, track.touching());
         match self {
-            Self::OfOne | Self::OfPlane => one,
-            Self::OfTwo => format!("{one},{},{:.4}", csv_on_line(second), track.numbers[2]),
+            Self::One | Self::Plane => one,
+            Self::Two => format!("{one},{},{:.4}", csv_on_line(second), track.numbers[2]),
         }
     }
 }

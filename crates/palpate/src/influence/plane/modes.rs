@@ -56,6 +56,9 @@ const CUT: f64 = 12.0;
 const FINE: f64 = 2.0;
 /// No block is halved below this, however loud the readings are.
 const LEAST_M: f64 = 1e-9;
+/// More parts than any reading takes that the surface explains. One that is far too loud for it has as many as there are
+/// nanometres, all of them as far from it.
+const MOST_BLOCKS: usize = 200_000;
 
 impl Search {
     /// The surroundings of `minima`, best first, of the reading in the scratch.
@@ -71,8 +74,11 @@ impl Search {
             modes[0].weight = 1.0;
             return Surroundings { modes, count: 1, region: modes[0].covariance };
         }
-        self.sum_up(minima, scratch);
-        self.summed(minima, &mut scratch.leaves)
+        if self.sum_up(minima, scratch) {
+            self.summed(minima, &mut scratch.leaves)
+        } else {
+            self.nothing_summed(&minima[0])
+        }
     }
 
     /// A minimum as a normal distribution, its weight relative to that of `best`; `None` where it is wide, near an edge, or
@@ -129,10 +135,12 @@ impl Search {
         Some([x[0], x[1], x[2], y[1], y[2], force[2]])
     }
 
-    /// Puts the parts of the surface that hold the probability into the scratch.
-    fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) {
+    /// Puts the parts of the surface that hold the probability into the scratch; false where they are too many.
+    fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) -> bool {
         let Scratch { whitened, profile, blocks, leaves } = scratch;
         leaves.clear();
+        blocks.clear();
+        let mut looked_at = 0;
         let best = self.cost(&minima[0]);
         let most = best + CUT;
         for cell in 0..self.coarse.cells() {
@@ -147,6 +155,10 @@ impl Search {
                 length: self.coarse.lengths[cell].map(|length| force_n * length),
             });
             while let Some(block) = blocks.pop() {
+                looked_at += 1;
+                if looked_at > MOST_BLOCKS {
+                    return false;
+                }
                 let (force_n, misfit) = self.profiled(whitened, block.middle_m);
                 let spread = self.spread(block.middle_m);
                 if block.floor(misfit) + spread > most {
@@ -166,6 +178,7 @@ impl Search {
                 }
             }
         }
+        true
     }
 
     /// The modes of what was summed up: what lies nearest to a minimum is its mode's.
@@ -176,7 +189,7 @@ impl Search {
             moments[leaf.mode].add(leaf.weight, leaf.at);
             all.add(leaf.weight, leaf.at);
         }
-        if all.weight.is_nan() || all.weight <= 0.0 {
+        if !(all.weight.is_finite() && all.weight > 0.0) {
             return self.nothing_summed(&minima[0]);
         }
         let mut modes = [Mode::default(); MOST_VALLEYS];

@@ -66,6 +66,9 @@ pub(super) struct Minimum {
     pub information: [[f64; 3]; 3],
 }
 
+/// A channel so many standard deviations off is nothing that a contact does.
+const LOUDEST: f64 = 1e15;
+
 /// A minimum this much above the best has a share of e⁻¹² of the probability.
 const NEGLIGIBLE: f64 = 24.0;
 
@@ -135,11 +138,17 @@ impl Search {
         scratch.whitened.iter().map(|d| d * d).sum()
     }
 
-    /// Writes d over `whitened`.
+    /// Writes d over `whitened`; a reading that is absurdly loud, at the loudness whose squares are still numbers.
     pub fn whiten_into(&self, reading: &[f64], whitened: &mut Vec<f64>) {
         whitened.clear();
         let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
-        whitened.extend(channels.map(|((s, offset), inverse)| (reading[*s] - offset) * inverse));
+        let finite = |d: f64| d.clamp(f64::MIN, f64::MAX);
+        whitened.extend(channels.map(|((s, offset), inverse)| finite((reading[*s] - offset) * inverse)));
+        let loudest = whitened.iter().fold(0.0, |most: f64, d| most.max(d.abs()));
+        if loudest > LOUDEST {
+            let scale = LOUDEST / loudest;
+            whitened.iter_mut().for_each(|d| *d *= scale);
+        }
     }
 
     /// The minima that matter, best first, of a reading that was whitened to length `square`.
@@ -249,10 +258,10 @@ impl Search {
         let variances = self.near(&self.variances, [x_m, y_m]);
         let scale = force_n.max(self.weights_force_n).powi(2);
         let mut sums = [[[0.0; 3]; 3]; 2];
-        for group in 0..self.patches.groups {
+        for (group, variances) in variances.iter().enumerate() {
             let values = self.patches.values(&place, group);
-            for lane in 0..8 {
-                let variance = scale * variances[group][lane];
+            for (lane, own) in variances.iter().enumerate() {
+                let variance = scale * own;
                 let weight = 1.0 / (1.0 + variance);
                 let j = [force_n * values.along[lane], force_n * values.across[lane], values.f[lane]];
                 for (sum, factor) in sums.iter_mut().zip([weight, weight * weight * variance]) {

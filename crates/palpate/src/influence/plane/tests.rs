@@ -203,6 +203,30 @@ fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
 }
 
 #[test]
+fn absurd_readings_are_outside_the_model() {
+    let rig = rig();
+    let known = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 0).unwrap());
+    for locator in [&known, &without_force(&known)] {
+        for loud in [1e3, 1e9, -1e150, 1e300, f64::MAX, -f64::MAX] {
+            let mut one = [0.0; 9];
+            one[4] = loud;
+            for reading in [[loud; 9], one] {
+                let estimate = locator.locate(&reading);
+                assert_eq!(estimate.status, Status::OutsideModel, "{reading:?}: {estimate:?}");
+                let Position { x_m, y_m } = estimate.contact.position;
+                assert!(
+                    (0.0..=0.3).contains(&x_m) && (0.0..=0.3).contains(&y_m),
+                    "{reading:?}: {estimate:?}"
+                );
+                let uncertainty = estimate.contact.uncertainty.unwrap();
+                assert!(uncertainty.covariance.iter().all(|value| value.is_finite()), "{estimate:?}");
+                assert!(estimate.contact.force_n.unwrap().is_finite());
+            }
+        }
+    }
+}
+
+#[test]
 fn a_dead_channel_is_left_out_and_the_last_is_kept() {
     let rig = rig();
     let mut locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());

@@ -48,7 +48,7 @@ impl KarhunenLoeve {
     pub fn reduced(&self, recording: &Recording, count: usize) -> Recording {
         let row = |row: &Row| {
             let reading: Array1<f64> = row.reading.iter().copied().collect();
-            Row { reading: self.along((reading - &self.mean) * &self.inverse_sd, count), ..row.clone() }
+            Row { reading: self.along(&((reading - &self.mean) * &self.inverse_sd), count), ..row.clone() }
         };
         let layout = raw_layout(count);
         Recording {
@@ -66,11 +66,11 @@ impl KarhunenLoeve {
             let slopes: Array1<f64> = gradients.iter().map(|gradient| gradient.position[k]).collect();
             slopes * &self.inverse_sd
         };
-        Bound::of_columns([self.along(by(0), count), self.along(by(1), count)])
+        Bound::of_columns([self.along(&by(0), count), self.along(&by(1), count)])
     }
 
-    fn along(&self, whitened: Array1<f64>, count: usize) -> Vec<f64> {
-        let all = self.components.t().dot(&whitened);
+    fn along(&self, whitened: &Array1<f64>, count: usize) -> Vec<f64> {
+        let all = self.components.t().dot(whitened);
         all.iter().take(count).copied().collect()
     }
 }

@@ -154,7 +154,7 @@ fn absurd_readings_and_gaps_on_a_plane_leave_numbers_behind() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
-    let absurd = [[0.0; 9], [1e-3; 9], [-3e-4; 9]];
+    let absurd = [[0.0; 9], [1e9; 9], [-1e150; 9], [1e-3; 9], [-3e-4; 9]];
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
         let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
         assert!(track.touching().is_finite());
