@@ -51,10 +51,12 @@ pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> 
 
 /// The middles of equal cells: x_i = (i + ½)·length/columns, and y_j = (j + ½)·width/rows on a plane.
 pub(crate) fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
-    warped_cells(extent, columns, rows, |share| share)
+    let middle = |i: usize, size_m: f64, count: usize| (i as f64 + 0.5) * size_m / count as f64;
+    let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
+    rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
 }
 
-/// The same with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
+/// The same middles with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
 pub(crate) fn warped_cells(
     extent: Extent,
     columns: usize,

@@ -138,3 +138,23 @@ fn judging_covers_the_surface() {
     assert_eq!((apart.len(), apart[0]), (15, Position { x_m: 0.05, y_m: 0.05 }));
     assert!(every(PLANE, 0.25).is_err() && every(PLANE, 1e-5).is_err() && every(PLANE, f64::NAN).is_err());
 }
+
+#[test]
+fn chebyshevs_nodes_are_the_zeros_of_his_polynomial() {
+    let found = Arrangement::Chebyshev.positions(7, LINE).unwrap();
+    for at in &found {
+        // T_7 over the length, mapped to −1…1.
+        let x = 2.0 * at.x_m / LINE.length_m - 1.0;
+        assert!((7.0 * x.acos()).cos().abs() < 1e-12, "{found:?}");
+    }
+    assert!(found.is_sorted_by(|a, b| a.x_m < b.x_m));
+    let refused = Arrangement::Chebyshev.positions(7, PLANE);
+    assert_eq!(refused, Err(ArrangementError::LineOnPlane { count: 7 }));
+}
+
+#[test]
+fn the_squarest_grid_has_the_sides_of_the_plane() {
+    assert_eq!(squarest(LINE, 12), (12, 1));
+    assert_eq!(squarest(PLANE, 6), (3, 2));
+    assert_eq!(squarest(PLANE, 24), (6, 4));
+}
