@@ -87,9 +87,11 @@ fn presses_at_one_place_add_up_and_tell_their_neighbours() {
     twice.press(0, 1.0);
     once.press(0, 0.5);
     for place in 0..3 {
+        // What is left is the small difference of large numbers.
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-6 * before.variance(place);
         let (a, b) = (twice.variance(place), once.variance(place));
-        assert!((a - b).abs() <= 1e-6 * before.variance(place), "{a} {b}");
-        assert_eq!(before.variance_after(place, 0, 0.5), once.variance(place));
+        assert!(close(a, b), "{a} {b}");
+        assert!(close(before.variance_after(place, 0, 0.5), b));
     }
     assert!(once.variance(0) < once.variance(1) && once.variance(1) < once.variance(2));
     assert!(once.variance(2) < before.variance(2));
