@@ -24,6 +24,11 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// Ctrl-C before anything was written.
+    pub fn stopped() -> Self {
+        Self::Interrupted("stopped; nothing was written".to_owned())
+    }
+
     /// Says what happened on stderr.
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {

@@ -50,6 +50,44 @@ impl Drop for FitWatch {
     }
 }
 
+/// Steps of the bar of a whole stage.
+const STAGE_STEPS: f64 = 1000.0;
+
+/// A bar that begins anew with every stage.
+pub struct StageWatch {
+    bar: ProgressBar,
+    stage: &'static str,
+    start: Instant,
+}
+
+impl StageWatch {
+    pub fn new() -> Self {
+        Self { bar: bar(STAGE_STEPS as u64, "beginning"), stage: "", start: Instant::now() }
+    }
+
+    /// Shows how far a stage, in words, has come; false once somebody pressed Ctrl-C.
+    pub fn keep_going(&mut self, stage: &'static str, share: f64) -> bool {
+        if self.stage != stage {
+            self.stage = stage;
+            self.start = Instant::now();
+            self.bar.set_message(stage);
+            self.bar.set_prefix("");
+        }
+        if share > 0.0 {
+            self.bar.set_position((share * STAGE_STEPS) as u64);
+            let left_s = self.start.elapsed().as_secs_f64() * (1.0 - share) / share;
+            self.bar.set_prefix(format!("about {} left of this", duration(left_s)));
+        }
+        !interrupt::asked()
+    }
+}
+
+impl Drop for StageWatch {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
 /// "1 min 20 s"
 pub fn duration(seconds: f64) -> String {
     let seconds = seconds.max(0.0).round() as u64;

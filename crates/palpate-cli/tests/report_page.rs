@@ -29,7 +29,7 @@ impl Observer for Unwatched {
 /// The pages of the paper's study, cut down to a few epochs: as the paper's, and as any study's.
 fn pages() -> [Vec<ReportFile>; 2] {
     let toml = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 50");
-    let study = PreparedStudy::new(Study::from_toml(&toml).unwrap()).unwrap();
+    let study = PreparedStudy::new(Study::from_toml(&toml).unwrap(), &mut |_, _| true).unwrap().unwrap();
     let seeds = 2;
     let options = RunOptions { seeds, threads: 1, set: InstructionSet::best() };
     let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();

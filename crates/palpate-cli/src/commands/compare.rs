@@ -183,7 +183,7 @@ fn compare(
         let keep_going = &mut || !interrupt::asked();
         match try_estimator(&rig.bench, &contender, trials, arguments.seed, &clock, keep_going) {
             Ok(Some(comparison)) => comparisons.push(comparison),
-            Ok(None) => return Err(Failure::Interrupted("stopped; nothing was written".to_owned())),
+            Ok(None) => return Err(Failure::stopped()),
             Err(error) => left_out.push(LeftOut { name: contender.kind(), why: error.to_string() }),
         }
         bar.inc(1);

@@ -132,8 +132,7 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     let mut watch = FitWatch::new(folds as u64 * rig.estimator.most_rounds());
     let evaluation = cross_validate(&rig, &recording, folds, seed, &mut || watch.keep_going());
     drop(watch);
-    let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
-    let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(stopped)?;
+    let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
 }
 

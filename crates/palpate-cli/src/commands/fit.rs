@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop(watch);
     let locator = locator.map_err(Complaint::new)?;
     let Some(locator) = locator else {
-        return Err(Failure::Interrupted("stopped; nothing was written".to_owned()));
+        return Err(Failure::stopped());
     };
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
@@ -98,8 +98,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     }
     const FOLDS: usize = 5;
     let choice = choose(&rig, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
-    let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
-    let choice = choice.map_err(Complaint::new)?.ok_or_else(stopped)?;
+    let choice = choice.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     let errors: Vec<String> = choice
         .mean_errors_m
         .iter()

@@ -1,13 +1,14 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
-use crate::commands::design::sensors::words;
-use crate::commands::design::watch::Watch as DesignWatch;
 use crate::failure::{Complaint, Failure};
+use crate::progress::StageWatch;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate::evaluation::Spread;
 use palpate::network::InstructionSet;
 use palpate::report::{StudyReport, paper_report, study_report};
+use palpate::study::dead_areas::DeadAreas;
+use palpate::study::elliott::Elliott;
 use palpate::study::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate::study::{
     ArmOutcome, ArmResults, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults,
@@ -17,11 +18,13 @@ use palpate::units::format_count;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+mod built_in;
 mod checkpoint;
 mod dead_areas;
 mod elliott;
 mod watch;
 
+use built_in::BuiltIn;
 use checkpoint::CheckpointFile;
 use watch::Watch;
 
@@ -64,11 +67,11 @@ struct ResultsFile<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.study == Path::new(dead_areas::NAME) {
-        return dead_areas::run(arguments);
+    if arguments.study == Path::new(DeadAreas::NAME) {
+        return built_in::run(&dead_areas::study(arguments)?, arguments);
     }
-    if arguments.study == Path::new(elliott::NAME) {
-        return elliott::run(arguments);
+    if arguments.study == Path::new(Elliott::NAME) {
+        return built_in::run(&elliott::study(arguments)?, arguments);
     }
     let is_paper = arguments.study == Path::new("paper");
     let (name, text) = if is_paper {
@@ -83,11 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         set: InstructionSet::best(),
     };
     let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(&study.name));
-    let mut watch = DesignWatch::new();
-    let prepared = PreparedStudy::watched(study, &mut |stage, share| watch.keep_going(words(stage), share));
+    let mut watch = StageWatch::new();
+    let prepared = PreparedStudy::new(study, &mut |stage, share| watch.keep_going(stage.in_words(), share));
     drop(watch);
     let prepared = prepared.map_err(|error| complaint(&error, &name, &text))?;
-    let prepared = prepared.ok_or_else(|| Failure::Interrupted("stopped; nothing was written".to_owned()))?;
+    let prepared = prepared.ok_or_else(Failure::stopped)?;
     let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
 
     let results = StudyResults::of(&outcomes, &prepared);

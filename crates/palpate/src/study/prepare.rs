@@ -71,21 +71,12 @@ pub(super) enum PreparedArm {
 }
 
 impl PreparedStudy {
-    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share.
+    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share; `None` when `keep_going`,
+    /// asked often while layouts are searched for, says no.
     ///
     /// # Errors
     /// [`StudyRunError`], naming the arm.
-    pub fn new(study: Study) -> Result<Self, StudyRunError> {
-        // Nobody says no.
-        let prepared = Self::watched(study.clone(), &mut |_, _| true)?;
-        Ok(prepared.unwrap_or(Self { study, arms: Vec::new() }))
-    }
-
-    /// As [`PreparedStudy::new`]; `None` when `keep_going`, asked often while layouts are searched for, says no.
-    ///
-    /// # Errors
-    /// [`StudyRunError`], naming the arm.
-    pub fn watched(study: Study, keep_going: &mut KeepGoing) -> Result<Option<Self>, StudyRunError> {
+    pub fn new(study: Study, keep_going: &mut KeepGoing) -> Result<Option<Self>, StudyRunError> {
         let Some(study) = lay_out(study, keep_going)? else { return Ok(None) };
         let arms = study.arms.iter().map(|arm| PreparedArm::of(arm, &study.judging));
         let arms = arms.collect::<Result<_, _>>()?;

@@ -51,6 +51,10 @@ impl Observer for Unwatched {
     }
 }
 
+fn prepare(study: Study) -> PreparedStudy {
+    PreparedStudy::new(study, &mut |_, _| true).unwrap().unwrap()
+}
+
 fn run(study: &PreparedStudy, seeds: u64, threads: usize) -> Vec<ArmOutcome> {
     let options = RunOptions { seeds, threads, set: InstructionSet::Portable };
     study.run(options, Vec::new(), &Unwatched).unwrap()
@@ -69,7 +73,7 @@ const THREE: &str = r#"
 
 #[test]
 fn locators_come_to_their_arms_limit() {
-    let prepared = PreparedStudy::new(beam(THREE)).unwrap();
+    let prepared = prepare(beam(THREE));
     let results = StudyResults::of(&run(&prepared, 2, 2), &prepared);
     let [unknown, known, reactions] = &results.arms[..] else { panic!("{results:?}") };
     for arm in [known, unknown, reactions] {
@@ -94,7 +98,7 @@ fn locators_come_to_their_arms_limit() {
 
 #[test]
 fn threads_change_nothing_and_seeds_do() {
-    let prepared = PreparedStudy::new(beam(THREE)).unwrap();
+    let prepared = prepare(beam(THREE));
     let (one, three) = (run(&prepared, 3, 1), run(&prepared, 3, 3));
     assert_eq!(one, three);
     assert_ne!(one[0].fits[0].evaluation, one[0].fits[1].evaluation);
@@ -118,7 +122,7 @@ fn layouts_are_found_once_for_arms_that_ask_alike() {
         estimator = { kind = "neighbours" }
     "#;
     let mut asked = 0;
-    let prepared = PreparedStudy::watched(beam(arms), &mut |_, _| {
+    let prepared = PreparedStudy::new(beam(arms), &mut |_, _| {
         asked += 1;
         true
     });
@@ -128,7 +132,7 @@ fn layouts_are_found_once_for_arms_that_ask_alike() {
     assert_ne!(layout(0), layout(1));
     assert_eq!(layout(1), layout(3));
     assert_eq!([layout(1).len(), layout(2).len()], [8, 4]);
-    assert!(PreparedStudy::watched(beam(arms), &mut |_, _| false).unwrap().is_none());
+    assert!(PreparedStudy::new(beam(arms), &mut |_, _| false).unwrap().is_none());
 }
 
 #[test]
@@ -136,7 +140,10 @@ fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
     let mut study = beam("[[arm]]\nname = \"tight\"\nlayout = \"genetic\"");
     study.arms[0].rig.design.as_mut().unwrap().spacing_m = 0.06;
     let place = study.arms[0].layout.as_ref().unwrap().place.clone();
-    let Err(StudyRunError::Design { arm, place: said, error }) = PreparedStudy::new(study) else { panic!() };
+    let Err(StudyRunError::Design { arm, place: said, error }) = PreparedStudy::new(study, &mut |_, _| true)
+    else {
+        panic!()
+    };
     assert_eq!((arm.as_str(), said), ("tight", place));
     assert!(matches!(error, DesignError::Spacing { count: 8, .. }), "{error}");
 }
@@ -146,11 +153,12 @@ fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
     let few = beam(
         "[[arm]]\nname = \"few\"\ntraining = { count = 1, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
     );
-    let prepared = PreparedStudy::new(few).unwrap();
+    let prepared = prepare(few);
     let options = RunOptions { seeds: 2, threads: 2, set: InstructionSet::Portable };
     let failed = prepared.run(options, Vec::new(), &Unwatched).unwrap_err();
     assert!(matches!(&failed, StudyRunError::Fit { arm, .. } if arm == "few"), "{failed}");
-    let auto = PreparedStudy::new(beam("[[arm]]\nname = \"any\"\nestimator = { kind = \"auto\" }"));
+    let auto = beam("[[arm]]\nname = \"any\"\nestimator = { kind = \"auto\" }");
+    let auto = PreparedStudy::new(auto, &mut |_, _| true);
     assert!(auto.unwrap_err().to_string().contains("arm `any`: the estimator is `auto`"));
 }
 
@@ -160,7 +168,7 @@ fn errors_are_told_apart_between_the_training_positions_and_beyond() {
     let (head, _) = text.split_once("[[arm]]").unwrap();
     let head = head.replace("portions =", "training_span = true\nportions =");
     let arm = "[[arm]]\nname = \"inner\"\ntraining = { count = 10, portion = [0.25, 0.75] }";
-    let prepared = PreparedStudy::new(Study::from_toml(&(head + arm)).unwrap()).unwrap();
+    let prepared = prepare(Study::from_toml(&(head + arm)).unwrap());
     assert!(prepared.is_in_lanes(0));
     let results = StudyResults::of(&run(&prepared, 1, 1), &prepared);
     let arm = &results.arms[0];

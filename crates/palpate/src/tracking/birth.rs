@@ -10,7 +10,7 @@ use super::config::TrackerConfig;
 use super::gaussian::Gaussian;
 use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact, seen_on_line};
 use crate::contact::{Contact, Position};
-use crate::method::LineLikelihood;
+use crate::method::{ContactFit, LineLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
 use std::f64::consts::PI;
 
@@ -24,9 +24,9 @@ pub(super) const FORCES: f64 = 10.0;
 /// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
 const UNREST: f64 = 0.02;
 
-/// What can come in one reading on a line.
-pub(super) struct Births<'a> {
-    pub line: &'a dyn LineLikelihood,
+/// What can come in one reading; `L` is the likelihood of a line or of a plane.
+pub(super) struct Births<'a, L: ?Sized> {
+    pub likelihood: &'a L,
     pub seen: Seen<'a>,
     pub config: &'a TrackerConfig,
     pub alone: &'a Estimate,
@@ -42,7 +42,22 @@ struct Newcomer {
     room: f64,
 }
 
-impl Births<'_> {
+impl<L: ?Sized> Births<'_, L> {
+    /// The single contacts that the reading by itself shows, one in each valley of its misfit.
+    pub fn valleys(&self) -> impl Iterator<Item = &ContactEstimate> {
+        let modes = self.alone.modes.as_slice().iter().map(|mode| &mode.contact);
+        let touched = self.alone.status != Status::NoContact;
+        std::iter::once(&self.alone.contact).chain(modes).filter(move |_| touched)
+    }
+}
+
+/// The force that fits a place, from a fit of one near it; its number is the third.
+pub(super) fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
+    let information = fit.information[2][2];
+    if information > 0.0 { (near_n + fit.pull[2] / information).max(0.0) } else { near_n }
+}
+
+impl Births<'_, dyn LineLikelihood + '_> {
     /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
     pub fn where_nothing_touched(&self) -> Vec<(f64, Belief)> {
         if self.alone.status == Status::NoContact {
@@ -51,9 +66,10 @@ impl Births<'_> {
         if let Some((first, second)) = self.pair() {
             return self.two_at_once(first, second).into_iter().collect();
         }
-        let modes = self.alone.modes.as_slice().iter().map(|mode| &mode.contact);
-        let contacts = std::iter::once(&self.alone.contact).chain(modes);
-        contacts.flat_map(|contact| self.parts(contact)).filter_map(|newcomer| self.one(newcomer)).collect()
+        self.valleys()
+            .flat_map(|contact| self.parts(contact))
+            .filter_map(|newcomer| self.one(newcomer))
+            .collect()
     }
 
     /// A second contact beside that of a belief.
@@ -72,7 +88,7 @@ impl Births<'_> {
         let Contact { position, force_n } = newcomer.contact;
         let born: Bank<6, 1> = Bank::of(self.joined(&Gaussian::<2>::default(), newcomer));
         let start = [self.balance_n(newcomer.contact), position.x_m, force_n];
-        let expand = |about: &[f64; 3]| self.seen.fit_one(self.line, about);
+        let expand = |about: &[f64; 3]| self.seen.fit_one(self.likelihood, about);
         let (bank, evidence) = born.updated(&seen_on_line(self.length_m()), expand, Some(start))?;
         Some((evidence + newcomer.room.ln(), Belief::One(Bank::of(bank.members[0]))))
     }
@@ -94,7 +110,7 @@ impl Births<'_> {
     ) -> Option<(Bank<10, M>, f64)> {
         let mode_n = self.balance_n(first) + self.balance_n(second);
         let start = [mode_n, first.position.x_m, first.force_n, second.position.x_m, second.force_n];
-        let expand = |about: &[f64; 5]| self.seen.fit_two(self.line, about);
+        let expand = |about: &[f64; 5]| self.seen.fit_two(self.likelihood, about);
         born.updated(&seen_on_line(self.length_m()), expand, Some(start))
     }
 
@@ -122,7 +138,7 @@ impl Births<'_> {
         }
         debug_assert_eq!(N2, N + OF_CONTACT);
         if let Some(swing) = self.config.swing {
-            let [shape, slope] = self.line.first_mode(position.x_m);
+            let [shape, slope] = self.likelihood.first_mode(position.x_m);
             let unrest = (UNREST * force_n).powi(2);
             let omega = 2.0 * PI * swing.frequency_hz;
             joined.mean[U] += force_n * shape;
@@ -143,7 +159,7 @@ impl Births<'_> {
     }
 
     fn balance_n(&self, contact: Contact) -> f64 {
-        contact.force_n * self.line.first_mode(contact.position.x_m)[0]
+        contact.force_n * self.likelihood.first_mode(contact.position.x_m)[0]
     }
 
     /// The two contacts that the reading by itself shows, from left to right.
@@ -182,9 +198,7 @@ impl Births<'_> {
     /// The force that fits a place, from one that fits near it.
     fn best_force_n(&self, x_m: f64, near_n: f64) -> f64 {
         let contact = Contact { position: Position::along(x_m), force_n: near_n };
-        let fit = self.line.fit_one(self.seen.whitened, contact, None);
-        let information = fit.information[2][2];
-        if information > 0.0 { (near_n + fit.pull[2] / information).max(0.0) } else { near_n }
+        better_force_n(&self.likelihood.fit_one(self.seen.whitened, contact, None), near_n)
     }
 
     fn newcomer(&self, x_m: f64, force_n: f64, variance_m2: f64, room: f64) -> Option<Newcomer> {

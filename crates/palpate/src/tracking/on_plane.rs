@@ -4,16 +4,15 @@
 //! bank has the three motions of one contact. The plane is in balance at every reading.
 
 use super::bank::{Bank, Dynamics, SeenNumbers};
-use super::belief::{Belief, Moments, Seen};
-use super::birth::{FORCES, MOST_PARTS, WIDEST};
-use super::config::TrackerConfig;
+use super::belief::{Belief, Moments};
+use super::birth::{Births, FORCES, MOST_PARTS, WIDEST, better_force_n};
 use super::gaussian::{Change, Gaussian};
 use super::step::{MOTIONS, Step, motion_of};
 use crate::contact::{Contact, Position};
 use crate::mechanics::Extent;
 use crate::method::{ContactFit, PlaneLikelihood};
 use crate::numerics::NORMAL_95;
-use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_core::ContactEstimate;
 
 /// Numbers of a state.
 pub(super) const NUMBERS: usize = 7;
@@ -70,15 +69,6 @@ impl Dynamics<NUMBERS, MOTIONS> for OnPlane<'_> {
     }
 }
 
-/// What can come in one reading on a plane: a contact in each valley of the reading's misfit, held possible as on a line
-/// ([`super::birth`]). A long valley is born in parts along its longer axis; across it the reading tells where.
-pub(super) struct PlaneBirths<'a> {
-    pub plane: &'a dyn PlaneLikelihood,
-    pub seen: Seen<'a>,
-    pub config: &'a TrackerConfig,
-    pub alone: &'a Estimate,
-}
-
 /// A contact that has just come, before its reading.
 #[derive(Clone, Copy)]
 struct Newcomer {
@@ -89,15 +79,15 @@ struct Newcomer {
     room: f64,
 }
 
-impl PlaneBirths<'_> {
+/// A contact in each valley of the reading's misfit, held possible as on a line ([`super::birth`]). A long valley is born in
+/// parts along its longer axis; across it the reading tells where.
+impl Births<'_, dyn PlaneLikelihood + '_> {
     /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
     pub fn where_nothing_touched(&self) -> Vec<(f64, Belief)> {
-        if self.alone.status == Status::NoContact {
-            return Vec::new();
-        }
-        let modes = self.alone.modes.as_slice().iter().map(|mode| &mode.contact);
-        let contacts = std::iter::once(&self.alone.contact).chain(modes);
-        contacts.flat_map(|contact| self.parts(contact)).filter_map(|newcomer| self.one(&newcomer)).collect()
+        self.valleys()
+            .flat_map(|contact| self.parts(contact))
+            .filter_map(|newcomer| self.one(&newcomer))
+            .collect()
     }
 
     /// A contact with the reading; what it does next is not known from that, so its motions are as one.
@@ -120,7 +110,7 @@ impl PlaneBirths<'_> {
             belief.covariance[FORCE][FORCE] = (FORCES * force_n).powi(2) / 12.0;
         }
         let born: Bank<NUMBERS, 1> = Bank::of(belief);
-        let expand = |about: &[f64; 3]| fit(self.plane, self.seen.whitened, about);
+        let expand = |about: &[f64; 3]| fit(self.likelihood, self.seen.whitened, about);
         let numbers = seen(self.seen.likelihood.extent());
         let (bank, evidence) = born.updated(&numbers, expand, Some([x_m, y_m, force_n]))?;
         Some((evidence + newcomer.room.ln(), Belief::OnPlane(Box::new(Bank::of(bank.members[0])))))
@@ -168,9 +158,8 @@ impl PlaneBirths<'_> {
         if let Some(known_n) = self.seen.likelihood.known_force_n() {
             return known_n;
         }
-        let fit = self.plane.fit_on_plane(self.seen.whitened, Contact { position, force_n: near_n });
-        let information = fit.information[2][2];
-        if information > 0.0 { (near_n + fit.pull[2] / information).max(0.0) } else { near_n }
+        let near = Contact { position, force_n: near_n };
+        better_force_n(&self.likelihood.fit_on_plane(self.seen.whitened, near), near_n)
     }
 }
 

@@ -11,7 +11,7 @@ use crate::mechanics::Motion;
 use crate::method::{FitTask, Likelihood, LineLikelihood};
 use crate::rig::Rig;
 use crate::sensing::{ChannelErrors, measure};
-use crate::simulate::{clean_reading, simulate};
+use crate::simulate::{CleanSensors, clean_reading, simulate};
 
 const RATE_HZ: f64 = 1000.0;
 
@@ -26,22 +26,42 @@ fn likelihood(rig: &Rig, force_n: Option<f64>) -> BeamLikelihood {
     BeamLikelihood::new(&InfluenceConfig::default().fit_beam(task, &mut || true).unwrap().unwrap())
 }
 
-/// Contacts along a motion with 3 N, and readings in balance.
-fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<(f64, Contact, Vec<f64>)> {
+/// When, the true contact, and the reading.
+pub(super) type Timed = (f64, Contact, Vec<f64>);
+
+/// Contacts along a motion with a force, and readings in balance.
+pub(super) fn timed_readings(rig: &Rig, motion: Motion, force_n: f64, seed: u64) -> Vec<Timed> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let errors = ChannelErrors::none(&rig.bench.layout);
-    let surface = rig.bench.surface.model().unwrap();
+    let layout = &rig.bench.layout;
+    let errors = ChannelErrors::none(layout);
+    let sensors = CleanSensors::new(rig.bench.surface.model().unwrap(), layout);
     let at = |i: usize| {
         let time_s = i as f64 / RATE_HZ;
-        let contact = motion.contact_at(time_s, 3.0);
-        let clean = clean_reading(surface, &rig.bench.layout, contact);
-        (time_s, contact, measure(&rig.bench.layout, &clean, &errors, &mut rng))
+        let contact = motion.contact_at(time_s, force_n);
+        (time_s, contact, measure(layout, &sensors.reading(contact), &errors, &mut rng))
     };
     (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
 }
 
+/// How many readings a tracker takes for a contact where there is none, or the other way round.
+pub(super) fn wrongly_touching(likelihood: &dyn Likelihood, readings: &[Timed]) -> usize {
+    let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
+    let mut wrong = 0;
+    for (time_s, truth, reading) in readings {
+        let track = tracker.follow(*time_s, reading).unwrap();
+        let touching = !track.contacts.is_empty();
+        assert_eq!(touching, track.touching() > 0.5);
+        wrong += usize::from(touching != (truth.force_n > 0.0));
+    }
+    wrong
+}
+
+fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<Timed> {
+    timed_readings(rig, motion, 3.0, seed)
+}
+
 /// Mean errors of single readings, of the filter and of the smoother, and the shares that the latter two cover.
-fn errors(likelihood: &BeamLikelihood, readings: &[(f64, Contact, Vec<f64>)]) -> ([f64; 3], [f64; 2]) {
+fn errors(likelihood: &BeamLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2]) {
     let mut tracker = SmoothTracker::new(likelihood, TrackerConfig::default());
     for (time_s, _, reading) in readings {
         tracker.follow(*time_s, reading).unwrap();
@@ -83,15 +103,7 @@ fn a_contact_that_lets_go_is_lost_and_found_again() {
         touch_s: 0.02,
         ..rig.motion.unwrap().first.motion
     };
-    let likelihood = likelihood(&rig, None);
-    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
-    let mut wrong = 0;
-    for (time_s, truth, reading) in readings(&rig, motion, 3) {
-        let track = tracker.follow(time_s, &reading).unwrap();
-        let touching = !track.contacts.is_empty();
-        assert_eq!(touching, track.touching() > 0.5);
-        wrong += usize::from(touching != (truth.force_n > 0.0));
-    }
+    let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
 }

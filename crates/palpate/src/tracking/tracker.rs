@@ -3,10 +3,9 @@
 use super::belief::{Belief, Mixed, Moments, Seen};
 use super::birth::Births;
 use super::config::TrackerConfig;
-use super::on_plane::PlaneBirths;
 use super::step::Step;
 use super::track::{Track, TrackError, Tracked};
-use crate::method::{Geometry, Likelihood};
+use crate::method::{Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 
 /// The most hypotheses that are held possible at once.
@@ -174,11 +173,11 @@ impl<'a> Tracker<'a> {
     /// What comes with this reading, weighed by it.
     fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
         let born = match self.likelihood.geometry() {
-            Geometry::Line(line) => {
-                self.births_on_line(newborn, &Births { line, seen, config: &self.config, alone })
+            Geometry::Line(likelihood) => {
+                self.births_on_line(newborn, &Births { likelihood, seen, config: &self.config, alone })
             }
-            Geometry::Plane(plane) => {
-                let births = PlaneBirths { plane, seen, config: &self.config, alone };
+            Geometry::Plane(likelihood) => {
+                let births = Births { likelihood, seen, config: &self.config, alone };
                 let weighed = |(evidence, belief)| (newborn.one + evidence, belief);
                 births.where_nothing_touched().into_iter().map(weighed).collect()
             }
@@ -190,7 +189,11 @@ impl<'a> Tracker<'a> {
         numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
     }
 
-    fn births_on_line(&self, newborn: Newborn, births: &Births) -> Vec<(f64, Belief)> {
+    fn births_on_line(
+        &self,
+        newborn: Newborn,
+        births: &Births<dyn LineLikelihood + '_>,
+    ) -> Vec<(f64, Belief)> {
         let mut born: Vec<(f64, Belief)> = Vec::new();
         for (evidence, belief) in births.where_nothing_touched() {
             let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };

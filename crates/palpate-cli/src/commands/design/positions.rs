@@ -5,8 +5,9 @@ mod next;
 mod rig_file;
 mod tables;
 
-use super::watch::Watch;
+use super::say_files;
 use crate::failure::{Complaint, Failure};
+use crate::progress::StageWatch;
 use crate::recording_files::RecordingFiles;
 use crate::{input, output};
 use palpate::design::positions::{Budget, Placed, PositionError, PositionProblem, Stage, best_placed};
@@ -84,10 +85,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let complain = |error: PositionError| complaint(&error, &arguments.rig);
     let problem = PositionProblem::new(&rig, budget(arguments, &rig)).map_err(complain)?;
-    let watch = Mutex::new(Watch::new());
-    let keep_going =
-        |stage, share| watch.lock().unwrap_or_else(PoisonError::into_inner).keep_going(words(stage), share);
-    let placed = problem.all(&keep_going).map_err(complain)?.ok_or_else(stopped)?;
+    let watch = Mutex::new(StageWatch::new());
+    let keep_going = |stage: Stage, share| {
+        watch.lock().unwrap_or_else(PoisonError::into_inner).keep_going(stage.in_words(), share)
+    };
+    let placed = problem.all(&keep_going).map_err(complain)?.ok_or_else(Failure::stopped)?;
     drop(watch);
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
@@ -100,13 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return output::say_json(&findings::findings(&outcome));
     }
     tables::print(&outcome)?;
-    if let Some(path) = &arguments.output {
-        output::say(format!("\nRig: {}", path.display()))?;
-    }
-    match &arguments.out {
-        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
-        None => Ok(()),
-    }
+    say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
 fn budget(arguments: &Arguments, rig: &Rig) -> Budget {
@@ -141,18 +137,6 @@ fn percent(text: &str) -> Result<f64, String> {
     }
 }
 
-fn words(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Variance => "least variance",
-        Stage::Search => "calibrating in search",
-        Stage::Verification => "verifying",
-    }
-}
-
 fn complaint(error: &PositionError, rig: &Path) -> Failure {
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
-}
-
-fn stopped() -> Failure {
-    Failure::Interrupted("stopped; nothing was written".to_owned())
 }

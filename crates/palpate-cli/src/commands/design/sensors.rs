@@ -5,13 +5,14 @@ mod findings;
 mod rig_file;
 mod tables;
 
-use super::watch::Watch;
+use super::say_files;
 use crate::failure::{Complaint, Failure};
+use crate::progress::StageWatch;
 use crate::{input, output};
 use counts::{Counts, counts};
 use palpate::bench::Bench;
 use palpate::design::sensors::{
-    CountPoint, DesignError, Designed, Method, SensorProblem, Stage, Verification, best_design,
+    CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
 use palpate::limit::LimitError;
 use palpate::report::{SensorDesignReport, sensor_design_report};
@@ -80,11 +81,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::check_writable(path)?;
     }
     let (bench, design) = what_to_design(arguments, &rig)?;
-    let mut watch = Watch::new();
+    let mut watch = StageWatch::new();
     let problem =
-        SensorProblem::new(&bench, &design, &mut |stage, share| watch.keep_going(words(stage), share))
+        SensorProblem::new(&bench, &design, &mut |stage, share| watch.keep_going(stage.in_words(), share))
             .map_err(|error| complaint(&error, &arguments.rig))?
-            .ok_or_else(stopped)?;
+            .ok_or_else(Failure::stopped)?;
     let outcome = outcome(arguments, &rig, &problem, &mut watch)?;
     drop(watch);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
@@ -97,13 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return output::say_json(&findings::findings(&outcome));
     }
     tables::print(&outcome)?;
-    if let Some(path) = &arguments.output {
-        output::say(format!("\nRig: {}", path.display()))?;
-    }
-    match &arguments.out {
-        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
-        None => Ok(()),
-    }
+    say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
 /// The rig's bench and design, with what the command line says.
@@ -128,18 +123,18 @@ fn outcome<'a>(
     arguments: &'a Arguments,
     rig: &Rig,
     problem: &'a SensorProblem<'a>,
-    watch: &mut Watch,
+    watch: &mut StageWatch,
 ) -> Result<Outcome<'a>, Failure> {
     let complain = |error: DesignError| complaint(&error, &arguments.rig);
-    let designed = problem.all(arguments.seed, &mut |stage, share| watch.keep_going(words(stage), share));
-    let designed = designed.map_err(complain)?.ok_or_else(stopped)?;
+    let designed = problem.all(arguments.seed, &mut |stage, share| watch.keep_going(stage.in_words(), share));
+    let designed = designed.map_err(complain)?.ok_or_else(Failure::stopped)?;
     let counts = match &arguments.counts {
         None => Vec::new(),
         Some(range) => {
             let curve = problem.counts(range.clone(), arguments.seed, &mut |stage, share| {
-                watch.keep_going(words(stage), share)
+                watch.keep_going(stage.in_words(), share)
             });
-            curve.map_err(complain)?.ok_or_else(stopped)?
+            curve.map_err(complain)?.ok_or_else(Failure::stopped)?
         }
     };
     let calibrations = arguments.verify.unwrap_or(if arguments.out.is_some() { 3 } else { 0 });
@@ -151,11 +146,11 @@ fn outcome<'a>(
                 &rig.estimator,
                 usize::from(calibrations),
                 arguments.seed,
-                &mut |stage, share| watch.keep_going(words(stage), share),
+                &mut |stage, share| watch.keep_going(stage.in_words(), share),
             );
             let complain =
                 |error| Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display()));
-            verified.push((designed.method, verification.map_err(complain)?.ok_or_else(stopped)?));
+            verified.push((designed.method, verification.map_err(complain)?.ok_or_else(Failure::stopped)?));
         }
     }
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
@@ -183,20 +178,4 @@ fn write_report(outcome: &Outcome, bench: &Bench, out: &Path) -> Result<(), Fail
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
-}
-
-/// A stage as progress names it.
-pub fn words(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Candidates => "what each site tells",
-        Stage::Exchange => "exchanging",
-        Stage::Exhaustive => "all layouts",
-        Stage::Genetic => "breeding",
-        Stage::Refinement => "refining",
-        Stage::Verification => "verifying",
-    }
-}
-
-fn stopped() -> Failure {
-    Failure::Interrupted("stopped; nothing was written".to_owned())
 }

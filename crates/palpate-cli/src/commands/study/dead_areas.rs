@@ -1,68 +1,77 @@
 //! `palpate study dead-areas`: errors between sensors, by estimator and by the number of sensors.
 
 use super::Arguments;
-use crate::failure::{Complaint, Failure};
-use crate::progress::FitWatch;
+use super::built_in::BuiltIn;
+use crate::failure::Failure;
+use crate::input;
 use crate::table::table;
-use crate::{input, output};
-use palpate::report::dead_areas_report;
+use palpate::report::{ReportError, ReportFile, dead_areas_report};
+use palpate::simulate::SimulateError;
 use palpate::study::dead_areas::{COUNTS, DeadAreaFindings, DeadAreas, RIG_TOML};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Calibrations at each count, unless `--seeds` says another number.
 const CALIBRATIONS: u64 = 3;
 const TOLERANCE_M: f64 = 2e-3;
 
-/// The name under which `palpate study` knows it.
-pub const NAME: &str = "dead-areas";
-
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let study = DeadAreas {
+/// The study as the command line asks for it.
+pub fn study(arguments: &Arguments) -> Result<DeadAreas, Failure> {
+    Ok(DeadAreas {
         rig: input::parse_rig(Path::new("examples/dead-areas.toml"), RIG_TOML)?,
         counts: COUNTS.to_vec(),
         calibrations: arguments.seeds.unwrap_or(CALIBRATIONS),
         tolerance_m: TOLERANCE_M,
         without: Vec::new(),
         seed: 0,
-    };
-    let mut watch = FitWatch::new(study.most_rounds());
-    let findings = study.run(&mut || watch.keep_going()).map_err(Complaint::new)?;
-    drop(watch);
-    let stopped = || Failure::Interrupted("stopped; nothing was written".to_owned());
-    let findings = findings.ok_or_else(stopped)?;
-    let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from("palpate-out").join(NAME));
-    output::write_report(&out, dead_areas_report(&study, &findings))?;
-    output::write_file(&out.join("results.json"), (output::to_json(&findings)? + "\n").as_bytes())?;
-    if arguments.json {
-        return output::say_json(&findings);
-    }
-    print(&findings, &out)
+    })
 }
 
-fn print(findings: &DeadAreaFindings, out: &Path) -> Result<(), Failure> {
-    let heading = [
-        "sensing",
-        "estimator",
-        "sensors",
-        "effective, %",
-        "over sensors, mm",
-        "between, mm",
-        "dead between, %",
-    ];
-    let rows = findings.rows.iter().map(|row| {
-        vec![
-            row.sensing.clone(),
-            row.estimator.to_owned(),
-            row.sensors.to_string(),
-            format!("{:.1}", row.effective_percent),
-            format!("{:.3}", row.folded.at_sensors_m * 1e3),
-            format!("{:.3}", row.folded.between_m * 1e3),
-            format!("{:.1}", row.folded.dead_percent),
-        ]
-    });
-    output::say(table(&heading, rows))?;
-    for (sensing, estimator, sensors, why) in &findings.left_out {
-        output::say(format!("{sensing}, {estimator}, {sensors} sensors: left out: {why}"))?;
+impl BuiltIn for DeadAreas {
+    const NAME: &'static str = "dead-areas";
+    type Findings = DeadAreaFindings;
+    type Error = SimulateError;
+
+    fn seeds(&self) -> (u64, u64) {
+        (self.calibrations, self.seed)
     }
-    output::say(format!("\nReport: {}", out.join("report.html").display()))
+
+    fn most_rounds(&self) -> u64 {
+        self.most_rounds()
+    }
+
+    fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<DeadAreaFindings>, SimulateError> {
+        self.run(keep_going)
+    }
+
+    fn report(&self, findings: &DeadAreaFindings) -> Result<Vec<ReportFile>, ReportError> {
+        dead_areas_report(self, findings)
+    }
+
+    fn tell(findings: &DeadAreaFindings) -> String {
+        let heading = [
+            "sensing",
+            "estimator",
+            "sensors",
+            "effective, %",
+            "over sensors, mm",
+            "between, mm",
+            "dead between, %",
+        ];
+        let rows = findings.rows.iter().map(|row| {
+            vec![
+                row.sensing.clone(),
+                row.estimator.to_owned(),
+                row.sensors.to_string(),
+                format!("{:.1}", row.effective_percent),
+                format!("{:.3}", row.folded.at_sensors_m * 1e3),
+                format!("{:.3}", row.folded.between_m * 1e3),
+                format!("{:.1}", row.folded.dead_percent),
+            ]
+        });
+        let mut told = table(&heading, rows);
+        for (sensing, estimator, sensors, why) in &findings.left_out {
+            told += &format!("\n{sensing}, {estimator}, {sensors} sensors: left out: {why}");
+        }
+        told
+    }
 }

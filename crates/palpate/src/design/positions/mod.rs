@@ -50,6 +50,17 @@ pub enum Stage {
     Verification,
 }
 
+impl Stage {
+    /// As people are told of it.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Variance => "least variance",
+            Self::Search => "calibrating in search",
+            Self::Verification => "verifying",
+        }
+    }
+}
+
 /// Is told the stage and the share of it that is done, from several threads, and says whether to go on.
 pub type Watch<'a> = dyn Fn(Stage, f64) -> bool + Sync + 'a;
 

@@ -69,6 +69,20 @@ pub enum Stage {
     Verification,
 }
 
+impl Stage {
+    /// As people are told of it.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Candidates => "what each site tells",
+            Self::Exchange => "exchanging",
+            Self::Exhaustive => "all layouts",
+            Self::Genetic => "breeding",
+            Self::Refinement => "refining",
+            Self::Verification => "verifying",
+        }
+    }
+}
+
 /// Is told the stage and the share of it that is done (NaN where that is not known), and says whether to go on.
 pub type KeepGoing<'a> = dyn FnMut(Stage, f64) -> bool + 'a;
 

@@ -33,7 +33,7 @@ impl Observer for Unwatched {
 }
 
 fn run(toml: &str, seeds: u64) -> Run {
-    let study = PreparedStudy::new(Study::from_toml(toml).unwrap()).unwrap();
+    let study = PreparedStudy::new(Study::from_toml(toml).unwrap(), &mut |_, _| true).unwrap().unwrap();
     let options = RunOptions { seeds, threads: 1, set: InstructionSet::Portable };
     let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
     let results = StudyResults::of(&outcomes, &study);

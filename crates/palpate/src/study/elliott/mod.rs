@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
-use crate::estimator::{EstimatorConfig, FitError, Fitting, Locator, ReadingError, TrackerConfig};
+use crate::estimator::{EstimatorConfig, FitError, Fitting, Locator, ReadingError, Track, TrackerConfig};
 use crate::evaluation::{Evaluation, FollowError, Spread, TrackErrors, Trial, follow};
 use crate::limit::Bound;
 use crate::mechanics::{Extent, ResponseGradient};
@@ -160,8 +160,8 @@ impl Elliott {
             let moving = simulate_moving(&self.rig, seed.wrapping_add(OTHER_NOISE))?;
             let reduction = KarhunenLoeve::of(&trial.training, &noise_sd);
             let bench = TrialBench { trial, moving: &moving, reduction: &reduction, seed };
-            for (chain, judged) in self.chains().into_iter().zip(&mut judged) {
-                let Some(one) = self.judge(chain, &bench, keep_going)? else { return Ok(None) };
+            let Some(every) = self.judge(&bench, keep_going)? else { return Ok(None) };
+            for (judged, one) in judged.iter_mut().zip(every) {
                 judged.push(one);
             }
             reductions.push(reduction);
@@ -200,61 +200,61 @@ impl Elliott {
         network
     }
 
+    /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
     fn judge(
         &self,
-        chain: Chain,
         bench: &TrialBench,
         keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Judged>, ElliottError> {
-        let Bench { surface, force_n, .. } = &self.rig.bench;
-        let network = EstimatorConfig::Network(self.network());
+    ) -> Result<Option<Vec<Judged>>, ElliottError> {
         let whole = &self.rig.bench;
-        match chain {
-            Chain::Components(count) => {
-                let layout = raw_layout(count);
-                let reduced =
-                    Bench { surface: without_model(surface), layout, force_n: *force_n, columns: None };
-                let reduce = |recording| bench.reduction.reduced(recording, count);
-                let trial =
-                    Trial { training: reduce(&bench.trial.training), judged: reduce(&bench.trial.judged) };
-                let moving =
-                    TimedRecording { recording: reduce(&bench.moving.recording), ..bench.moving.clone() };
-                let bench = TrialBench { trial: &trial, moving: &moving, ..*bench };
-                self.judge_readings(&reduced, &network, &bench, keep_going)
-            }
-            Chain::Readings => self.judge_readings(whole, &network, bench, keep_going),
-            Chain::Influence => self.judge_readings(whole, &self.rig.estimator, bench, keep_going),
-            Chain::Filter | Chain::Smoother => {
-                let Some(locator) = bench.fit(whole, &self.rig.estimator, keep_going)? else {
-                    return Ok(None);
-                };
-                let followed = follow(&locator, TrackerConfig::default(), bench.moving)?;
-                let tracks = if chain == Chain::Filter { followed.filtered } else { followed.smoothed };
-                let extent = whole.surface.extent();
-                let errors = TrackErrors::of(&tracks, &bench.moving.truths(), extent);
-                let moving_error_m = errors.ok_or(ElliottError::NothingTracked)?.track_m;
-                Ok(Some(Judged { pressed: None, moving_error_m }))
-            }
+        let network = EstimatorConfig::Network(self.network());
+        let mut judged = Vec::new();
+        for &count in &self.components {
+            let reduce = |recording| bench.reduction.reduced(recording, count);
+            let trial =
+                Trial { training: reduce(&bench.trial.training), judged: reduce(&bench.trial.judged) };
+            let recording = reduce(&bench.moving.recording);
+            let moving = TimedRecording { recording, ..bench.moving.clone() };
+            let reduced = Bench {
+                surface: without_model(&whole.surface),
+                layout: raw_layout(count),
+                force_n: whole.force_n,
+                columns: None,
+            };
+            let bench = TrialBench { trial: &trial, moving: &moving, ..*bench };
+            let Some(locator) = bench.fit(&reduced, &network, keep_going)? else { return Ok(None) };
+            judged.push(self.judge_readings(&locator, &bench)?);
         }
+        let Some(locator) = bench.fit(whole, &network, keep_going)? else { return Ok(None) };
+        judged.push(self.judge_readings(&locator, bench)?);
+        let Some(locator) = bench.fit(whole, &self.rig.estimator, keep_going)? else { return Ok(None) };
+        judged.push(self.judge_readings(&locator, bench)?);
+        judged.extend(self.judge_tracks(&locator, bench)?);
+        Ok(Some(judged))
     }
 
-    fn judge_readings(
-        &self,
-        of: &Bench,
-        estimator: &EstimatorConfig,
-        bench: &TrialBench,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Judged>, ElliottError> {
-        let Some(locator) = bench.fit(of, estimator, keep_going)? else { return Ok(None) };
-        let mut pressed = Evaluation::of(&locator, &bench.trial.judged)?;
-        let extent = of.surface.extent();
+    /// A locator's errors, reading by reading.
+    fn judge_readings(&self, locator: &Locator, bench: &TrialBench) -> Result<Judged, ElliottError> {
+        let mut pressed = Evaluation::of(locator, &bench.trial.judged)?;
+        let extent = self.rig.bench.surface.extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
-        let moving = Evaluation::of(&locator, &bench.moving.recording)?;
+        let moving = Evaluation::of(locator, &bench.moving.recording)?;
         let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
-        Ok(Some(Judged {
+        Ok(Judged {
             pressed: Some((mean_m(&pressed), pressed.effective_percent(self.tolerance_m))),
             moving_error_m: mean_m(&moving),
-        }))
+        })
+    }
+
+    /// The errors of a locator's tracker, as readings come and with all of them.
+    fn judge_tracks(&self, locator: &Locator, bench: &TrialBench) -> Result<[Judged; 2], ElliottError> {
+        let followed = follow(locator, TrackerConfig::default(), bench.moving)?;
+        let (truths, extent) = (bench.moving.truths(), self.rig.bench.surface.extent());
+        let judge = |tracks: &[Track]| -> Result<Judged, ElliottError> {
+            let errors = TrackErrors::of(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
+            Ok(Judged { pressed: None, moving_error_m: errors.track_m })
+        };
+        Ok([judge(&followed.filtered)?, judge(&followed.smoothed)?])
     }
 
     /// The derivatives of all readings at each judged contact.

@@ -1,19 +1,14 @@
 //! A plate in balance under a contact that slides over it, lets go and comes down again.
 
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::influence::{InfluenceConfig, InfluenceLocator, InfluenceSource, PlateLikelihood};
 use crate::mechanics::Motion;
 use crate::method::{Fit, FitTask, Likelihood, PlaneLikelihood};
 use crate::rig::Rig;
-use crate::sensing::{ChannelErrors, measure};
-use crate::simulate::{CleanSensors, simulate};
+use crate::simulate::simulate;
+use crate::tracking::tests::{Timed, timed_readings, wrongly_touching};
 use crate::tracking::{SmoothTracker, Tracker, TrackerConfig};
-
-const RATE_HZ: f64 = 1000.0;
 
 /// The example on a mesh that is solved at once.
 fn rig() -> Rig {
@@ -36,22 +31,12 @@ fn likelihood_from(from: InfluenceSource, rig: &Rig, force_n: Option<f64>) -> Pl
     }
 }
 
-/// Contacts along a motion with 5 N, and readings.
-fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<(f64, Contact, Vec<f64>)> {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let layout = &rig.bench.layout;
-    let errors = ChannelErrors::none(layout);
-    let sensors = CleanSensors::new(rig.bench.surface.model().unwrap(), layout);
-    let at = |i: usize| {
-        let time_s = i as f64 / RATE_HZ;
-        let contact = motion.contact_at(time_s, 5.0);
-        (time_s, contact, measure(layout, &sensors.reading(contact), &errors, &mut rng))
-    };
-    (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
+fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<Timed> {
+    timed_readings(rig, motion, 5.0, seed)
 }
 
 /// Mean errors of single readings, of the filter and of the smoother, and the shares that the ellipses of the latter two hold.
-fn errors(likelihood: &PlateLikelihood, readings: &[(f64, Contact, Vec<f64>)]) -> ([f64; 3], [f64; 2]) {
+fn errors(likelihood: &PlateLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2]) {
     let mut tracker = SmoothTracker::new(likelihood, TrackerConfig::default());
     for (time_s, _, reading) in readings {
         tracker.follow(*time_s, reading).unwrap();
@@ -81,7 +66,6 @@ fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(5.0), 2.5, 4.0), (None, 2.5, 4.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
-        eprintln!("{force_n:?}: {single} {filtered} {smoothed} {covered}");
         assert!(single / filtered > filter, "{force_n:?}: {single} {filtered}");
         assert!(single / smoothed > smoother, "{force_n:?}: {single} {smoothed}");
         assert!((0.88..1.0).contains(&covered), "{force_n:?}: {covered}");
@@ -98,15 +82,7 @@ fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
         touch_s: 0.02,
         ..rig.motion.unwrap().first.motion
     };
-    let likelihood = likelihood(&rig, None);
-    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
-    let mut wrong = 0;
-    for (time_s, truth, reading) in readings(&rig, motion, 3) {
-        let track = tracker.follow(time_s, &reading).unwrap();
-        let touching = !track.contacts.is_empty();
-        assert_eq!(touching, track.touching() > 0.5);
-        wrong += usize::from(touching != (truth.force_n > 0.0));
-    }
+    let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
 }

@@ -1,8 +1,9 @@
 //! The next press of a recording begun.
 
-use super::{Arguments, Watch, complaint, findings, stopped};
+use super::{Arguments, complaint, findings};
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::StageWatch;
 use crate::table::table;
 use palpate::design::positions::{Advice, next_press};
 use palpate::recording::Recording;
@@ -38,12 +39,12 @@ struct Next {
 
 pub fn run(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
     let contacts = rig.design.as_ref().map(|design| &design.contacts);
-    let mut watch = Watch::new();
+    let mut watch = StageWatch::new();
     let advice = next_press(&rig.bench, contacts, recording, arguments.stop_below, &mut || {
         watch.keep_going("learning from the recording", f64::NAN)
     });
     drop(watch);
-    let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?.ok_or_else(stopped)?;
+    let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?.ok_or_else(Failure::stopped)?;
     if arguments.json {
         return output::say_json(&told(arguments, &advice));
     }

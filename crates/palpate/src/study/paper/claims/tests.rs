@@ -9,7 +9,7 @@ type MadeUp = fn(&str, u32) -> (f64, u32);
 /// The paper's arms with three seeds each, whose locators are off by `made_up`.
 fn judged(made_up: MadeUp) -> Vec<Claim> {
     let text = crate::study::paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 1");
-    let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap()).unwrap();
+    let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), &mut |_, _| true).unwrap().unwrap();
     let mut outcomes = Vec::new();
     for (index, arm) in prepared.study.arms.iter().enumerate() {
         let (family, count) = arm.name.rsplit_once('-').unwrap();
