@@ -1,14 +1,17 @@
 //! The tracker at 1 kHz on the paper's beam, which swings, and on a plate in balance: readings a second on one core, CPU time,
-//! medians; and how much closer the track is than its readings, at several speeds.
+//! medians; and how much closer the track is than its readings, at several speeds, in the mean of several recordings.
 
 use cpu_time::ThreadTime;
 use palpate::bench::Bench;
-use palpate::estimator::{Fitting, Locator, Swing, Tracker, TrackerConfig};
-use palpate::evaluation::{TrackErrors, follow};
+use palpate::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate::evaluation::{Followed, TrackErrors, follow};
+use palpate::recording::TimedRecording;
 use palpate::rig::Rig;
 use palpate::simulate::{simulate, simulate_moving};
 
 const ROUNDS: usize = 7;
+/// Recordings of each motion, under noise of their own.
+const RECORDINGS: u64 = 6;
 
 const BEAM: &str = include_str!("../../../examples/moving-load.toml");
 const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
@@ -37,42 +40,62 @@ fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
 }
 
 fn measure(locator: &Locator, rig: &Rig) {
-    let timed = simulate_moving(rig, 2).expect("the example can be moved");
-    let rows = &timed.recording.rows;
-    let truths = timed.truths();
+    let seeds = 2..2 + RECORDINGS;
+    let moving: Vec<TimedRecording> =
+        seeds.map(|seed| simulate_moving(rig, seed).expect("the example can be moved")).collect();
     let beam = rig.motion.and_then(|moving| moving.beam);
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
     let ways = [Some(("in balance", None)), own.map(|own| ("with inertia", Some(own)))];
     for (name, swing) in ways.into_iter().flatten() {
         let config = TrackerConfig { swing, ..TrackerConfig::default() };
-        let tracking = locator.tracking(&config).expect("an influence locator");
-        let mut rates: Vec<f64> = (0..ROUNDS)
-            .map(|_| {
-                let mut tracker = Tracker::new(tracking.likelihood(), config);
-                let start = ThreadTime::now();
-                for (row, time_s) in rows.iter().zip(&timed.times_s) {
-                    std::hint::black_box(tracker.follow(*time_s, &row.reading).expect("times rise"));
-                }
-                rows.len() as f64 / start.elapsed().as_secs_f64()
-            })
+        let rate = readings_per_s(locator, config, &moving[0]);
+        let followed: Vec<_> = moving
+            .iter()
+            .map(|timed| follow(locator, config, timed).expect("an influence locator"))
             .collect();
-        rates.sort_by(f64::total_cmp);
-        let followed = follow(locator, config, &timed).expect("an influence locator");
-        let errors = |tracks| {
-            TrackErrors::of(tracks, &truths, rig.bench.surface.extent()).expect("something was tracked")
+        let tell = |tracks: fn(&Followed) -> &[Track]| {
+            let errors: Vec<TrackErrors> = followed
+                .iter()
+                .zip(&moving)
+                .map(|(followed, timed)| {
+                    TrackErrors::of(tracks(followed), &timed.truths(), rig.bench.surface.extent())
+                        .expect("something was tracked")
+                })
+                .collect();
+            let mean = |of: fn(&TrackErrors) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+            let (single_m, track_m) = (mean(|one| one.single_m), mean(|one| one.track_m));
+            format!(
+                "{:.3} mm of {:.3}, {:.2} times, covers {:.1} %",
+                track_m * 1e3,
+                single_m * 1e3,
+                single_m / track_m,
+                mean(|one| one.track_covered) * 100.0
+            )
         };
-        let (filter, smoother) = (errors(&followed.filtered), errors(&followed.smoothed));
         println!(
-            "    {name}: single {:.3} mm; filter {:.3} mm, {:.2} times, covers {:.1} %; smoother {:.3} mm, {:.2} times, covers {:.1} %; {:.0} thousand readings/s",
-            filter.single_m * 1e3,
-            filter.track_m * 1e3,
-            filter.ratio(),
-            filter.track_covered * 100.0,
-            smoother.track_m * 1e3,
-            smoother.ratio(),
-            smoother.track_covered * 100.0,
-            rates[ROUNDS / 2] / 1e3
+            "    {name}: filter {}; smoother {}; {:.0} thousand readings/s",
+            tell(|followed| &followed.filtered),
+            tell(|followed| &followed.smoothed),
+            rate / 1e3
         );
     }
+}
+
+/// The filter's rate: CPU time, the median of several rounds.
+fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecording) -> f64 {
+    let tracking = locator.tracking(&config).expect("an influence locator");
+    let rows = &timed.recording.rows;
+    let mut rates: Vec<f64> = (0..ROUNDS)
+        .map(|_| {
+            let mut tracker = Tracker::new(tracking.likelihood(), config);
+            let start = ThreadTime::now();
+            for (row, time_s) in rows.iter().zip(&timed.times_s) {
+                std::hint::black_box(tracker.follow(*time_s, &row.reading).expect("times rise"));
+            }
+            rows.len() as f64 / start.elapsed().as_secs_f64()
+        })
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    rates[ROUNDS / 2]
 }

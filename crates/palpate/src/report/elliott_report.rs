@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::numbers::{mm, number, spread};
 use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text};
 use super::{
-    Axis, Chart, ErrorPoint, Mark, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
+    Axis, Chart, ErrorPoint, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
 };
 use crate::evaluation::Spread;
 use crate::study::elliott::{Chain, ChainRow, Elliott, ElliottFindings, INNER};
@@ -87,14 +87,9 @@ impl ElliottReport<'_> {
         let limits = self.by_components().filter_map(|(count, row)| Some((count, row.limit_m? * 1e3)));
         let kind = SeriesKind::Line { points: limits.collect(), stroke: Stroke::Dashed };
         series.push(Series { label: "limit of these components".to_owned(), colour: 6, kind });
-        let marks = [(Chain::Readings, "network on all readings"), (Chain::Influence, "influence locator")];
-        let mark = |(chain, name): &(Chain, &str)| horizontal(self.row(*chain)?.error_m?, name);
-        let chart = Chart {
-            title: "Error by the number of components".to_owned(),
-            series,
-            marks: marks.iter().filter_map(mark).collect(),
-            ..self.by_count()
-        };
+        series.extend(self.across(|row| row.error_m));
+        let chart =
+            Chart { title: "Error by the number of components".to_owned(), series, ..self.by_count() };
         let caption = html! {
             "Mean error of one press at each of some 400 places, within the inner " (INNER * 100.0) " % of the plate: medians over \
              the calibrations, bars from the 5th to the 95th percentile. The limit is the Cramér–Rao bound of what the components hold."
@@ -103,19 +98,9 @@ impl ElliottReport<'_> {
     }
 
     fn moving_figure(&self, number: usize) -> Figure {
-        let marks = [
-            (Chain::Readings, "network on all readings"),
-            (Chain::Influence, "influence locator"),
-            (Chain::Filter, "its filter"),
-            (Chain::Smoother, "its smoother"),
-        ];
-        let mark = |(chain, name): &(Chain, &str)| horizontal(self.row(*chain)?.moving_error_m, name);
-        let chart = Chart {
-            title: "Error under a load that moves".to_owned(),
-            series: vec![self.bars("network on components", 0, |row| Some(row.moving_error_m))],
-            marks: marks.iter().filter_map(mark).collect(),
-            ..self.by_count()
-        };
+        let mut series = vec![self.bars("network on components", 0, |row| Some(row.moving_error_m))];
+        series.extend(self.across(|row| Some(row.moving_error_m)));
+        let chart = Chart { title: "Error under a load that moves".to_owned(), series, ..self.by_count() };
         let caption = html! { "Mean error of the readings of the moving load, one by one but for filter and smoother." };
         figure(number, &chart, caption)
     }
@@ -153,6 +138,23 @@ impl ElliottReport<'_> {
         let points = self.by_components().filter_map(point).collect();
         let kind = SeriesKind::ErrorBars { points, marker: Marker::Circle };
         Series { label: label.to_owned(), colour, kind }
+    }
+
+    /// The chains that do not depend on a number of components: a line across each.
+    fn across(&self, error: fn(&ChainRow) -> Option<Spread>) -> impl Iterator<Item = Series> {
+        let chains = [
+            (Chain::Readings, "network on all readings", 1),
+            (Chain::Influence, "influence locator", 2),
+            (Chain::Filter, "its filter", 3),
+            (Chain::Smoother, "its smoother", 5),
+        ];
+        let counts: Vec<f64> = self.by_components().map(|(count, _)| count).collect();
+        chains.into_iter().filter_map(move |(chain, name, colour)| {
+            let median_mm = error(self.row(chain)?)?.median * 1e3;
+            let points = counts.iter().map(|count| (*count, median_mm)).collect();
+            let kind = SeriesKind::Line { points, stroke: Stroke::Solid };
+            Some(Series { label: format!("{name}, {} mm", number(median_mm)), colour, kind })
+        })
     }
 
     fn table(&self, table: usize) -> Markup {
@@ -219,11 +221,6 @@ fn dash() -> String {
 
 fn scaled(error: Spread) -> Spread {
     Spread { median: error.median * 1e3, p05: error.p05 * 1e3, p95: error.p95 * 1e3 }
-}
-
-fn horizontal(error: Spread, name: &str) -> Option<Mark> {
-    let y = error.median * 1e3;
-    y.is_finite().then(|| Mark::HorizontalLine { y, label: format!("{name}, {} mm", number(y)) })
 }
 
 fn figure(number: usize, chart: &Chart, caption: Markup) -> Figure {

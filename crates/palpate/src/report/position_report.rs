@@ -151,29 +151,24 @@ impl<'a> PositionDesignReport<'a> {
         let rows = self.placed.len();
         let y = |row: usize| (rows - row) as f64;
         let series = self.placed.iter().enumerate().map(|(row, placed)| Series {
-            label: placed.placement.name().to_owned(),
+            label: String::new(),
             colour: row,
             kind: SeriesKind::Points {
                 points: placed.positions.iter().map(|at| (at.x_m * 1e3, y(row))).collect(),
                 marker: Marker::Circle,
             },
         });
+        let names = self.placed.iter().enumerate();
+        let names = names.map(|(row, placed)| (y(row), placed.placement.name().to_owned()));
         let chart = Chart {
             title: "Where to press".to_owned(),
             x: Axis::linear("training position, mm").from_to(0.0, self.length_mm()),
-            y: Axis::linear("arrangement")
-                .from_to(0.4, rows as f64 + 0.6)
-                .ticks_at((0..rows).map(y).collect::<Vec<_>>()),
+            y: Axis::default().from_to(0.4, rows as f64 + 0.6).named(names.collect()),
             series: series.collect(),
-            height_px: (190 + 34 * rows) as u32,
+            height_px: (150 + 34 * rows) as u32,
             ..Chart::default()
         };
-        let names: Vec<String> = (0..rows)
-            .rev()
-            .map(|row| format!("{}: {}", rows - row, self.placed[row].placement.name()))
-            .collect();
-        let caption =
-            html! { "The training positions of every arrangement, a row each. " (names.join(", ")) "." };
+        let caption = html! { "The training positions of every arrangement, a row each." };
         Figure { number, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
     }
 

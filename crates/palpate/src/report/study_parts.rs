@@ -312,7 +312,7 @@ pub(crate) fn glossary(report: &StudyReport) -> Markup {
             dt { "Seed" }
             dd {
                 @if report.results.arms.iter().any(|arm| arm.limit.is_some()) {
-                    "The number from which the noise of an arm's recording follows, and a network's random start. "
+                    "The number from which the noise of an arm's recording follows, and a network's random start; "
                 } @else {
                     "The number from which a network's random start follows. Networks that differ in nothing else come out \
                      differently, so "
