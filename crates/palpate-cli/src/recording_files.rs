@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// A recording: one file, or readings and contacts apart.
 #[derive(clap::Args)]
 pub struct RecordingFiles {
-    /// The recording [default: simulated, where the rig has a model]
+    /// A recording [default: simulations, where the rig has a model]
     #[arg(long, value_name = "FILE.csv")]
     pub data: Option<PathBuf>,
     /// The recording's contacts, where --data has the readings alone; row by row

@@ -1,7 +1,7 @@
 //! Numbers as people read them.
 
 use crate::evaluation::Spread;
-use crate::units::format_count;
+use crate::units::{Dimension, Quantity, format_count};
 
 /// What stands where there is no number.
 pub(crate) const NOTHING: &str = "–";
@@ -22,6 +22,16 @@ pub(crate) fn number(value: f64) -> String {
         format!("{value:.decimals$}")
     } else {
         format!("{value:.1e}")
+    }
+}
+
+/// An SI value with its unit, in print: "5 µm" where files and the terminal have "5 um".
+pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
+    let told = Quantity { value, dimension }.to_string();
+    match told.split_once(" u") {
+        Some((number, "e")) => format!("{number} µε"),
+        Some((number, unit)) => format!("{number} µ{unit}"),
+        None => told,
     }
 }
 
@@ -90,6 +100,13 @@ mod tests {
         let shown = [0.0, 999.0, 1000.0, -1_234_567.0, f64::INFINITY].map(whole);
         assert_eq!(shown, ["0", "999", "1,000", "−1,234,567", "–"]);
         assert_eq!([26_850.0, 3.6].map(as_written), ["26,850", "3.6"]);
+    }
+
+    #[test]
+    fn micro_is_a_letter_of_its_own_in_print() {
+        let shown = [quantity(5e-6, Dimension::Length), quantity(1e-6, Dimension::Strain)];
+        assert_eq!(shown, ["5 µm", "1 µε"]);
+        assert_eq!(quantity(5e-3, Dimension::Force), "5 mN");
     }
 
     #[test]

@@ -40,13 +40,18 @@ pub fn position_design_report(report: &PositionDesignReport) -> Result<Vec<Repor
         None => vec![report.rows_figure(1), report.errors_figure(2)],
     };
     let shown = Figures(figures);
+    let (positions, errors) = if report.problem.is_plane() {
+        (html! {}, html! { (shown.show(1)) (shown.show(2)) })
+    } else {
+        (shown.show(1), shown.show(2))
+    };
     let sections = vec![
         Section {
             id: "positions",
             heading: "The arrangements",
-            body: html! { (report.table(1)) (shown.show(1)) (report.places(2)) },
+            body: html! { (report.table(1)) (positions) (report.places(2)) },
         },
-        Section { id: "errors", heading: "Where the locator is off", body: html! { (shown.show(2)) } },
+        Section { id: "errors", heading: "Where the locator is off", body: errors },
         Section { id: "meaning", heading: "How positions are found and judged", body: report.meaning() },
     ];
     let page = Page {
@@ -235,7 +240,7 @@ impl<'a> PositionDesignReport<'a> {
                     values: placed.errors_m.iter().map(|error_m| error_m * 1e3).collect(),
                 }],
                 sensors_mm: placed.positions.iter().map(|at| (at.x_m * 1e3, at.y_m * 1e3)).collect(),
-                label: "mean error, mm".to_owned(),
+                label: "error, mm".to_owned(),
                 most,
                 width_px: 640,
             };
@@ -256,11 +261,13 @@ impl<'a> PositionDesignReport<'a> {
         let budget = self.problem.budget();
         html! {
             p {
-                "Every arrangement is judged by the same calibrations: presses are simulated with noise, the estimator is fitted, and                  readings of the contacts are located. The search judged by " (counted(budget.calibrations, "calibration", "calibrations"))
+                "Every arrangement is judged by the same calibrations: presses are simulated with noise, the estimator is fitted, and \
+                 readings of the contacts are located. The search judged by " (counted(budget.calibrations, "calibration", "calibrations"))
                 "; the figures here are of " (counted(budget.verifications, "other one", "other ones")) ", with noise that no search has seen."
             }
             p {
-                b { "even" } " and " b { "edge-dense" } " are the founding paper's, " b { "chebyshev" } " are the nodes that polynomials are best                  interpolated from, " b { "variance-optimal" } " leaves influence functions, learnt from the presses alone, the least variance, and "
+                b { "even" } " and " b { "edge-dense" } " are the founding paper's, " b { "chebyshev" } " are the nodes that polynomials are best \
+                 interpolated from, " b { "variance-optimal" } " leaves influence functions, learnt from the presses alone, the least variance, and "
                 b { "optimal" } " is the best of these and of some between, with its positions moved about while simulated calibrations get better."
             }
         }

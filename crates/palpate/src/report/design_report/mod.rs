@@ -5,7 +5,7 @@ mod plane;
 
 use maud::{Markup, html};
 
-use super::numbers::{counted, mm, number, stated};
+use super::numbers::{counted, mm, number, quantity, stated};
 use super::page::{Figures, Page, Section, Table, numeric, short, text, wide};
 use super::{ReportError, ReportFile};
 use crate::bench::Bench;
@@ -142,18 +142,34 @@ impl<'a> SensorDesignReport<'a> {
             let error = told.map_or("–".to_owned(), |told| {
                 format!("{:.3} ± {:.3}", told.mean_error_m * 1e3, told.standard_error_m * 1e3)
             });
-            vec![
+            let mut cells = vec![
                 text(format!("{}{star}", designed.method.name())),
                 text(number(worth.score * scale)),
                 mm(worth.mean_limit_m),
                 mm(worth.worst_limit_m),
                 text(number(worth.within_tolerance_percent)),
                 text(number(worth.score_one_dead.map_or(f64::NAN, |score| score * scale))),
-                text(stated(worth.cost)),
                 mm(worth.mean_error_m),
                 text(error),
-            ]
+            ];
+            if self.has_costs() {
+                cells.push(text(stated(worth.cost)));
+            }
+            cells
         });
+        let mut columns = vec![
+            short("layout"),
+            numeric("score"),
+            numeric("mean limit, mm"),
+            numeric("largest, mm"),
+            numeric(format!("within {} mm, %", self::mm(design.tolerance_m))),
+            numeric("one dead: score"),
+            numeric("expected error, mm"),
+            numeric("simulated error, mm"),
+        ];
+        if self.has_costs() {
+            columns.push(numeric("cost"));
+        }
         let broken = self.designed.iter().any(|designed| !designed.assessment.keeps_constraints);
         Table {
             number: table,
@@ -163,20 +179,16 @@ impl<'a> SensorDesignReport<'a> {
                  calibrated with noise and asked. A dash: the readings do not tell some contact, or the layout was not simulated."
                 @if broken { " *: breaks a constraint." }
             },
-            columns: vec![
-                short("layout"),
-                numeric("score"),
-                numeric("mean limit, mm"),
-                numeric("largest, mm"),
-                numeric(format!("within {} mm, %", self::mm(design.tolerance_m))),
-                numeric("one dead: score"),
-                numeric("cost"),
-                numeric("expected error, mm"),
-                numeric("simulated error, mm"),
-            ],
+            columns,
             rows: rows.collect(),
         }
         .markup()
+    }
+
+    /// Whether sensors differ in what they cost, or the whole must not cost too much.
+    fn has_costs(&self) -> bool {
+        let design = self.problem.design();
+        design.budget.is_some() || design.offers.iter().any(|offer| offer.cost != design.offers[0].cost)
     }
 
     fn places(&self, table: usize) -> Markup {
@@ -219,12 +231,16 @@ impl<'a> SensorDesignReport<'a> {
             .offers
             .iter()
             .map(|offer| {
-                let quantity = |value| crate::units::Quantity { value, dimension: offer.kind.dimension() };
-                let mut words = format!("{}, noise {}", offer.kind, quantity(offer.channel.noise_sd));
-                if offer.channel.resolution > 0.0 {
-                    words += &format!(", resolution {}", quantity(offer.channel.resolution));
+                let channel = &offer.channel;
+                let told = |value| quantity(value, offer.kind.dimension());
+                let mut words = format!("{}, noise {}", offer.kind, told(channel.noise_sd));
+                if channel.resolution > 0.0 {
+                    words += &format!(", resolution {}", told(channel.resolution));
                 }
-                words + &format!(", cost {}", stated(offer.cost))
+                if self.has_costs() {
+                    words += &format!(", cost {}", stated(offer.cost));
+                }
+                words
             })
             .collect();
         html! {

@@ -5,14 +5,13 @@ mod plane;
 
 use maud::{Markup, html};
 
-use super::numbers::{counted, mm, number, stated};
+use super::numbers::{counted, mm, number, quantity, stated};
 use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text, wide, words};
 use super::{ReportError, ReportFile};
 use crate::bench::Bench;
 use crate::contact::Position;
 use crate::limit::{Force, Limit, LimitCurve, LimitWarning};
 use crate::sensing::Sensor;
-use crate::units::Quantity;
 
 /// What a limit's report is made from.
 #[derive(Clone, Copy)]
@@ -205,13 +204,13 @@ fn noise_in_words(sensor: &Sensor) -> String {
     if channel.dead {
         return "dead: left out".to_owned();
     }
-    let quantity = |value| Quantity { value, dimension: sensor.kind.dimension() };
+    let told = |value| quantity(value, sensor.kind.dimension());
     let mut parts = Vec::new();
     if channel.noise_sd > 0.0 {
-        parts.push(format!("standard deviation {}", quantity(channel.noise_sd)));
+        parts.push(format!("standard deviation {}", told(channel.noise_sd)));
     }
     if channel.resolution > 0.0 {
-        parts.push(format!("resolution {}", quantity(channel.resolution)));
+        parts.push(format!("resolution {}", told(channel.resolution)));
     }
     parts.join(", ")
 }
