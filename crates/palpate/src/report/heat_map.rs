@@ -5,6 +5,7 @@ use plotters::style::Color;
 use super::canvas::{self, Anchor, Canvas, GRID, INK, Label, QUIET_INK, WHITE};
 use super::chart::{Axis, Ticks};
 use super::colour_map::colour_of;
+use super::extremes::Extremes;
 use super::geometry::{Point, Rect};
 use super::scale::AxisScale;
 use super::text;
@@ -27,8 +28,6 @@ const BAR_LABELS: f64 = 54.0;
 /// Least distances between the labels of neighbouring ticks.
 const LABEL_GAP: f64 = 12.0;
 const LEAST_PITCH: f64 = 26.0;
-/// A value this many times another is drawn on a logarithmic scale.
-const LOGARITHMIC_FROM: f64 = 10.0;
 /// Most height of one map.
 const MOST_HEIGHT: f64 = 420.0;
 /// Cells overlap by this much, or a line of background would show between them.
@@ -207,15 +206,13 @@ impl Layout {
 
 /// The scale of the colours.
 fn colours(map: &HeatMap) -> AxisScale {
-    let shown = || {
-        let all = map.panels.iter().flat_map(|panel| panel.values.iter().copied());
-        all.filter(|value| value.is_finite()).map(|value| value.min(map.most))
-    };
-    let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
-    let logarithmic = low > 0.0 && high >= LOGARITHMIC_FROM * low;
-    let axis = if logarithmic { Axis::log10("") } else { Axis::linear("") };
-    let from = if logarithmic { low } else { low.min(0.0) };
-    AxisScale::new(&axis.from_to(from, high), &[low, high])
+    let all = map.panels.iter().flat_map(|panel| panel.values.iter().copied());
+    let finite = all.filter(|value| value.is_finite());
+    let extremes = Extremes::of(finite.map(|value| value.min(map.most)));
+    let Extremes { least, greatest } = extremes;
+    let (axis, from) =
+        if extremes.are_far_apart() { (Axis::log10(""), least) } else { (Axis::linear(""), least.min(0.0)) };
+    AxisScale::new(&axis.from_to(from, greatest), &[least, greatest])
 }
 
 fn draw_cells(canvas: &Canvas<'_>, map: &HeatMap, panel: &HeatPanel, plot: Rect, colours: &AxisScale) {

@@ -36,6 +36,7 @@ mod design_report;
 mod digit_figures;
 mod elliott_report;
 mod evaluation_report;
+mod extremes;
 mod geometry;
 mod heat_map;
 mod layout;

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::extremes::Extremes;
 use super::numbers::{counted, mm, number};
 use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text, wide};
 use super::{
@@ -11,9 +12,6 @@ use super::{
 use crate::bench::Bench;
 use crate::contact::in_words;
 use crate::design::positions::{Placed, Placement, PositionProblem, best_placed};
-
-/// Errors whose largest is this many times the smallest are drawn on a logarithmic axis.
-const LOGARITHMIC_FROM: f64 = 10.0;
 
 /// What a report of training positions is made from.
 #[derive(Clone, Copy)]
@@ -198,15 +196,9 @@ impl<'a> PositionDesignReport<'a> {
                 },
             })
             .collect();
-        let errors = self.compared().into_iter().flat_map(|placed| placed.errors_m.iter().copied());
-        let (low, high) = errors
-            .filter(|error_m| *error_m > 0.0)
-            .fold((f64::INFINITY, 0.0f64), |(low, high), error_m| (low.min(error_m), high.max(error_m)));
-        let y = if high > LOGARITHMIC_FROM * low {
-            Axis::log10("mean error, mm")
-        } else {
-            Axis::linear("mean error, mm")
-        };
+        let label = "mean error, mm";
+        let wide = Extremes::of_lines(&series).are_far_apart();
+        let y = if wide { Axis::log10(label) } else { Axis::linear(label) };
         let chart = Chart {
             title: "Error by contact position".to_owned(),
             x: Axis::linear("contact position, mm").from_to(0.0, self.length_mm()),

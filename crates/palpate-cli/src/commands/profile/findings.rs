@@ -1,6 +1,6 @@
 //! What is printed of a profile, in the units that people read.
 
-use palpate::estimator::{LoadProfile, Patch, PatchLimit, Profiler, patch_limits};
+use palpate::estimator::{CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits};
 use palpate::mechanics::UniformLoad;
 
 /// All that a reading tells of the load; what it does not tell is null.
@@ -92,74 +92,81 @@ impl Findings {
         line: Option<u64>,
     ) -> Self {
         let plane = profile.cells.extent.width_m.is_some();
-        let limit = |i: usize| limits.and_then(|limits| limits.get(i));
-        let patch = |(i, patch): (usize, &Patch)| PatchFound {
-            stretch_mm: [patch.from.x_m * 1e3, patch.to.x_m * 1e3],
-            centre_x_mm: Interval::new(
-                patch.centre.position.x_m,
-                patch.centre.sd_x_m,
-                patch.centre.x_95_m(),
-                1e3,
-            ),
-            across: plane.then(|| Across {
-                stretch_y_mm: [patch.from.y_m * 1e3, patch.to.y_m * 1e3],
-                centre_y_mm: Interval::new(
-                    patch.centre.position.y_m,
-                    patch.centre.sd_y_m,
-                    patch.centre.y_95_m(),
-                    1e3,
-                ),
-                limit_y_mm: limit(i).map(|limit| limit.sd_y_m * 1e3),
-            }),
-            force_n: Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0),
-            limit_x_mm: limit(i).map(|limit| limit.sd_x_m * 1e3),
-            limit_force_n: limit(i).map(|limit| limit.sd_force_n),
-        };
         let of_truth = patch_limits(profiler.sensors(), truth);
-        let load = |(i, load): (usize, &UniformLoad)| {
-            let limit = of_truth.as_ref().and_then(|limits| limits.get(i));
-            TrueLoad {
-                stretch_mm: [load.from.x_m * 1e3, load.to.x_m * 1e3],
-                centre_x_mm: load.centre().x_m * 1e3,
-                across: plane.then(|| Across {
-                    stretch_y_mm: [load.from.y_m * 1e3, load.to.y_m * 1e3],
-                    centre_y_mm: load.centre().y_m * 1e3,
-                    limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
-                }),
-                force_n: load.force_n,
-                limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
-                limit_force_n: limit.map(|limit| limit.sd_force_n),
-            }
-        };
-        let per_mm = if plane { 1e-6 } else { 1e-3 };
-        let cell = |cell: usize| {
-            let (centre, (density, (low, high))) = (profile.cells.centre(cell), profile.density(cell));
-            CellFound {
-                x_mm: centre.x_m * 1e3,
-                y_mm: plane.then_some(centre.y_m * 1e3),
-                density: density * per_mm,
-                low: low * per_mm,
-                high: high * per_mm,
-            }
-        };
+        let limit =
+            |limits: Option<&[PatchLimit]>, i: usize| limits.and_then(|limits| limits.get(i).copied());
+        let patches = profile.patches.iter().enumerate();
+        let loads = truth.iter().enumerate();
         Self {
             line,
             status: profile.status.name(),
             misfit: profile.misfit,
             worst_misfit: profile.worst_misfit,
             total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.total_95_n(), 1.0),
-            centre_x_mm: profile
-                .centre
-                .map(|centre| Interval::new(centre.position.x_m, centre.sd_x_m, centre.x_95_m(), 1e3)),
-            centre_y_mm: profile
-                .centre
-                .filter(|_| plane)
-                .map(|centre| Interval::new(centre.position.y_m, centre.sd_y_m, centre.y_95_m(), 1e3)),
+            centre_x_mm: profile.centre.map(|centre| x_mm(&centre)),
+            centre_y_mm: profile.centre.filter(|_| plane).map(|centre| y_mm(&centre)),
             resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
-            patches: profile.patches.iter().enumerate().map(patch).collect(),
-            loads: truth.iter().enumerate().map(load).collect(),
-            profile: (0..profile.cells.len()).map(cell).collect(),
+            patches: patches.map(|(i, patch)| PatchFound::of(patch, limit(limits, i), plane)).collect(),
+            loads: loads.map(|(i, load)| TrueLoad::of(load, limit(of_truth.as_deref(), i), plane)).collect(),
+            profile: (0..profile.cells.len()).map(|cell| CellFound::of(profile, cell)).collect(),
             residuals: profile.residuals.clone(),
         }
     }
+}
+
+impl PatchFound {
+    fn of(patch: &Patch, limit: Option<PatchLimit>, plane: bool) -> Self {
+        Self {
+            stretch_mm: [patch.from.x_m * 1e3, patch.to.x_m * 1e3],
+            centre_x_mm: x_mm(&patch.centre),
+            across: plane.then(|| Across {
+                stretch_y_mm: [patch.from.y_m * 1e3, patch.to.y_m * 1e3],
+                centre_y_mm: y_mm(&patch.centre),
+                limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
+            }),
+            force_n: Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0),
+            limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
+            limit_force_n: limit.map(|limit| limit.sd_force_n),
+        }
+    }
+}
+
+impl TrueLoad {
+    fn of(load: &UniformLoad, limit: Option<PatchLimit>, plane: bool) -> Self {
+        Self {
+            stretch_mm: [load.from.x_m * 1e3, load.to.x_m * 1e3],
+            centre_x_mm: load.centre().x_m * 1e3,
+            across: plane.then(|| Across {
+                stretch_y_mm: [load.from.y_m * 1e3, load.to.y_m * 1e3],
+                centre_y_mm: load.centre().y_m * 1e3,
+                limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
+            }),
+            force_n: load.force_n,
+            limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
+            limit_force_n: limit.map(|limit| limit.sd_force_n),
+        }
+    }
+}
+
+impl CellFound {
+    fn of(profile: &LoadProfile, cell: usize) -> Self {
+        let plane = profile.cells.extent.width_m.is_some();
+        let per_mm = if plane { 1e-6 } else { 1e-3 };
+        let (centre, (density, (low, high))) = (profile.cells.centre(cell), profile.density(cell));
+        Self {
+            x_mm: centre.x_m * 1e3,
+            y_mm: plane.then_some(centre.y_m * 1e3),
+            density: density * per_mm,
+            low: low * per_mm,
+            high: high * per_mm,
+        }
+    }
+}
+
+fn x_mm(centre: &CentreOfPressure) -> Interval {
+    Interval::new(centre.position.x_m, centre.sd_x_m, centre.x_95_m(), 1e3)
+}
+
+fn y_mm(centre: &CentreOfPressure) -> Interval {
+    Interval::new(centre.position.y_m, centre.sd_y_m, centre.y_95_m(), 1e3)
 }

@@ -19,12 +19,14 @@ mod exchange;
 mod exhaustive;
 mod genetic;
 mod limit_objective;
+mod method;
 mod objective;
 mod pivoting;
 mod pool;
 mod principal;
 mod refine;
 mod rows;
+mod stage;
 mod starts;
 mod verification;
 
@@ -34,7 +36,9 @@ pub use candidates::PlacedSensor;
 pub use contacts::WeightedContacts;
 pub use counts::{CountPoint, enough};
 pub use error::{DesignError, Exclusion};
+pub use method::Method;
 pub use pivoting::{condition_number, pivoted_columns};
+pub use stage::{KeepGoing, Stage};
 
 use std::sync::Arc;
 
@@ -51,97 +55,6 @@ use objective::{Block, Objective};
 use pool::Pool;
 use principal::{PrincipalComponents, Reconstruction};
 use rows::Touches;
-
-/// What a design is busy with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// What each candidate tells of each contact.
-    Candidates,
-    /// Greedy choice and exchange.
-    Exchange,
-    /// All layouts, one by one.
-    Exhaustive,
-    /// Generations of layouts.
-    Genetic,
-    /// Positions between the sites.
-    Refinement,
-    /// Simulated calibrations.
-    Verification,
-}
-
-impl Stage {
-    /// As people are told of it.
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Self::Candidates => "what each site tells",
-            Self::Exchange => "exchanging",
-            Self::Exhaustive => "all layouts",
-            Self::Genetic => "breeding",
-            Self::Refinement => "refining",
-            Self::Verification => "verifying",
-        }
-    }
-}
-
-/// Is told the stage and the share of it that is done (NaN where that is not known), and says whether to go on.
-pub type KeepGoing<'a> = dyn FnMut(Stage, f64) -> bool + 'a;
-
-/// How a layout came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Evenly, whatever the constraints: what the others are compared with.
-    Even,
-    /// As the rig has it.
-    Rig,
-    /// Greedy choice, then exchange until nothing improves.
-    GreedyExchange,
-    /// The best of all layouts.
-    Exhaustive,
-    /// A genetic search.
-    Genetic,
-    /// The best of those before, moved off the candidate sites.
-    Refined,
-    /// The most information, by greedy choice and exchange.
-    DOptimal,
-    /// The best reconstruction from principal components, by greedy choice and exchange.
-    PrincipalComponents,
-    /// QR factorisation with column pivoting on principal components.
-    QrPivoting,
-}
-
-impl Method {
-    /// Its name in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Even => "even",
-            Self::Rig => "rig",
-            Self::GreedyExchange => "greedy-exchange",
-            Self::Exhaustive => "exhaustive",
-            Self::Genetic => "genetic",
-            Self::Refined => "refined",
-            Self::DOptimal => "d-optimal",
-            Self::PrincipalComponents => "principal-components",
-            Self::QrPivoting => "qr-pivoting",
-        }
-    }
-
-    /// What can be asked for by name, in the order that messages list them.
-    pub const NAMED: [Self; 7] = [
-        Self::Even,
-        Self::GreedyExchange,
-        Self::Genetic,
-        Self::Refined,
-        Self::DOptimal,
-        Self::PrincipalComponents,
-        Self::QrPivoting,
-    ];
-
-    /// Whether it searches by the design's criterion, so that its best layout is the design.
-    pub const fn is_search(self) -> bool {
-        matches!(self, Self::GreedyExchange | Self::Exhaustive | Self::Genetic | Self::Refined)
-    }
-}
 
 /// A layout and its worth.
 #[derive(Clone, Debug, PartialEq)]

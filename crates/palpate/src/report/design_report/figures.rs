@@ -9,14 +9,12 @@ use crate::limit::{Limit, LimitCurve};
 use crate::mechanics::SurfaceSpec;
 use crate::report::beam_drawing::{beam_drawing, supported_beam_drawing};
 use crate::report::digit_figures::shapes_figure;
+use crate::report::extremes::Extremes;
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
 use crate::report::sites::sites_chart;
 use crate::report::{Axis, Chart, Mark, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
-
-/// Values whose largest is this many times the smallest are drawn on a logarithmic axis.
-const LOGARITHMIC_FROM: f64 = 10.0;
 
 /// The bench with the best layout, where it can be drawn.
 pub(super) fn bench_figure(
@@ -64,19 +62,13 @@ pub(super) fn limit_figure(report: &SensorDesignReport, number: usize) -> Option
         .into_iter()
         .chain(drawn(best, 0, Stroke::Solid))
         .collect();
-    let values = lines.iter().flat_map(|line| match &line.kind {
-        SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
-        _ => Vec::new(),
-    });
-    let finite: Vec<f64> = values.filter(|value| value.is_finite() && *value > 0.0).collect();
-    let (low, high) =
-        (finite.iter().copied().fold(f64::INFINITY, f64::min), finite.iter().copied().fold(0.0, f64::max));
-    let logarithmic = high > LOGARITHMIC_FROM * low;
+    let extremes = Extremes::of_lines(&lines);
+    let Extremes { least, greatest } = extremes;
     // Sensors stand in two rows beneath the curves.
-    let (axis, rows) = if logarithmic {
-        (Axis::log10("limit, mm").from_to(0.35 * low, 1.4 * high), [0.6 * low, 0.45 * low])
+    let (axis, rows) = if extremes.are_far_apart() {
+        (Axis::log10("limit, mm").from_to(0.35 * least, 1.4 * greatest), [0.6 * least, 0.45 * least])
     } else {
-        (Axis::linear("limit, mm").from_to(0.0, 1.1 * high), [0.1 * high, 0.04 * high])
+        (Axis::linear("limit, mm").from_to(0.0, 1.1 * greatest), [0.1 * greatest, 0.04 * greatest])
     };
     let sites = |designed: &Designed, colour, y, marker| Series {
         label: format!("sensors, {} layout", designed.method.name()),
@@ -127,48 +119,25 @@ pub(super) fn sites_figure(report: &SensorDesignReport, number: usize) -> Figure
 /// The mean limit against the number of sensors.
 pub(super) fn counts_figure(report: &SensorDesignReport, number: usize) -> Option<Figure> {
     let (first, last) = (report.counts.first()?, report.counts.last()?);
-    let line = |label: &str, colour, stroke, of: &dyn Fn(&CountPoint) -> Option<Assessment>| {
-        let limit = |point: &CountPoint| of(point).and_then(|worth| worth.mean_limit_m);
-        let points = report
-            .counts
-            .iter()
-            .map(|point| (point.count as f64, limit(point).map_or(f64::NAN, |m| m * 1e3)));
-        Series {
-            label: label.to_owned(),
-            colour,
-            kind: SeriesKind::Line { points: points.collect(), stroke },
-        }
+    let curve = |of: fn(&CountPoint) -> Option<Assessment>| -> Vec<(f64, f64)> {
+        let limit_m = |point| of(point).and_then(|worth| worth.mean_limit_m).unwrap_or(f64::NAN);
+        report.counts.iter().map(|point| (point.count as f64, limit_m(point) * 1e3)).collect()
     };
-    let series = vec![
-        line("even", 6, Stroke::Dashed, &|point| point.even),
-        line("designed", 0, Stroke::Solid, &|point| Some(point.designed)),
+    let curves = [
+        ("even", 6, Stroke::Dashed, curve(|point| point.even)),
+        ("designed", 0, Stroke::Solid, curve(|point| Some(point.designed))),
     ];
-    let dots: Vec<Series> = series
-        .iter()
-        .map(|series| {
-            let points = match &series.kind {
-                SeriesKind::Line { points, .. } => points.clone(),
-                _ => Vec::new(),
-            };
-            let kind = SeriesKind::Points { points, marker: Marker::Circle };
-            Series { label: String::new(), colour: series.colour, kind }
-        })
-        .collect();
-    let values: Vec<f64> = dots
-        .iter()
-        .flat_map(|series| match &series.kind {
-            SeriesKind::Points { points, .. } => points.iter().map(|point| point.1).collect(),
-            _ => Vec::new(),
-        })
-        .filter(|value| value.is_finite())
-        .collect();
-    let (low, high) =
-        (values.iter().copied().fold(f64::INFINITY, f64::min), values.iter().copied().fold(0.0, f64::max));
-    let label = "mean limit, mm";
-    let y = if high > LOGARITHMIC_FROM * low {
-        Axis::log10(label)
+    let with_dots = |(label, colour, stroke, points): (&str, usize, Stroke, Vec<(f64, f64)>)| {
+        let dots = SeriesKind::Points { points: points.clone(), marker: Marker::Circle };
+        let line = SeriesKind::Line { points, stroke };
+        [(label, line), ("", dots)].map(|(label, kind)| Series { label: label.to_owned(), colour, kind })
+    };
+    let series: Vec<Series> = curves.into_iter().flat_map(with_dots).collect();
+    let extremes = Extremes::of_lines(&series);
+    let y = if extremes.are_far_apart() {
+        Axis::log10("mean limit, mm")
     } else {
-        Axis::linear(label).from_to(0.0, 1.1 * high)
+        Axis::linear("mean limit, mm").from_to(0.0, 1.1 * extremes.greatest)
     };
     let step = (report.counts.len() / 12 + 1).max(1);
     let ticks: Vec<f64> = report.counts.iter().step_by(step).map(|point| point.count as f64).collect();
@@ -176,7 +145,7 @@ pub(super) fn counts_figure(report: &SensorDesignReport, number: usize) -> Optio
         title: "How the limit falls with the number of sensors".to_owned(),
         x: Axis::linear("sensors").from_to(first.count as f64 - 0.5, last.count as f64 + 0.5).ticks_at(ticks),
         y,
-        series: series.into_iter().chain(dots).collect(),
+        series,
         ..Chart::default()
     };
     let caption = html! {

@@ -7,13 +7,12 @@ use crate::limit::{Bound, LimitCurve, LimitWarning};
 use crate::mechanics::SurfaceSpec;
 use crate::report::beam_drawing::{beam_drawing, supported_beam_drawing};
 use crate::report::digit_figures::{force_limit_figure, linear_theory_figures, shapes_figure};
+use crate::report::extremes::Extremes;
 use crate::report::limit_line::along;
 use crate::report::numbers::{counted, mm, stated};
 use crate::report::page::Figure;
 use crate::report::{Axis, Chart, Mark, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
 
-/// Limits whose largest is this many times the smallest are drawn on a logarithmic axis.
-const LOGARITHMIC_FROM: f64 = 10.0;
 /// Where the surface ends, errors do: limits beyond this many lengths are cut off.
 const MOST_LENGTHS: f64 = 10.0;
 
@@ -77,22 +76,15 @@ pub(super) fn digit_figures(report: &LimitReport) -> Vec<Figure> {
     figures
 }
 
-fn values(series: &[Series]) -> impl Iterator<Item = f64> + '_ {
-    series.iter().flat_map(|series| match &series.kind {
-        SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
-        _ => Vec::new(),
-    })
-}
-
 fn axis(series: &[Series], length_mm: f64) -> Axis {
-    let finite = || values(series).filter(|value| value.is_finite());
-    let (least, most) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
+    let extremes = Extremes::of_lines(series);
+    let Extremes { least, greatest } = extremes;
     let label = "limit, mm";
-    if most > LOGARITHMIC_FROM * least {
-        let top = most.min(MOST_LENGTHS * length_mm);
+    if extremes.are_far_apart() {
+        let top = greatest.min(MOST_LENGTHS * length_mm);
         Axis::log10(label).from_to(0.7 * least, (1.4 * top).max(2.0 * least))
-    } else if most > 0.0 {
-        Axis::linear(label).from_to(0.0, 1.1 * most)
+    } else if greatest > 0.0 {
+        Axis::linear(label).from_to(0.0, 1.1 * greatest)
     } else {
         Axis::linear(label)
     }
