@@ -155,6 +155,11 @@ pub enum Symmetry {
 }
 
 impl SensorDesign {
+    /// Whether costs tell layouts apart: sensors differ in theirs, or a budget limits them.
+    pub fn has_costs(&self) -> bool {
+        self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
+    }
+
     /// What is designed when a rig does not say: as many sensors of the kinds of `layout`, for contacts all over the surface.
     /// `None` where no model explains the sensors.
     pub fn of(layout: &Layout, extent: Extent) -> Option<Self> {

@@ -152,7 +152,7 @@ impl<'a> SensorDesignReport<'a> {
                 mm(worth.mean_error_m),
                 text(error),
             ];
-            if self.has_costs() {
+            if design.has_costs() {
                 cells.push(text(stated(worth.cost)));
             }
             cells
@@ -167,7 +167,7 @@ impl<'a> SensorDesignReport<'a> {
             numeric("expected error, mm"),
             numeric("simulated error, mm"),
         ];
-        if self.has_costs() {
+        if design.has_costs() {
             columns.push(numeric("cost"));
         }
         let broken = self.designed.iter().any(|designed| !designed.assessment.keeps_constraints);
@@ -183,12 +183,6 @@ impl<'a> SensorDesignReport<'a> {
             rows: rows.collect(),
         }
         .markup()
-    }
-
-    /// Whether sensors differ in what they cost, or the whole must not cost too much.
-    fn has_costs(&self) -> bool {
-        let design = self.problem.design();
-        design.budget.is_some() || design.offers.iter().any(|offer| offer.cost != design.offers[0].cost)
     }
 
     fn places(&self, table: usize) -> Markup {
@@ -237,7 +231,7 @@ impl<'a> SensorDesignReport<'a> {
                 if channel.resolution > 0.0 {
                     words += &format!(", resolution {}", told(channel.resolution));
                 }
-                if self.has_costs() {
+                if design.has_costs() {
                     words += &format!(", cost {}", stated(offer.cost));
                 }
                 words

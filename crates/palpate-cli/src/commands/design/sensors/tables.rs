@@ -51,7 +51,7 @@ fn designs(outcome: &Outcome) -> String {
     let design = outcome.problem.design();
     let tolerance = format!("within {}, %", format_length_mm(design.tolerance_m));
     let mut heading = vec!["layout", "score", "mean limit, mm", "largest, mm", &tolerance, "one dead: score"];
-    if design.budget.is_some() {
+    if design.has_costs() {
         heading.push("cost");
     }
     if !outcome.verified.is_empty() {
@@ -69,7 +69,7 @@ fn designs(outcome: &Outcome) -> String {
             format!("{:.1}", worth.within_tolerance_percent),
             figure(worth.score_one_dead.map(|score| score * unit)),
         ];
-        if design.budget.is_some() {
+        if design.has_costs() {
             row.push(format!("{}", worth.cost));
         }
         if !outcome.verified.is_empty() {
