@@ -3,13 +3,13 @@
 //! and what bounds a batch in `influence/batch.rs`.
 
 use cpu_time::ThreadTime;
-use palpate::bench::Bench;
-use palpate::contact::{Contact, Position};
-use palpate::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
-use palpate::method::FitTask;
-use palpate::recording::Recording;
-use palpate::rig::Rig;
-use palpate::simulate::{clean_reading, simulate};
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_estimators::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
+use palpate_estimators::method::FitTask;
+use palpate_estimators::recording::Recording;
+use palpate_rig::Rig;
+use palpate_estimators::simulate::{clean_reading, simulate};
 use palpate_core::{Estimate, Status};
 
 const ROUNDS: usize = 201;

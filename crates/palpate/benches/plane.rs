@@ -2,15 +2,15 @@
 //! uncertainty; one core, CPU time, medians.
 
 use cpu_time::ThreadTime;
-use palpate::arrangement::every;
-use palpate::bench::Bench;
-use palpate::contact::{Contact, Position};
-use palpate::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
-use palpate::mechanics::Extent;
-use palpate::method::FitTask;
-use palpate::recording::Recording;
-use palpate::rig::Rig;
-use palpate::simulate::{CleanSensors, simulate};
+use palpate_estimators::arrangement::every;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
+use palpate_mechanics::surface::Extent;
+use palpate_estimators::method::FitTask;
+use palpate_estimators::recording::Recording;
+use palpate_rig::Rig;
+use palpate_estimators::simulate::{CleanSensors, simulate};
 
 const ROUNDS: usize = 51;
 

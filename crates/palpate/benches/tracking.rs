@@ -2,12 +2,12 @@
 //! medians; and how much closer the track is than its readings, at several speeds, in the mean of several recordings.
 
 use cpu_time::ThreadTime;
-use palpate::bench::Bench;
-use palpate::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
-use palpate::evaluation::{Followed, TrackErrors, follow};
-use palpate::recording::TimedRecording;
-use palpate::rig::Rig;
-use palpate::simulate::{simulate, simulate_moving};
+use palpate_estimators::setup::Bench;
+use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
+use palpate_estimators::recording::TimedRecording;
+use palpate_rig::Rig;
+use palpate_estimators::simulate::{simulate, simulate_moving};
 
 const ROUNDS: usize = 7;
 /// Recordings of each motion, under noise of their own.
