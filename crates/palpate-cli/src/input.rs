@@ -3,9 +3,9 @@
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::CsvError;
+use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_rig::{Rig, RigError};
 use palpate_studies::{Study, StudyError, StudyProblem};
-use palpate_mechanics::units::{Dimension, Quantity};
 use std::path::Path;
 
 /// The text of a file.

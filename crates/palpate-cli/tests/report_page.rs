@@ -3,14 +3,14 @@
 
 mod support {
     pub mod browser;
-    #[path = "../../../palpate/tests/support/skip.rs"]
+    #[path = "../../../palpate-testing/src/skip.rs"]
     pub mod skip;
 }
 
 use std::fs;
 
-use palpate_mechanics::limit::{Force, Limit, LimitCurve, limit_warnings};
 use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
 use palpate_rig::Rig;
 use palpate_studies::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};

@@ -5,13 +5,15 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use super::sensors::WeightedContacts;
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError};
+use palpate_estimators::estimator::{
+    EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError,
+};
 use palpate_estimators::network::{InstructionSet, Precision};
 use palpate_estimators::recording::Recording;
-use palpate_mechanics::sensing::ChannelModel;
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{SimulateError, simulate_at};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::ChannelModel;
 
 /// Why a calibration cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

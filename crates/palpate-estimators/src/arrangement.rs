@@ -3,9 +3,9 @@
 mod grid;
 mod training;
 
-pub use training::Training;
 pub use grid::{EveryError, all_over, every};
 pub use grid::{cells, chebyshev, inner_grid, squarest, warped_cells};
+pub use training::Training;
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;

@@ -7,6 +7,8 @@ pub mod digit;
 pub mod estimator;
 pub mod evaluation;
 pub mod features;
+#[cfg(test)]
+mod fixtures;
 pub mod gaussian_process;
 pub mod influence;
 pub mod load_profile;

@@ -6,8 +6,8 @@ mod likelihood;
 pub use held_out::HeldOutSpread;
 pub use likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
 
-use crate::setup::Bench;
 use crate::recording::Recording;
+use crate::setup::Bench;
 use palpate_core::Estimate;
 
 /// What a method is fitted to.

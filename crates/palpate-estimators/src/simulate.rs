@@ -8,11 +8,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
+use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
-use crate::recording::{Provenance, Recording, Row};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
+use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
 
 pub use moving::{MovingContact, MovingContacts, simulate_moving};
 
@@ -68,14 +68,21 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
     CleanSensors::new(surface, layout).reading(contact)
 }
 
-/// Presses the bench's simulated surface at the training positions, with the force of the training presses; see
-/// [`simulate_at`].
-///
-/// # Errors
-/// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
-pub fn simulate(bench: &Bench, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
-    let positions = training.positions(bench.surface.extent())?;
-    simulate_at(&training.pressed(bench), &positions, training.repeats, seed)
+impl Bench {
+    /// The bench as it is when pressed to calibrate: with the force of these presses.
+    pub fn pressed_by(&self, training: &Training) -> Self {
+        Self { force_n: training.force_n.or(self.force_n), ..self.clone() }
+    }
+
+    /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
+    /// faulty channels report; see [`simulate_at`].
+    ///
+    /// # Errors
+    /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
+    pub fn simulate(&self, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
+        let positions = training.positions(self.surface.extent())?;
+        simulate_at(&self.pressed_by(training), &positions, training.repeats, seed)
+    }
 }
 
 /// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its

@@ -3,8 +3,8 @@
 use super::numbers::stated;
 use super::{BenchDrawing, BenchDrawingError, BenchStep, BenchSupport, BenchSupportKind, bench_to_svg};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, BeamSupportKind, SupportedBeam, Surface};
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Beam, BeamSupportKind, SupportedBeam, Surface};
 
 /// Where the drawn load acts, as a share of the length: off the middle, so that the shape is seen to be askew.
 const DRAWN_LOAD: f64 = 0.35;

@@ -10,8 +10,8 @@ use super::{
     Axis, Chart, HeatPanel, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
     heat_map_to_svg,
 };
-use palpate_estimators::setup::Bench;
 use palpate_estimators::evaluation::{Comparison, Located, limit_ratio, percentage_error, percentile};
+use palpate_estimators::setup::Bench;
 
 /// What a comparison's report is made from.
 #[derive(Clone, Copy)]

@@ -6,13 +6,13 @@ use super::limit_line::along;
 use super::numbers::{counted, mm, stated};
 use super::page::Figure;
 use super::{Axis, Chart, Marker, Series, SeriesKind, Stroke, chart_to_svg};
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
 use palpate_estimators::estimator::{EstimatorConfig, Fitting, Locator};
-use palpate_mechanics::limit::{Force, Limit, LimitCurve};
-use palpate_mechanics::surface::{Digit, Surface};
-use palpate_mechanics::sensing::Layout;
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{CleanSensors, simulate_at};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::{Force, Limit, LimitCurve};
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::{Digit, Surface};
 
 /// Where the drawn contacts are, as shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];

@@ -2,9 +2,9 @@
 
 use super::{HeatMap, HeatPanel};
 use palpate_estimators::arrangement::cells;
+use palpate_estimators::evaluation::{Evaluation, Located, percentile};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_estimators::evaluation::{Evaluation, Located, percentile};
 use palpate_mechanics::limit::Force;
 
 /// Cells a side beyond which a map is no clearer.
@@ -95,7 +95,11 @@ impl ErrorGrid {
 
 /// Where the sensors are, in mm; raw channels are nowhere.
 pub(super) fn sensors_mm(bench: &Bench) -> Vec<(f64, f64)> {
-    let placed = bench.layout.sensors.iter().filter(|sensor| sensor.kind != palpate_mechanics::sensing::SensorKind::Raw);
+    let placed = bench
+        .layout
+        .sensors
+        .iter()
+        .filter(|sensor| sensor.kind != palpate_mechanics::sensing::SensorKind::Raw);
     placed.map(|sensor| (sensor.position.x_m * 1e3, sensor.position.y_m * 1e3)).collect()
 }
 

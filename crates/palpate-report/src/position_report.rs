@@ -9,9 +9,9 @@ use super::{
     Axis, Chart, HeatMap, HeatPanel, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke,
     chart_to_svg, heat_map_to_svg,
 };
+use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::in_words;
-use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
 
 /// What a report of training positions is made from.
 #[derive(Clone, Copy)]

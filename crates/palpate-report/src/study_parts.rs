@@ -6,8 +6,8 @@ use super::limit_line::limit_line_or_assumed;
 use super::numbers::{NOTHING, counted, mm, number, whole};
 use super::page::{Table, numeric, short, text, words};
 use super::{Axis, BandPoint, Chart, Mark, Series, SeriesKind, Stroke, StudyReport};
-use palpate_estimators::setup::Bench;
 use palpate_estimators::evaluation::{Located, Portion, Spread};
+use palpate_estimators::setup::Bench;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, TrainedSeed};
 
 /// How an arm is drawn and named.

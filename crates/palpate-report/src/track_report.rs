@@ -7,9 +7,9 @@ use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text};
 use super::{
     Axis, BandPoint, Chart, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
 };
-use palpate_mechanics::contact::{Contact, Position};
 use palpate_estimators::estimator::Track;
 use palpate_estimators::evaluation::{SpeedErrors, TrackErrors, tracked_of};
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 
 /// What a track's report is made from.

@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use palpate_estimators::arrangement::ArrangementError;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::modal::ModalBeamError;
-use palpate_mechanics::surface::{BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError};
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::modal::ModalBeamError;
+use palpate_mechanics::surface::{
+    BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError,
+};
 use palpate_mechanics::units::UnitError;
 
 /// A rig file, or a section of one in a study, that cannot be used.

@@ -13,14 +13,14 @@ pub use sections::{
 pub use validate::validate;
 pub use value::{RawQuantity, choice, count, positive};
 
-use palpate_estimators::arrangement::Training;
-use palpate_estimators::setup::Bench;
 use palpate_design::sensors::SensorDesign;
+use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::EstimatorConfig;
-use palpate_mechanics::surface::UniformLoad;
-use palpate_estimators::recording::{Recording, TimedRecording};
 use palpate_estimators::evaluation::Trial;
-use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate, simulate_moving};
+use palpate_estimators::recording::{Recording, TimedRecording};
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
+use palpate_mechanics::surface::UniformLoad;
 
 /// A bench, where to press it, and the method that then locates: all checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,15 +42,15 @@ pub struct Rig {
 impl Rig {
     /// The bench as it is when pressed to calibrate: with the force of the training presses.
     pub fn pressed_bench(&self) -> Bench {
-        self.training.as_ref().map_or_else(|| self.bench.clone(), |training| training.pressed(&self.bench))
+        self.training.as_ref().map_or_else(|| self.bench.clone(), |training| self.bench.pressed_by(training))
     }
 
-    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`simulate`].
+    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Bench::simulate`].
     ///
     /// # Errors
     /// [`RigSimulationError`] when the rig has no training positions, no model or no force.
     pub fn simulate(&self, seed: u64) -> Result<Recording, RigSimulationError> {
-        Ok(simulate(&self.bench, self.training()?, seed)?)
+        Ok(self.bench.simulate(self.training()?, seed)?)
     }
 
     /// Simulated calibrations at the training positions; see [`Trial::by_simulation`].

@@ -4,11 +4,12 @@ mod planes;
 mod plates;
 
 use super::*;
-use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
+use palpate_estimators::arrangement::Arrangement;
 use palpate_estimators::network::{InputScale, NetworkConfig, OutputCoding};
 use palpate_estimators::recording::{Column, PositionColumns};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
 use palpate_testing::data::recording;
 
 mod supports;

@@ -75,11 +75,7 @@ pub(super) fn bounded(
 }
 
 /// A quantity that must be greater than 0.
-pub fn positive(
-    key: &'static str,
-    raw: &Spanned<RawQuantity>,
-    wanted: Dimension,
-) -> Result<f64, RigError> {
+pub fn positive(key: &'static str, raw: &Spanned<RawQuantity>, wanted: Dimension) -> Result<f64, RigError> {
     bounded(key, raw, wanted, |value| value > 0.0, "greater than 0")
 }
 

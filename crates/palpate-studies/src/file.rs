@@ -7,15 +7,15 @@ use sha2::{Digest, Sha256};
 use toml::Spanned;
 
 use super::{Arm, AskedLayout, Judging, Study};
-use palpate_mechanics::contact::Position;
 use palpate_design::sensors::Method;
 use palpate_estimators::evaluation::Portion;
 use palpate_estimators::network::Precision;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::units::{Dimension, format_length_mm};
 use palpate_rig::{
     ContactSection, DesignSection, EstimatorSection, RawQuantity, RigError, RigProblem, RigSections,
     SensorsSections, SurfaceSection, TrainingSection, choice, count, positive, validate,
 };
-use palpate_mechanics::units::{Dimension, format_length_mm};
 
 /// A study file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

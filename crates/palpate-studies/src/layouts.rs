@@ -1,9 +1,9 @@
 //! The layouts that arms ask for by method.
 
 use super::{Arm, AskedLayout, Study, StudyRunError};
-use palpate_estimators::setup::Bench;
-use palpate_design::sensors::{DesignError, KeepGoing, Method, SensorProblem};
 use palpate_design::sensors::SensorDesign;
+use palpate_design::sensors::{DesignError, KeepGoing, Method, SensorProblem};
+use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::Layout;
 
 /// Seed of the searches, the same whatever the study's seeds are: a layout is part of what an arm is.

@@ -29,10 +29,10 @@ mod tests;
 
 use std::ops::Range;
 
-use palpate_mechanics::contact::Position;
 use palpate_design::sensors::Method;
 use palpate_estimators::evaluation::Portion;
 use palpate_estimators::network::Precision;
+use palpate_mechanics::contact::Position;
 use palpate_rig::Rig;
 
 /// A set of experiments: every arm is a rig, fitted once a seed.

@@ -11,8 +11,8 @@ use palpate_estimators::estimator::{EstimatorConfig, FitError, Fitting, Locator,
 use palpate_estimators::evaluation::Evaluation;
 use palpate_estimators::network::TrainingOutcome;
 use palpate_estimators::recording::Recording;
-use palpate_mechanics::sensing::ChannelModel;
 use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::sensing::ChannelModel;
 use palpate_rig::RigSimulationError;
 
 /// Why a study cannot be run.
@@ -131,8 +131,8 @@ impl PreparedArm {
         let perfect = bench.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
             EstimatorConfig::Network(_) if perfect => {
-                let judged =
-                    simulate_at(&touched_bench(&arm.rig), &judging.positions, 1, 0).map_err(|error| simulated(error.into()))?;
+                let judged = simulate_at(&touched_bench(&arm.rig), &judging.positions, 1, 0)
+                    .map_err(|error| simulated(error.into()))?;
                 let recording = arm.rig.simulate(0).map_err(simulated)?;
                 let fitting = Fitting::prepare(bench, &arm.rig.estimator, &recording).map_err(unfitted)?;
                 Ok(Self::InLanes { fitting: Box::new(fitting), judged })

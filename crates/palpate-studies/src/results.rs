@@ -5,10 +5,12 @@ use serde::Serialize;
 use super::limits::expected_errors_m;
 use super::seed_by_seed::touched_bench;
 use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
-use palpate_mechanics::contact::Position;
-use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error};
-use palpate_mechanics::limit::Force;
+use palpate_estimators::evaluation::{
+    ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error,
+};
 use palpate_estimators::network::{Precision, TrainingStatus};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
 
 /// What a study found.

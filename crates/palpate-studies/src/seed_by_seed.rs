@@ -2,12 +2,12 @@
 
 use super::run::TrainedSeed;
 use super::{Judging, StudyRunError};
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::Position;
 use palpate_estimators::estimator::{EstimatorConfig, Fitting};
 use palpate_estimators::evaluation::Evaluation;
-use palpate_rig::{Rig, RigSimulationError};
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{SimulateError, simulate_at};
+use palpate_mechanics::contact::Position;
+use palpate_rig::{Rig, RigSimulationError};
 
 /// Where an arm is pressed, first to fit and then to judge.
 #[derive(Clone, Debug)]

@@ -2,8 +2,8 @@
 
 use super::*;
 use palpate_design::sensors::DesignError;
-use palpate_mechanics::limit::Force;
 use palpate_estimators::network::InstructionSet;
+use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
 
 /// The paper's beam with noise and an influence locator; contacts of unknown force.

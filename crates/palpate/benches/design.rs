@@ -3,12 +3,12 @@
 //! same matrix of sines says `design_scipy.py` beside this file.
 
 use cpu_time::ThreadTime;
-use palpate_estimators::setup::Bench;
-use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
-use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_design::sensors::{SensorDesign, Sites};
-use palpate_rig::Rig;
+use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
+use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_rig::Rig;
 
 const SITES: usize = 100_000;
 const SENSORS: usize = 8;

@@ -5,10 +5,10 @@ use std::hint::black_box;
 
 use cpu_time::ProcessTime;
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Plate, Surface};
 use palpate_numerics::EliminationOrder;
-use palpate_mechanics::sensing::SensorKind;
 
 const SIDE_M: f64 = 0.3;
 const EVALUATIONS: usize = 4_000_000;

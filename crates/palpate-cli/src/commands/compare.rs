@@ -4,7 +4,9 @@ use crate::failure::{Complaint, Failure};
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
-use palpate_estimators::evaluation::{Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator};
+use palpate_estimators::evaluation::{
+    Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator,
+};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};

@@ -9,9 +9,9 @@ use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
 use palpate_estimators::recording::{Provenance, Recording};
+use palpate_estimators::simulate::simulate_at;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
-use palpate_estimators::simulate::simulate_at;
 use std::path::{Path, PathBuf};
 
 /// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
@@ -130,7 +130,8 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let mut watch = FitWatch::new(folds as u64 * rig.estimator.most_rounds());
-    let evaluation = cross_validate(&rig.bench, &rig.estimator, &recording, folds, seed, &mut || watch.keep_going());
+    let evaluation =
+        cross_validate(&rig.bench, &rig.estimator, &recording, folds, seed, &mut || watch.keep_going());
     drop(watch);
     let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })

@@ -8,8 +8,8 @@ use palpate_estimators::estimator::{EstimatorConfig, Fitting};
 use palpate_estimators::evaluation::choose;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
-use palpate_rig::Rig;
 use palpate_mechanics::units::{format_count, format_length_mm};
+use palpate_rig::Rig;
 use std::path::PathBuf;
 
 /// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
@@ -96,7 +96,8 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
         return Ok(rig);
     }
     const FOLDS: usize = 5;
-    let choice = choose(&rig.bench, &rig.estimator, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
+    let choice =
+        choose(&rig.bench, &rig.estimator, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
     let choice = choice.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     let errors: Vec<String> = choice
         .mean_errors_m

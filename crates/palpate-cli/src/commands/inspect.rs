@@ -3,18 +3,18 @@
 use crate::failure::Failure;
 use crate::recording_files::read_recording;
 use crate::{input, output};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::arrangement::Training;
 use palpate_estimators::centroid::Weighing;
-use palpate_mechanics::contact::Position;
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::influence::measured::{HiddenRole, MeasuredLocator};
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_estimators::network::Topology;
-use palpate_estimators::arrangement::Training;
-use palpate_rig::Rig;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -61,21 +61,30 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(beam.length_m),
             format_length_mm(beam.width_m),
             format_length_mm(beam.thickness_m),
-            Quantity { value: beam.youngs_modulus_pa, dimension: palpate_mechanics::units::Dimension::Modulus }
+            Quantity {
+                value: beam.youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            }
         ),
         SurfaceSpec::SupportedBeam(beam) => format!(
             "beam, {} long, {}; section {}; Young's modulus {}",
             format_length_mm(extent.length_m),
             beam.spec().supports_in_words(),
             beam.spec().sections_in_words(),
-            Quantity { value: beam.spec().youngs_modulus_pa, dimension: palpate_mechanics::units::Dimension::Modulus }
+            Quantity {
+                value: beam.spec().youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            }
         ),
         SurfaceSpec::Plate(plate) => format!(
             "plate, {} × {} × {}, Young's modulus {}, Poisson's ratio {}",
             format_length_mm(plate.spec().length_m),
             format_length_mm(plate.spec().width_m),
             format_length_mm(plate.spec().thickness_m),
-            Quantity { value: plate.spec().youngs_modulus_pa, dimension: palpate_mechanics::units::Dimension::Modulus },
+            Quantity {
+                value: plate.spec().youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            },
             plate.spec().poissons_ratio
         ),
         SurfaceSpec::Digit(digit) => format!(
@@ -83,7 +92,10 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(digit.length_m),
             format_length_mm(digit.width_m),
             format_length_mm(digit.thickness_m),
-            Quantity { value: digit.youngs_modulus_pa, dimension: palpate_mechanics::units::Dimension::Modulus },
+            Quantity {
+                value: digit.youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            },
             digit.direction.name(),
             digit.characteristic_force_n()
         ),

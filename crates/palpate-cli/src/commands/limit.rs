@@ -8,10 +8,10 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
     Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
 };
-use palpate_mechanics::surface::Extent;
-use palpate_report::{LimitReport, limit_report};
 use palpate_mechanics::sensing::NoiseError;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_report::{LimitReport, limit_report};
 use std::path::{Path, PathBuf};
 
 /// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, and what the bench cannot tell.

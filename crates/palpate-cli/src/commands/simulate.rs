@@ -4,9 +4,9 @@ use crate::failure::{Complaint, Failure};
 use crate::{input, output};
 use palpate_estimators::arrangement::{EveryError, every};
 use palpate_estimators::recording;
-use palpate_rig::Rig;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::units::format_count;
+use palpate_rig::Rig;
 use std::path::PathBuf;
 
 /// Make a recording from the model, with the sensors' noise and faults.
@@ -61,7 +61,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
-    let timed = rig.simulate_moving(arguments.seed)
+    let timed = rig
+        .simulate_moving(arguments.seed)
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
     let mut csv = Vec::new();
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());

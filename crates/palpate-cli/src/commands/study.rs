@@ -6,6 +6,7 @@ use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate_estimators::evaluation::Spread;
 use palpate_estimators::network::InstructionSet;
+use palpate_mechanics::units::format_count;
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::dead_areas::DeadAreas;
 use palpate_studies::elliott::Elliott;
@@ -14,7 +15,6 @@ use palpate_studies::{
     ArmOutcome, ArmResults, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults,
     StudyRunError, Trained,
 };
-use palpate_mechanics::units::format_count;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

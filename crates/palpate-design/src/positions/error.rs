@@ -1,7 +1,7 @@
 //! Why training positions cannot be designed.
 
-use palpate_estimators::arrangement::ArrangementError;
 use crate::calibration::CalibrationError;
+use palpate_estimators::arrangement::ArrangementError;
 use palpate_numerics::regression::RegressionError;
 
 /// A rig, a budget or a recording that no training positions can be designed for.

@@ -4,14 +4,14 @@ use ndarray::Array2;
 
 use super::PositionError;
 use palpate_estimators::arrangement::cells;
+use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::surface::Extent;
-use palpate_estimators::recording::Recording;
-use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
 use palpate_mechanics::sensing::Layout;
-use palpate_estimators::simulate::CleanSensors;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
 
 /// Positions at which a model is asked, along a line and along each side of a plane.
 const ASKED: usize = 60;

@@ -16,17 +16,17 @@ pub use super::calibration::{CalibrationError, Verification};
 pub use error::PositionError;
 pub use next::{Advice, NextPress, next_press};
 
+use crate::calibration::{Seeds, Trial};
+use crate::sensors::ContactPrior;
+use crate::sensors::{SensorDesign, WeightedContacts};
+use forward::Forward;
 use palpate_estimators::arrangement::{Arrangement, Training, cells, chebyshev, squarest, warped_cells};
+use palpate_estimators::estimator::EstimatorConfig;
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::calibration::{Seeds, Trial};
-use crate::sensors::{SensorDesign, WeightedContacts};
-use palpate_estimators::estimator::EstimatorConfig;
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::surface::Extent;
-use crate::sensors::ContactPrior;
 use palpate_mechanics::sensing::ChannelModel;
-use forward::Forward;
+use palpate_mechanics::surface::Extent;
 use search::{PatternSearch, evaluate};
 
 /// Readings that a calibration is judged by, about: while searching, and when verifying.
@@ -169,7 +169,8 @@ impl<'a> PositionProblem<'a> {
         let prior = design.map(|design| design.contacts.clone());
         let contacts = WeightedContacts::of(&prior.unwrap_or_else(|| ContactPrior::all_over(extent)), extent);
         let tolerance_m = design.map_or(Self::TOLERANCE_M, |design| design.tolerance_m);
-        let known = design.and_then(|design| design.force_is_known).unwrap_or(true) && bench.force_n.is_some();
+        let known =
+            design.and_then(|design| design.force_is_known).unwrap_or(true) && bench.force_n.is_some();
         let force = if known { Force::Known } else { Force::Unknown };
         Ok(Self { bench, training, estimator, budget, extent, force, contacts, tolerance_m })
     }
@@ -348,7 +349,7 @@ impl<'a> PositionProblem<'a> {
 }
 
 fn pressed(bench: &Bench, training: Option<&Training>) -> Bench {
-    training.map_or_else(|| bench.clone(), |training| training.pressed(bench))
+    training.map_or_else(|| bench.clone(), |training| bench.pressed_by(training))
 }
 
 /// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that

@@ -4,12 +4,12 @@ use super::PositionError;
 use super::forward::Forward;
 use super::knowledge::Knowledge;
 use super::variance::Expectation;
+use crate::sensors::ContactPrior;
+use crate::sensors::WeightedContacts;
+use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::sensors::WeightedContacts;
 use palpate_mechanics::limit::Force;
-use palpate_estimators::recording::Recording;
-use crate::sensors::ContactPrior;
 
 /// Presses that are looked ahead, at most.
 const MOST_AHEAD: usize = 200;

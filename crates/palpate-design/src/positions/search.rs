@@ -1,10 +1,10 @@
 //! Positions moved about while simulated calibrations get better.
 
 use super::PositionError;
-use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::{Extent, Surface};
-use palpate_mechanics::sensing::Layout;
 use palpate_estimators::simulate::CleanSensors;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::{Extent, Surface};
 
 /// A move must lower the score by more than this share of it.
 const LEAST_GAIN: f64 = 1e-3;

@@ -2,19 +2,18 @@ use super::knowledge::Knowledge;
 use super::search::reads_mirrored;
 use super::variance::Expectation;
 use super::*;
-use palpate_mechanics::sensing::SensorKind;
 use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::plate::PlateSpec;
 
-const RIG: &str = include_str!("../../../../examples/training-positions.toml");
-const PLATE: &str = include_str!("../../../../examples/plate.toml");
-const NOISY: &str = include_str!("../../../../examples/sensor-design.toml");
+use crate::fixtures::{Example, noisy, paper, plate};
 
 fn budget(count: usize) -> Budget {
     Budget { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, seed: 0 }
 }
 
-fn rig(text: &str) -> Rig {
-    Rig::from_toml(text).unwrap()
+fn problem(example: &Example, budget: Budget) -> Result<PositionProblem<'_>, PositionError> {
+    PositionProblem::new(&example.bench, example.training.as_ref(), &example.estimator, None, budget)
 }
 
 /// The score of a layout of positions by themselves: how far each is from where it should be.
@@ -63,7 +62,7 @@ fn a_search_keeps_to_its_trials() {
 
 #[test]
 fn a_bench_is_mirrored_or_not() {
-    let bench = rig(RIG).bench;
+    let bench = paper().bench;
     let surface = bench.surface.model().unwrap();
     assert!(reads_mirrored(surface, &bench.layout, 3.0));
     let mut moved = bench.layout.clone();
@@ -71,15 +70,13 @@ fn a_bench_is_mirrored_or_not() {
     assert!(!reads_mirrored(surface, &moved, 3.0));
 }
 
-fn forward(text: &str) -> (Forward, Rig) {
-    let rig = rig(text);
-    let forward = Forward::of_model(&rig.pressed_bench(), Force::Known, &mut || true).unwrap().unwrap();
-    (forward, rig)
+fn forward(bench: &Bench) -> Forward {
+    Forward::of_model(bench, Force::Known, &mut || true).unwrap().unwrap()
 }
 
 #[test]
 fn presses_at_one_place_add_up_and_tell_their_neighbours() {
-    let (forward, _) = forward(NOISY);
+    let forward = forward(&noisy().bench);
     let places: Vec<Position> = [0.1, 0.12, 0.3].map(Position::along).into();
     let before = Knowledge::before(&forward, &places);
     let (mut twice, mut once) = (before.clone(), before.clone());
@@ -99,8 +96,9 @@ fn presses_at_one_place_add_up_and_tell_their_neighbours() {
 
 #[test]
 fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
-    let (forward, rig) = forward(NOISY);
-    let limit = rig.bench.cramer_rao_bound().unwrap();
+    let bench = noisy().bench;
+    let forward = forward(&bench);
+    let limit = bench.cramer_rao_bound().unwrap();
     for x_m in [0.05, 0.13, 0.25, 0.33] {
         let contact = palpate_mechanics::contact::Contact { position: Position::along(x_m), force_n: 3.0 };
         let (ours, theirs) =
@@ -111,9 +109,9 @@ fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
 
 #[test]
 fn the_least_variance_is_less_than_the_even_positions() {
-    for (text, count) in [(NOISY, 8), (PLATE, 9)] {
-        let (forward, rig) = forward(text);
-        let extent = rig.bench.surface.extent();
+    for (bench, count) in [(noisy().bench, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).bench, 9)] {
+        let forward = forward(&bench);
+        let extent = bench.surface.extent();
         let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent);
         let found = variance::least(&forward, &contacts, extent, &budget(count), &mut || true).unwrap();
         let error_m = |positions: &[Position]| {
@@ -131,8 +129,8 @@ fn the_least_variance_is_less_than_the_even_positions() {
 
 #[test]
 fn the_papers_network_is_better_calibrated_near_the_ends() {
-    let rig = rig(RIG);
-    let problem = PositionProblem::new(&rig, budget(10)).unwrap();
+    let rig = paper();
+    let problem = problem(&rig, budget(10)).unwrap();
     let error = |placement: Placement| {
         let (_, positions) = problem.by_rule().unwrap().into_iter().find(|(of, _)| *of == placement).unwrap();
         let placed = problem.verified(placement, positions, 0.0, &|_, _| true).unwrap().unwrap();
@@ -143,16 +141,16 @@ fn the_papers_network_is_better_calibrated_near_the_ends() {
 
 #[test]
 fn an_interrupted_design_is_none() {
-    let rig = rig(NOISY);
-    let problem = PositionProblem::new(&rig, budget(4)).unwrap();
+    let rig = noisy();
+    let problem = problem(&rig, budget(4)).unwrap();
     assert_eq!(problem.all(&|stage, _| stage == Stage::Variance), Ok(None));
     assert_eq!(problem.all(&|_, _| false), Ok(None));
 }
 
 #[test]
 fn a_design_has_every_arrangement_once_and_is_the_same_again() {
-    let rig = rig(NOISY);
-    let problem = PositionProblem::new(&rig, budget(6)).unwrap();
+    let rig = noisy();
+    let problem = problem(&rig, budget(6)).unwrap();
     let placed = problem.all(&|_, _| true).unwrap().unwrap();
     let names: Vec<&str> = placed.iter().map(|placed| placed.placement.name()).collect();
     assert_eq!(names, ["even", "edge-dense", "chebyshev", "variance-optimal", "optimal"]);
@@ -162,22 +160,22 @@ fn a_design_has_every_arrangement_once_and_is_the_same_again() {
 
 #[test]
 fn what_cannot_be_designed_is_refused() {
-    let refusal = |text: &str, count: usize| {
-        PositionProblem::new(&rig(text), budget(count)).map(|_| ()).unwrap_err().to_string()
+    let refusal = |example: &Example, count: usize| {
+        problem(example, budget(count)).map(|_| ()).unwrap_err().to_string()
     };
     let network = "an estimator of kind `network` needs at least 2";
-    assert_eq!(refusal(RIG, 1), format!("1 training position(s); {network}"));
-    let auto = NOISY.replace("kind = \"influence\"", "kind = \"auto\"");
+    assert_eq!(refusal(&paper(), 1), format!("1 training position(s); {network}"));
+    let auto = Example { estimator: EstimatorConfig::Auto, ..noisy() };
     assert!(refusal(&auto, 5).contains("positions are designed for one estimator"));
-    let presses = "[training]\narrangement = \"even\"\ncount = 20\nrepeats = 5\n";
-    let unknown = NOISY.replace("force = \"3 N\"", "").replace(presses, "");
+    let mut unknown = Example { training: None, ..noisy() };
+    unknown.bench.force_n = None;
     assert!(refusal(&unknown, 5).contains("the force of the presses is not known"));
-    let measured = include_str!("../../../../examples/fsi-water.toml");
-    assert!(refusal(measured, 5).contains("has no model"));
+    let measured = Example { bench: Bench::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
+    assert!(refusal(&measured, 5).contains("has no model"));
 }
 
 fn begun(positions_m: &[f64], repeats: usize) -> (Bench, palpate_estimators::recording::Recording) {
-    let bench = rig(NOISY).bench;
+    let bench = noisy().bench;
     let positions: Vec<Position> = positions_m.iter().map(|x_m| Position::along(*x_m)).collect();
     let recording = simulate_at(&bench, &positions, repeats, 3).unwrap();
     (bench, recording)

@@ -7,9 +7,9 @@
 use super::Budget;
 use super::forward::Forward;
 use super::knowledge::Knowledge;
+use crate::sensors::WeightedContacts;
 use palpate_estimators::arrangement::cells;
 use palpate_mechanics::contact::Position;
-use crate::sensors::WeightedContacts;
 use palpate_mechanics::surface::Extent;
 
 /// Where could be pressed, along a line and along each side of a plane.

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use super::error::{DesignError, Exclusion};
 use super::pool::exclusion;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, Surface};
 use crate::sensors::{MustHave, SensorDesign, Sites, Symmetry};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
+use palpate_mechanics::surface::{Extent, Surface};
 
 /// Places closer than this share of the length are the same.
 const SAME: f64 = 1e-6;

@@ -1,8 +1,8 @@
 //! The contacts that a design is for.
 
+use crate::sensors::ContactPrior;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use crate::sensors::ContactPrior;
 
 /// Contact positions, and how often the surface is touched there.
 #[derive(Clone, Debug, PartialEq)]

@@ -46,15 +46,15 @@ pub use stage::{KeepGoing, Stage};
 
 use std::sync::Arc;
 
+use candidates::Candidates;
+use exchange::Found;
+use objective::{Block, Objective};
 use palpate_estimators::arrangement::{inner_grid, squarest};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitError};
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
-use candidates::Candidates;
-use exchange::Found;
-use objective::{Block, Objective};
+use palpate_mechanics::surface::Extent;
 use pool::Pool;
 use principal::{PrincipalComponents, Reconstruction};
 use rows::Touches;

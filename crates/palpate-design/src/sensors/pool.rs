@@ -2,9 +2,9 @@
 
 use super::candidates::{Candidates, PlacedSensor, mirrored};
 use super::error::{DesignError, Exclusion};
-use palpate_mechanics::surface::Extent;
 use crate::sensors::{SensorDesign, Sites, Symmetry};
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 
 /// One sensor, or two that mirror each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,8 +4,8 @@ use super::candidates::{PlacedSensor, mirrored, reads_something};
 use super::objective::{Block, ForceBelief, State};
 use super::pool::exclusion;
 use super::{KeepGoing, SensorProblem, Stage};
-use palpate_mechanics::contact::Position;
 use crate::sensors::Sites;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 
 /// Steps begin at the distance of sites and are halved as often; on a plane, where each is a solution, less often.

@@ -10,11 +10,11 @@ use super::error::DesignError;
 use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
 use super::{KeepGoing, Stage};
+use crate::sensors::{DesignCriterion, SensorDesign};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::surface::{Extent, ResponseGradient, Surface};
-use crate::sensors::{DesignCriterion, SensorDesign};
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
+use palpate_mechanics::surface::{Extent, ResponseGradient, Surface};
 
 /// More bytes than the rows of all candidates may take.
 const MOST_BYTES: f64 = 4e9;

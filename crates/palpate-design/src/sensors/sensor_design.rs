@@ -1,8 +1,8 @@
 //! What a sensor design may choose from, and what it must keep to.
 
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
+use palpate_mechanics::surface::Extent;
 
 /// Candidate sites a line has unless the rig says otherwise: every millimetre of the paper's beam.
 const SITES_ALONG: f64 = 400.0;

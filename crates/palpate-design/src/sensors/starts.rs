@@ -2,8 +2,8 @@
 
 use super::error::DesignError;
 use super::pool::Pool;
-use palpate_numerics::random_order;
 use crate::sensors::Symmetry;
+use palpate_numerics::random_order;
 
 /// A layout packed from the left, the cheapest kinds first.
 ///

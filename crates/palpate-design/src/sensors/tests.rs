@@ -1,17 +1,9 @@
 use super::*;
-use palpate_mechanics::contact::Position;
+use crate::fixtures::{plate, sensor_design};
 use crate::sensors::{ContactPrior, KeepOut, MustHave, SensorOffer, Sites, Symmetry};
-use palpate_rig::Rig;
+use palpate_mechanics::contact::Position;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-const RIG: &str = include_str!("../../../../examples/sensor-design.toml");
-const PLATE: &str = include_str!("../../../../examples/plate.toml");
-
-fn rig() -> (Bench, SensorDesign) {
-    let rig = Rig::from_toml(RIG).unwrap();
-    (rig.bench, rig.design.unwrap())
-}
 
 fn problem<'a>(bench: &'a Bench, design: &SensorDesign) -> SensorProblem<'a> {
     SensorProblem::new(bench, design, &mut |_, _| true).unwrap().unwrap()
@@ -45,7 +37,7 @@ fn places(designed: &Designed) -> Vec<f64> {
 /// The issue's own figures: eight deflection sensors, contacts from 20 to 380 mm every 5 mm, force unknown.
 #[test]
 fn the_papers_beam_gains_at_least_18_percent() {
-    let (bench, design) = rig();
+    let (bench, design) = sensor_design();
     let problem = problem(&bench, &design);
     let even = problem.even().unwrap().unwrap().assessment.mean_limit_m.unwrap();
     assert!((even - 2.64e-3).abs() < 5e-6, "{even}");
@@ -57,7 +49,7 @@ fn the_papers_beam_gains_at_least_18_percent() {
 /// What the assessment says is what `palpate::limit` says, and scores never exceed what the surface's size tells.
 #[test]
 fn scores_agree_with_the_limit() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     for known in [true, false] {
         design.force_is_known = Some(known);
         let problem = problem(&bench, &design);
@@ -112,7 +104,7 @@ fn random_problem(bench: &Bench, design: &SensorDesign, rng: &mut impl Rng) -> S
 #[test]
 fn greedy_and_exchange_find_the_optimum_of_small_problems() {
     const PROBLEMS: usize = 100;
-    let (bench, design) = rig();
+    let (bench, design) = sensor_design();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut found = 0;
     for _ in 0..PROBLEMS {
@@ -130,7 +122,7 @@ fn greedy_and_exchange_find_the_optimum_of_small_problems() {
 
 #[test]
 fn every_search_keeps_every_constraint() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.offers = four_kinds();
     design.spacing_m = 0.02;
     design.keep_out = vec![KeepOut { from: Position::along(0.09), to: Position::along(0.13) }];
@@ -161,7 +153,7 @@ fn every_search_keeps_every_constraint() {
 
 #[test]
 fn what_cannot_be_met_is_named() {
-    let (bench, base) = rig();
+    let (bench, base) = sensor_design();
     let spaced = SensorDesign { spacing_m: 0.06, ..base.clone() };
     let poor = SensorDesign { budget: Some(7.5), ..base.clone() };
     let few = SensorDesign { sites: Sites::Count(5), ..base.clone() };
@@ -212,7 +204,7 @@ fn what_cannot_be_met_is_named() {
 
 #[test]
 fn budgets_buy_what_helps_most() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.offers = four_kinds();
     design.count = 4;
     let score = |budget: Option<f64>| {
@@ -228,7 +220,7 @@ fn budgets_buy_what_helps_most() {
 /// With an unknown force, two reaction sensors tell the position at the supports that deflections do not.
 #[test]
 fn mixed_kinds_go_beyond_deflections() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     let deflections = exchanged(&problem(&bench, &design)).assessment.score;
     design.offers = four_kinds();
     let designed = exchanged(&problem(&bench, &design));
@@ -237,7 +229,7 @@ fn mixed_kinds_go_beyond_deflections() {
 
 #[test]
 fn many_sites_are_searched_as_few_are() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.sites = Sites::Count(1599);
     let few = exchanged(&problem(&bench, &design)).assessment.score;
     design.sites = Sites::Count(6399);
@@ -248,7 +240,7 @@ fn many_sites_are_searched_as_few_are() {
 /// What the samples left out is found all the same: exchanged one by one, no unit of all gains a millionth of the score.
 #[test]
 fn no_exchange_for_one_of_very_many_matters() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.offers = four_kinds();
     design.contacts.every_m = 0.02;
     design.spacing_m = 0.002;
@@ -278,7 +270,7 @@ fn no_exchange_for_one_of_very_many_matters() {
 
 #[test]
 fn more_sensors_never_tell_less() {
-    let (bench, design) = rig();
+    let (bench, design) = sensor_design();
     let points = problem(&bench, &design).counts(2..=6, 0, &mut |_, _| true).unwrap().unwrap();
     assert!(points.windows(2).all(|pair| pair[1].designed.score < pair[0].designed.score));
     assert_eq!(points.iter().map(|point| point.count).collect::<Vec<_>>(), [2, 3, 4, 5, 6]);
@@ -289,7 +281,7 @@ fn more_sensors_never_tell_less() {
 
 #[test]
 fn plates_are_designed_too() {
-    let bench = Rig::from_toml(&PLATE.replace("# elements = 128", "elements = 24")).unwrap().bench;
+    let bench = plate(24).bench;
     let mut design = SensorDesign::of(&bench.layout, bench.surface.extent()).unwrap();
     design.sites = Sites::Every(0.03);
     let corner = |at_m| Position { x_m: at_m, y_m: at_m };
@@ -309,7 +301,7 @@ fn plates_are_designed_too() {
 
 #[test]
 fn a_layout_does_what_its_score_promises() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.contacts.every_m = 0.02;
     let problem = problem(&bench, &design);
     let estimator = palpate_estimators::estimator::EstimatorConfig::Influence(Default::default());
@@ -327,7 +319,7 @@ fn a_layout_does_what_its_score_promises() {
 
 #[test]
 fn a_search_can_be_stopped() {
-    let (bench, design) = rig();
+    let (bench, design) = sensor_design();
     assert!(SensorProblem::new(&bench, &design, &mut |_, _| false).unwrap().is_none());
     assert_eq!(problem(&bench, &design).all(0, &mut |stage, _| stage != Stage::Genetic).unwrap(), None);
 }
@@ -335,7 +327,7 @@ fn a_search_can_be_stopped() {
 /// One method alone has the layout that it has among all.
 #[test]
 fn a_method_that_is_asked_for_gives_its_own_layout() {
-    let (bench, mut design) = rig();
+    let (bench, mut design) = sensor_design();
     design.sites = Sites::Every(0.02);
     let problem = problem(&bench, &design);
     let all = problem.all(0, &mut |_, _| true).unwrap().unwrap();

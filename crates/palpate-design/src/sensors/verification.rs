@@ -2,11 +2,11 @@
 
 use super::SensorProblem;
 use super::{KeepGoing, Stage};
+use crate::calibration::{CalibrationError, Seeds, Trial, Verification};
 use palpate_estimators::arrangement::cells;
+use palpate_estimators::estimator::EstimatorConfig;
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::calibration::{CalibrationError, Seeds, Trial, Verification};
-use palpate_estimators::estimator::EstimatorConfig;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
 

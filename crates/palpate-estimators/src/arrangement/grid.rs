@@ -57,12 +57,7 @@ pub fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
 }
 
 /// The same middles with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
-pub fn warped_cells(
-    extent: Extent,
-    columns: usize,
-    rows: usize,
-    warp: impl Fn(f64) -> f64,
-) -> Vec<Position> {
+pub fn warped_cells(extent: Extent, columns: usize, rows: usize, warp: impl Fn(f64) -> f64) -> Vec<Position> {
     let middle = |i: usize, size_m: f64, count: usize| size_m * warp((i as f64 + 0.5) / count as f64);
     let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
     rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))

@@ -1,7 +1,6 @@
 //! Where to press, how often and how hard.
 
 use super::{Arrangement, ArrangementError};
-use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 
@@ -19,6 +18,40 @@ pub struct Training {
 }
 
 impl Training {
+    /// `count` positions by a rule, each pressed once with the contact's force.
+    ///
+    /// ```
+    /// use palpate_estimators::arrangement::{Arrangement, Training};
+    /// use palpate_mechanics::units::newtons;
+    ///
+    /// let training = Training::new(Arrangement::Even, 10).repeated(5).with_force(newtons(3.0));
+    /// ```
+    pub const fn new(arrangement: Arrangement, count: usize) -> Self {
+        Self { arrangement, count, repeats: 1, force_n: None }
+    }
+
+    /// `count` equally spaced positions along the length.
+    pub const fn even(count: usize) -> Self {
+        Self::new(Arrangement::Even, count)
+    }
+
+    /// The middles of columns × rows equal cells of a plane.
+    pub const fn grid(columns: usize, rows: usize) -> Self {
+        Self::new(Arrangement::Grid { columns, rows }, columns * rows)
+    }
+
+    /// The same, each position pressed `repeats` times; at least 1.
+    #[must_use]
+    pub fn repeated(self, repeats: usize) -> Self {
+        Self { repeats: repeats.max(1), ..self }
+    }
+
+    /// The same, pressed with this force in newtons, whatever the force of contacts in use.
+    #[must_use]
+    pub fn with_force(self, force_n: f64) -> Self {
+        Self { force_n: Some(force_n), ..self }
+    }
+
     /// The positions on a surface of this `extent`, each once.
     ///
     /// # Errors
@@ -26,10 +59,4 @@ impl Training {
     pub fn positions(&self, extent: Extent) -> Result<Vec<Position>, ArrangementError> {
         self.arrangement.positions(self.count, extent)
     }
-
-    /// The bench as it is when pressed to calibrate: with the force of these presses.
-    pub fn pressed(&self, bench: &Bench) -> Bench {
-        Bench { force_n: self.force_n.or(bench.force_n), ..bench.clone() }
-    }
 }
-

@@ -3,11 +3,11 @@
 use ndarray::{Array1, Array2};
 
 use super::{CentroidLocator, Weighing};
-use crate::setup::Bench;
 use crate::method::{Fit, FitTask, HeldOutSpread};
-use palpate_numerics::{Cholesky, NotPositiveDefinite};
 use crate::recording::{Recording, Row, TooFewPositions};
+use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
 /// The calibrated centroid. Channel i weighs w_i = |r_i| / Σ|r_j|, its reading taken in units of the largest that its
 /// kind has in the training recording.

@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::method::{HeldOutSpread, Locate, LocatorFault};
 use crate::setup::Bench;
+use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use crate::method::{HeldOutSpread, Locate, LocatorFault};
-use palpate_core::{ContactEstimate, Estimate, Status};
 
 /// A centroid that locates; see [`CentroidConfig`](super::CentroidConfig).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

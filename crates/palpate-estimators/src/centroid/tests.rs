@@ -1,13 +1,13 @@
 //! The centroid on readings for which it is exact, and on those for which it is not.
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
 
 fn recording(bench: &Bench, rows: Vec<Row>) -> Recording {
     let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };

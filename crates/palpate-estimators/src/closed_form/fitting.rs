@@ -1,10 +1,10 @@
 //! What the closed form asks of a bench.
 
 use super::ClosedFormLocator;
-use crate::setup::Bench;
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::method::{Fit, FitTask};
+use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::SurfaceSpec;
 
 /// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
 ///

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use super::balance::Balance;
 use super::posterior::{Posterior, RARE};
 use super::segment::Segment;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, Surface};
 use crate::method::{Locate, LocatorFault};
-use palpate_numerics::chi_squared_bound;
-use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Beam, Surface};
+use palpate_numerics::chi_squared_bound;
 
 /// A closed form that locates; see [`ClosedFormConfig`](super::ClosedFormConfig).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

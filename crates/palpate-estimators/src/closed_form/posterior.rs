@@ -2,9 +2,9 @@
 
 use super::locator::Noise;
 use super::segment::Segment;
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::chi_squared_bound;
-use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 /// Modes whose probabilities sum to less than this are not spoken of.
 const NEGLIGIBLE: f64 = 0.05;

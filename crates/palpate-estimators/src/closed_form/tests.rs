@@ -1,13 +1,13 @@
 //! Clean readings over the whole beam, noise against its propagation, and what the closed form must not claim.
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, Extent, Surface, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, Sensor, SensorKind, measure};
+use crate::setup::Bench;
 use palpate_core::Status;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, Sensor, SensorKind, measure};
+use palpate_mechanics::surface::{Beam, Extent, Surface, SurfaceSpec};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 

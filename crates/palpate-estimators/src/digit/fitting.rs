@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::DigitLocator;
-use crate::setup::Bench;
-use palpate_mechanics::surface::{Digit, SurfaceSpec};
 use crate::method::{Fit, FitTask};
+use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Digit, SurfaceSpec};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.

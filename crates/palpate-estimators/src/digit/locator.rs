@@ -7,13 +7,13 @@ use super::gauges::gauges;
 use super::likelihood::Likelihood;
 use super::posterior::{Piece, Posterior};
 use super::shape::DigitShape;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Digit, Surface};
 use crate::method::{Locate, LocatorFault};
-use palpate_numerics::chi_squared_bound;
-use palpate_mechanics::sensing::{Layout, SensorKind};
+use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Digit, Surface};
+use palpate_numerics::chi_squared_bound;
 
 /// A reading that noise gives as rarely as this has another cause.
 const RARE: f64 = 1e-3;

@@ -1,8 +1,8 @@
 //! The shape of a finger at an estimated contact, and how sure it is.
 
+use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::{Digit, Elastica};
-use palpate_core::ContactEstimate;
 
 /// The centre line of a finger, from clamp to tip.
 #[derive(Clone, Debug, PartialEq)]

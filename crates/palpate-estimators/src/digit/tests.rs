@@ -1,23 +1,16 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
 use crate::estimator::{ContactEstimate, EstimatorConfig, Fitting, Locator, Method, Status};
-use palpate_mechanics::limit::{Force, Limit};
-use palpate_mechanics::surface::{Digit, SurfaceSpec};
-use palpate_rig::Rig;
+use crate::fixtures;
+use crate::setup::Bench;
 use crate::simulate::{clean_reading, simulate_at};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::surface::{Digit, ForceDirection, SurfaceSpec};
 
-const EXAMPLE: &str = include_str!("../../../../examples/digit.toml");
-
-fn rig(changes: &[(&str, &str)]) -> Rig {
-    let mut text = EXAMPLE.to_owned();
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from}");
-        text = text.replace(from, to);
-    }
-    Rig::from_toml(&text).unwrap()
+fn example() -> Bench {
+    fixtures::digit(ForceDirection::Normal, 4.0).bench
 }
 
 fn digit(bench: &Bench) -> Digit {
@@ -98,19 +91,19 @@ fn tally(bench: &Bench, force_n: f64, from_m: f64, count: usize, seed: u64) -> T
 /// Printed with --nocapture.
 #[test]
 fn beyond_the_second_gauge_position_force_and_shape_are_at_their_limits() {
-    for direction in ["normal", "vertical"] {
-        let bench = rig(&[("direction = \"normal\"", &format!("direction = \"{direction}\""))]).bench;
+    for direction in [ForceDirection::Normal, ForceDirection::Vertical] {
+        let bench = fixtures::digit(direction, 4.0).bench;
         let mut covered = [0.0; 2];
         for (i, force_n) in [1.0, 3.0, 5.0, 8.0, 13.0].into_iter().enumerate() {
             let tally = tally(&bench, force_n, 0.020, 400, i as u64);
             let turn = digit(&bench).shape(Contact { position: Position::along(0.12), force_n }).angle(0.12);
-            println!("{direction} {force_n} N, tip turned by {:.0}°: {tally:.3?}", turn.to_degrees());
+            println!("{direction:?} {force_n} N, tip turned by {:.0}°: {tally:.3?}", turn.to_degrees());
             assert!(tally.ratios.iter().all(|ratio| *ratio < 1.2), "{tally:?}");
             assert!(tally.located > 97.0 && tally.counts[1] > 390.0, "{tally:?}");
             assert!(tally.shape_percent < 0.5, "{tally:?}");
             covered = [covered[0] + tally.covered[0] / 5.0, covered[1] + tally.covered[1] / 5.0];
         }
-        println!("{direction}: 95 % intervals hold {covered:.1?} %");
+        println!("{direction:?}: 95 % intervals hold {covered:.1?} %");
         assert!(covered.iter().all(|percent| (93.0..=97.0).contains(percent)), "{covered:?}");
     }
 }
@@ -121,8 +114,8 @@ proptest! {
     fn clean_readings_are_located_to_many_digits(x in 0.021..0.12f64, load in 0.05..7.0f64, vertical: bool) {
         // Within the noise of a gauge both of its sides explain a reading.
         prop_assume!([0.04, 0.06, 0.08].iter().all(|gauge_m| (x - gauge_m).abs() > 5e-4));
-        let direction = if vertical { "direction = \"vertical\"" } else { "direction = \"normal\"" };
-        let bench = rig(&[("direction = \"normal\"", direction)]).bench;
+        let direction = if vertical { ForceDirection::Vertical } else { ForceDirection::Normal };
+        let bench = fixtures::digit(direction, 4.0).bench;
         let force_n = load * digit(&bench).bending_stiffness() / (x * x);
         let estimate = locator(&bench, DigitTheory::Exact).locate(&clean(&bench, x, force_n)).unwrap();
         prop_assert_eq!(estimate.status, Status::Located);
@@ -133,7 +126,7 @@ proptest! {
 
 #[test]
 fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
-    let bench = rig(&[]).bench;
+    let bench = example();
     let reading = clean(&bench, 0.014, 2.0);
     let estimate = locator(&bench, DigitTheory::Exact).locate(&reading).unwrap();
     assert_eq!(estimate.status, Status::Ambiguous);
@@ -150,7 +143,7 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
 
 #[test]
 fn readings_that_no_push_explains_say_so() {
-    let bench = rig(&[]).bench;
+    let bench = example();
     let locator = locator(&bench, DigitTheory::Exact);
     let status = |reading: &[f64]| locator.locate(reading).unwrap().status;
     assert_eq!(status(&[1e-6, -1e-6, 0.5e-6, 0.0, -0.5e-6]), Status::NoContact);
@@ -166,7 +159,8 @@ fn readings_that_no_push_explains_say_so() {
 
 #[test]
 fn dead_and_saturated_gauges_are_left_out() {
-    let bench = rig(&[("noise =", "range = [\"-1500 ue\", \"1500 ue\"]\nnoise =")]).bench;
+    let mut bench = example();
+    bench.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
     let mut locator = locator(&bench, DigitTheory::Exact);
     let mut reading = clean(&bench, 0.09, 2.0);
     assert!(reading[0] < -1500e-6 && reading[2] > -1500e-6);
@@ -190,7 +184,7 @@ fn dead_and_saturated_gauges_are_left_out() {
 
 #[test]
 fn the_linear_theory_is_right_for_small_forces_and_far_off_for_large_ones() {
-    let bench = rig(&[("direction = \"normal\"", "direction = \"vertical\"")]).bench;
+    let bench = fixtures::digit(ForceDirection::Vertical, 4.0).bench;
     let linear = locator(&bench, DigitTheory::Linear);
     let off_mm = |force_n: f64| {
         let contact = linear.locate(&clean(&bench, 0.09, force_n)).unwrap().contact;
@@ -205,7 +199,7 @@ fn the_linear_theory_is_right_for_small_forces_and_far_off_for_large_ones() {
 
 #[test]
 fn the_shape_has_an_honest_band() {
-    let bench = rig(&[]).bench;
+    let bench = example();
     let locator = locator(&bench, DigitTheory::Exact);
     let truth = Contact { position: Position::along(0.07), force_n: 4.0 };
     let pressed = Bench { force_n: Some(truth.force_n), ..bench.clone() };
@@ -225,7 +219,7 @@ fn the_shape_has_an_honest_band() {
 
 #[test]
 fn a_locator_survives_its_file_and_bad_numbers_do_not() {
-    let locator = locator(&rig(&[]).bench, DigitTheory::Exact);
+    let locator = locator(&example(), DigitTheory::Exact);
     let text = locator.to_json().unwrap();
     assert_eq!(Locator::from_json(&text).unwrap(), locator);
     let refused = |change: fn(&mut DigitLocator)| {
@@ -249,8 +243,8 @@ fn a_locator_survives_its_file_and_bad_numbers_do_not() {
 
 #[test]
 fn benches_that_do_not_suit_are_refused_in_words() {
-    let paper = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap().bench;
-    let good = rig(&[]).bench;
+    let paper = fixtures::paper(5e-6, 1).bench;
+    let good = example();
     let refused = |bench: &Bench| {
         let pressed = Bench { force_n: Some(1.0), ..bench.clone() };
         let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
@@ -276,8 +270,8 @@ fn benches_that_do_not_suit_are_refused_in_words() {
 /// In the linear range every estimator works: the influence functions of the digit's mechanics reach the limit too.
 #[test]
 fn for_small_forces_influence_functions_are_at_the_limit() {
-    let rig = rig(&[("force = \"4 N\"", "force = \"0.3 N\"")]);
-    let recording = crate::simulate::simulate(&rig, 1).unwrap();
+    let rig = fixtures::digit(ForceDirection::Normal, 0.3);
+    let recording = rig.simulate(1);
     let config = EstimatorConfig::Influence(crate::influence::InfluenceConfig {
         from: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()

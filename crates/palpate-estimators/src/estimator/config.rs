@@ -1,14 +1,14 @@
 //! What a rig's `[estimator]` section says.
 
-use crate::setup::Bench;
 use crate::centroid::CentroidConfig;
 use crate::closed_form::ClosedFormConfig;
 use crate::digit::{DigitConfig, DigitTheory};
 use crate::gaussian_process::GaussianProcessConfig;
 use crate::influence::InfluenceConfig;
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::neighbours::NeighboursConfig;
 use crate::network::{LevenbergMarquardtConfig, NetworkConfig};
+use crate::setup::Bench;
+use palpate_mechanics::surface::SurfaceSpec;
 
 /// A configured method; fitting it to a recording gives a locator.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,6 @@
 //! From a bench, an estimator and a recording to locators.
 
 use super::{EstimatorConfig, Locator, LocatorProvenance, Method};
-use crate::setup::Bench;
 use crate::centroid::CentroidFitError;
 use crate::closed_form::ClosedFormFitError;
 use crate::digit::DigitFitError;
@@ -14,6 +13,7 @@ use crate::network::{
     TrainedNetwork, TrainingOutcome, train_many, train_one,
 };
 use crate::recording::Recording;
+use crate::setup::Bench;
 
 /// Why an estimator cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

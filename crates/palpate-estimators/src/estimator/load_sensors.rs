@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{Locator, Method};
-use crate::setup::Bench;
-use crate::load_profile::{LoadChannel, LoadSensors, LoadSensorsError};
 use crate::influence::InfluenceLocator;
+use crate::load_profile::{LoadChannel, LoadSensors, LoadSensorsError};
+use crate::setup::Bench;
 
 /// The sensors of a bench, by mechanics.
 ///

@@ -1,6 +1,5 @@
 //! What fitting gives: all that a reading needs to become an estimate.
 
-use crate::setup::Bench;
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
 use crate::digit::{DigitLocator, DigitShape};
@@ -10,6 +9,7 @@ use crate::method::{Locate, LocatorFault, ReadingError};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
 use crate::recording::Provenance;
+use crate::setup::Bench;
 use palpate_core::Estimate;
 
 /// A fitted estimator. It carries its surface, layout, scaling and provenance, so that nothing it needs is outside it.

@@ -2,9 +2,9 @@
 
 use super::{Locator, Method};
 use crate::influence::{BeamLikelihood, InfluenceLocator, PlateLikelihood};
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::method::Likelihood;
 use crate::tracking::TrackerConfig;
+use palpate_mechanics::surface::SurfaceSpec;
 
 /// What a tracker needs of a locator.
 pub struct Tracking {

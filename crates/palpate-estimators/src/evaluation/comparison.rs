@@ -2,12 +2,12 @@
 
 use super::{CrossValidationError, Evaluation};
 use crate::arrangement::{Training, all_over};
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
 use crate::estimator::{EstimatorConfig, FitError, Fitting};
-use palpate_mechanics::limit::Force;
 use crate::recording::{Recording, TooFewPositions};
+use crate::setup::Bench;
 use crate::simulate::{SimulateError, simulate_at};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
 
 /// A recording to fit, and one to judge by, whose contacts the fit has not seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +58,7 @@ impl Trial {
     ) -> Result<Vec<Self>, SimulateError> {
         let extent = bench.surface.extent();
         let positions = all_over(extent);
-        let bench = training.pressed(bench);
+        let bench = bench.pressed_by(training);
         let at = training.positions(extent)?;
         let trial = |k: u64| {
             // A calibration and its judgement share the bench's gains and offsets, which a seed's first draws decide.

@@ -1,9 +1,9 @@
 //! Errors at positions that the estimator was not fitted to.
 
 use super::{Evaluation, ReadingError, choose};
-use crate::setup::Bench;
 use crate::estimator::{EstimatorConfig, FitError, Fitting};
 use crate::recording::{Recording, TooFewPositions};
+use crate::setup::Bench;
 
 /// Why a recording cannot be cross-validated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -13,10 +13,10 @@ pub use tracking::{
     tracked_of,
 };
 
-use palpate_mechanics::contact::Position;
 use crate::estimator::{ContactEstimate, Locator, ReadingError};
-use palpate_mechanics::surface::Extent;
 use crate::recording::Recording;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 
 /// One reading whose contact was known, and where the locator saw it.
 #[derive(Clone, Copy, Debug, PartialEq)]

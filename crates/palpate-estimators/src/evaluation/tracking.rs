@@ -1,15 +1,15 @@
 //! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
 
 use super::covered;
-use palpate_mechanics::contact::{Contact, Position};
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
     TrackerConfig,
 };
-use palpate_mechanics::surface::Extent;
 use crate::recording::TimedRecording;
 use crate::setup::Bench;
 use crate::simulate::{MovingContacts, SimulateError, simulate_moving};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
 
 /// Mean errors over the contacts while they touched, in metres, and how often the 95 % intervals held them. Where there are
 /// several, those that were found are paired with the true ones so that the distances are least.

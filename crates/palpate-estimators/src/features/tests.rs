@@ -1,6 +1,6 @@
 use super::{FeatureKind, FeatureSource, Features, NoFeatures};
-use palpate_mechanics::contact::Position;
 use crate::recording::{Provenance, Recording, Row};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 
 /// Readings of forces between 1 and 3 at ten places: two lever reactions, a dead channel and a deflection.

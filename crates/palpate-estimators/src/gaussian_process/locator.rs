@@ -2,11 +2,11 @@
 
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
+use crate::features::Features;
+use crate::method::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::features::Features;
 use palpate_mechanics::surface::Extent;
-use crate::method::{Locate, LocatorFault};
 use palpate_numerics::NORMAL_95;
 use palpate_numerics::regression::GaussianProcess;
 

@@ -6,12 +6,12 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_testing::data::recording;
 
 const EXTENT: Extent = Extent { length_m: 0.4, width_m: None };

@@ -6,9 +6,9 @@ use super::lanes::{self, Array, Eight};
 use super::scratch::Scratch;
 use super::search::{Minimum, Search, worst_misfit};
 use super::several::{criterion, explain};
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{NORMAL_95, normal_distribution};
-use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 /// Another place with at least this share of the probability is said.
 const MODE_THAT_MATTERS: f64 = 0.01;

@@ -7,9 +7,9 @@ use super::learning::{Learnt, learn};
 use super::locator::{BeamLocator, BeamParts};
 use super::measured::MeasuredError;
 use super::table::InfluenceTable;
+use crate::method::FitTask;
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::method::FitTask;
 use palpate_numerics::NotPositiveDefinite;
 
 /// Why influence functions cannot be fitted to a recording.

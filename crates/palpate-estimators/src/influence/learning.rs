@@ -7,10 +7,10 @@ use super::hyperparameters::{MOST_PRESSES, most_evident};
 use super::posterior::{Posterior, SensorPresses};
 use super::presses::Presses;
 use super::prior::{Mean, Prior, Remainders, Spread};
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Surface;
 use crate::method::FitTask;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::Surface;
 
 /// One sensor's influence function as the presses tell it, at the places that were asked for.
 pub(super) struct Learnt<'s, 'a> {

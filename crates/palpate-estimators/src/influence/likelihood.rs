@@ -12,12 +12,12 @@ use std::f64::consts::PI;
 use super::belief::ForceBelief;
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
-use palpate_mechanics::contact::Contact;
-use palpate_mechanics::surface::Extent;
 use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood, Locate};
-use palpate_numerics::Cholesky;
 use ndarray::Array2;
 use palpate_core::Estimate;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::Cholesky;
 
 /// The likelihood of a [`BeamLocator`], ready to be asked often.
 #[derive(Clone, Debug, PartialEq)]

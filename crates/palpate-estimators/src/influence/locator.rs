@@ -9,8 +9,8 @@ use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
 use super::table_function::FittedInfluence;
-use crate::setup::Bench;
 use crate::method::{Locate, LocatorFault};
+use crate::setup::Bench;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 

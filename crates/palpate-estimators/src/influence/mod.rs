@@ -37,8 +37,8 @@ pub use scratch::Scratch;
 pub use table::InfluenceTable;
 pub use table_function::FittedInfluence;
 
-use crate::setup::Bench;
 use crate::method::{Fit, FitTask, Locate, LocatorFault};
+use crate::setup::Bench;
 use measured::{MeasuredConfig, MeasuredLocator};
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};

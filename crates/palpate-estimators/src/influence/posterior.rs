@@ -2,8 +2,8 @@
 
 use super::presses::Presses;
 use super::prior::{Parts, Prior, Spread};
-use palpate_numerics::{Cholesky, NotPositiveDefinite};
 use ndarray::{Array1, Array2, ArrayView1};
+use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
 /// Sharpens no posterior beyond what f64 can hold: variance of a reading, relative to the full-scale reading squared.
 const FLOOR: f64 = 1e-18;

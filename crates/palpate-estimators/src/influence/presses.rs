@@ -1,8 +1,8 @@
 //! A recording as an influence fit sees it: presses at the same place with the same force, averaged.
 
 use super::InfluenceFitError;
-use palpate_mechanics::contact::Position;
 use crate::recording::Recording;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
 
 /// Presses at one position with one force.

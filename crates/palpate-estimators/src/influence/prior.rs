@@ -4,10 +4,10 @@
 //! covariance is that of a wrong gain, of a sensor that sits beside its place, and of a remainder (see [`Remainders`]).
 
 use crate::arrangement::cells;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface};
-use palpate_mechanics::sensing::{Sensor, SensorKind};
 use ndarray::{Array1, Array2};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Sensor, SensorKind};
+use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface};
 use std::sync::Arc;
 
 /// Standard deviations of what an influence function may deviate by, shared by sensors of one kind.

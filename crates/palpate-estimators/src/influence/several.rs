@@ -8,10 +8,10 @@
 use super::coarse::{COARSE, STRIDE};
 use super::scratch::Scratch;
 use super::search::Search;
-use palpate_mechanics::contact::Position;
-use palpate_numerics::{Cholesky, NORMAL_95};
 use ndarray::{Array1, Array2};
 use palpate_core::{ContactEstimate, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_numerics::{Cholesky, NORMAL_95};
 
 /// The most contacts that are told apart.
 pub(super) const MOST_CONTACTS: usize = 3;

@@ -2,28 +2,21 @@ mod batch;
 mod reference;
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::Surface;
+use crate::fixtures::{faulty_paper, paper};
 use crate::method::Locate;
-use palpate_numerics::Cholesky;
 use crate::recording::Recording;
-use palpate_rig::Rig;
-use palpate_mechanics::sensing::{ChannelErrors, measure};
-use crate::simulate::{clean_reading, displaced, simulate};
+use crate::setup::Bench;
+use crate::simulate::{clean_reading, displaced};
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Status};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use palpate_mechanics::surface::Surface;
+use palpate_numerics::Cholesky;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const SOURCES: [InfluenceSource; 2] = [InfluenceSource::Recording, InfluenceSource::Corrected];
-
-/// The paper's bench with another noise and number of repeats.
-fn rig(noise: &str, repeats: usize) -> Rig {
-    let text = include_str!("../../../../examples/paper.toml");
-    let text = text.replace("noise = \"5 um\"", &format!("noise = \"{noise}\""));
-    Rig::from_toml(&text.replace("repeats = 1", &format!("repeats = {repeats}"))).unwrap()
-}
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
     config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
@@ -64,8 +57,8 @@ fn limit_m(bench: &Bench, x_m: f64, force_known: bool) -> f64 {
 #[test]
 fn clean_presses_locate_to_a_thousandth_of_a_percent() {
     for from in SOURCES {
-        let rig = rig("0 um", 1);
-        let recording = simulate(&rig, 1).unwrap();
+        let rig = paper(0.0, 1);
+        let recording = rig.simulate(1);
         let locator = fit(InfluenceConfig { from, ..InfluenceConfig::default() }, &rig.bench, &recording);
         let errors: Vec<f64> = (1..400)
             .map(|mm| {
@@ -84,8 +77,8 @@ fn clean_presses_locate_to_a_thousandth_of_a_percent() {
 /// What is wrong with the sensors, unknown to the locator but for the dead one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Faults {
-    /// Keys of a rig's sensors.
-    keys: &'static str,
+    /// Those of every channel.
+    channel: Option<ChannelModel>,
     dead: Option<usize>,
 }
 
@@ -93,17 +86,15 @@ struct Faults {
 fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) -> (f64, f64) {
     let (mut error_m, mut limit, mut covered, mut count) = (0.0, 0.0, 0, 0);
     for seed in 0..40 {
-        let mut rig = rig("5 um", 10);
+        let mut rig = paper(5e-6, 10);
         let known = rig.bench.clone();
-        if !faults.keys.is_empty() {
-            let text = include_str!("../../../../examples/paper.toml");
-            let text = text.replace("repeats = 1", "repeats = 10");
-            rig = Rig::from_toml(&text.replace("noise = \"5 um\"", faults.keys)).unwrap();
+        if let Some(channel) = faults.channel {
+            rig = faulty_paper(channel, 10);
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
         rig.bench.layout = displaced(&rig.bench.layout, rig.bench.surface.extent(), &mut rng);
         let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
-        let mut recording = simulate(&rig, seed).unwrap();
+        let mut recording = rig.simulate(seed);
         for row in &mut recording.rows {
             let truth = clean(&rig.bench, &[(row.position.x_m, 3.0)]);
             row.reading = measure(&rig.bench.layout, &truth, &errors, &mut rng);
@@ -154,9 +145,14 @@ fn noisy_presses_locate_at_the_limit_and_intervals_hold_what_they_say() {
 
 #[test]
 fn unknown_gains_offsets_and_places_cost_little() {
-    let keys =
-        "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"20 um\"\nposition_error = \"0.5 mm\"";
-    let faults = Faults { keys, dead: None };
+    let channel = ChannelModel {
+        noise_sd: 5e-6,
+        gain_error: 0.05,
+        offset_error: 20e-6,
+        position_error_m: 0.5e-3,
+        ..ChannelModel::default()
+    };
+    let faults = Faults { channel: Some(channel), dead: None };
     for from in SOURCES {
         for force_known in [true, false] {
             let (ratio, coverage) = ratio_and_coverage(from, force_known, faults);
@@ -168,8 +164,8 @@ fn unknown_gains_offsets_and_places_cost_little() {
 
 #[test]
 fn near_the_ends_left_and_right_are_ambiguous() {
-    let rig = rig("5 um", 10);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 3).unwrap());
+    let rig = paper(5e-6, 10);
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(3));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let (mut flips, mut ambiguous) = (0, 0);
     for _ in 0..400 {
@@ -190,8 +186,8 @@ fn near_the_ends_left_and_right_are_ambiguous() {
 
 #[test]
 fn no_contact_and_two_contacts_are_no_single_contact() {
-    let rig = rig("5 um", 10);
-    let recording = simulate(&rig, 3).unwrap();
+    let rig = paper(5e-6, 10);
+    let recording = rig.simulate(3);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(3.0), None] {
         let bench = Bench { force_n, ..rig.bench.clone() };
@@ -207,10 +203,10 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 
 #[test]
 fn two_contacts_are_told_apart() {
-    let rig = rig("5 um", 10);
+    let rig = paper(5e-6, 10);
     let config = InfluenceConfig { contacts: 3, ..InfluenceConfig::default() };
     let bench = Bench { force_n: None, ..rig.bench.clone() };
-    let locator = fit(config, &bench, &simulate(&rig, 3).unwrap());
+    let locator = fit(config, &bench, &rig.simulate(3));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut right, mut near, mut count) = (0, 0, 0u32);
     for left_mm in (50..=250).step_by(25) {
@@ -259,8 +255,8 @@ fn both_near(bench: &Bench, truth: [(f64, f64); 2], found: [ContactEstimate; 2])
 
 #[test]
 fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
-    let rig = rig("5 um", 2);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let rig = paper(5e-6, 2);
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<BeamLocator>(&json).unwrap(), locator);
     for (good, bad) in [("\"contacts\":1", "\"contacts\":9"), ("\"sensors\":8", "\"sensors\":7")] {
@@ -271,8 +267,8 @@ fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
 
 #[test]
 fn presses_that_say_too_little_are_refused() {
-    let rig = rig("5 um", 1);
-    let mut recording = simulate(&rig, 1).unwrap();
+    let rig = paper(5e-6, 1);
+    let mut recording = rig.simulate(1);
     let refuse = |config: InfluenceConfig, bench: &Bench, recording: &Recording| {
         config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap_err()
     };

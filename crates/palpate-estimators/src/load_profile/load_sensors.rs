@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
+use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface};
 
 /// One channel of a reading.
 #[derive(Clone)]

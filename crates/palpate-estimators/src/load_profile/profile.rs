@@ -8,8 +8,8 @@ use super::patches::{Patch, find_patches};
 use super::resolution::Resolution;
 use super::smoothness::{Mixture, Problem};
 use super::{Cells, LoadSensors};
-use palpate_mechanics::contact::Position;
 use crate::method::ReadingError;
+use palpate_mechanics::contact::Position;
 use palpate_numerics::{NORMAL_95, chi_squared_bound};
 
 /// Readings that noise alone makes this rarely are a contact; those that a load and noise make this rarely are not of the

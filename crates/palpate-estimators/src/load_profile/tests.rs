@@ -7,10 +7,10 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, Extent, InfluenceFunction, Surface, UniformLoad};
-use palpate_mechanics::sensing::{ChannelModel, Layout, NoiseError, Sensor, SensorKind};
 use palpate_core::Status;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{ChannelModel, Layout, NoiseError, Sensor, SensorKind};
+use palpate_mechanics::surface::{Beam, Extent, InfluenceFunction, Surface, UniformLoad};
 
 fn beam() -> Beam {
     Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 }

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::LocatorFault;
-use palpate_mechanics::contact::Position;
 use palpate_core::Uncertainty;
+use palpate_mechanics::contact::Position;
 
 /// How far a method was off at positions that it had not seen: an uncertainty for methods without a noise model.
 ///

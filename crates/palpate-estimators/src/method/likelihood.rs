@@ -1,8 +1,8 @@
 //! How probable a reading is under contacts: what a filter over time asks of a locator.
 
+use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
-use palpate_core::Estimate;
 
 /// A fitted method that can say how well contacts explain a reading.
 pub trait Likelihood: Send + Sync {

@@ -2,10 +2,10 @@
 
 use super::search::{means, nearest};
 use super::{Neighbour, NeighboursLocator};
-use palpate_mechanics::contact::Position;
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::method::{Fit, FitTask, HeldOutSpread};
 use crate::recording::{Row, TooFewPositions};
+use palpate_mechanics::contact::Position;
 
 /// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
 /// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::search::{means, nearest};
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
 use crate::features::Features;
-use palpate_mechanics::surface::Extent;
 use crate::method::{HeldOutSpread, Locate, LocatorFault};
+use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 
 /// Neighbours that locate; see [`NeighboursConfig`](super::NeighboursConfig).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

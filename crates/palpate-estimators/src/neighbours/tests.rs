@@ -1,12 +1,12 @@
 //! Neighbours on surfaces whose readings are the position itself.
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 fn bench(force_n: Option<f64>) -> Bench {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);

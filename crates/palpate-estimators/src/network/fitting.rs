@@ -4,9 +4,9 @@ use super::{
     InputScale, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
     TrainedNetwork, TrainingTask,
 };
-use palpate_mechanics::surface::{Extent, Surface};
 use crate::network::locator::ChannelScaling;
 use crate::recording::Recording;
+use palpate_mechanics::surface::{Extent, Surface};
 
 /// Why a network cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

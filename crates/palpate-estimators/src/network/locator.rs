@@ -1,11 +1,11 @@
 //! A fitted network: scaling, weights and coding, all that a reading needs to become a position.
 
 use super::{PreparedNetwork, Topology, TrainingOutcome};
+use crate::method::{Locate, LocatorFault};
 use crate::setup::Bench;
+use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use crate::method::{Locate, LocatorFault};
-use palpate_core::{Estimate, Status};
 
 /// How a channel's reading r becomes an input: (r − offset) / divisor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

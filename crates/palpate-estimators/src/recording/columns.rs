@@ -5,8 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 /// Which column is what. Columns that have no role are ignored.
@@ -81,6 +81,18 @@ impl fmt::Display for Column {
     }
 }
 
+impl From<&str> for Column {
+    fn from(name: &str) -> Self {
+        Self::Name(name.trim().to_owned())
+    }
+}
+
+impl From<usize> for Column {
+    fn from(number: usize) -> Self {
+        Self::Number(number)
+    }
+}
+
 /// The column or columns of the contact position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -125,6 +137,68 @@ pub enum Need {
 }
 
 impl Columns {
+    /// A file whose positions, in millimetres, stand in one column, and whose raw channels stand in these, by name or by
+    /// number from 1. Where any is a number, the file has no header.
+    ///
+    /// ```
+    /// use palpate_estimators::recording::Columns;
+    /// use palpate_mechanics::units::Unit;
+    ///
+    /// let columns = Columns::along("X", ["Pl", "Pr"]).force("F");
+    /// assert_eq!(columns.position_unit, Unit::from_symbol("mm").unwrap());
+    /// ```
+    pub fn along<C: Into<Column>>(
+        position: impl Into<Column>,
+        channels: impl IntoIterator<Item = C>,
+    ) -> Self {
+        Self::of(PositionColumns::Along(position.into()), channels)
+    }
+
+    /// The same with positions in two columns, along and across.
+    pub fn plane<C: Into<Column>>(
+        x: impl Into<Column>,
+        y: impl Into<Column>,
+        channels: impl IntoIterator<Item = C>,
+    ) -> Self {
+        Self::of(PositionColumns::Plane { x: x.into(), y: y.into() }, channels)
+    }
+
+    fn of<C: Into<Column>>(position: PositionColumns, channels: impl IntoIterator<Item = C>) -> Self {
+        let channels: Vec<ValueColumn> = channels
+            .into_iter()
+            .map(|column| ValueColumn { column: column.into(), unit: Unit::NONE })
+            .collect();
+        let numbered = channels.iter().any(|channel| matches!(channel.column, Column::Number(_)));
+        Self {
+            header: if numbered { Header::Absent } else { Header::Present },
+            position,
+            position_unit: Unit::from_symbol("mm").unwrap_or(Unit::NONE),
+            frame: Frame::default(),
+            channels,
+            force: None,
+            hidden: None,
+        }
+    }
+
+    /// The same with the contact force, in newtons, in this column.
+    #[must_use]
+    pub fn force(self, column: impl Into<Column>) -> Self {
+        let values = ValueColumn { column: column.into(), unit: SensorKind::Reaction.unit() };
+        Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
+    }
+
+    /// The same with a hidden coordinate in this column and unit; see [`Row::hidden`](super::Row::hidden).
+    #[must_use]
+    pub fn hidden(self, column: impl Into<Column>, unit: Unit) -> Self {
+        Self { hidden: Some(ValueColumn { column: column.into(), unit }), ..self }
+    }
+
+    /// The same with coordinates of the file's own frame.
+    #[must_use]
+    pub fn in_frame(self, frame: Frame) -> Self {
+        Self { frame, ..self }
+    }
+
     /// The columns that palpate itself writes: `position_mm` (or `x_mm`, `y_mm`), `force_n` where it is known, and
     /// for each channel its name and unit, as in `deflection_1_mm`; a raw channel has just its name.
     ///

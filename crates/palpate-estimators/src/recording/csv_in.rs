@@ -11,8 +11,8 @@ use super::lines::{is_passed_over, without_mark};
 use super::reading_parser::ChannelFields;
 use super::{Provenance, Recording, Row};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 /// What a file must agree with to be a recording of a bench.

@@ -1,8 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 const STRIP: Extent = Extent { length_m: 0.1, width_m: None };

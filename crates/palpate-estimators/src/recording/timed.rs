@@ -13,8 +13,8 @@ use super::csv_out::{header, record};
 use super::lines::Lines;
 use super::reading_parser::ChannelFields;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::Extent;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 /// The column of time, in seconds.

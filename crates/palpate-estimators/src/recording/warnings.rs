@@ -181,8 +181,11 @@ impl<'a> Channel<'a> {
     }
 
     fn quantity(&self, value: f64) -> Quantity {
-        let dimension =
-            self.recording.kinds.get(self.index).map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
+        let dimension = self
+            .recording
+            .kinds
+            .get(self.index)
+            .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
         Quantity { value, dimension }
     }
 }

@@ -4,12 +4,12 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{CleanSensors, SimulateError};
-use palpate_mechanics::contact::Contact;
+use crate::recording::{Provenance, Recording, Row, TimedRecording};
 use crate::setup::Bench;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 use palpate_mechanics::surface::Motion;
 use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
-use crate::recording::{Provenance, Recording, Row, TimedRecording};
-use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 
 /// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
 const MODES: usize = 10;

@@ -1,21 +1,19 @@
 use super::*;
 use palpate_mechanics::sensing::SensorKind;
 
-const PAPER: &str = include_str!("../../../../examples/paper.toml");
+use crate::fixtures::{Example, faulty_paper, paper, strip};
+use palpate_mechanics::sensing::ChannelModel;
 
-fn paper() -> Rig {
-    Rig::from_toml(PAPER).unwrap()
-}
-
-fn noisy() -> Rig {
-    let faults = "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"2 um\"";
-    Rig::from_toml(&PAPER.replace("noise = \"5 um\"", faults).replace("repeats = 1", "repeats = 3")).unwrap()
+fn noisy() -> Example {
+    let faults =
+        ChannelModel { noise_sd: 5e-6, gain_error: 0.05, offset_error: 2e-6, ..ChannelModel::default() };
+    faulty_paper(faults, 3)
 }
 
 #[test]
 fn a_clean_simulation_is_force_times_influence() {
-    let rig = Rig::from_toml(&PAPER.replace("5 um", "0 um")).unwrap();
-    let recording = simulate(&rig, 1).unwrap();
+    let rig = paper(0.0, 1);
+    let recording = rig.simulate(1);
     assert_eq!(recording.rows.len(), 10);
     let surface = rig.bench.surface.model().unwrap();
     for (i, row) in recording.rows.iter().enumerate() {
@@ -30,17 +28,17 @@ fn a_clean_simulation_is_force_times_influence() {
 #[test]
 fn one_seed_gives_one_recording_and_another_seed_another() {
     let rig = noisy();
-    let recording = simulate(&rig, 7).unwrap();
+    let recording = rig.simulate(7);
     assert_eq!(recording.rows.len(), 30);
-    assert_eq!(simulate(&rig, 7).unwrap(), recording);
-    assert_ne!(simulate(&rig, 8).unwrap().rows, recording.rows);
+    assert_eq!(rig.simulate(7), recording);
+    assert_ne!(rig.simulate(8).rows, recording.rows);
     assert_eq!(recording.provenance.seed, Some(7));
 }
 
 #[test]
 fn a_simulation_survives_its_file_bit_for_bit() {
     let rig = noisy();
-    let recording = simulate(&rig, 7).unwrap();
+    let recording = rig.simulate(7);
     let mut bytes = Vec::new();
     crate::recording::write(&recording, rig.bench.surface.extent(), "a simulation", &mut bytes).unwrap();
     assert!(bytes.starts_with(b"# a simulation\nposition_mm,force_n,deflection_1_mm,deflection_2_mm,"));
@@ -49,16 +47,14 @@ fn a_simulation_survives_its_file_bit_for_bit() {
 
 #[test]
 fn what_cannot_be_simulated_is_refused_with_the_reason() {
-    let measured = Rig::from_toml(include_str!("../../../../examples/fsi-water.toml")).unwrap();
-    let mut no_force = paper();
+    let measured = strip();
+    let mut no_force = paper(5e-6, 1);
     no_force.bench.force_n = None;
-    let no_training = Rig { training: None, ..paper() };
     let here = [Position::along(0.1)];
     let messages = [
-        simulate_at(&measured.bench, &here, 1, 1).unwrap_err().to_string(),
-        simulate(&no_force, 1).unwrap_err().to_string(),
-        simulate(&no_training, 1).unwrap_err().to_string(),
-        simulate_at(&paper().bench, &[Position::along(0.1), Position::along(0.401)], 1, 1)
+        simulate_at(&measured, &here, 1, 1).unwrap_err().to_string(),
+        no_force.bench.simulate(&no_force.training, 1).unwrap_err().to_string(),
+        simulate_at(&paper(5e-6, 1).bench, &[Position::along(0.1), Position::along(0.401)], 1, 1)
             .unwrap_err()
             .to_string(),
     ];

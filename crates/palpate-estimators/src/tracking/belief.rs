@@ -4,8 +4,8 @@ use super::bank::Bank;
 use super::gaussian::Gaussian;
 use super::on_plane::{self, OnPlane};
 use super::step::{OnLine, Step, V, W, X, contact, contacts, seen_on_line};
-use palpate_mechanics::contact::{Contact, Position};
 use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood};
+use palpate_mechanics::contact::{Contact, Position};
 
 /// A bank of a surface with as many contacts.
 #[derive(Clone, Debug, PartialEq)]

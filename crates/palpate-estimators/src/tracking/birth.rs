@@ -9,9 +9,9 @@ use super::belief::{Belief, Seen};
 use super::config::TrackerConfig;
 use super::gaussian::Gaussian;
 use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact, seen_on_line};
-use palpate_mechanics::contact::{Contact, Position};
 use crate::method::{ContactFit, LineLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::contact::{Contact, Position};
 use std::f64::consts::PI;
 
 /// A valley of a reading's misfit that is wider than this share of the length is born in parts no wider, since its force

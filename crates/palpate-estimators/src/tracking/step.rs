@@ -7,8 +7,8 @@
 use super::bank::{Dynamics, SeenNumbers};
 use super::config::TrackerConfig;
 use super::gaussian::{Change, Gaussian, Matrix};
-use palpate_mechanics::surface::modal::Oscillator;
 use crate::method::LineLikelihood;
+use palpate_mechanics::surface::modal::Oscillator;
 use std::f64::consts::PI;
 
 /// Force of the first mode, and how fast it changes.

@@ -4,23 +4,23 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
+use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, InfluenceConfig};
-use palpate_mechanics::surface::Motion;
 use crate::method::{FitTask, Likelihood, LineLikelihood};
-use palpate_rig::Rig;
+use crate::setup::Bench;
+use crate::simulate::{CleanSensors, clean_reading};
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, measure};
-use crate::simulate::{CleanSensors, clean_reading, simulate};
+use palpate_mechanics::surface::Motion;
 
 const RATE_HZ: f64 = 1000.0;
 
-fn rig() -> Rig {
-    Rig::from_toml(include_str!("../../../../examples/moving-load.toml")).unwrap()
+fn rig() -> Example {
+    moving_beam()
 }
 
-fn likelihood(rig: &Rig, force_n: Option<f64>) -> BeamLikelihood {
-    let recording = simulate(rig, 1).unwrap();
+fn likelihood(rig: &Example, force_n: Option<f64>) -> BeamLikelihood {
+    let recording = rig.simulate(1);
     let bench = Bench { force_n, ..rig.bench.clone() };
     let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
     BeamLikelihood::new(&InfluenceConfig::default().fit_beam(task, &mut || true).unwrap().unwrap())
@@ -30,7 +30,7 @@ fn likelihood(rig: &Rig, force_n: Option<f64>) -> BeamLikelihood {
 pub(super) type Timed = (f64, Contact, Vec<f64>);
 
 /// Contacts along a motion with a force, and readings in balance.
-pub(super) fn timed_readings(rig: &Rig, motion: Motion, force_n: f64, seed: u64) -> Vec<Timed> {
+pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: u64) -> Vec<Timed> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let layout = &rig.bench.layout;
     let errors = ChannelErrors::none(layout);
@@ -56,7 +56,7 @@ pub(super) fn wrongly_touching(likelihood: &dyn Likelihood, readings: &[Timed]) 
     wrong
 }
 
-fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<Timed> {
+fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
     timed_readings(rig, motion, 3.0, seed)
 }
 
@@ -83,7 +83,7 @@ fn errors(likelihood: &BeamLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2
 #[test]
 fn a_track_is_several_times_closer_than_its_readings() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..rig.motion.unwrap().first.motion };
+    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..along_the_beam() };
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(3.0), 3.0, 5.0), (None, 4.0, 6.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
@@ -96,13 +96,7 @@ fn a_track_is_several_times_closer_than_its_readings() {
 #[test]
 fn a_contact_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
-    let motion = Motion {
-        speed_m_per_s: 1.0,
-        passes: 2,
-        lifted_s: 0.2,
-        touch_s: 0.02,
-        ..rig.motion.unwrap().first.motion
-    };
+    let motion = Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..along_the_beam() };
     let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
@@ -114,7 +108,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
     let likelihood = likelihood(&rig, Some(3.0));
     let load = |x_m: f64| Contact { position: Position::along(x_m), force_n: 3.0 };
     // Bent as by a load in the middle, which has just jumped elsewhere.
-    let mut response = rig.motion.unwrap().beam.unwrap().at_rest(1, &[load(0.2)]);
+    let mut response = swinging_beam().at_rest(1, &[load(0.2)]);
     response.change_loads(&[load(0.1)]);
     let sensors = &rig.bench.layout.sensors;
     let reading: Vec<f64> =
@@ -150,7 +144,7 @@ fn the_pulls_of_a_fit_are_the_slopes_of_its_misfit() {
 }
 
 /// Readings in balance under two contacts, each with its force.
-fn two_readings(rig: &Rig, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contact; 2], Vec<f64>)> {
+fn two_readings(rig: &Example, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contact; 2], Vec<f64>)> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::none(&rig.bench.layout);
     let surface = rig.bench.surface.model().unwrap();
@@ -167,10 +161,8 @@ fn two_readings(rig: &Rig, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contac
 
 #[test]
 fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
-    let rig = Rig::from_toml(include_str!("../../../../examples/two-moving-loads.toml")).unwrap();
-    let moving = rig.motion.unwrap();
-    let motions = [moving.first.motion, moving.second.unwrap().motion];
-    let recording = simulate(&rig, 1).unwrap();
+    let (rig, motions) = two_moving_loads();
+    let recording = rig.simulate(1);
     let task = FitTask { bench: &rig.bench, recording: &recording, seed: 0 };
     let config = InfluenceConfig { contacts: 2, ..InfluenceConfig::default() };
     let likelihood = BeamLikelihood::new(&config.fit_beam(task, &mut || true).unwrap().unwrap());

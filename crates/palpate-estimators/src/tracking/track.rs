@@ -1,11 +1,11 @@
 //! What a tracker answers.
 
 use super::belief::Moments;
+use crate::method::Likelihood;
+use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use crate::method::Likelihood;
 use palpate_numerics::{NORMAL_95, normal_distribution};
-use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 
 /// Below this share of the probability, one hypothesis does not speak for all.
 const SURE: f64 = 0.98;

@@ -28,8 +28,8 @@ pub use zone::Zone;
 use std::sync::Arc;
 
 use crate::contact::Contact;
-use crate::surface::{ResponseFunction, ResponseGradient, Surface};
 use crate::sensing::{Layout, Sensor, SensorKind};
+use crate::surface::{ResponseFunction, ResponseGradient, Surface};
 
 /// What is known of the contact force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

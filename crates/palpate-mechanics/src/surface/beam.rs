@@ -43,6 +43,30 @@ pub enum BeamError {
 }
 
 impl Beam {
+    /// A beam of this length, width and thickness, in metres, and Young's modulus, in pascals.
+    ///
+    /// # Errors
+    /// [`BeamError`] for a number that is not positive and finite, or a compliance that is not.
+    ///
+    /// ```
+    /// use palpate_mechanics::surface::Beam;
+    /// use palpate_mechanics::units::{gpa, mm};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// assert!((beam.bending_stiffness() - 1.152).abs() < 1e-12); // N·m²
+    /// # Ok::<(), palpate_mechanics::surface::BeamError>(())
+    /// ```
+    pub fn new(
+        length_m: f64,
+        width_m: f64,
+        thickness_m: f64,
+        youngs_modulus_pa: f64,
+    ) -> Result<Self, BeamError> {
+        let beam = Self { length_m, width_m, thickness_m, youngs_modulus_pa };
+        beam.validate()?;
+        Ok(beam)
+    }
+
     /// Checks that every dimension is positive and finite, and that the deflections are so too.
     ///
     /// # Errors

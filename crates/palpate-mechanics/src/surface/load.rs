@@ -62,8 +62,8 @@ pub fn midpoints(from: Position, to: Position, counts: [usize; 2]) -> Vec<Positi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Beam, Surface};
     use crate::sensing::SensorKind;
+    use crate::surface::{Beam, Surface};
 
     fn beam() -> Beam {
         Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 }

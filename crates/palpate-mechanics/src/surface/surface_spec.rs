@@ -20,6 +20,36 @@ pub enum SurfaceSpec {
     Measured(Extent),
 }
 
+impl From<Beam> for SurfaceSpec {
+    fn from(beam: Beam) -> Self {
+        Self::Beam(beam)
+    }
+}
+
+impl From<SupportedBeam> for SurfaceSpec {
+    fn from(beam: SupportedBeam) -> Self {
+        Self::SupportedBeam(Box::new(beam))
+    }
+}
+
+impl From<Plate> for SurfaceSpec {
+    fn from(plate: Plate) -> Self {
+        Self::Plate(plate)
+    }
+}
+
+impl From<Digit> for SurfaceSpec {
+    fn from(digit: Digit) -> Self {
+        Self::Digit(digit)
+    }
+}
+
+impl From<Extent> for SurfaceSpec {
+    fn from(extent: Extent) -> Self {
+        Self::Measured(extent)
+    }
+}
+
 impl SurfaceSpec {
     /// The area that can be touched.
     pub fn extent(&self) -> Extent {

@@ -3,10 +3,6 @@
 use maud::html;
 
 use super::SensorDesignReport;
-use palpate_estimators::setup::Bench;
-use palpate_design::sensors::{Assessment, CountPoint, Designed};
-use palpate_mechanics::limit::LimitCurve;
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::beam_drawing::{beam_drawing, supported_beam_drawing};
 use crate::digit_figures::shapes_figure;
 use crate::extremes::Extremes;
@@ -15,6 +11,10 @@ use crate::numbers::{counted, mm, stated};
 use crate::page::Figure;
 use crate::sites::sites_chart;
 use crate::{Axis, Chart, Mark, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
+use palpate_design::sensors::{Assessment, CountPoint, Designed};
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::limit::LimitCurve;
+use palpate_mechanics::surface::SurfaceSpec;
 
 /// The bench with the best layout, where it can be drawn.
 pub(super) fn bench_figure(

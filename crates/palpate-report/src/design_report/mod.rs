@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use super::numbers::{counted, mm, number, quantity, stated};
 use super::page::{Figures, Page, Section, Table, numeric, short, text, wide};
 use super::{ReportError, ReportFile};
-use palpate_estimators::setup::Bench;
 use palpate_design::sensors::{
     CountPoint, Designed, Method, SensorProblem, Verification, best_design, enough,
 };
 use palpate_design::sensors::{DesignCriterion, Symmetry};
+use palpate_estimators::setup::Bench;
 
 /// What a sensor design's report is made from.
 #[derive(Clone, Copy)]

@@ -3,14 +3,14 @@
 use maud::html;
 
 use super::SensorDesignReport;
-use palpate_estimators::arrangement::cells;
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::Contact;
-use palpate_design::sensors::Designed;
 use crate::numbers::stated;
 use crate::page::Figure;
 use crate::plane_figures::sensors_mm;
 use crate::{HeatMap, HeatPanel, heat_map_to_svg};
+use palpate_design::sensors::Designed;
+use palpate_estimators::arrangement::cells;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::Contact;
 
 /// Cells of a map, about.
 const CELLS: f64 = 1600.0;

@@ -3,11 +3,11 @@
 use maud::{Markup, html};
 
 use super::EvaluationReport;
-use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Spread};
 use crate::limit_line::{limit_in_words, limit_line};
 use crate::numbers::mm;
 use crate::page::Figure;
 use crate::{Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, Stroke, chart_to_svg};
+use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Spread};
 
 /// More positions than this are drawn as a line: markers would hide each other.
 const MOST_MARKERS: usize = 80;

@@ -9,11 +9,11 @@ use super::numbers::{counted, listed, mm, number, whole};
 use super::page::{Column, Figures, Page, Section, Table, numeric, short, text, words};
 use super::study_parts::portion_in_words;
 use super::{ReportError, ReportFile};
-use palpate_estimators::setup::Bench;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Portion, percentage_error};
-use palpate_mechanics::surface::SurfaceSpec;
 use palpate_estimators::recording::Provenance;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::surface::SurfaceSpec;
 use palpate_rig::Rig;
 
 /// What an evaluation's report is made from.

@@ -3,8 +3,6 @@
 use maud::{Markup, html};
 
 use super::LimitReport;
-use palpate_mechanics::limit::{Bound, LimitCurve, LimitWarning};
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::beam_drawing::{beam_drawing, supported_beam_drawing};
 use crate::digit_figures::{force_limit_figure, linear_theory_figures, shapes_figure};
 use crate::extremes::Extremes;
@@ -12,6 +10,8 @@ use crate::limit_line::along;
 use crate::numbers::{counted, mm, stated};
 use crate::page::Figure;
 use crate::{Axis, Chart, Mark, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
+use palpate_mechanics::limit::{Bound, LimitCurve, LimitWarning};
+use palpate_mechanics::surface::SurfaceSpec;
 
 /// Where the surface ends, errors do: limits beyond this many lengths are cut off.
 const MOST_LENGTHS: f64 = 10.0;

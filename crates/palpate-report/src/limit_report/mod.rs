@@ -116,7 +116,8 @@ impl LimitReport<'_> {
     }
 
     fn limit_table(&self, table: usize) -> Markup {
-        let contact = |position| palpate_mechanics::contact::Contact { position, force_n: self.known.force_n };
+        let contact =
+            |position| palpate_mechanics::contact::Contact { position, force_n: self.known.force_n };
         let cell =
             |limit_m: Option<f64>, unit: f64| text(number(limit_m.map_or(f64::NAN, |limit| limit * unit)));
         let rows = self.listed.iter().map(|&position| {

@@ -3,13 +3,13 @@
 use maud::html;
 
 use super::LimitReport;
-use palpate_estimators::arrangement::cells;
-use palpate_mechanics::contact::Contact;
-use palpate_mechanics::limit::Force;
 use crate::numbers::stated;
 use crate::page::Figure;
 use crate::plane_figures::sensors_mm;
 use crate::{HeatMap, HeatPanel, heat_map_to_svg};
+use palpate_estimators::arrangement::cells;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::limit::Force;
 
 /// Cells of a map, about.
 const CELLS: f64 = 2000.0;

@@ -3,11 +3,11 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use palpate_estimators::evaluation::Spread;
 use crate::limit_line::limit_in_words;
 use crate::page::Figure;
 use crate::study_parts::{Drawn, along, banded, error_chart};
 use crate::{Axis, Chart, ErrorPoint, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
+use palpate_estimators::evaluation::Spread;
 use palpate_studies::ArmResults;
 use palpate_studies::paper::COUNTS;
 

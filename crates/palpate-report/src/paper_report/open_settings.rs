@@ -3,12 +3,12 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use palpate_estimators::estimator::Setting;
-use palpate_mechanics::surface::{Beam, Surface};
 use crate::numbers::{number, stated};
 use crate::page::{Table, text, words};
-use palpate_rig::Rig;
+use palpate_estimators::estimator::Setting;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Surface};
+use palpate_rig::Rig;
 
 /// Young's modulus as the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;

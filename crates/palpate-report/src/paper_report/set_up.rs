@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use crate::ReportError;
 use crate::beam_drawing::beam_drawing;
 use crate::numbers::{counted, mm, number, stated};
 use crate::page::{Figure, Figures};
-use palpate_rig::Rig;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_rig::Rig;
 
 impl Paper<'_> {
     /// What is on the bench, where the surface is a beam. All arms of the paper share it.

@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 
 use super::{Paper, ours};
-use palpate_estimators::arrangement::Arrangement;
-use palpate_mechanics::contact::Position;
-use palpate_estimators::evaluation::{Portion, Spread};
 use crate::numbers::{NOTHING, listed, mm, number, spread};
 use crate::page::{Table, numeric, short, text, wide};
 use crate::study_parts::portion_in_words;
+use palpate_estimators::arrangement::Arrangement;
 use palpate_estimators::arrangement::Training;
+use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_mechanics::contact::Position;
 
 /// Arms with the same training positions.
 struct Set<'a> {

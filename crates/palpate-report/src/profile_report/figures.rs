@@ -5,10 +5,10 @@ mod plane;
 use maud::html;
 
 use super::ProfileReport;
-use palpate_estimators::estimator::{LoadProfile, Resolution};
 use crate::numbers::mm;
 use crate::page::Figure;
 use crate::{Axis, BandPoint, Chart, Mark, Marker, Series, SeriesKind, Stroke, chart_to_svg};
+use palpate_estimators::estimator::{LoadProfile, Resolution};
 
 /// Places whose averaging kernels are drawn, as shares of the length.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];

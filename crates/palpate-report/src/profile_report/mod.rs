@@ -8,8 +8,8 @@ use super::numbers::{counted, mm, number, stated};
 use super::page::{Figures, Page, Section, Table, numeric, short, text, words};
 use super::{ReportError, ReportFile};
 use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
-use palpate_mechanics::surface::UniformLoad;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::UniformLoad;
 
 /// What a profile's report is made from.
 #[derive(Clone, Copy)]

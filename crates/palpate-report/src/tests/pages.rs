@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use palpate_estimators::estimator::Fitting;
-use palpate_estimators::evaluation::{Evaluation, Portion};
-use palpate_mechanics::limit::{Force, Limit, LimitCurve, limit_warnings};
-use palpate_estimators::network::{InstructionSet, Precision};
 use crate::{
     EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
+use palpate_estimators::estimator::Fitting;
+use palpate_estimators::evaluation::{Evaluation, Portion};
+use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_rig::Rig;
-use palpate_estimators::simulate::{simulate, simulate_at};
 use palpate_studies::{
     ArmOutcome, Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper,
 };
@@ -226,9 +226,9 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
 
 #[test]
 fn an_evaluation_says_whose_answers_it_holds() {
-    let rig = Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "50"))
-        .unwrap();
-    let recording = simulate(&rig, 0).unwrap();
+    let rig =
+        Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "50")).unwrap();
+    let recording = rig.simulate(0).unwrap();
     let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
         .unwrap()
         .fit(0, &mut || true)
@@ -267,9 +267,9 @@ fn an_evaluation_says_whose_answers_it_holds() {
 
 #[test]
 fn an_evaluation_of_nothing_has_a_report() {
-    let rig = Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "5"))
-        .unwrap();
-    let recording = simulate(&rig, 0).unwrap();
+    let rig =
+        Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "5")).unwrap();
+    let recording = rig.simulate(0).unwrap();
     let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
         .unwrap()
         .fit(0, &mut || true)
@@ -336,7 +336,7 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
     let quick = include_str!("../../../../examples/paper.toml").replace("1_000_000", "5");
     for (toml, drawn) in [(quick.clone(), true), (quick.replace("5 um", "0 um"), false)] {
         let rig = Rig::from_toml(&toml).unwrap();
-        let recording = simulate(&rig, 0).unwrap();
+        let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {
             title: "Errors",
             evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },

@@ -1,6 +1,7 @@
 //! Two coordinates: pairs, grids, and what is said where they are mixed up with lines.
 
 use super::*;
+use palpate_estimators::arrangement::Arrangement;
 use palpate_mechanics::contact::Position;
 
 /// A plane on which everything can be changed.

@@ -1,9 +1,9 @@
 //! Plates: edges, supports at points, and what is said of those that cannot be.
 
 use super::*;
+use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
-use palpate_estimators::simulate::clean_reading;
 
 const EXAMPLE: &str = include_str!("../../../../examples/plate.toml");
 

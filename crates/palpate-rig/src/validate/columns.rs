@@ -4,13 +4,15 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
-use palpate_estimators::recording::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 use crate::error::{RigError, RigProblem};
 use crate::sections::{RecordingSection, UnitNames};
 use crate::value::{RawColumn, RawQuantity, out_of_range, positive, quantity};
+use palpate_estimators::recording::{
+    Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn,
+};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Unit, UnitError};
 
 /// What the section does not say is as in the recordings that palpate itself writes.

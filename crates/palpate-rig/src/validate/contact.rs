@@ -5,12 +5,12 @@ use std::ops::Range;
 use toml::Spanned;
 
 use super::places::{grid_sides, place};
-use palpate_estimators::arrangement::{Arrangement, ArrangementError};
-use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec};
-use palpate_estimators::arrangement::Training;
 use crate::error::{RigError, RigProblem};
 use crate::sections::{ContactSection, RigSections, TrainingSection};
 use crate::value::{RawQuantity, choice, count, positive, quantity};
+use palpate_estimators::arrangement::Training;
+use palpate_estimators::arrangement::{Arrangement, ArrangementError};
+use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec};
 use palpate_mechanics::units::Dimension;
 
 /// More training positions, or presses of one position, than anyone makes.

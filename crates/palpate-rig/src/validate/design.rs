@@ -3,15 +3,15 @@
 use toml::Spanned;
 
 use super::places::{in_order, on_surface};
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use crate::error::{RigError, RigProblem};
 use crate::sections::{ContactsKeys, DesignSection, MustHaveKeys, OfferKeys, SitesKey, ZoneKeys};
 use crate::value::{RawQuantity, choice, count, not_negative, number, positive};
 use palpate_design::sensors::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
+use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_mechanics::units::Dimension;
 
 const SECTION: &str = "design";
@@ -230,8 +230,8 @@ fn missing<T>(key: &'static str, section: &Spanned<T>) -> RigError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_mechanics::contact::Position;
     use crate::Rig;
+    use palpate_mechanics::contact::Position;
 
     const RIG: &str = include_str!("../../../../examples/sensor-design.toml");
     const PLATE: &str = include_str!("../../../../examples/plate.toml");

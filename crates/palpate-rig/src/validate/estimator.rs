@@ -2,6 +2,9 @@
 
 use toml::Spanned;
 
+use crate::error::{RigError, RigProblem};
+use crate::sections::EstimatorSection;
+use crate::value::{RawQuantity, choice, count, number, out_of_range, positive};
 use palpate_estimators::centroid::CentroidConfig;
 use palpate_estimators::closed_form::ClosedFormConfig;
 use palpate_estimators::digit::{DigitConfig, DigitTheory};
@@ -13,9 +16,6 @@ use palpate_estimators::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
     PresentationOrder,
 };
-use crate::error::{RigError, RigProblem};
-use crate::sections::EstimatorSection;
-use crate::value::{RawQuantity, choice, count, number, out_of_range, positive};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::units::Dimension;
 

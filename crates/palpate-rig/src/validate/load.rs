@@ -3,10 +3,10 @@
 use toml::Spanned;
 
 use super::places::{in_order, on_surface};
-use palpate_mechanics::surface::{Extent, SurfaceSpec, UniformLoad};
 use crate::error::{RigError, RigProblem};
 use crate::sections::LoadSection;
 use crate::value::positive;
+use palpate_mechanics::surface::{Extent, SurfaceSpec, UniformLoad};
 use palpate_mechanics::units::Dimension;
 
 const SECTION: &str = "load";

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use palpate_mechanics::surface::modal::ModalBeam;
-use palpate_mechanics::surface::{Beam, Extent, Motion, SurfaceSpec};
 use crate::error::{RigError, RigProblem};
 use crate::sections::{MotionSection, MotionSections, SurfaceSection};
 use crate::value::{bounded, count, not_negative, positive};
 use palpate_estimators::simulate::{MovingContact, MovingContacts};
+use palpate_mechanics::surface::modal::ModalBeam;
+use palpate_mechanics::surface::{Beam, Extent, Motion, SurfaceSpec};
 use palpate_mechanics::units::Dimension;
 
 use super::places::on_surface;

@@ -2,10 +2,10 @@
 
 use toml::Spanned;
 
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
 use crate::error::{RigError, RigProblem};
 use crate::value::{RawPosition, RawQuantity, count, quantity};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Dimension;
 
 /// A position that stands at `key`, or in its list: one length on a line, a pair on a plane.

@@ -5,12 +5,12 @@ use std::ops::Range;
 use toml::Spanned;
 
 use super::surface::need;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
-use palpate_mechanics::surface::{Plate, PlateError};
 use crate::error::{RigError, RigProblem};
 use crate::sections::{EdgesSection, SupportKeys, SupportsKey, SurfaceSection};
 use crate::value::{RawPosition, RawQuantity, choice, count, number, positive, quantity};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
+use palpate_mechanics::surface::{Plate, PlateError};
 use palpate_mechanics::units::Dimension;
 
 pub(super) fn validate(section: &Spanned<SurfaceSection>) -> Result<Plate, RigError> {

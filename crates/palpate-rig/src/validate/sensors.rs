@@ -3,15 +3,13 @@
 use toml::Spanned;
 
 use super::places::{grid_sides, place};
-use palpate_estimators::arrangement::inner_grid;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::SurfaceSpec;
 use crate::error::{RigError, RigProblem};
 use crate::sections::{RecordingSection, SensorsSection, SensorsSections};
-use crate::value::{
-    RawColumn, RawPosition, RawQuantity, bounded, choice, count, not_negative, quantity,
-};
+use crate::value::{RawColumn, RawPosition, RawQuantity, bounded, choice, count, not_negative, quantity};
+use palpate_estimators::arrangement::inner_grid;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
+use palpate_mechanics::surface::SurfaceSpec;
 use palpate_mechanics::units::Dimension;
 
 const SECTION: &str = "sensors";

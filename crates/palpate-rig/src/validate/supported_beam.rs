@@ -5,12 +5,12 @@ use std::ops::Range;
 use toml::Spanned;
 
 use super::surface::need;
-use palpate_mechanics::surface::{
-    BeamPart, BeamSection, BeamSupport, BeamSupportKind, SupportedBeam, SupportedBeamError, SupportedBeamSpec,
-};
 use crate::error::{RigError, RigProblem};
 use crate::sections::{BeamSectionKeys, SupportKeys, SupportsKey, SurfaceSection};
 use crate::value::{RawPosition, RawQuantity, choice, positive, quantity};
+use palpate_mechanics::surface::{
+    BeamPart, BeamSection, BeamSupport, BeamSupportKind, SupportedBeam, SupportedBeamError, SupportedBeamSpec,
+};
 use palpate_mechanics::units::Dimension;
 
 /// Whether a beam's section says more than two simple supports and one section.

@@ -5,11 +5,11 @@ use std::ops::Range;
 use toml::Spanned;
 
 use super::{plate, supported_beam};
-use palpate_mechanics::surface::SurfaceSpec;
-use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection};
 use crate::error::{RigError, RigProblem};
 use crate::sections::SurfaceSection;
 use crate::value::{RawQuantity, choice, positive};
+use palpate_mechanics::surface::SurfaceSpec;
+use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection};
 use palpate_mechanics::units::Dimension;
 
 const SECTION: &str = "surface";

@@ -4,14 +4,14 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::Position;
 use palpate_estimators::evaluation::Trial;
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_estimators::recording::{Provenance, Recording, Row};
-use palpate_rig::{Rig, RigSimulationError};
-use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::SimulateError;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
+use palpate_rig::{Rig, RigSimulationError};
 
 /// Standard deviation of a point spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,8 @@ impl ArraySensor {
             Spread::Metres(spread_m) => spread_m,
             Spread::Pitches(pitches) => pitches * pitch_m,
         };
-        let (positions, repeats) = (training.positions(bench.surface.extent()).map_err(SimulateError::from)?, training.repeats);
+        let (positions, repeats) =
+            (training.positions(bench.surface.extent()).map_err(SimulateError::from)?, training.repeats);
         let rig = Rig { bench, loads: Vec::new(), ..rig.clone() };
         Ok(Self { rig, spread, spread_m, noise_sd, training: positions, repeats })
     }

@@ -15,8 +15,8 @@ use serde::Serialize;
 use palpate_estimators::centroid::CentroidConfig;
 use palpate_estimators::estimator::EstimatorConfig;
 use palpate_estimators::evaluation::{Trial, contenders, try_estimator};
-use palpate_rig::{Rig, RigSimulationError};
 use palpate_mechanics::sensing::{Layout, Sensor};
+use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
 pub const RIG_TOML: &str = include_str!("../../../../examples/dead-areas.toml");

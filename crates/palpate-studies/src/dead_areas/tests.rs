@@ -1,8 +1,8 @@
 //! Dead areas are there for an array's centroid where its sensors see too little, and not for the influence estimator.
 
 use super::*;
-use palpate_mechanics::contact::Position;
 use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 
 fn study(counts: &[usize]) -> DeadAreaFindings {

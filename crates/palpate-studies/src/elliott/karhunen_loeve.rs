@@ -2,12 +2,12 @@
 
 use ndarray::{Array1, Array2};
 
+use palpate_estimators::recording::{Recording, Row};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Bound;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{ResponseGradient, SurfaceSpec};
 use palpate_numerics::symmetric_eigen;
-use palpate_estimators::recording::{Recording, Row};
-use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
 
 /// The components of a recording's readings: with d a reading less the mean m, each channel over its noise, and
 /// Σ d·dᵀ = V·Λ·Vᵀ over the rows, the components of a reading are Vᵀ·d, those of the largest variance first. Whitened so,

@@ -12,17 +12,19 @@ pub use karhunen_loeve::KarhunenLoeve;
 use karhunen_loeve::{raw_layout, without_model};
 use serde::Serialize;
 
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Fitting, Locator, ReadingError, Track, TrackerConfig};
+use palpate_estimators::estimator::{
+    EstimatorConfig, FitError, Fitting, Locator, ReadingError, Track, TrackerConfig,
+};
 use palpate_estimators::evaluation::{Evaluation, FollowError, Spread, TrackErrors, Trial, follow};
-use palpate_mechanics::limit::Bound;
-use palpate_mechanics::surface::{Extent, ResponseGradient};
 use palpate_estimators::network::{InputScale, NetworkConfig};
 use palpate_estimators::recording::TimedRecording;
-use palpate_rig::{Rig, RigSimulationError};
-use palpate_mechanics::sensing::NoiseError;
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::SimulateError;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Bound;
+use palpate_mechanics::sensing::NoiseError;
+use palpate_mechanics::surface::{Extent, ResponseGradient};
+use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
 pub const RIG_TOML: &str = include_str!("../../../../examples/elliott.toml");

@@ -2,7 +2,6 @@
 
 use super::*;
 use palpate_estimators::recording::Recording;
-use palpate_estimators::simulate::simulate;
 
 /// The bench of the study on a mesh that is solved at once.
 fn rig() -> Rig {
@@ -22,7 +21,7 @@ fn study(components: &[usize], presentations: u32) -> Elliott {
 
 fn pressed() -> (Rig, Recording, KarhunenLoeve) {
     let rig = rig();
-    let recording = simulate(&rig, 3).unwrap();
+    let recording = rig.simulate(3).unwrap();
     let reduction = KarhunenLoeve::of(&recording, &[20e-6; 25]);
     (rig, recording, reduction)
 }

@@ -6,8 +6,8 @@
 use serde::Serialize;
 
 use super::COUNTS;
-use palpate_estimators::evaluation::{Portion, percentile};
 use crate::{ArmOutcome, Judging, TrainedSeed};
+use palpate_estimators::evaluation::{Portion, percentile};
 
 /// A claim and its verdict.
 #[derive(Clone, Debug, PartialEq, Serialize)]

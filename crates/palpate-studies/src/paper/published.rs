@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use palpate_estimators::evaluation::Spread;
 use crate::{ArmResults, StudyResults};
+use palpate_estimators::evaluation::Spread;
 
 /// How near our median must come to a published figure to agree with it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -10,13 +10,13 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::StageWatch;
 use crate::{input, output};
 use counts::{Counts, counts};
-use palpate_estimators::setup::Bench;
+use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
+use palpate_estimators::setup::Bench;
 use palpate_mechanics::limit::LimitError;
 use palpate_report::{SensorDesignReport, sensor_design_report};
-use palpate_design::sensors::SensorDesign;
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,8 @@
 //! What is printed of a profile, in the units that people read.
 
-use palpate_estimators::estimator::{CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits};
+use palpate_estimators::estimator::{
+    CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits,
+};
 use palpate_mechanics::surface::UniformLoad;
 
 /// All that a reading tells of the load; what it does not tell is null.

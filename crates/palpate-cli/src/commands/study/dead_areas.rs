@@ -39,7 +39,10 @@ impl BuiltIn for DeadAreas {
         self.most_rounds()
     }
 
-    fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<DeadAreaFindings>, RigSimulationError> {
+    fn run(
+        &self,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<DeadAreaFindings>, RigSimulationError> {
         self.run(keep_going)
     }
 

@@ -1,8 +1,8 @@
 //! How the surface is to be learnt, and why it cannot be.
 
 use super::Scale;
-use palpate_numerics::NotPositiveDefinite;
 use crate::recording::TooFewPositions;
+use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
 
 /// How readings are to be learnt as a function of position and hidden coordinate.

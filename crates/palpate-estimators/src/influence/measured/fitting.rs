@@ -8,10 +8,10 @@ use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
-use crate::setup::Bench;
 use crate::method::{Fit, FitTask};
-use palpate_numerics::chi_squared_bound;
 use crate::recording::Recording;
+use crate::setup::Bench;
+use palpate_numerics::chi_squared_bound;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
 
 /// Distinct positions without which a reading cannot be a function of anything.

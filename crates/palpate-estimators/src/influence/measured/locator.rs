@@ -4,9 +4,9 @@ use palpate_core::{Estimate, Status};
 
 use super::posterior::Posterior;
 use super::{Axis, Scale, Table, Whitening};
+use crate::method::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
-use crate::method::{Locate, LocatorFault};
 
 /// What the hidden coordinate is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -9,14 +9,14 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale};
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
+use crate::fixtures::{pad, strip};
 use crate::influence::{InfluenceConfig, InfluenceSource};
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use palpate_rig::Rig;
+use crate::setup::Bench;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_testing::data::recording;
 
 const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
@@ -251,9 +251,9 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
 }
 
 /// Held to the share by which scikit-learn's best, `median_mm` and `mean_mm`, must be undercut.
-fn check_strip(rig: &str, file: &str, (median_mm, mean_mm): (f64, f64), less: f64) {
+fn check_strip(file: &str, (median_mm, mean_mm): (f64, f64), less: f64) {
     let Some(bytes) = data(&format!("tactile-fsi/{file}")) else { return };
-    let bench = Rig::from_toml(rig).unwrap().bench;
+    let bench = strip();
     let recording = bench.read_recording(file, bytes).unwrap();
     check(file, &five_folds(&bench, &recording), (median_mm, mean_mm), less);
 }
@@ -267,22 +267,19 @@ fn check(name: &str, found: &Pooled, (median_mm, mean_mm): (f64, f64), less: f64
 
 #[test]
 fn a_strip_over_water_beats_scikit_learn_by_a_fifth() {
-    let rig = include_str!("../../../../../examples/fsi-water.toml");
-    check_strip(rig, "1d-water-1.5mm.csv", (0.565, 0.844), 0.20);
+    check_strip("1d-water-1.5mm.csv", (0.565, 0.844), 0.20);
 }
 
 #[test]
 #[ignore = "the water strip's test is quicker by half"]
 fn a_strip_over_air_beats_scikit_learn() {
-    let rig = include_str!("../../../../../examples/fsi-air.toml");
-    check_strip(rig, "1d-air-2.0mm.csv", (0.600, 0.824), 0.15);
+    check_strip("1d-air-2.0mm.csv", (0.600, 0.824), 0.15);
 }
 
 #[test]
 #[ignore = "the water strip's test is quicker by half"]
 fn a_strip_over_oil_beats_scikit_learn() {
-    let rig = include_str!("../../../../../examples/fsi-oil.toml");
-    check_strip(rig, "1d-oil-1.0mm.csv", (0.438, 0.902), 0.05);
+    check_strip("1d-oil-1.0mm.csv", (0.438, 0.902), 0.05);
 }
 
 #[test]
@@ -290,7 +287,7 @@ fn a_strip_over_oil_beats_scikit_learn() {
 fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
     let Some(readings) = data("eflesh/fixed-depth-readings.csv") else { return };
     let Some(contacts) = data("eflesh/fixed-depth-contacts.csv") else { return };
-    let bench = Rig::from_toml(include_str!("../../../../../examples/eflesh.toml")).unwrap().bench;
+    let bench = pad();
     let recording = bench.read_recording_pair(("readings", readings), ("contacts", contacts)).unwrap();
     assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
     check("eflesh", &five_folds(&bench, &recording), (0.312, 0.343), 0.10);
@@ -298,7 +295,7 @@ fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
 
 #[test]
 fn settings_that_need_mechanics_are_refused() {
-    let bench = Rig::from_toml(include_str!("../../../../../examples/eflesh.toml")).unwrap().bench;
+    let bench = pad();
     let provenance = Provenance { source: String::new(), rows: 0, digests: vec![], seed: None };
     let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
     let recording = Recording { channels, kinds, rows: vec![], provenance };

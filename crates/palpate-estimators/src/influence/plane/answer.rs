@@ -2,9 +2,9 @@
 
 use super::modes::{MODE_THAT_MATTERS, Mode};
 use super::search::{Scratch, Search, Unknowns};
+use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::NORMAL_95;
-use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
 /// The estimate of one contact.
 ///

@@ -2,11 +2,11 @@
 
 use super::locator::PlaneLocator;
 use super::table::PlaneTable;
-use palpate_mechanics::contact::Position;
 use crate::influence::InfluenceConfig;
 use crate::influence::fitting::{InfluenceFitError, dead, force_belief};
 use crate::influence::learning::{Learnt, learn};
 use crate::method::FitTask;
+use palpate_mechanics::contact::Position;
 
 /// Fits the influence functions of a plane with a model; `None` when `keep_going` says no.
 pub(in crate::influence) fn fit_plane(

@@ -5,11 +5,11 @@
 use super::locator::PlaneLocator;
 use super::refine::solve;
 use super::search::Search;
-use palpate_mechanics::contact::Contact;
 use crate::influence::belief::ForceBelief;
-use palpate_mechanics::surface::Extent;
 use crate::method::{ContactFit, Geometry, Likelihood, Locate, PlaneLikelihood};
 use palpate_core::Estimate;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
 
 /// The likelihood of a [`PlaneLocator`], ready to be asked often.
 #[derive(Clone, Debug, PartialEq)]

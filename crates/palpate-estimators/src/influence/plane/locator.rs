@@ -3,10 +3,10 @@
 use super::answer::locate;
 use super::search::{Scratch, Search};
 use super::table::PlaneTable;
-use crate::setup::Bench;
 use crate::influence::belief::ForceBelief;
 use crate::influence::channels::{self, Channels};
 use crate::method::{Locate, LocatorFault};
+use crate::setup::Bench;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 

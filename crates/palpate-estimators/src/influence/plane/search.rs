@@ -8,8 +8,8 @@ use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::modes::{Block, Leaf};
 use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
-use palpate_mechanics::contact::{Contact, Position};
 use crate::influence::belief::ForceBelief;
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::chi_squared_bound;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.

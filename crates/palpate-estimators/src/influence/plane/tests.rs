@@ -2,25 +2,34 @@
 
 use super::*;
 use crate::arrangement::cells;
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
+use crate::fixtures::{Example, plate};
 use crate::influence::{ForceBelief, InfluenceConfig, InfluenceFitError, InfluenceSource};
-use palpate_mechanics::limit::{Force, Limit};
-use palpate_mechanics::surface::Extent;
 use crate::method::{FitTask, Locate};
 use crate::recording::Recording;
-use palpate_rig::Rig;
-use palpate_mechanics::sensing::{ChannelErrors, measure};
-use crate::simulate::{CleanSensors, simulate};
+use crate::setup::Bench;
+use crate::simulate::CleanSensors;
 use palpate_core::Status;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::surface::plate::PlateSpec;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-const PLATE: &str = include_str!("../../../../../examples/plate.toml");
-
-fn rig() -> Rig {
-    Rig::from_toml(PLATE).unwrap()
+fn rig() -> Example {
+    plate(PlateSpec::DEFAULT_ELEMENTS, NOISE)
 }
+
+const NOISE: ChannelModel = ChannelModel {
+    noise_sd: 5e-6,
+    resolution: 0.0,
+    gain_error: 0.0,
+    offset_error: 0.0,
+    position_error_m: 0.0,
+    range: None,
+    dead: false,
+};
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> PlaneLocator {
     config.fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
@@ -47,9 +56,9 @@ const CALIBRATIONS: u64 = 2;
 const SIDE: usize = 28;
 
 /// Locators from [`CALIBRATIONS`] calibrations with 5 N.
-fn calibrated(rig: &Rig, from: InfluenceSource) -> Vec<PlaneLocator> {
+fn calibrated(rig: &Example, from: InfluenceSource) -> Vec<PlaneLocator> {
     let config = InfluenceConfig { from, ..InfluenceConfig::default() };
-    (0..CALIBRATIONS).map(|seed| fit(config, &rig.bench, &simulate(rig, seed).unwrap())).collect()
+    (0..CALIBRATIONS).map(|seed| fit(config, &rig.bench, &rig.simulate(seed))).collect()
 }
 
 /// The same locator, to which nothing is known of the force.
@@ -71,7 +80,7 @@ struct Touch {
 }
 
 /// Touches of 5 N all over the inner 90 % of the plate.
-fn touches(rig: &Rig, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
+fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
     let limit = rig.bench.cramer_rao_bound().unwrap();
     let (clean, errors) = (sensors(&rig.bench), ChannelErrors::none(&rig.bench.layout));
     let mut scratch = PlaneScratch::default();
@@ -160,7 +169,7 @@ fn noisy(
 #[test]
 fn no_contact_and_two_contacts_are_no_single_contact() {
     let rig = rig();
-    let recording = simulate(&rig, 3).unwrap();
+    let recording = rig.simulate(3);
     let clean = sensors(&rig.bench);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(5.0), None] {
@@ -185,10 +194,12 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 
 #[test]
 fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
-    let text =
-        PLATE.replace("grid = [3, 3]", "positions = [[\"150 mm\", \"150 mm\"], [\"150 mm\", \"75 mm\"]]");
-    let rig = Rig::from_toml(&text).unwrap();
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let mut rig = rig();
+    rig.bench.layout.sensors.truncate(2);
+    for (sensor, y_m) in rig.bench.layout.sensors.iter_mut().zip([0.15, 0.075]) {
+        sensor.position = Position { x_m: 0.15, y_m };
+    }
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
     let clean = sensors(&rig.bench);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
     for _ in 0..20 {
@@ -205,7 +216,7 @@ fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
 #[test]
 fn absurd_readings_are_outside_the_model() {
     let rig = rig();
-    let known = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 0).unwrap());
+    let known = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(0));
     for locator in [&known, &without_force(&known)] {
         for loud in [1e3, 1e9, -1e150, 1e300, f64::MAX, -f64::MAX] {
             let mut one = [0.0; 9];
@@ -229,7 +240,7 @@ fn absurd_readings_are_outside_the_model() {
 #[test]
 fn a_dead_channel_is_left_out_and_the_last_is_kept() {
     let rig = rig();
-    let mut locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let mut locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
     let clean = sensors(&rig.bench);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     assert!(locator.leave_out(4));
@@ -243,9 +254,8 @@ fn a_dead_channel_is_left_out_and_the_last_is_kept() {
 
 #[test]
 fn faults_that_a_calibration_shows_are_corrected() {
-    let text =
-        PLATE.replace("noise = \"5 um\"", "noise = \"5 um\"\ngain_error = \"5 %\"\noffset_error = \"20 um\"");
-    let mut rig = Rig::from_toml(&text).unwrap();
+    let mut rig =
+        plate(PlateSpec::DEFAULT_ELEMENTS, ChannelModel { gain_error: 0.05, offset_error: 20e-6, ..NOISE });
     let told = rig.bench.clone();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
     for sensor in &mut rig.bench.layout.sensors {
@@ -255,7 +265,7 @@ fn faults_that_a_calibration_shows_are_corrected() {
     let limit = told.cramer_rao_bound().unwrap();
     let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
     let clean = sensors(&rig.bench);
-    let mut recording = simulate(&rig, 0).unwrap();
+    let mut recording = rig.simulate(0);
     for row in &mut recording.rows {
         let reading = clean.reading(Contact { position: row.position, force_n: 5.0 });
         row.reading = measure(&rig.bench.layout, &reading, &errors, &mut rng);
@@ -280,7 +290,7 @@ fn faults_that_a_calibration_shows_are_corrected() {
 #[test]
 fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let rig = rig();
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<PlaneLocator>(&json).unwrap(), locator);
     let replaced = [
@@ -298,7 +308,7 @@ fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
 #[test]
 fn what_a_plane_cannot_do_is_refused_in_words() {
     let rig = rig();
-    let mut recording = simulate(&rig, 1).unwrap();
+    let mut recording = rig.simulate(1);
     let refuse = |config: InfluenceConfig, recording: &Recording| {
         let task = FitTask { bench: &rig.bench, recording, seed: 0 };
         config.fit_plane(task, &mut || true).unwrap_err()

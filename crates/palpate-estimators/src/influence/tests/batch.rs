@@ -1,7 +1,7 @@
 //! A batch against readings one by one, and every instruction set against plain arrays.
 
-use super::{fit, noisy, rig};
-use crate::setup::Bench;
+use super::{fit, noisy};
+use crate::fixtures::paper;
 use crate::influence::InfluenceConfig;
 use crate::influence::answer::NOTHING;
 use crate::influence::batch::Rows;
@@ -9,7 +9,7 @@ use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;
 use crate::method::Locate;
-use crate::simulate::simulate;
+use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -35,7 +35,7 @@ fn readings(bench: &Bench) -> Vec<Vec<f64>> {
 
 /// The paper's bench with what is known of the force, and up to how many contacts.
 fn benches() -> Vec<(Bench, InfluenceConfig)> {
-    let bench = rig("5 um", 10).bench;
+    let bench = paper(5e-6, 10).bench;
     let unknown = Bench { force_n: None, ..bench.clone() };
     let config = InfluenceConfig::default();
     vec![
@@ -48,7 +48,7 @@ fn benches() -> Vec<(Bench, InfluenceConfig)> {
 
 #[test]
 fn a_batch_answers_as_readings_one_by_one_do() {
-    let recording = simulate(&rig("5 um", 10), 3).unwrap();
+    let recording = paper(5e-6, 10).simulate(3);
     let mut seen = Vec::new();
     for (bench, config) in benches() {
         let locator = fit(config, &bench, &recording);
@@ -70,7 +70,7 @@ fn a_batch_answers_as_readings_one_by_one_do() {
 
 #[test]
 fn every_instruction_set_answers_as_plain_arrays_do() {
-    let recording = simulate(&rig("5 um", 10), 3).unwrap();
+    let recording = paper(5e-6, 10).simulate(3);
     for (bench, config) in benches() {
         for dead in [None, Some(2)] {
             let mut locator = fit(config, &bench, &recording);
@@ -93,8 +93,8 @@ fn every_instruction_set_answers_as_plain_arrays_do() {
 
 #[test]
 fn a_batch_locates_as_many_as_there_are() {
-    let rig = rig("5 um", 2);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &simulate(&rig, 1).unwrap());
+    let rig = paper(5e-6, 2);
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
     assert!(matches!(locator.force(), ForceBelief::Known(_)));
     let mut estimates = vec![NOTHING; 3];
     let mut scratch = Scratch::default();

@@ -1,14 +1,14 @@
 //! The search against an exhaustive one: readings of every odd kind, and the misfit at two thousand places.
 
-use super::{clean, fit, noisy, rig};
-use crate::setup::Bench;
+use super::{clean, fit, noisy};
+use crate::fixtures::paper;
 use crate::influence::InfluenceConfig;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::Array;
 use crate::influence::scratch::Scratch;
 use crate::influence::search::{Minimum, Search};
 use crate::influence::table::InfluenceTable;
-use crate::simulate::simulate;
+use crate::setup::Bench;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -93,8 +93,8 @@ fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
 
 #[test]
 fn the_lowest_misfit_is_found_in_odd_readings() {
-    let recording = simulate(&rig("5 um", 10), 3).unwrap();
-    let bench = rig("5 um", 10).bench;
+    let recording = paper(5e-6, 10).simulate(3);
+    let bench = paper(5e-6, 10).bench;
     let unknown = Bench { force_n: None, ..bench.clone() };
     let config = InfluenceConfig::default();
     let believed = InfluenceConfig { force_sd_n: Some(0.5), ..config };

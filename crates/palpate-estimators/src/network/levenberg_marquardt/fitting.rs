@@ -4,11 +4,11 @@ use ndarray::Array2;
 
 use super::training::{Trained, Training};
 use super::{LevenbergMarquardtLocator, Member, NetworkInputs, OutputScale};
-use crate::setup::Bench;
 use crate::features::NoFeatures;
 use crate::method::{Fit, FitTask};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, TooFewPositions};
+use crate::setup::Bench;
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///

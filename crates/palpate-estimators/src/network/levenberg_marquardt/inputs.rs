@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
 use crate::method::LocatorFault;
-use palpate_numerics::symmetric_eigen;
 use crate::recording::Recording;
 use palpate_mechanics::sensing::Layout;
+use palpate_numerics::symmetric_eigen;
 
 /// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
 /// training recording.

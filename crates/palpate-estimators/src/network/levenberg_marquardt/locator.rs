@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::NetworkInputs;
 use super::perceptron::jacobians;
 use super::training::Trained;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::Extent;
 use crate::method::{Locate, LocatorFault};
 use crate::network::Topology;
+use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 
 /// Networks that locate; see [`LevenbergMarquardtConfig`](super::LevenbergMarquardtConfig).
 ///

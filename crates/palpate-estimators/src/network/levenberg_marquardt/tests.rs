@@ -5,14 +5,14 @@ use ndarray::Array2;
 use super::evidence::Hyperparameters;
 use super::perceptron::{jacobians, outputs};
 use super::*;
-use crate::setup::Bench;
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Beam, SurfaceSpec};
 use crate::method::{Fit, FitTask, Locate};
 use crate::network::{Activation, Topology};
-use palpate_numerics::Cholesky;
 use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, SensorKind, measure};
+use palpate_mechanics::surface::{Beam, SurfaceSpec};
+use palpate_numerics::Cholesky;
 use palpate_testing::data;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -76,7 +76,8 @@ fn bench(noise_sd: f64, force_n: Option<f64>) -> Bench {
 
 fn reading(bench: &Bench, x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     let model = bench.surface.model().unwrap();
-    let influence = |s: &palpate_mechanics::sensing::Sensor| model.influence(s.kind, s.position, Position::along(x_m));
+    let influence =
+        |s: &palpate_mechanics::sensing::Sensor| model.influence(s.kind, s.position, Position::along(x_m));
     let clean: Vec<f64> = bench.layout.sensors.iter().map(|s| force_n * influence(s)).collect();
     measure(&bench.layout, &clean, &ChannelErrors::none(&bench.layout), rng)
 }

@@ -1,27 +1,24 @@
 //! A plate in balance under a contact that slides over it, lets go and comes down again.
 
-use crate::setup::Bench;
-use palpate_mechanics::contact::{Contact, Position};
+use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{InfluenceConfig, InfluenceLocator, InfluenceSource, PlateLikelihood};
-use palpate_mechanics::surface::Motion;
 use crate::method::{Fit, FitTask, Likelihood, PlaneLikelihood};
-use palpate_rig::Rig;
-use crate::simulate::simulate;
+use crate::setup::Bench;
 use crate::tracking::tests::{Timed, timed_readings, wrongly_touching};
 use crate::tracking::{SmoothTracker, Tracker, TrackerConfig};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Motion;
 
-/// The example on a mesh that is solved at once.
-fn rig() -> Rig {
-    let text = include_str!("../../../../../examples/moving-plate.toml");
-    Rig::from_toml(&text.replacen("edges =", "elements = 24\nedges =", 1)).unwrap()
+fn rig() -> Example {
+    moving_plate()
 }
 
-fn likelihood(rig: &Rig, force_n: Option<f64>) -> PlateLikelihood {
+fn likelihood(rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
     likelihood_from(InfluenceConfig::default().from, rig, force_n)
 }
 
-fn likelihood_from(from: InfluenceSource, rig: &Rig, force_n: Option<f64>) -> PlateLikelihood {
-    let recording = simulate(rig, 1).unwrap();
+fn likelihood_from(from: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
+    let recording = rig.simulate(1);
     let bench = Bench { force_n, ..rig.bench.clone() };
     let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
     let config = InfluenceConfig { from, ..InfluenceConfig::default() };
@@ -31,7 +28,7 @@ fn likelihood_from(from: InfluenceSource, rig: &Rig, force_n: Option<f64>) -> Pl
     }
 }
 
-fn readings(rig: &Rig, motion: Motion, seed: u64) -> Vec<Timed> {
+fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
     timed_readings(rig, motion, 5.0, seed)
 }
 
@@ -62,7 +59,7 @@ fn errors(likelihood: &PlateLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 
 #[test]
 fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 0.3, passes: 2, ..rig.motion.unwrap().first.motion };
+    let motion = Motion { speed_m_per_s: 0.3, passes: 2, ..over_the_plate() };
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(5.0), 2.5, 4.0), (None, 2.5, 4.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
@@ -75,13 +72,7 @@ fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
 #[test]
 fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
-    let motion = Motion {
-        speed_m_per_s: 1.0,
-        passes: 2,
-        lifted_s: 0.2,
-        touch_s: 0.02,
-        ..rig.motion.unwrap().first.motion
-    };
+    let motion = Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..over_the_plate() };
     let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
@@ -114,7 +105,7 @@ fn what_calibration_leaves_falls_with_its_repeats() {
     let contact = Contact { position: Position { x_m: 0.12, y_m: 0.17 }, force_n: 5.0 };
     let left_m2 = |repeats: usize| {
         let mut rig = rig.clone();
-        rig.training.as_mut().unwrap().repeats = repeats;
+        rig.training.repeats = repeats;
         // Mechanics that is right leaves nothing uncertain; a recording alone does.
         let likelihood = likelihood_from(InfluenceSource::Recording, &rig, Some(5.0));
         let [[xx, xy, yy], second] = likelihood.calibration_m2(&[contact]);

@@ -3,8 +3,8 @@
 use super::beam::ModalBeam;
 use super::oscillator::{Oscillator, State};
 use crate::contact::{Contact, Position};
-use crate::surface::Surface;
 use crate::sensing::SensorKind;
+use crate::surface::Surface;
 
 /// The highest mode's force turns by at most this many radians in a step of the integration, so that between its ends it
 /// is as good as linear: its middle is off by 1/8 of the square, 10⁻⁵.

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::contact::{Contact, Position};
-use crate::surface::{Beam, Surface};
 use crate::sensing::SensorKind::{self, Deflection, Reaction, Slope, Strain};
+use crate::surface::{Beam, Surface};
 
 /// The founding paper's beam, of steel.
 fn paper(damping_ratio: f64) -> ModalBeam {

@@ -5,8 +5,8 @@ use super::error::PlateError;
 use super::mesh::{Mesh, NODE_DEGREES};
 use super::spec::{Edge, PlateSpec, PointSupport, PointSupportKind};
 use crate::contact::Position;
-use crate::surface::{NothingToRead, first_not_positive};
 use crate::sensing::SensorKind;
+use crate::surface::{NothingToRead, first_not_positive};
 
 /// The fewest and the most elements along the longer side.
 const FEWEST_ELEMENTS: usize = 4;

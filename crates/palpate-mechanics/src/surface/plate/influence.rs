@@ -6,8 +6,8 @@ use super::solved::Solved;
 use super::spec::{PlateSpec, PointSupportKind};
 use super::{check, spec};
 use crate::contact::Position;
-use crate::surface::InfluenceFunction;
 use crate::sensing::SensorKind;
+use crate::surface::InfluenceFunction;
 
 /// Bicubic patches over the plate, with their own degrees of freedom.
 ///

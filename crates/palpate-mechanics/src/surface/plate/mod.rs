@@ -25,10 +25,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Extent, InfluenceFunction, NothingToRead, Surface};
 use crate::contact::Position;
-use palpate_numerics::EliminationOrder;
 use crate::sensing::SensorKind;
 use full_scale::FullScales;
 use influence::{NotANumber, PlateInfluence};
+use palpate_numerics::EliminationOrder;
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -57,6 +57,29 @@ impl Plate {
     pub fn new(spec: PlateSpec) -> Result<Self, PlateError> {
         check::check(&spec)?;
         Ok(Self { spec, computed: Arc::default() })
+    }
+
+    /// A plate of this length, width and thickness, in metres, Young's modulus, in pascals, and Poisson's ratio, simply
+    /// supported along all edges.
+    ///
+    /// # Errors
+    /// [`PlateError`] as for [`Plate::new`].
+    pub fn simply_supported(
+        (length_m, width_m): (f64, f64),
+        thickness_m: f64,
+        youngs_modulus_pa: f64,
+        poissons_ratio: f64,
+    ) -> Result<Self, PlateError> {
+        Self::new(PlateSpec {
+            length_m,
+            width_m,
+            thickness_m,
+            youngs_modulus_pa,
+            poissons_ratio,
+            edges: Edges::all(Edge::Simple),
+            supports: Vec::new(),
+            elements: PlateSpec::DEFAULT_ELEMENTS,
+        })
     }
 
     /// What it is.

@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 
 use super::residual_figure;
-use palpate_mechanics::contact::Position;
-use palpate_estimators::estimator::Resolution;
-use palpate_mechanics::surface::UniformLoad;
 use crate::numbers::mm;
 use crate::page::Figure;
 use crate::profile_report::ProfileReport;
 use crate::{HeatMap, HeatPanel, heat_map_to_svg};
+use palpate_estimators::estimator::Resolution;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::UniformLoad;
 
 /// Places whose averaging kernels are drawn, as shares of length and width.
 const KERNEL_PLACES: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1, 0.5]];

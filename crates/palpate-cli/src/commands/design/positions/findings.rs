@@ -1,8 +1,8 @@
 //! Training positions as JSON.
 
 use super::Outcome;
-use palpate_mechanics::contact::Position;
 use palpate_design::positions::{Placed, Placement};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 
 /// What is printed as JSON.

@@ -4,8 +4,8 @@ use super::Outcome;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::table;
-use palpate_mechanics::contact::in_words;
 use palpate_design::positions::{Placed, Placement, best_placed};
+use palpate_mechanics::contact::in_words;
 use palpate_mechanics::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
