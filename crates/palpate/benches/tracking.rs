@@ -6,7 +6,6 @@ use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, Tra
 use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
-use palpate_estimators::simulate::{simulate, simulate_moving};
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;

@@ -8,7 +8,7 @@ use crate::influence::batch::Rows;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;
-use crate::method::Locate;
+use crate::fit::Locate;
 use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
 use rand::SeedableRng;

@@ -1,6 +1,6 @@
 //! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
 
-use super::covered;
+use crate::evaluation::covered;
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
     TrackerConfig,
