@@ -67,7 +67,11 @@ impl<'a> Watch<'a> {
         self.report(Progress::Stage { name, share })
     }
 
-    fn report(&self, progress: Progress) -> Result<(), Cancelled> {
+    /// Reports any progress.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the work is to stop.
+    pub fn report(&self, progress: Progress) -> Result<(), Cancelled> {
         match self.observe {
             Some(observe) if !observe(progress) => Err(Cancelled),
             _ => Ok(()),

@@ -1,7 +1,7 @@
 //! Calibrating a centroid by least squares.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use ndarray::{Array1, Array2};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::{CentroidLocator, Weighing};
 use crate::fit::{ChannelMismatch, Fit, FitTask};

@@ -1,11 +1,11 @@
 //! What the closed form asks of a bench.
 
-use palpate_numerics::watch::Cancelled;
 use super::ClosedFormLocator;
 use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::SurfaceSpec;
+use palpate_numerics::watch::Cancelled;
 
 /// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
 ///

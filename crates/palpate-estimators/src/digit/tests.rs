@@ -1,8 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::fit::Fit;
 use crate::estimator::{ContactEstimate, EstimatorConfig, Locator, Method, Status};
+use crate::fit::Fit;
 use crate::fixtures;
 use crate::setup::Bench;
 use crate::simulate::{clean_reading, simulate_at};
@@ -276,8 +276,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
         from: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()
     });
-    let locator =
-        config.fit(&rig.bench, &recording).unwrap();
+    let locator = config.fit(&rig.bench, &recording).unwrap();
     let limit = rig.bench.cramer_rao_bound().unwrap();
     let positions: Vec<Position> =
         (0..200).map(|i| Position::along(0.03 + 0.09 * f64::from(i) / 200.0)).collect();

@@ -3,9 +3,9 @@
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
 use crate::digit::{DigitLocator, DigitShape};
+use crate::fit::{Fitted, Locate, LocatorFault};
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
-use crate::fit::{Fitted, Locate, LocatorFault};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
 use crate::setup::Bench;
@@ -80,6 +80,16 @@ impl Method {
             Self::Neighbours(neighbours) => neighbours,
             Self::Centroid(centroid) => centroid,
         }
+    }
+}
+
+impl<M> Fitted<M>
+where
+    Method: From<M>,
+{
+    /// The same locator as one of any estimator.
+    pub fn into_locator(self) -> Locator {
+        self.map(Method::from)
     }
 }
 

@@ -11,8 +11,8 @@ pub use statistics::{Spread, percentile};
 pub use trial::{Trial, Tried, try_estimator};
 
 use crate::fit::{Fitted, Locate, ReadingError};
-use palpate_core::ContactEstimate;
 use crate::recording::Recording;
+use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 

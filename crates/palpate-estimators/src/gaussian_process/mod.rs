@@ -7,11 +7,11 @@
 mod fitting;
 mod locator;
 
-use crate::fit::ChannelMismatch;
-use palpate_numerics::watch::Cancelled;
 use crate::features::{FeatureKind, NoFeatures};
+use crate::fit::ChannelMismatch;
 use crate::recording::TooFewPositions;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
+use palpate_numerics::watch::Cancelled;
 
 pub use locator::GaussianProcessLocator;
 

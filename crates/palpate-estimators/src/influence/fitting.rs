@@ -1,6 +1,5 @@
 //! Why a fit fails; and from presses to a table of influence functions along a line.
 
-use palpate_numerics::watch::Cancelled;
 use super::belief::ForceBelief;
 use super::channels::Channels;
 use super::config::InfluenceConfig;
@@ -12,6 +11,7 @@ use crate::fit::{ChannelMismatch, FitTask};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::watch::Cancelled;
 
 /// Why influence functions cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,10 +79,7 @@ pub enum InfluenceFitError {
 }
 
 /// Fits the influence functions of a one-dimensional surface with a model.
-pub(super) fn fit_modelled(
-    config: InfluenceConfig,
-    task: FitTask,
-) -> Result<BeamLocator, InfluenceFitError> {
+pub(super) fn fit_modelled(config: InfluenceConfig, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
     let sensors = task.bench.layout.len();
     let mut table = empty_table(sensors, task.bench.surface.extent().length_m);
     let places = around_nodes(&table);

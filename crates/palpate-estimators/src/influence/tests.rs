@@ -2,8 +2,8 @@ mod batch;
 mod reference;
 
 use super::*;
-use crate::fixtures::{faulty_paper, paper};
 use crate::fit::Locate;
+use crate::fixtures::{faulty_paper, paper};
 use crate::recording::Recording;
 use crate::setup::Bench;
 use crate::simulate::{clean_reading, displaced};

@@ -1,6 +1,5 @@
 //! Choosing how many neighbours to ask.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use super::search::{means, nearest};
 use super::{Neighbour, NeighboursLocator};
 use crate::features::{FeatureKind, Features, NoFeatures};
@@ -8,6 +7,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::held_out::HeldOutSpread;
 use crate::recording::{Row, TooFewPositions};
 use palpate_mechanics::contact::Position;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
 /// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
@@ -68,11 +68,7 @@ impl Fit for NeighboursConfig {
 }
 
 /// Errors (x, y) in metres of every row by 1, 2, … neighbours at other positions, up to `most` or as many as every row has.
-fn held_out_errors(
-    rows: &[Neighbour],
-    most: usize,
-    watch: Watch,
-) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
+fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
     for (i, row) in rows.iter().enumerate() {
         watch.round()?;

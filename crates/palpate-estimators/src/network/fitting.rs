@@ -1,14 +1,14 @@
 //! From a recording to training patterns, and from trained weights to a locator.
 
-use palpate_numerics::watch::Cancelled;
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use super::{
-    InputScale, InstructionSet, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
-    TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
+    InputScale, InstructionSet, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns,
+    Topology, TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
 };
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use crate::network::locator::ChannelScaling;
 use crate::recording::Recording;
 use palpate_mechanics::surface::{Extent, Surface};
+use palpate_numerics::watch::Cancelled;
 
 /// Why a network cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

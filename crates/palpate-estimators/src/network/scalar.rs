@@ -12,9 +12,9 @@
 //!
 //! `V` is one lane of the arithmetic that the SIMD lanes have, so that both round alike.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use super::lanes::{Lanes, OrderDrawer, Real, Streams, activate, derivative};
 use super::{PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Trains the network of one seed; `watch` is told of every epoch.
 #[inline(always)]

@@ -1,8 +1,8 @@
 //! The trainer's two doors: one network, or many side by side.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use super::lanes::{InstructionSet, Precision, train_lanes, train_scalar};
 use super::{BackPropagation, Patterns, Topology, TrainedNetwork};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// What every network of a group is trained on.
 #[derive(Clone, Copy, Debug)]

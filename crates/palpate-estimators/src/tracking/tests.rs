@@ -4,9 +4,9 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::fit::FitTask;
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, InfluenceConfig};
-use crate::fit::FitTask;
 use crate::likelihood::{Likelihood, LineLikelihood};
 use crate::setup::Bench;
 use crate::simulate::{CleanSensors, clean_reading};

@@ -47,11 +47,7 @@ impl Regression {
     ///
     /// # Errors
     /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
-    pub fn fit(
-        &self,
-        samples: Samples,
-        watch: Watch,
-    ) -> Result<GaussianProcess, RegressionError> {
+    pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::of(samples)?;
         let found = self.search(&groups, watch)?;
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found)
@@ -61,11 +57,7 @@ impl Regression {
     ///
     /// # Errors
     /// [`RegressionError`], with the row or value that no regression can use.
-    pub fn fit_each(
-        &self,
-        samples: Samples,
-        watch: Watch,
-    ) -> Result<Vec<GaussianProcess>, RegressionError> {
+    pub fn fit_each(&self, samples: Samples, watch: Watch) -> Result<Vec<GaussianProcess>, RegressionError> {
         let mut processes = Vec::with_capacity(samples.outputs.ncols());
         for column in samples.outputs.axis_chunks_iter(Axis(1), 1) {
             processes.push(self.fit(Samples { outputs: column, ..samples }, watch)?);

@@ -1,11 +1,11 @@
 //! How the surface is to be learnt, and why it cannot be.
 
-use crate::fit::ChannelMismatch;
-use palpate_numerics::watch::Cancelled;
 use super::Scale;
+use crate::fit::ChannelMismatch;
 use crate::recording::TooFewPositions;
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
+use palpate_numerics::watch::Cancelled;
 
 /// How readings are to be learnt as a function of position and hidden coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -51,8 +51,7 @@ impl Fit for MeasuredConfig {
         let axes = presses.axes(&process, bench);
         let coarse = presses.table(axes, &process, &whitening, watch)?;
         let finer = presses.finer(axes, coarse.too_coarse());
-        let table =
-            if finer == axes { coarse } else { presses.table(finer, &process, &whitening, watch)? };
+        let table = if finer == axes { coarse } else { presses.table(finer, &process, &whitening, watch)? };
         // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
         let factor = table.too_coarse();
         let (table, whitening) = (table.widened(factor), whitening.widened(factor));

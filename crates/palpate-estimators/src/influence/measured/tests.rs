@@ -10,9 +10,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad, strip};
 use crate::influence::{InfluenceConfig, InfluenceSource};
-use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;

@@ -2,10 +2,10 @@
 
 use super::locator::PlaneLocator;
 use super::table::PlaneTable;
+use crate::fit::FitTask;
 use crate::influence::InfluenceConfig;
 use crate::influence::fitting::{InfluenceFitError, dead, force_belief};
 use crate::influence::learning::{Learnt, learn};
-use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 
 /// Fits the influence functions of a plane with a model.

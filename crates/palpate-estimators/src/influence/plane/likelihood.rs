@@ -5,8 +5,8 @@
 use super::locator::PlaneLocator;
 use super::refine::solve;
 use super::search::Search;
-use crate::influence::belief::ForceBelief;
 use crate::fit::Locate;
+use crate::influence::belief::ForceBelief;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, PlaneLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::arrangement::cells;
+use crate::fit::{FitTask, Locate};
 use crate::fixtures::{Example, plate};
 use crate::influence::{ForceBelief, InfluenceConfig, InfluenceFitError, InfluenceSource};
-use crate::fit::{FitTask, Locate};
 use crate::recording::Recording;
 use crate::setup::Bench;
 use crate::simulate::CleanSensors;

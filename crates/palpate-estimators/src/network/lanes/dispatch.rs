@@ -1,11 +1,11 @@
 //! Picks the widest arithmetic that the machine has, when the program runs.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use super::forward::{self, Batch};
 use super::portable::Array;
 use super::single::{self, Layer};
 use super::{Lanes, kernel};
-use crate::network::{TrainingQueue, TrainedNetwork, TrainingTask, scalar};
+use crate::network::{TrainedNetwork, TrainingQueue, TrainingTask, scalar};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Width of a floating-point number in training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -92,7 +92,9 @@ pub(crate) fn train_lanes(
     match (set, precision) {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
-        (InstructionSet::Avx512, Precision::F64) => unsafe { avx512::<super::avx512::F64x8, 8>(task, queue, watch) },
+        (InstructionSet::Avx512, Precision::F64) => unsafe {
+            avx512::<super::avx512::F64x8, 8>(task, queue, watch)
+        },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
         (InstructionSet::Avx512, Precision::F32) => unsafe {
@@ -130,7 +132,11 @@ pub(crate) fn train_scalar(
 /// The machine must have AVX-512 F and DQ.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,fma")]
-unsafe fn avx512<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn TrainingQueue, watch: Watch) -> Result<(), Cancelled> {
+unsafe fn avx512<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     kernel::train::<V, N>(task, queue, watch)
 }
 
@@ -138,18 +144,30 @@ unsafe fn avx512<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut d
 /// The machine must have AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn fma<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn TrainingQueue, watch: Watch) -> Result<(), Cancelled> {
+unsafe fn fma<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     kernel::train::<V, N>(task, queue, watch)
 }
 
 /// The kernel where the compiler may use the machine's multiply-add. Call it only where [`has_fma`].
-fn fused<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn TrainingQueue, watch: Watch) -> Result<(), Cancelled> {
+fn fused<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     #[cfg(target_arch = "x86_64")]
     {
         /// # Safety
         /// The machine must have FMA.
         #[target_feature(enable = "fma")]
-        unsafe fn inner<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn TrainingQueue, watch: Watch) -> Result<(), Cancelled> {
+        unsafe fn inner<V: Lanes<N>, const N: usize>(
+            task: &TrainingTask,
+            queue: &mut dyn TrainingQueue,
+            watch: Watch,
+        ) -> Result<(), Cancelled> {
             kernel::train::<V, N>(task, queue, watch)
         }
         // SAFETY: the caller has asked `has_fma`.

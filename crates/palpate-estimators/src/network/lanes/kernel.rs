@@ -8,17 +8,22 @@
 //! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use super::order::{OrderDrawer, Streams};
 use super::{Lanes, Real, Table, logistic};
 use crate::network::{
-    Activation, BackPropagation, PresentationOrder, TrainingQueue, TrainedNetwork, TrainingOutcome, TrainingTask,
+    Activation, BackPropagation, PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingQueue,
+    TrainingTask,
 };
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::mem::swap;
 
 /// Trains every network of the queue. A lane whose network has finished takes the next seed.
 #[inline(always)]
-pub(super) fn train<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn TrainingQueue, watch: Watch) -> Result<(), Cancelled> {
+pub(super) fn train<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let topology = task.topology;
     let one_hidden_layer = topology.layers() == 2;
     if one_hidden_layer && topology.row_len(0) == 9 && topology.row_len(1) == 11 {

@@ -1,7 +1,7 @@
 //! From a recording to an ensemble of networks.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use ndarray::Array2;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::training::{Trained, Training};
 use super::{LevenbergMarquardtLocator, Member, NetworkInputs, OutputScale};

@@ -1,7 +1,7 @@
 //! Derivatives against differences, evidence against a line's closed form, and the paper's beam.
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use ndarray::Array2;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::evidence::Hyperparameters;
 use super::perceptron::{jacobians, outputs};

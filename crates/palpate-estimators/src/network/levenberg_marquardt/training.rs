@@ -1,7 +1,7 @@
 //! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994).
 
-use palpate_numerics::watch::{Cancelled, Watch};
 use ndarray::{Array1, Array2, Axis};
+use palpate_numerics::watch::{Cancelled, Watch};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,8 +1,8 @@
 //! A plate in balance under a contact that slides over it, lets go and comes down again.
 
+use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{InfluenceConfig, InfluenceLocator, InfluenceSource, PlateLikelihood};
-use crate::fit::{Fit, FitTask};
 use crate::likelihood::{Likelihood, PlaneLikelihood};
 use crate::setup::Bench;
 use crate::tracking::tests::{Timed, timed_readings, wrongly_touching};
