@@ -1,14 +1,12 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
-mod cross_validation;
 mod limit_ratio;
 mod statistics;
 mod trial;
 
-pub use cross_validation::{CrossValidationError, cross_validate};
 pub use limit_ratio::limit_ratio;
 pub use statistics::{Spread, percentile};
-pub use trial::{Trial, Tried, try_estimator};
+pub use trial::{CrossValidationError, Trial, Tried, cross_validate, try_estimator};
 
 use crate::fit::{Fitted, Locate, ReadingError};
 use crate::recording::Recording;
