@@ -1,13 +1,16 @@
 //! What can be wrong with a rig file, where, and what would help.
 
+use std::fmt::Display;
 use std::ops::Range;
 
+use serde::de::{Expected, Unexpected};
+
+use super::document::Place;
 use crate::arrangement::ArrangementError;
 use crate::contact::Position;
 use crate::mechanics::modal::ModalBeamError;
 use crate::mechanics::{BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError};
 use crate::sensing::SensorKind;
-use crate::units::UnitError;
 
 /// A rig file, or a section of one in a study, that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,13 +28,15 @@ pub enum RigProblem {
     /// The text is not TOML, or a value has the wrong type.
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
-    /// A key that no section has, or not this one.
-    #[error("unknown key `{key}`{}", suggestion(key, known.iter().map(String::as_str)))]
+    /// A key that the section does not have.
+    #[error("{}", unknown_key(key, known, with.as_deref()))]
     UnknownKey {
         /// The key.
         key: String,
         /// The keys that can stand there.
-        known: Vec<String>,
+        known: Vec<&'static str>,
+        /// What of the section leaves it with these keys, where it has others too: `kind = "beam"`.
+        with: Option<String>,
     },
     /// A section is missing.
     #[error("there is no section [{section}]")]
@@ -40,48 +45,48 @@ pub enum RigProblem {
         section: &'static str,
     },
     /// A section lacks a key.
-    #[error("[{section}] has no `{key}`")]
+    #[error("{} has no `{key}`", if section.is_empty() { "the file".to_owned() } else { format!("[{section}]") })]
     MissingKey {
-        /// The section.
-        section: &'static str,
+        /// The section and those around it, as in `surface.supports`; empty for the file itself.
+        section: String,
         /// The key.
-        key: &'static str,
+        key: String,
     },
     /// A key that means nothing beside another one.
     #[error("`{key}` does not go with {with}")]
     UnusedKey {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What it does not go with.
-        with: &'static str,
+        with: String,
     },
     /// A word that the key cannot be.
-    #[error("`{key}` is `{word}`{}", suggestion(word, known.iter().copied()))]
+    #[error("`{key}` is `{word}`{}", suggestion(word, known))]
     UnknownWord {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What it is.
         word: String,
         /// What it can be.
         known: Vec<&'static str>,
     },
-    /// A text that is not the quantity which the key wants.
-    #[error("`{key}`: {error}")]
-    Unit {
+    /// A text that is not what the key wants, such as a quantity in another unit.
+    #[error("`{key}`: {reason}")]
+    Invalid {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What is wrong with it.
-        error: UnitError,
+        reason: String,
     },
     /// A number outside its bound.
     #[error("`{key}` is {value}; it must be {bound}")]
     OutOfRange {
         /// The key.
-        key: &'static str,
+        key: String,
         /// Its value, as written.
         value: String,
         /// What it must be.
-        bound: &'static str,
+        bound: String,
     },
     /// A beam that cannot be computed.
     #[error(transparent)]
@@ -181,7 +186,7 @@ pub enum RigProblem {
     )]
     Coordinates {
         /// Where it stands.
-        key: &'static str,
+        key: String,
         /// What is there.
         found: &'static str,
         /// Whether the surface has a width.
@@ -195,7 +200,7 @@ pub enum RigProblem {
     )]
     PlaceOffSurface {
         /// The key.
-        key: &'static str,
+        key: String,
         /// Where it is.
         position: Position,
         /// The surface.
@@ -258,7 +263,7 @@ pub enum RigProblem {
     #[error("`{key}` lists {listed}, but there are {sensors} sensors; they must be as many")]
     ChannelCount {
         /// The key.
-        key: &'static str,
+        key: String,
         /// How many it lists.
         listed: usize,
         /// How many sensors there are.
@@ -294,10 +299,11 @@ impl RigError {
     /// What would help, where more can be said than the message does.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
-            RigProblem::UnknownKey { key, known } => closest(key, known.iter().map(String::as_str))
-                .map(|_| format!("known keys: {}", known.join(", "))),
+            RigProblem::UnknownKey { key, known, .. } => {
+                closest(key, known).map(|_| format!("known keys: {}", known.join(", ")))
+            }
             RigProblem::UnknownWord { word, known, .. } => {
-                closest(word, known.iter().copied()).map(|_| format!("it can be: {}", known.join(", ")))
+                closest(word, known).map(|_| format!("it can be: {}", known.join(", ")))
             }
             RigProblem::MissingSection { section } => Some(format!("add a section [{section}]")),
             RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
@@ -324,26 +330,91 @@ impl RigError {
         }
     }
 
-    /// The error for a document that is not even a set of sections.
-    pub(crate) fn from_toml(error: toml::de::Error) -> Self {
-        let span = error.span();
-        let problem = match unknown_key(error.message()) {
-            Some((key, known)) => RigProblem::UnknownKey { key, known },
-            None => RigProblem::Toml(error),
+    /// Names the value that a type has refused, unless a value within it has been named already.
+    pub(super) fn within(mut self, place: &Place) -> Self {
+        if self.span.is_some() {
+            return self;
+        }
+        match &mut *self.problem {
+            RigProblem::OutOfRange { key, value, .. } => {
+                place.key().clone_into(key);
+                place.written().clone_into(value);
+            }
+            RigProblem::UnknownWord { key, .. } | RigProblem::Invalid { key, .. } => {
+                place.key().clone_into(key);
+            }
+            RigProblem::MissingKey { section, .. } => place.path().clone_into(section),
+            _ => {}
+        }
+        // What the file itself lacks is nowhere.
+        self.span = (!place.path().is_empty()).then(|| place.span.clone());
+        self
+    }
+
+    /// Names the place of a key that a table has refused, and what tells the table's keys.
+    pub(super) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
+        if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
+            known.insert(0, key);
+            *with = Some(format!("{key} = \"{word}\""));
+        }
+        self.span = Some(span);
+        self
+    }
+}
+
+impl From<RigProblem> for RigError {
+    /// The problem, of something that is nowhere.
+    fn from(problem: RigProblem) -> Self {
+        Self { problem: Box::new(problem), span: None }
+    }
+}
+
+/// What types refuse; [`RigError::within`] says where.
+impl serde::de::Error for RigError {
+    fn custom<T: Display>(reason: T) -> Self {
+        RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.into()
+    }
+
+    fn invalid_type(_: Unexpected, expected: &dyn Expected) -> Self {
+        let expected = expected.to_string();
+        let bound = match expected.as_str() {
+            "a sequence" => "a list",
+            "a boolean" => "true or false",
+            "a string" => "a text",
+            "i64" => "a whole number",
+            "f64" => "a number",
+            words if words.starts_with("struct ") || words.starts_with("enum ") => "a table",
+            words => words,
         };
-        Self { problem: Box::new(problem), span }
+        let bound = bound.to_owned();
+        RigProblem::OutOfRange { key: String::new(), value: String::new(), bound }.into()
+    }
+
+    fn invalid_value(unexpected: Unexpected, expected: &dyn Expected) -> Self {
+        Self::invalid_type(unexpected, expected)
+    }
+
+    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
+        Self::invalid_type(Unexpected::Seq, expected)
+    }
+
+    fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownWord { key: String::new(), word: word.to_owned(), known: known.to_vec() }.into()
+    }
+
+    fn unknown_field(key: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownKey { key: key.to_owned(), known: known.to_vec(), with: None }.into()
+    }
+
+    fn missing_field(key: &'static str) -> Self {
+        RigProblem::MissingKey { section: String::new(), key: key.to_owned() }.into()
     }
 }
 
 impl RigProblem {
     /// This problem, at a place of the document.
-    pub(crate) fn at(self, span: Range<usize>) -> RigError {
-        RigError { problem: Box::new(self), span: Some(span) }
-    }
-
-    /// This problem, of something that is not there.
-    pub(crate) fn nowhere(self) -> RigError {
-        RigError { problem: Box::new(self), span: None }
+    pub(super) fn at(self, place: &Place) -> RigError {
+        RigError { problem: Box::new(self), span: Some(place.span.clone()) }
     }
 }
 
@@ -357,24 +428,26 @@ fn force_takers(extent: Extent, supports: &[Position]) -> String {
     }
 }
 
-/// The key and the known keys, from serde's words "unknown field `a`, expected one of `b`, `c`".
-fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
-    let rest = message.strip_prefix("unknown field `")?;
-    let (key, known) = rest.split_once("`, expected ")?;
-    let known = known.split('`').skip(1).step_by(2).map(str::to_owned).collect();
-    Some((key.to_owned(), known))
+fn unknown_key(key: &str, known: &[&'static str], with: Option<&str>) -> String {
+    match with {
+        Some(with) if closest(key, known).is_none() => {
+            format!("`{key}` does not go with {with}; known are {}", known.join(", "))
+        }
+        _ => format!("unknown key `{key}`{}", suggestion(key, known)),
+    }
 }
 
 /// ", did you mean `x`?" for the known word closest to `word`, or what is known where none is close.
-fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    match closest(word, known.clone()) {
+fn suggestion(word: &str, known: &[&'static str]) -> String {
+    match closest(word, known) {
         Some(other) => format!(", did you mean `{other}`?"),
-        None => format!("; known are {}", known.collect::<Vec<_>>().join(", ")),
+        None => format!("; known are {}", known.join(", ")),
     }
 }
 
 /// The known word that is a slip of the pen away: one edit, and one more for every four letters.
-fn closest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let (distance, other) = known.map(|other| (strsim::damerau_levenshtein(word, other), other)).min()?;
+fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
+    let (distance, other) =
+        known.iter().map(|other| (strsim::damerau_levenshtein(word, other), *other)).min()?;
     (distance <= 1 + word.chars().count() / 4).then_some(other)
 }

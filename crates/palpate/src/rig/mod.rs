@@ -1,21 +1,24 @@
 //! The rig file: one TOML document that says what is on the bench.
 
+mod design;
+mod document;
 mod error;
-mod sections;
+mod estimator;
+mod file;
+mod motion;
+mod recording;
 mod sensor_design;
-mod validate;
-mod value;
+mod sensors;
+mod study;
+mod surface;
+mod training;
+mod values;
 
 pub use error::{RigError, RigProblem};
-pub(crate) use sections::{
-    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection,
-    TrainingSection,
-};
 pub use sensor_design::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
-pub(crate) use validate::validate;
-pub(crate) use value::{RawQuantity, choice, count, positive};
+pub use study::{Arm, AskedLayout, Judging, Study, StudyError, StudyProblem};
 
 use crate::arrangement::{Arrangement, ArrangementError};
 use crate::bench::Bench;
@@ -116,14 +119,6 @@ impl Rig {
     pub fn pressed_bench(&self) -> Bench {
         let force_n = self.training.as_ref().and_then(|training| training.force_n);
         Bench { force_n: force_n.or(self.bench.force_n), ..self.bench.clone() }
-    }
-
-    /// Reads a rig file.
-    ///
-    /// # Errors
-    /// [`RigError`], with the place in `text`, the value and its bound.
-    pub fn from_toml(text: &str) -> Result<Self, RigError> {
-        validate(&toml::from_str(text).map_err(RigError::from_toml)?)
     }
 }
 

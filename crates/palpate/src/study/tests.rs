@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::design::sensors::DesignError;
+use crate::evaluation::Portion;
 use crate::limit::Force;
 use crate::network::InstructionSet;
 use crate::sensing::SensorKind;
