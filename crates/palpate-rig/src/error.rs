@@ -1,0 +1,289 @@
+//! What can be wrong with a rig or study file, where, and what would help.
+
+use std::fmt::Display;
+use std::ops::Range;
+
+use palpate_estimators::arrangement::ArrangementError;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::modal::ModalBeamError;
+use palpate_mechanics::surface::{
+    BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError,
+};
+use serde::de::{Expected, Unexpected};
+
+use crate::document::Place;
+
+/// A rig or study file that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{problem}")]
+pub struct RigError {
+    /// What is wrong.
+    pub problem: Box<RigProblem>,
+    /// The bytes of the document that are meant; `None` when something is not there at all.
+    pub span: Option<Range<usize>>,
+}
+
+/// What is wrong with a rig or study file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RigProblem {
+    /// The text is not TOML.
+    #[error("{}", .0.message())]
+    Toml(toml::de::Error),
+    /// A section is missing.
+    #[error("there is no section {section}")]
+    MissingSection {
+        /// Its name in brackets.
+        section: &'static str,
+    },
+    /// A section lacks a key.
+    #[error("{} has no `{key}`", if section.is_empty() { "the file".to_owned() } else { format!("[{section}]") })]
+    MissingKey {
+        /// The section and those around it, as in `surface.supports`; empty for the file itself.
+        section: String,
+        /// The key.
+        key: String,
+    },
+    /// A key that the section does not have.
+    #[error("{}", unknown_key(key, known, with.as_deref()))]
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// The keys that can stand there.
+        known: Vec<&'static str>,
+        /// What leaves the section with these keys, where it can have others: `kind = "beam"`.
+        with: Option<String>,
+    },
+    /// A key that means nothing beside what else is written.
+    #[error("`{key}` does not go with {with}")]
+    UnusedKey {
+        /// The key.
+        key: String,
+        /// What it does not go with.
+        with: String,
+    },
+    /// A word that the key cannot be.
+    #[error("`{key}` is `{word}`{}", suggestion(word, known))]
+    UnknownWord {
+        /// The key.
+        key: String,
+        /// What it is.
+        word: String,
+        /// What it can be.
+        known: Vec<&'static str>,
+    },
+    /// A text that is not what the key wants, such as a quantity in another unit.
+    #[error("`{key}`: {reason}")]
+    Invalid {
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A value outside its bound.
+    #[error("`{key}` is {value}; it must be {bound}")]
+    OutOfRange {
+        /// The key.
+        key: String,
+        /// Its value, as written.
+        value: String,
+        /// What it must be.
+        bound: String,
+    },
+    /// A beam that cannot be computed.
+    #[error(transparent)]
+    Beam(BeamError),
+    /// A beam on supports that cannot be computed.
+    #[error(transparent)]
+    SupportedBeam(SupportedBeamError),
+    /// A plate that cannot be computed.
+    #[error(transparent)]
+    Plate(PlateError),
+    /// A digit that cannot be computed.
+    #[error(transparent)]
+    Digit(DigitError),
+    /// A beam whose motion cannot be computed.
+    #[error(transparent)]
+    ModalBeam(ModalBeamError),
+    /// Training positions that cannot be laid out.
+    #[error(transparent)]
+    Arrangement(ArrangementError),
+    /// A sensor that reads nothing, wherever the surface is touched.
+    #[error(
+        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        extent.place_in_words(*position)
+    )]
+    NothingToRead {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+        /// Why.
+        reason: NothingToRead,
+    },
+    /// A reaction sensor where nothing supports the surface.
+    #[error(
+        "reaction sensor {number} is at {}, where no support takes up force; {}",
+        extent.place_in_words(*position),
+        force_takers(*extent, supports)
+    )]
+    NoSupport {
+        /// Which sensor of its section, from 1.
+        number: usize,
+        /// Where it is.
+        position: Position,
+        /// Where supports take up force.
+        supports: Vec<Position>,
+        /// The surface.
+        extent: Extent,
+    },
+    /// The rig is to be simulated, but its force is unknown.
+    #[error(
+        "the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`"
+    )]
+    NoForce,
+}
+
+impl RigError {
+    /// What would help, where more can be said than the message does.
+    pub fn help(&self) -> Option<String> {
+        match &*self.problem {
+            RigProblem::UnknownKey { key, known, .. } => {
+                closest(key, known).map(|_| format!("known keys: {}", known.join(", ")))
+            }
+            RigProblem::UnknownWord { word, known, .. } => {
+                closest(word, known).map(|_| format!("it can be: {}", known.join(", ")))
+            }
+            RigProblem::MissingSection { section } => Some(format!("add a section {section}")),
+            RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
+            RigProblem::NoForce => {
+                Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
+            }
+            RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
+            RigProblem::NothingToRead { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
+            _ => None,
+        }
+    }
+
+    /// Names the value that a type has refused, unless a value within it has been named already.
+    pub(crate) fn within(mut self, place: &Place) -> Self {
+        if self.span.is_some() {
+            return self;
+        }
+        match &mut *self.problem {
+            RigProblem::OutOfRange { key, value, .. } => {
+                place.key().clone_into(key);
+                place.written.clone_into(value);
+            }
+            RigProblem::UnknownWord { key, .. } | RigProblem::Invalid { key, .. } => {
+                place.key().clone_into(key);
+            }
+            RigProblem::MissingKey { section, .. } => place.path.clone_into(section),
+            _ => {}
+        }
+        // What the file itself lacks is nowhere.
+        self.span = (!place.path.is_empty()).then(|| place.span.clone());
+        self
+    }
+
+    /// Names the place of a key that a table has refused, and what tells the table's keys.
+    pub(crate) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
+        if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
+            known.insert(0, key);
+            *with = Some(format!("{key} = \"{word}\""));
+        }
+        self.span = Some(span);
+        self
+    }
+}
+
+impl RigProblem {
+    /// This problem, at a place of the document.
+    pub(crate) fn at(self, place: &Place) -> RigError {
+        RigError { problem: Box::new(self), span: Some(place.span.clone()) }
+    }
+
+    /// This problem, of something that is not there.
+    pub(crate) fn nowhere(self) -> RigError {
+        RigError { problem: Box::new(self), span: None }
+    }
+}
+
+/// What types refuse; [`RigError::within`] says where.
+impl serde::de::Error for RigError {
+    fn custom<T: Display>(reason: T) -> Self {
+        RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.nowhere()
+    }
+
+    fn invalid_type(_: Unexpected, expected: &dyn Expected) -> Self {
+        let expected = expected.to_string();
+        let bound = match expected.as_str() {
+            "a sequence" => "a list",
+            "a boolean" => "true or false",
+            "a string" => "a text",
+            "i64" => "a whole number",
+            words if words.starts_with("struct ") || words.starts_with("enum ") => "a table",
+            words => words,
+        };
+        RigProblem::OutOfRange { key: String::new(), value: String::new(), bound: bound.to_owned() }.nowhere()
+    }
+
+    fn invalid_value(unexpected: Unexpected, expected: &dyn Expected) -> Self {
+        Self::invalid_type(unexpected, expected)
+    }
+
+    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
+        Self::invalid_type(Unexpected::Seq, expected)
+    }
+
+    fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownWord { key: String::new(), word: word.to_owned(), known: known.to_vec() }.nowhere()
+    }
+
+    fn unknown_field(key: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownKey { key: key.to_owned(), known: known.to_vec(), with: None }.nowhere()
+    }
+
+    fn missing_field(key: &'static str) -> Self {
+        RigProblem::MissingKey { section: String::new(), key: key.to_owned() }.nowhere()
+    }
+}
+
+/// "those that do are at 0 mm and 400 mm".
+fn force_takers(extent: Extent, supports: &[Position]) -> String {
+    let places: Vec<String> = supports.iter().map(|support| extent.place_in_words(*support)).collect();
+    match places.as_slice() {
+        [] => "none of the supports does".to_owned(),
+        [only] => format!("the only one that does is at {only}"),
+        [first @ .., last] => format!("those that do are at {} and {last}", first.join(", ")),
+    }
+}
+
+fn unknown_key(key: &str, known: &[&'static str], with: Option<&str>) -> String {
+    match with {
+        Some(with) if closest(key, known).is_none() => {
+            format!("`{key}` does not go with {with}; known are {}", known.join(", "))
+        }
+        _ => format!("unknown key `{key}`{}", suggestion(key, known)),
+    }
+}
+
+/// ", did you mean `x`?" for the known word closest to `word`, or what is known where none is close.
+fn suggestion(word: &str, known: &[&'static str]) -> String {
+    match closest(word, known) {
+        Some(other) => format!(", did you mean `{other}`?"),
+        None => format!("; known are {}", known.join(", ")),
+    }
+}
+
+/// The known word that is a slip of the pen away: one edit, and one more for every four letters.
+fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
+    let (distance, other) =
+        known.iter().map(|other| (strsim::damerau_levenshtein(word, other), *other)).min()?;
+    (distance <= 1 + word.chars().count() / 4).then_some(other)
+}
