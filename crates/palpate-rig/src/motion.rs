@@ -1,158 +1,144 @@
 //! `[motion]`, or two `[[motion]]`
 
-use std::ops::Range;
+use serde::Deserialize;
 
-use toml::Spanned;
-
-use crate::error::{RigError, RigProblem};
-use crate::sections::{MotionSection, MotionSections, SurfaceSection};
-use crate::value::{bounded, count, not_negative, positive};
 use palpate_estimators::simulate::{MovingContact, MovingContacts};
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_mechanics::surface::{Beam, Extent, Motion, SurfaceSpec};
-use palpate_mechanics::units::Dimension;
 
-use super::places::on_surface;
+use crate::document::{At, place};
+use crate::error::{RigError, RigProblem};
+use crate::values::{Count, Density, Force, Fraction, Frequency, Length, NotNegative, OneOrMany, Point};
+use crate::values::{Positive, Speed, Time};
 
-const SECTION: &str = "motion";
+/// A contact that goes to and fro between two places.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MotionKeys {
+    /// Where it starts.
+    pub from: At<Point>,
+    /// Where it turns.
+    pub to: At<Point>,
+    /// Its speed between turns.
+    pub speed: Positive<Speed>,
+    /// The way on which it slows down and speeds up again; a fifth of the whole unless said otherwise.
+    pub turn: Option<At<Positive<Length>>>,
+    /// How often it goes from one place to the other; once unless said otherwise.
+    pub passes: Option<Count<1, 100_000>>,
+    /// How long it is lifted off at each turn; not at all unless said otherwise.
+    pub lifted: Option<NotNegative<Time>>,
+    /// How long it takes to touch, and to let go; 0.1 s unless said otherwise.
+    pub touch: Option<At<Positive<Time>>>,
+    /// Its force, where that is neither known nor the one of the calibration's presses.
+    pub force: Option<At<Positive<Force>>>,
+    /// Readings a second.
+    pub rate: Option<At<Positive<Frequency>>>,
+    /// Damping ratio of the beam's modes.
+    pub damping: Option<At<Fraction>>,
+}
+
 /// More readings than a recording should hold in memory.
 const MOST_READINGS: f64 = 1e7;
 /// A turn takes this share of the way, and a touch this long, unless the rig says otherwise.
 const TURN: f64 = 0.2;
 const TOUCH_S: f64 = 0.1;
 
-pub(super) fn validate(
-    sections: Option<&Spanned<MotionSections>>,
-    surface_section: Option<&Spanned<SurfaceSection>>,
+pub(crate) fn build(
+    sections: &At<OneOrMany<MotionKeys>>,
     surface: &SurfaceSpec,
+    density: Option<&At<Positive<Density>>>,
     known_force_n: Option<f64>,
-) -> Result<Option<MovingContacts>, RigError> {
-    let density = surface_section.and_then(|section| section.get_ref().density.as_ref());
-    let density =
-        density.map(|raw| Ok((positive("density", raw, Dimension::Density)?, raw.span()))).transpose()?;
-    let Some(sections) = sections else { return Ok(None) };
-    let listed = sections.get_ref().each(sections.span());
-    let context = |(keys, span)| Context { keys, span, known_force_n };
-    let contacts: Vec<Context> = listed.into_iter().map(context).collect();
-    let (first, second) = match contacts.as_slice() {
+) -> Result<MovingContacts, RigError> {
+    let (first, second) = match sections.sections() {
         [first] => (first, None),
         [first, second] => (first, Some(second)),
         others => {
+            let place = others.get(2).map_or(&sections.place, |third| &third.place);
             let value = format!("a list of {}", others.len());
-            let at = others.get(2).map_or(sections.span(), |third| third.span.clone());
-            return Err(RigProblem::OutOfRange { key: SECTION, value, bound: "one, or a list of two" }.at(at));
+            return Err(place.refuse_as(value, "one, or a list of two"));
         }
     };
     let extent = surface.extent();
     let beam = match surface {
-        SurfaceSpec::Beam(beam) => Some(modal_beam(*beam, first, density)?),
+        SurfaceSpec::Beam(beam) => Some(first.modal_beam(*beam, density)?),
         SurfaceSpec::Plate(_) => None,
-        _ => {
-            let with = "a surface other than a beam on two supports or a plate";
-            return Err(RigProblem::UnusedKey { key: SECTION, with }.at(first.span.clone()));
-        }
+        _ => return Err(first.place.unused("a surface other than a beam on two supports or a plate")),
     };
-    if let (None, Some(damping)) = (beam, &first.keys.damping) {
-        let with = "a plate, which is in balance at every reading";
-        return Err(RigProblem::UnusedKey { key: "damping", with }.at(damping.span()));
+    if let (None, Some(damping)) = (beam, &first.damping) {
+        return Err(damping.place.unused("a plate, which is in balance at every reading"));
     }
     if let (true, Some(second)) = (extent.is_plane(), second) {
-        let (value, bound) = ("a list of two".to_owned(), "one on a plane");
-        return Err(RigProblem::OutOfRange { key: SECTION, value, bound }.at(second.span.clone()));
+        return Err(second.place.refuse_as("a list of two", "one on a plane"));
     }
-    let rate_hz = positive("rate", first.need("rate", first.keys.rate.as_ref())?, Dimension::Frequency)?;
+    let rate_hz = first.rate.as_ref().ok_or_else(|| first.place.missing("rate"))?.si;
     let moving = MovingContacts {
-        first: first.contact(extent)?,
-        second: second.map(|second| second.further(extent)).transpose()?,
+        first: first.contact(extent, known_force_n)?,
+        second: second.map(|second| second.further(extent, known_force_n)).transpose()?,
         beam,
         rate_hz,
     };
     let readings = moving.duration_s() * rate_hz;
     if readings > MOST_READINGS || !readings.is_finite() {
-        return Err(RigProblem::TooManyReadings { readings, most: MOST_READINGS }.at(sections.span()));
+        let value = format!("{readings} readings long");
+        return Err(sections.place.refuse_as(value, format!("at most {MOST_READINGS}")));
     }
-    Ok(Some(moving))
+    Ok(moving)
 }
 
-/// The beam that swings under its first contact; its density is the surface's.
-fn modal_beam(
-    beam: Beam,
-    first: &Context,
-    density: Option<(f64, Range<usize>)>,
-) -> Result<ModalBeam, RigError> {
-    let (density_kg_per_m3, span) = density.ok_or_else(|| {
-        RigProblem::MissingKey { section: "surface", key: "density" }.at(first.span.clone())
-    })?;
-    let below_1 = |ratio: f64| (0.0..1.0).contains(&ratio);
-    let damping_ratio = first.keys.damping.as_ref().map_or(Ok(ModalBeam::USUAL_DAMPING_RATIO), |raw| {
-        bounded("damping", raw, Dimension::Ratio, below_1, "at least 0 and below 1")
-    })?;
-    let beam = ModalBeam { beam, density_kg_per_m3, damping_ratio };
-    beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(span))?;
-    Ok(beam)
-}
+impl At<MotionKeys> {
+    /// The beam that swings under this contact; its density is the surface's.
+    fn modal_beam(&self, beam: Beam, density: Option<&At<Positive<Density>>>) -> Result<ModalBeam, RigError> {
+        let missing =
+            || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
+        let density = density.ok_or_else(|| missing().at(&self.place))?;
+        let damping_ratio = self.damping.as_ref().map_or(ModalBeam::USUAL_DAMPING_RATIO, |ratio| ratio.si);
+        let beam = ModalBeam { beam, density_kg_per_m3: density.si, damping_ratio };
+        beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(&density.place))?;
+        Ok(beam)
+    }
 
-/// One section.
-struct Context<'a> {
-    keys: &'a MotionSection,
-    span: Range<usize>,
-    known_force_n: Option<f64>,
-}
-
-impl<'a> Context<'a> {
     /// A contact beside another one, which says what both share.
-    fn further(&self, extent: Extent) -> Result<MovingContact, RigError> {
-        for (key, value) in [("rate", &self.keys.rate), ("damping", &self.keys.damping)] {
-            if let Some(value) = value {
-                let with = "a second [[motion]]; the first says it for both";
-                return Err(RigProblem::UnusedKey { key, with }.at(value.span()));
-            }
+    fn further(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
+        match place(&self.rate).or(place(&self.damping)) {
+            Some(key) => Err(key.unused("a second [[motion]]; the first says it for both")),
+            None => self.contact(extent, known_force_n),
         }
-        self.contact(extent)
     }
 
-    fn contact(&self, extent: Extent) -> Result<MovingContact, RigError> {
-        let force = self.keys.force.as_ref();
-        if let (Some(raw), Some(_)) = (force, self.known_force_n) {
-            let with = "a [contact] whose force is known";
-            return Err(RigProblem::UnusedKey { key: "force", with }.at(raw.span()));
+    fn contact(&self, extent: Extent, known_force_n: Option<f64>) -> Result<MovingContact, RigError> {
+        if let (Some(force), Some(_)) = (&self.force, known_force_n) {
+            return Err(force.place.unused("a [contact] whose force is known"));
         }
-        let force_n = force.map(|raw| positive("force", raw, Dimension::Force)).transpose()?;
+        let force_n = self.force.as_ref().map(|force| force.si);
         Ok(MovingContact { motion: self.motion(extent)?, force_n })
     }
 
     fn motion(&self, extent: Extent) -> Result<Motion, RigError> {
-        let keys = self.keys;
-        let (raw_from, raw_to) = (self.need("from", keys.from.as_ref())?, self.need("to", keys.to.as_ref())?);
-        let (from, to) = (on_surface("from", raw_from, extent)?, on_surface("to", raw_to, extent)?);
+        let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);
         let way_m = from.distance_m(to);
         if way_m == 0.0 {
-            let value = extent.place_in_words(to);
-            let bound = "elsewhere than `from`";
-            return Err(RigProblem::OutOfRange { key: "to", value, bound }.at(raw_to.span()));
+            return Err(self.to.place.refuse_as(extent.place_in_words(to), "elsewhere than `from`"));
         }
-        let half_way = |turn_m: f64| turn_m > 0.0 && turn_m <= 0.5 * way_m;
-        let turn_m = keys.turn.as_ref().map_or(Ok(TURN * way_m), |raw| {
-            bounded("turn", raw, Dimension::Length, half_way, "greater than 0 and at most half the way")
-        })?;
-        let passes = keys
-            .passes
-            .as_ref()
-            .map_or(Ok(1), |raw| count("passes", raw, 1..=100_000, "at least 1 and at most 100000"))?;
-        let lifted_s =
-            keys.lifted.as_ref().map_or(Ok(0.0), |raw| not_negative("lifted", raw, Dimension::Time))?;
-        let touch_s =
-            keys.touch.as_ref().map_or(Ok(TOUCH_S), |raw| positive("touch", raw, Dimension::Time))?;
-        if let (Some(touch), true) = (&keys.touch, lifted_s == 0.0) {
-            let with = "a contact that is never `lifted`";
-            return Err(RigProblem::UnusedKey { key: "touch", with }.at(touch.span()));
+        let turn_m = match &self.turn {
+            Some(turn) if turn.si > 0.5 * way_m => {
+                return Err(turn.place.refuse("greater than 0 and at most half the way"));
+            }
+            Some(turn) => turn.si,
+            None => TURN * way_m,
+        };
+        let lifted_s = self.lifted.map_or(0.0, |lifted| lifted.si);
+        if let (Some(touch), true) = (&self.touch, lifted_s == 0.0) {
+            return Err(touch.place.unused("a contact that is never `lifted`"));
         }
-        let speed_m_per_s = positive("speed", self.need("speed", keys.speed.as_ref())?, Dimension::Speed)?;
-        Ok(Motion { from, to, speed_m_per_s, turn_m, passes, lifted_s, touch_s })
-    }
-
-    fn need<T>(&self, key: &'static str, value: Option<&'a Spanned<T>>) -> Result<&'a Spanned<T>, RigError> {
-        value.ok_or_else(|| RigProblem::MissingKey { section: SECTION, key }.at(self.span.clone()))
+        Ok(Motion {
+            from,
+            to,
+            speed_m_per_s: self.speed.si,
+            turn_m,
+            passes: self.passes.map_or(1, Count::get),
+            lifted_s,
+            touch_s: self.touch.as_ref().map_or(TOUCH_S, |touch| touch.si),
+        })
     }
 }
 
@@ -160,7 +146,7 @@ impl<'a> Context<'a> {
 mod tests {
     use crate::Rig;
 
-    const RIG: &str = include_str!("../../../../examples/moving-load.toml");
+    const RIG: &str = include_str!("../../../examples/moving-load.toml");
 
     #[test]
     fn a_motion_is_read_with_its_beam() {
@@ -172,7 +158,7 @@ mod tests {
         assert!((moving.first.motion.speed_m_per_s, moving.beam.unwrap().density_kg_per_m3) == (0.5, 7850.0));
     }
 
-    const PLATE: &str = include_str!("../../../../examples/moving-plate.toml");
+    const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
 
     #[test]
     fn a_motion_on_a_plate_is_between_two_points_of_it() {
