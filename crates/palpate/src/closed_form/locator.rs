@@ -9,7 +9,7 @@ use crate::bench::Bench;
 use crate::contact::Position;
 use crate::mechanics::{Beam, Surface};
 use crate::method::{Locate, LocatorFault};
-use crate::numerics::chi_squared_bound;
+use crate::numerics::{chi_squared_bound, normal_interval_95};
 use crate::sensing::{Layout, Sensor, SensorKind};
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
@@ -96,10 +96,9 @@ impl ClosedFormLocator {
         } else {
             (Status::OutsideSurface, balanced.position_m)
         };
-        let half_m = 1.96 * sd_m;
         let uncertainty = (noise == Noise::Known).then_some(Uncertainty {
             covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: (balanced.position_m - half_m, balanced.position_m + half_m),
+            x_95_m: normal_interval_95(balanced.position_m, sd_m),
             y_95_m: (0.0, 0.0),
         });
         let position = Position::along(position_m);

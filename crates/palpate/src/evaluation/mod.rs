@@ -16,6 +16,8 @@ pub use tracking::{
 use crate::contact::Position;
 use crate::estimator::{ContactEstimate, Locator, ReadingError};
 use crate::mechanics::Extent;
+use crate::numerics::ELLIPSE_95;
+use crate::numerics::small::Ldl;
 use crate::recording::Recording;
 
 /// One reading whose contact was known, and where the locator saw it.
@@ -86,7 +88,7 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
 }
 
 /// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
-/// (e − t)ᵀ·C⁻¹·(e − t) ≤ 5.991, the 95th percentile of χ² with two degrees of freedom.
+/// (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
 fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
     if extent.width_m.is_none() {
@@ -95,8 +97,8 @@ fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option
     }
     let [xx, xy, _, yy, ..] = uncertainty.covariance;
     let (dx, dy) = (contact.position.x_m - truth.x_m, contact.position.y_m - truth.y_m);
-    let determinant = xx * yy - xy * xy;
-    Some((dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) <= 5.991 * determinant)
+    let factors = Ldl::new(&[[xx, xy], [xy, yy]]);
+    Some(factors.is_some_and(|factors| factors.quadratic([dx, dy]) <= ELLIPSE_95))
 }
 
 impl Evaluation {

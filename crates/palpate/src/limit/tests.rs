@@ -8,6 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::*;
 use crate::contact::Position;
 use crate::mechanics::{Beam, Extent, InfluenceFunction};
+use crate::numerics::small::dot;
 use crate::rig::Rig;
 
 /// The founding paper's beam.
@@ -160,7 +161,7 @@ fn most_likely(limit: &Limit, reading: &[f64], near_m: f64, step_m: f64, force: 
         let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
         let scale = match force {
             Force::Known => 1.0,
-            Force::Unknown => information::dot(&shape, reading) / information::dot(&shape, &shape),
+            Force::Unknown => dot(&shape, reading) / dot(&shape, &shape),
         };
         shape.iter().zip(reading).map(|(s, r)| (r - scale * s).powi(2)).sum::<f64>()
     };

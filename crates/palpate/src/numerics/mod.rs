@@ -5,10 +5,14 @@ mod distributions;
 mod eigen;
 mod elliptic;
 mod random_order;
+pub mod small;
 mod sparse_cholesky;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
-pub use distributions::{NORMAL_95, chi_squared_bound, normal_distribution, normal_quantile};
+pub use distributions::{
+    ELLIPSE_95, NORMAL_95, bisect, chi_squared_bound, held_interval, normal_distribution, normal_interval_95,
+    normal_quantile,
+};
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use random_order::random_order;

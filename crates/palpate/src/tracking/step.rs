@@ -6,9 +6,10 @@
 
 use super::bank::{Dynamics, SeenNumbers};
 use super::config::TrackerConfig;
-use super::gaussian::{Change, Gaussian, Matrix};
+use super::gaussian::{Change, Gaussian};
 use crate::mechanics::modal::Oscillator;
 use crate::method::LineLikelihood;
+use crate::numerics::small::Matrix;
 use std::f64::consts::PI;
 
 /// Force of the first mode, and how fast it changes.

@@ -5,7 +5,7 @@ use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
 use crate::contact::Position;
-use crate::numerics::NORMAL_95;
+use crate::numerics::normal_interval_95;
 
 /// Squared residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
 const CUT: f64 = 20.0;
@@ -171,14 +171,10 @@ impl<'a> Posterior<'a> {
             true => covariance,
             false => [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0],
         };
-        let around = |mean_m: f64, variance_m2: f64| {
-            let half_m = NORMAL_95 * variance_m2.sqrt();
-            (mean_m - half_m, mean_m + half_m)
-        };
         let uncertainty = Uncertainty {
             covariance,
-            x_95_m: around(position.x_m, covariance[0]),
-            y_95_m: around(position.y_m, covariance[3]),
+            x_95_m: normal_interval_95(position.x_m, covariance[0].sqrt()),
+            y_95_m: normal_interval_95(position.y_m, covariance[3].sqrt()),
         };
         let force_n = if known { Some(force_n) } else { self.locator.force_n };
         ContactEstimate { position, force_n, uncertainty: Some(uncertainty) }

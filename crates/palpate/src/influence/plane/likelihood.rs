@@ -3,12 +3,12 @@
 //! Symbols as in [`super::search`].
 
 use super::locator::PlaneLocator;
-use super::refine::solve;
 use super::search::Search;
 use crate::contact::Contact;
 use crate::influence::belief::ForceBelief;
 use crate::mechanics::Extent;
 use crate::method::{ContactFit, Geometry, Likelihood, Locate, PlaneLikelihood};
+use crate::numerics::small::{Ldl, form};
 use palpate_core::Estimate;
 
 /// The likelihood of a [`PlaneLocator`], ready to be asked often.
@@ -61,16 +61,9 @@ impl Likelihood for PlateLikelihood {
         let free = [true, true, self.known_force_n().is_none()];
         for (left, contact) in left.iter_mut().zip(contacts) {
             let [a, b] = self.search.calibration(*contact);
-            let column = |k: usize| {
-                let mut unit = [0.0; 3];
-                unit[k] = 1.0;
-                solve(a, unit, free)
-            };
-            if let (Some(x), Some(y)) = (column(0), column(1)) {
-                let spread = |p: [f64; 3], q: [f64; 3]| -> f64 {
-                    (0..3).map(|i| p[i] * (0..3).map(|j| b[i][j] * q[j]).sum::<f64>()).sum()
-                };
-                *left = [spread(x, x), spread(x, y), spread(y, y)];
+            if let Some(factors) = Ldl::of_free(&a, free) {
+                let [x, y, _] = factors.inverse();
+                *left = [form(&x, &b, &x), form(&x, &b, &y), form(&y, &b, &y)];
             }
         }
         left

@@ -7,9 +7,10 @@
 //! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
 use super::coarse::MOST_VALLEYS;
-use super::refine::solve;
 use super::search::{Minimum, Scratch, Search};
 use crate::influence::belief::ForceBelief;
+use crate::numerics::ELLIPSE_95;
+use crate::numerics::small::{Ldl, principal_direction, principal_variances};
 
 /// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,8 +42,6 @@ impl Surroundings {
 
 /// Another place with at least this share of the probability is said.
 pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
-/// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
-pub(super) const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 /// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
 const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.
@@ -105,10 +104,8 @@ impl Search {
     /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
     fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
         let [xx, xy, _, yy, ..] = mode.covariance;
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        let radius = half.hypot(xy);
-        let (sin, cos) = (0.5 * xy.atan2(half)).sin_cos();
-        let (longer, shorter) = ((mean + radius).sqrt(), (mean - radius).max(0.0).sqrt());
+        let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);
+        let [cos, sin] = principal_direction([xx, xy, yy]);
         let [x_m, y_m, _] = mode.mean;
         let here = self.profiled(whitened, [x_m, y_m]).1;
         let is_straight = |along: f64, across: f64| {
@@ -123,16 +120,9 @@ impl Search {
 
     /// The inverse of the information; `None` where the reading does not tell.
     fn covariance(&self, minimum: &Minimum) -> Option<[f64; 6]> {
-        let known = matches!(self.force, ForceBelief::Known(_));
-        let free = [true, true, !known];
-        let column = |k: usize| {
-            let mut unit = [0.0; 3];
-            unit[k] = 1.0;
-            solve(minimum.information, unit, free)
-        };
-        let [x, y] = [column(0)?, column(1)?];
-        let force = if known { [0.0; 3] } else { column(2)? };
-        Some([x[0], x[1], x[2], y[1], y[2], force[2]])
+        let free = [true, true, !matches!(self.force, ForceBelief::Known(_))];
+        let [[xx, xy, xf], [_, yy, yf], [_, _, ff]] = Ldl::of_free(&minimum.information, free)?.inverse();
+        Some([xx, xy, xf, yy, yf, ff])
     }
 
     /// Puts the parts of the surface that hold the probability into the scratch; false where they are too many.
@@ -229,13 +219,9 @@ impl Search {
 /// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
 fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
-    let determinant = xx * yy - xy * xy;
-    if determinant.is_nan() || determinant <= 0.0 {
-        return 1.0;
-    }
+    let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
     for leaf in &mut *leaves {
-        let (x, y) = (leaf.at[0] - about[0], leaf.at[1] - about[1]);
-        leaf.distance = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
+        leaf.distance = factors.quadratic([leaf.at[0] - about[0], leaf.at[1] - about[1]]);
     }
     leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
     let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();

@@ -11,6 +11,7 @@ use super::table::PlaneTable;
 use crate::contact::{Contact, Position};
 use crate::influence::belief::ForceBelief;
 use crate::numerics::chi_squared_bound;
+use crate::numerics::small::{Matrix, add_outer};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +64,7 @@ pub(super) struct Minimum {
     /// χ² there.
     pub misfit: f64,
     /// JᵀwJ there, J the derivatives of W·f by x, y and W.
-    pub information: [[f64; 3]; 3],
+    pub information: Matrix<3>,
 }
 
 /// A channel so many standard deviations off is nothing that a contact does.
@@ -252,7 +253,7 @@ impl Search {
     }
 
     /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
-    pub fn calibration(&self, contact: Contact) -> [[[f64; 3]; 3]; 2] {
+    pub fn calibration(&self, contact: Contact) -> [Matrix<3>; 2] {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;
         let place = self.patches.place(x_m, y_m);
         let variances = self.near(&self.variances, [x_m, y_m]);
@@ -265,9 +266,7 @@ impl Search {
                 let weight = 1.0 / (1.0 + variance);
                 let j = [force_n * values.along[lane], force_n * values.across[lane], values.f[lane]];
                 for (sum, factor) in sums.iter_mut().zip([weight, weight * weight * variance]) {
-                    for p in 0..3 {
-                        (0..3).for_each(|q| sum[p][q] += factor * j[p] * j[q]);
-                    }
+                    add_outer(sum, factor, &j);
                 }
             }
         }
@@ -332,7 +331,7 @@ impl Search {
 pub(super) struct Equations {
     pub misfit: f64,
     pub right: [f64; 3],
-    pub information: [[f64; 3]; 3],
+    pub information: Matrix<3>,
 }
 
 const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };
