@@ -5,9 +5,10 @@ mod cross_validation;
 mod statistics;
 mod tracking;
 
+pub use crate::numerics::percentile;
 pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
 pub use cross_validation::{CrossValidationError, cross_validate};
-pub use statistics::{Spread, percentile};
+pub use statistics::Spread;
 pub use tracking::{
     FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
     tracked_of,
@@ -16,8 +17,8 @@ pub use tracking::{
 use crate::contact::Position;
 use crate::estimator::{ContactEstimate, Locator, ReadingError};
 use crate::mechanics::Extent;
-use crate::numerics::ELLIPSE_95;
 use crate::numerics::small::Ldl;
+use crate::numerics::{ELLIPSE_95, mean, root_mean_square};
 use crate::recording::Recording;
 
 /// One reading whose contact was known, and where the locator saw it.
@@ -125,14 +126,13 @@ impl Evaluation {
         let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
         let mut errors: Vec<f64> = self.located.iter().filter(inside).map(Located::error_m).collect();
         errors.sort_by(f64::total_cmp);
-        let count = errors.len();
         Some(ErrorSummary {
-            count,
-            average_m: errors.iter().sum::<f64>() / count as f64,
+            count: errors.len(),
+            average_m: mean(errors.iter().copied()),
             median_m: percentile(&errors, 50.0)?,
             p95_m: percentile(&errors, 95.0)?,
             largest_m: *errors.last()?,
-            rmse_m: (errors.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
+            rmse_m: root_mean_square(&errors),
         })
     }
 
@@ -152,14 +152,9 @@ impl Evaluation {
 
     /// Errors of each distinct position, by x and then y.
     pub fn by_position(&self) -> Vec<(Position, ErrorSummary)> {
-        let key = |p: &Position| (p.x_m, p.y_m);
-        let order = |a: &Position, b: &Position| {
-            let ((ax, ay), (bx, by)) = (key(a), key(b));
-            ax.total_cmp(&bx).then(ay.total_cmp(&by))
-        };
         let mut sorted = self.located.clone();
-        sorted.sort_by(|a, b| order(&a.truth, &b.truth));
-        let groups = sorted.chunk_by(|a, b| key(&a.truth) == key(&b.truth));
+        sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
+        let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
         let summaries = groups.filter_map(|group| {
             let part = Self { length_m: self.length_m, located: group.to_vec() };
             Some((group[0].truth, part.summary(None)?))

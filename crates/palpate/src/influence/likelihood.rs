@@ -9,7 +9,6 @@
 
 use std::f64::consts::PI;
 
-use super::belief::ForceBelief;
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
 use crate::contact::Contact;
@@ -195,10 +194,7 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn known_force_n(&self) -> Option<f64> {
-        match self.locator.force() {
-            ForceBelief::Known(force_n) => Some(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
-        }
+        self.locator.force().known_n()
     }
 
     fn most_contacts(&self) -> usize {

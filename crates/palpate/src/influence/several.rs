@@ -50,29 +50,31 @@ pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Optio
     }
     let whitened = scratch.whitened.channels(search.live.len());
     match count {
-        2 => refine::<2, 5>(search, whitened, best_nodes(search, whitened)?),
-        _ => refine::<3, 7>(search, whitened, best_nodes(search, whitened)?),
+        2 => refine::<2, 5>(search, whitened, best_nodes(search, whitened, pairs())?),
+        _ => refine::<3, 7>(search, whitened, best_nodes(search, whitened, triples())?),
     }
 }
 
-/// The nodes whose influences explain the most, with every force greater than 0.
-fn best_nodes<const K: usize>(search: &Search, whitened: &[f64]) -> Option<[usize; K]> {
+/// Those of the `choices` of nodes whose influences explain the most, with every force greater than 0.
+fn best_nodes<const K: usize>(
+    search: &Search,
+    whitened: &[f64],
+    choices: impl Iterator<Item = [usize; K]>,
+) -> Option<[usize; K]> {
     let column = |node: usize| search.table.at_node(STRIDE * node);
     let gram = Array2::from_shape_fn((COARSE, COARSE), |(i, j)| dot(column(i), column(j)));
     let pull: Vec<f64> = (0..COARSE).map(|node| dot(column(node), whitened)).collect();
-    let mut best: Option<(f64, [usize; K])> = None;
-    let mut chosen: [usize; K] = std::array::from_fn(|k| k);
-    loop {
-        if let Some(gain) = gain(&gram, &pull, chosen)
-            && best.is_none_or(|(most, _)| gain > most)
-        {
-            best = Some((gain, chosen));
-        }
-        let Some(k) = (0..K).rev().find(|k| chosen[*k] < COARSE - K + k) else { break };
-        chosen[k] += 1;
-        (k + 1..K).for_each(|later| chosen[later] = chosen[later - 1] + 1);
-    }
+    let gains = choices.filter_map(|chosen| Some((gain(&gram, &pull, chosen)?, chosen)));
+    let best = gains.reduce(|best, next| if next.0 > best.0 { next } else { best });
     best.map(|(_, chosen)| chosen)
+}
+
+fn pairs() -> impl Iterator<Item = [usize; 2]> {
+    (0..COARSE).flat_map(|i| (i + 1..COARSE).map(move |j| [i, j]))
+}
+
+fn triples() -> impl Iterator<Item = [usize; 3]> {
+    pairs().flat_map(|[i, j]| (j + 1..COARSE).map(move |k| [i, j, k]))
 }
 
 /// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::mechanics::{Extent, Surface};
 use crate::network::locator::ChannelScaling;
+use crate::numerics::mean_and_variance;
 use crate::recording::Recording;
 
 /// Why a network cannot be fitted to a recording.
@@ -129,9 +130,7 @@ fn channel_scaling(
             }
             (InputScale::FullScale, None) => (0.0, largest(), "largest reading"),
             (InputScale::Standardized, _) => {
-                let count = recording.rows.len() as f64;
-                let mean = column(c).sum::<f64>() / count;
-                let variance = column(c).map(|r| (r - mean).powi(2)).sum::<f64>() / count;
+                let (mean, variance) = mean_and_variance(column(c));
                 (mean, variance.sqrt(), "standard deviation")
             }
         };

@@ -1,4 +1,4 @@
-//! Linear algebra and distribution functions that several modules need.
+//! Linear algebra, statistics and distribution functions that several modules need.
 
 mod cholesky;
 mod distributions;
@@ -7,6 +7,7 @@ mod elliptic;
 mod random_order;
 pub mod small;
 mod sparse_cholesky;
+mod statistics;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{
@@ -17,3 +18,4 @@ pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use random_order::random_order;
 pub use sparse_cholesky::{EliminationOrder, SparseCholesky, SparseCholeskyError, SparseSymmetric};
+pub use statistics::{mean, mean_and_variance, median, percentile, root_mean_square, standard_error};

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Recording, Row};
+use crate::numerics::median;
 use crate::units::Quantity;
 
 /// Something about a channel that the bench's owner should look at.
@@ -185,14 +186,6 @@ impl<'a> Channel<'a> {
             self.recording.kinds.get(self.index).map_or(crate::units::Dimension::None, |k| k.dimension());
         Quantity { value, dimension }
     }
-}
-
-/// The middle value, or the mean of the two middle ones; `None` of nothing.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    let upper = values.get(half)?;
-    if values.len() % 2 == 1 { Some(*upper) } else { Some(0.5 * (values[half - 1] + upper)) }
 }
 
 impl fmt::Display for Warning {

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use sha2::{Digest, Sha256};
 use toml::Spanned;
 
 use super::{Arm, AskedLayout, Judging, Study};
@@ -11,6 +10,7 @@ use crate::contact::Position;
 use crate::design::sensors::Method;
 use crate::evaluation::Portion;
 use crate::network::Precision;
+use crate::recording::sha256_hex;
 use crate::rig::{
     ContactSection, DesignSection, EstimatorSection, RawQuantity, RigError, RigProblem, RigSections,
     SensorsSections, SurfaceSection, TrainingSection, choice, count, positive, validate,
@@ -191,7 +191,7 @@ impl Study {
             precision: file.precision()?,
             judging: judging(file.evaluation.as_ref(), length_m)?,
             arms,
-            digest: Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect(),
+            digest: sha256_hex(text.as_bytes()),
         })
     }
 }

@@ -8,6 +8,7 @@ use crate::bench::Bench;
 use crate::contact::{Contact, Position};
 use crate::limit::Force;
 use crate::mechanics::Extent;
+use crate::numerics::mean;
 use crate::recording::Recording;
 use crate::regression::{GaussianProcess, Kernel, Regression, Samples};
 use crate::sensing::Layout;
@@ -116,7 +117,7 @@ impl Forward {
         };
         let Some(process) = Regression::default().fit(samples, keep_going)? else { return Ok(None) };
         let outputs = process.outputs();
-        let signal_variance = (0..outputs).map(|j| process.signal_variance(j)).sum::<f64>() / outputs as f64;
+        let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
         Ok(Some(Self { process, signal_variance, extent, force }))
     }
 
@@ -174,7 +175,7 @@ fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
 fn at_one_force(recording: &Recording) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         recording.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
-    let mean = forces.as_ref().map(|forces| forces.iter().sum::<f64>() / forces.len() as f64);
+    let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
     let scaled = |(i, row): (usize, &crate::recording::Row)| {
         let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
         row.reading.iter().map(|value| factor * value).collect()
@@ -193,7 +194,7 @@ fn scatter(recording: &Recording, readings: &[Vec<f64>], channel: usize) -> Opti
             .filter(|(row, _)| row.position == position)
             .map(|(_, reading)| reading[channel])
             .collect();
-        let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
+        let mean = mean(repeats.iter().copied());
         squares += repeats.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         freedom += repeats.len() - 1;
     }

@@ -24,6 +24,7 @@ use crate::design::sensors::WeightedContacts;
 use crate::estimator::EstimatorConfig;
 use crate::limit::Force;
 use crate::mechanics::Extent;
+use crate::numerics::mean;
 use crate::rig::{ContactPrior, Rig};
 use crate::sensing::ChannelModel;
 use forward::Forward;
@@ -302,13 +303,12 @@ impl<'a> PositionProblem<'a> {
         let Some(all) = trial.calibrate(&positions, self.budget.repeats, seeds, keep_going)? else {
             return Ok(None);
         };
-        let mean =
-            |contact: usize| all.iter().map(|one| one.errors_m[contact]).sum::<f64>() / all.len() as f64;
+        let mean_error_m = |contact: usize| mean(all.iter().map(|one| one.errors_m[contact]));
         Ok(Some(Placed {
             placement,
             positions,
             verification: Verification::of(&all, &self.contacts),
-            errors_m: (0..self.contacts.len()).map(mean).collect(),
+            errors_m: (0..self.contacts.len()).map(mean_error_m).collect(),
         }))
     }
 

@@ -22,10 +22,7 @@ pub struct PlateLikelihood {
 impl PlateLikelihood {
     /// The likelihood of the channels that a locator does not leave out.
     pub fn new(locator: &PlaneLocator) -> Self {
-        let force = match locator.force() {
-            ForceBelief::Known(force_n) => ForceBelief::Known(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => ForceBelief::Unknown,
-        };
+        let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
         Self { locator: locator.clone(), search: locator.search_with(force) }
     }
 }
@@ -79,10 +76,7 @@ impl Likelihood for PlateLikelihood {
     }
 
     fn known_force_n(&self) -> Option<f64> {
-        match self.search.force {
-            ForceBelief::Known(force_n) => Some(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
-        }
+        self.search.force.known_n()
     }
 
     fn most_contacts(&self) -> usize {

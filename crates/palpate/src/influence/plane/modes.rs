@@ -8,7 +8,7 @@
 
 use super::coarse::MOST_VALLEYS;
 use super::search::{Minimum, Scratch, Search};
-use crate::influence::belief::ForceBelief;
+use crate::influence::moments::Moments;
 use crate::numerics::ELLIPSE_95;
 use crate::numerics::small::{Ldl, principal_direction, principal_variances};
 
@@ -120,7 +120,7 @@ impl Search {
 
     /// The inverse of the information; `None` where the reading does not tell.
     fn covariance(&self, minimum: &Minimum) -> Option<[f64; 6]> {
-        let free = [true, true, !matches!(self.force, ForceBelief::Known(_))];
+        let free = [true, true, self.force.known_n().is_none()];
         let [[xx, xy, xf], [_, yy, yf], [_, _, ff]] = Ldl::of_free(&minimum.information, free)?.inverse();
         Some([xx, xy, xf, yy, yf, ff])
     }
@@ -184,13 +184,13 @@ impl Search {
         }
         let mut modes = [Mode::default(); MOST_VALLEYS];
         for ((mode, moments), minimum) in modes.iter_mut().zip(&moments).zip(minima) {
-            *mode = moments.mode(minimum);
+            *mode = mode_of(moments, minimum);
             mode.weight /= all.weight;
             mode.covariance[5] += self.own_variance(minimum);
         }
         let count = minima.len();
         modes[..count].sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let Mode { mean: [x, y, f], mut covariance, .. } = all.mode(&minima[0]);
+        let ([x, y, f], mut covariance) = all.mean_and_covariance();
         let [dx, dy, df] = [x - modes[0].mean[0], y - modes[0].mean[1], f - modes[0].mean[2]];
         let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
@@ -202,8 +202,7 @@ impl Search {
     /// Variance of a force at a place that is known.
     fn own_variance(&self, minimum: &Minimum) -> f64 {
         let told = minimum.information[2][2];
-        let known = matches!(self.force, ForceBelief::Known(_));
-        if known || told <= 0.0 { 0.0 } else { 1.0 / told }
+        if self.force.known_n().is_some() || told <= 0.0 { 0.0 } else { 1.0 / told }
     }
 
     /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
@@ -214,6 +213,15 @@ impl Search {
         modes[0] = Mode { weight: 1.0, mean: minimum.at, covariance: region };
         Surroundings { modes, count: 1, region }
     }
+}
+
+/// The mode of what lies nearest to a minimum; without a weight where that is nothing.
+fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
+    if moments.weight <= 0.0 {
+        return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
+    }
+    let (mean, covariance) = moments.mean_and_covariance();
+    Mode { weight: moments.weight, mean, covariance }
 }
 
 /// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
@@ -295,36 +303,4 @@ fn nearest(minima: &[Minimum], at: [f64; 2]) -> usize {
     let square = |minimum: &Minimum| (minimum.at[0] - at[0]).powi(2) + (minimum.at[1] - at[1]).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
     minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
-}
-
-/// Sums from which mean and covariance follow.
-#[derive(Clone, Copy, Default)]
-struct Moments {
-    weight: f64,
-    first: [f64; 3],
-    second: [f64; 6],
-}
-
-impl Moments {
-    fn add(&mut self, weight: f64, [x, y, f]: [f64; 3]) {
-        self.weight += weight;
-        let squares = [x * x, x * y, x * f, y * y, y * f, f * f];
-        self.first.iter_mut().zip([x, y, f]).for_each(|(sum, value)| *sum += weight * value);
-        self.second.iter_mut().zip(squares).for_each(|(sum, value)| *sum += weight * value);
-    }
-
-    /// The mode of these moments; where nothing was added, the minimum without a weight.
-    fn mode(&self, minimum: &Minimum) -> Mode {
-        if self.weight <= 0.0 {
-            return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
-        }
-        let mean @ [x, y, f] = self.first.map(|sum| sum / self.weight);
-        let mut covariance = self.second.map(|sum| sum / self.weight);
-        let squares = [x * x, x * y, x * f, y * y, y * f, f * f];
-        covariance.iter_mut().zip(squares).for_each(|(value, square)| *value -= square);
-        for variance in [0, 3, 5] {
-            covariance[variance] = covariance[variance].max(0.0);
-        }
-        Mode { weight: self.weight, mean, covariance }
-    }
 }

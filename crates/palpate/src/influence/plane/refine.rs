@@ -4,7 +4,6 @@
 //! Symbols as in [`super::search`].
 
 use super::search::{Equations, Minimum, Search, Unknowns};
-use crate::influence::belief::ForceBelief;
 use crate::numerics::small::Ldl;
 
 /// Steps, those that were refused included.
@@ -49,7 +48,7 @@ impl Search {
     fn step(&self, equations: &Equations, at: Unknowns, damping: f64) -> Option<Unknowns> {
         let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), (0.0, f64::INFINITY)];
         let mut free = [true; 3];
-        free[2] = !matches!(self.force, ForceBelief::Known(_));
+        free[2] = self.force.known_n().is_none();
         for k in 0..3 {
             let right = equations.right[k];
             free[k] &= !(at[k] <= ends[k].0 && right < 0.0 || at[k] >= ends[k].1 && right > 0.0);

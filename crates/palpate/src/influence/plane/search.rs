@@ -10,7 +10,7 @@ use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
 use crate::contact::{Contact, Position};
 use crate::influence::belief::ForceBelief;
-use crate::numerics::chi_squared_bound;
+use crate::influence::search::worst_misfit;
 use crate::numerics::small::{Matrix, add_outer};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
@@ -93,11 +93,7 @@ impl Search {
                     table.variances[node * table.sensors + s] * inverse * inverse;
             }
         }
-        // Offsets are as uncertain as influences at the calibration's force, so a softer touch counts as one of that force.
-        let weights_force_n = match force {
-            ForceBelief::Known(force_n) => force_n.max(reference_force_n),
-            _ => reference_force_n,
-        };
+        let weights_force_n = force.weights_force_n(reference_force_n);
         let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
         let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
         let coarse = Coarse::new(table, &patches, live.len(), force);
@@ -114,11 +110,8 @@ impl Search {
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
             charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
-            worst_misfit: match channels.saturating_sub(unknowns) {
-                0 => f64::INFINITY,
-                freedom => chi_squared_bound(1e-4, freedom),
-            },
-            worst_noise: chi_squared_bound(1e-4, channels),
+            worst_misfit: worst_misfit(channels.saturating_sub(unknowns)),
+            worst_noise: worst_misfit(channels),
             size_m: [table.length_m, table.width_m],
             live,
             inverse_sd,
@@ -233,10 +226,7 @@ impl Search {
 
     /// The best force at a place.
     pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
-        match self.force {
-            ForceBelief::Known(force_n) => force_n,
-            _ => self.profiled(whitened, at).0,
-        }
+        self.force.known_n().unwrap_or_else(|| self.profiled(whitened, at).0)
     }
 
     /// The groups of the node nearest to a place.

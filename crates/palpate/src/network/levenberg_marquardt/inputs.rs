@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
 use crate::method::LocatorFault;
-use crate::numerics::symmetric_eigen;
+use crate::numerics::{mean, symmetric_eigen};
 use crate::recording::Recording;
 use crate::sensing::Layout;
 
@@ -69,8 +69,7 @@ impl NetworkInputs {
                 let square = |reading: &[f64]| {
                     channels.iter().map(|s| (reading[s.channel] / s.divisor).powi(2)).sum::<f64>()
                 };
-                let norms = recording.rows.iter().map(|row| square(&row.reading).sqrt());
-                norms.sum::<f64>() / recording.rows.len() as f64
+                mean(recording.rows.iter().map(|row| square(&row.reading).sqrt()))
             }
         };
         let of_feature = |source| match source {

@@ -6,7 +6,8 @@
 use serde::Serialize;
 
 use super::COUNTS;
-use crate::evaluation::{Portion, percentile};
+use crate::evaluation::Portion;
+use crate::numerics;
 use crate::study::{ArmOutcome, Judging, TrainedSeed};
 
 /// A claim and its verdict.
@@ -232,9 +233,8 @@ impl Table<'_> {
         let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
         let asked = std::cell::Cell::new(true);
         let median = |name: &str, figure: Figure| {
-            let mut values: Vec<f64> = self.fits(name).iter().map(|fit| self.figure(fit, figure)).collect();
-            values.sort_by(f64::total_cmp);
-            percentile(&values, 50.0).unwrap_or_else(|| {
+            let values = self.fits(name).iter().map(|fit| self.figure(fit, figure)).collect();
+            numerics::median(values).unwrap_or_else(|| {
                 asked.set(false);
                 f64::NAN
             })
