@@ -1,7 +1,7 @@
 //! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
 
 use crate::failure::{Complaint, Failure};
-use palpate::report::{ReportError, ReportFile};
+use palpate_report::{ReportError, ReportFile};
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! A track as a line of CSV or JSON.
 
 use crate::failure::{Complaint, Failure};
-use palpate::estimator::{Across, Track, Tracked};
+use palpate_estimators::estimator::{Across, Track, Tracked};
 
 /// What a line of CSV has room for; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]

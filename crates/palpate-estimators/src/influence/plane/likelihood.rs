@@ -1,0 +1,85 @@
+//! How well a contact explains a reading, by the table of a plane's influence functions: what tracking asks.
+//!
+//! Symbols as in [`super::search`].
+
+use super::locator::PlaneLocator;
+use super::search::Search;
+use crate::influence::belief::ForceBelief;
+use crate::method::{ContactFit, Geometry, Likelihood, Locate, PlaneLikelihood};
+use palpate_core::Estimate;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::small::{Ldl, form};
+
+/// The likelihood of a [`PlaneLocator`], ready to be asked often.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlateLikelihood {
+    locator: PlaneLocator,
+    /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
+    search: Search,
+}
+
+impl PlateLikelihood {
+    /// The likelihood of the channels that a locator does not leave out.
+    pub fn new(locator: &PlaneLocator) -> Self {
+        let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
+        Self { locator: locator.clone(), search: locator.search_with(force) }
+    }
+}
+
+impl PlaneLikelihood for PlateLikelihood {
+    fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3> {
+        let at = [contact.position.x_m, contact.position.y_m, contact.force_n];
+        let equations = self.search.equations(whitened, at, None);
+        ContactFit { misfit: equations.misfit, pull: equations.right, information: equations.information }
+    }
+}
+
+impl Likelihood for PlateLikelihood {
+    fn geometry(&self) -> Geometry<'_> {
+        Geometry::Plane(self)
+    }
+
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+        self.search.whiten_into(reading, whitened);
+    }
+
+    fn fit_nothing(&self, whitened: &[f64], _mode_n: f64) -> ContactFit<1> {
+        ContactFit { misfit: whitened.iter().map(|d| d * d).sum(), ..ContactFit::NOTHING }
+    }
+
+    fn signal(&self, contact: Contact) -> f64 {
+        self.search.signal(contact)
+    }
+
+    /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ w²·v·j·jᵀ, j the derivatives of W·f by place and unknown force.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
+        let mut left = [[0.0; 3]; 2];
+        let free = [true, true, self.known_force_n().is_none()];
+        for (left, contact) in left.iter_mut().zip(contacts) {
+            let [a, b] = self.search.calibration(*contact);
+            if let Some(factors) = Ldl::of_free(&a, free) {
+                let [x, y, _] = factors.inverse();
+                *left = [form(&x, &b, &x), form(&x, &b, &y), form(&y, &b, &y)];
+            }
+        }
+        left
+    }
+
+    fn locate_alone(&self, reading: &[f64]) -> Estimate {
+        self.locator.locate(reading)
+    }
+
+    fn extent(&self) -> Extent {
+        let [length_m, width_m] = self.search.size_m;
+        Extent { length_m, width_m: Some(width_m) }
+    }
+
+    fn known_force_n(&self) -> Option<f64> {
+        self.search.force.known_n()
+    }
+
+    fn most_contacts(&self) -> usize {
+        1
+    }
+}

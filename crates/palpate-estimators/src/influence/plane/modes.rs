@@ -1,0 +1,306 @@
+//! How probable the surroundings of each minimum are, and the moments of position and force there.
+//!
+//! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
+//! approximation). Any other reading's probability is summed up over the surface: near an edge it is cut off, where the
+//! readings tell little it is bent, and several minima share it. Of the coarse cells those that could matter are halved
+//! until the misfit is smooth within their parts, each with the force that is best there; a part that is too far from the
+//! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
+
+use super::coarse::MOST_VALLEYS;
+use super::search::{Minimum, Scratch, Search};
+use crate::influence::moments::Moments;
+use palpate_numerics::ELLIPSE_95;
+use palpate_numerics::small::{Ldl, principal_direction, principal_variances};
+
+/// The surroundings of a minimum.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Mode {
+    /// Its share of the probability.
+    pub weight: f64,
+    /// Mean of x, y and W.
+    pub mean: [f64; 3],
+    /// Covariance of the three: xx, xy, xf, yy, yf, ff.
+    pub covariance: [f64; 6],
+}
+
+/// What the readings tell of a contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings {
+    modes: [Mode; MOST_VALLEYS],
+    count: usize,
+    /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
+    /// shape must be to hold 95 % of the probability.
+    pub region: [f64; 6],
+}
+
+impl Surroundings {
+    /// The most probable first.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes[..self.count]
+    }
+}
+
+/// Another place with at least this share of the probability is said.
+pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
+/// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
+const MOST_CELLS: f64 = 0.6;
+/// So many standard deviations from an edge, an edge does not matter.
+const CLEAR: f64 = 3.0;
+/// At two standard deviations a paraboloid is 4 above its minimum; what is off by more than this is bent.
+const MOST_BENT: f64 = 1.0;
+/// A misfit this much above the best has no probability worth adding up: e⁻⁶.
+const CUT: f64 = 12.0;
+/// A block stands for its middle when its whitened length is no longer: the sum over a normal distribution at steps of h
+/// standard deviations is off by 2·e^(−2π²/h²), a hundredth.
+const FINE: f64 = 2.0;
+/// No block is halved below this, however loud the readings are.
+const LEAST_M: f64 = 1e-9;
+/// More parts than any reading takes that the surface explains. One that is far too loud for it has as many as there are
+/// nanometres, all of them as far from it.
+const MOST_BLOCKS: usize = 200_000;
+
+impl Search {
+    /// The surroundings of `minima`, best first, of the reading in the scratch.
+    pub fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        let are_plain = minima.iter().zip(&mut modes).all(|(minimum, mode)| {
+            let plain = self.plain(minimum, &minima[0]);
+            plain.inspect(|plain| *mode = *plain).is_some()
+        });
+        let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
+        let is_alone = are_plain && modes[0].weight >= (1.0 - MODE_THAT_MATTERS) * sum;
+        if is_alone && self.is_paraboloid(&scratch.whitened, &modes[0]) {
+            modes[0].weight = 1.0;
+            return Surroundings { modes, count: 1, region: modes[0].covariance };
+        }
+        if self.sum_up(minima, scratch) {
+            self.summed(minima, &mut scratch.leaves)
+        } else {
+            self.nothing_summed(&minima[0])
+        }
+    }
+
+    /// A minimum as a normal distribution, its weight relative to that of `best`; `None` where it is wide, near an edge, or
+    /// not told at all.
+    fn plain(&self, minimum: &Minimum, best: &Minimum) -> Option<Mode> {
+        let covariance = self.covariance(minimum)?;
+        let [xx, xy, _, yy, ..] = covariance;
+        let sd_m = [xx.sqrt(), yy.sqrt()];
+        let narrow = (0..2).all(|k| {
+            sd_m[k] <= MOST_CELLS * self.coarse.cell_m[k]
+                && CLEAR * sd_m[k] < minimum.at[k]
+                && CLEAR * sd_m[k] < self.size_m[k] - minimum.at[k]
+        });
+        let volume = 2.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(0.0).sqrt();
+        let weight = (0.5 * (self.cost(best) - self.cost(minimum))).exp() * volume;
+        (narrow && weight.is_finite()).then_some(Mode { weight, mean: minimum.at, covariance })
+    }
+
+    /// Minus twice the logarithm of the likelihood, but for a constant.
+    fn cost(&self, minimum: &Minimum) -> f64 {
+        minimum.misfit + self.spread([minimum.at[0], minimum.at[1]])
+    }
+
+    /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
+    fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
+        let [xx, xy, _, yy, ..] = mode.covariance;
+        let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);
+        let [cos, sin] = principal_direction([xx, xy, yy]);
+        let [x_m, y_m, _] = mode.mean;
+        let here = self.profiled(whitened, [x_m, y_m]).1;
+        let is_straight = |along: f64, across: f64| {
+            let rise = self.profiled(whitened, [x_m + 2.0 * along, y_m + 2.0 * across]).1 - here;
+            (rise - 4.0).abs() <= MOST_BENT
+        };
+        [1.0, -1.0].iter().all(|side| {
+            is_straight(side * longer * cos, side * longer * sin)
+                && is_straight(-side * shorter * sin, side * shorter * cos)
+        })
+    }
+
+    /// The inverse of the information; `None` where the reading does not tell.
+    fn covariance(&self, minimum: &Minimum) -> Option<[f64; 6]> {
+        let free = [true, true, self.force.known_n().is_none()];
+        let [[xx, xy, xf], [_, yy, yf], [_, _, ff]] = Ldl::of_free(&minimum.information, free)?.inverse();
+        Some([xx, xy, xf, yy, yf, ff])
+    }
+
+    /// Puts the parts of the surface that hold the probability into the scratch; false where they are too many.
+    fn sum_up(&self, minima: &[Minimum], scratch: &mut Scratch) -> bool {
+        let Scratch { whitened, profile, blocks, leaves } = scratch;
+        leaves.clear();
+        blocks.clear();
+        let mut looked_at = 0;
+        let best = self.cost(&minima[0]);
+        let most = best + CUT;
+        for cell in 0..self.coarse.cells() {
+            let middle_m = self.coarse.middle_m(cell);
+            if self.floor(profile, cell) + self.spread(middle_m) > most {
+                continue;
+            }
+            let force_n = profile.force_n(cell, self.force);
+            blocks.push(Block {
+                middle_m,
+                size_m: self.coarse.cell_m,
+                length: self.coarse.lengths[cell].map(|length| force_n * length),
+            });
+            while let Some(block) = blocks.pop() {
+                looked_at += 1;
+                if looked_at > MOST_BLOCKS {
+                    return false;
+                }
+                let (force_n, misfit) = self.profiled(whitened, block.middle_m);
+                let spread = self.spread(block.middle_m);
+                if block.floor(misfit) + spread > most {
+                    continue;
+                }
+                if let Some(halves) = block.halves() {
+                    blocks.extend(halves);
+                } else {
+                    let area = block.size_m[0] * block.size_m[1];
+                    let [x_m, y_m] = block.middle_m;
+                    leaves.push(Leaf {
+                        weight: (0.5 * (best - misfit - spread)).exp() * area,
+                        at: [x_m, y_m, force_n],
+                        mode: nearest(minima, block.middle_m),
+                        distance: 0.0,
+                    });
+                }
+            }
+        }
+        true
+    }
+
+    /// The modes of what was summed up: what lies nearest to a minimum is its mode's.
+    fn summed(&self, minima: &[Minimum], leaves: &mut [Leaf]) -> Surroundings {
+        let mut moments = [Moments::default(); MOST_VALLEYS];
+        let mut all = Moments::default();
+        for leaf in &*leaves {
+            moments[leaf.mode].add(leaf.weight, leaf.at);
+            all.add(leaf.weight, leaf.at);
+        }
+        if !(all.weight.is_finite() && all.weight > 0.0) {
+            return self.nothing_summed(&minima[0]);
+        }
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        for ((mode, moments), minimum) in modes.iter_mut().zip(&moments).zip(minima) {
+            *mode = mode_of(moments, minimum);
+            mode.weight /= all.weight;
+            mode.covariance[5] += self.own_variance(minimum);
+        }
+        let count = minima.len();
+        modes[..count].sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let ([x, y, f], mut covariance) = all.mean_and_covariance();
+        let [dx, dy, df] = [x - modes[0].mean[0], y - modes[0].mean[1], f - modes[0].mean[2]];
+        let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
+        covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
+        covariance[5] += self.own_variance(&minima[0]);
+        let growth = growth(leaves, modes[0].mean, &covariance);
+        Surroundings { modes, count, region: covariance.map(|value| growth * value) }
+    }
+
+    /// Variance of a force at a place that is known.
+    fn own_variance(&self, minimum: &Minimum) -> f64 {
+        let told = minimum.information[2][2];
+        if self.force.known_n().is_some() || told <= 0.0 { 0.0 } else { 1.0 / told }
+    }
+
+    /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
+    fn nothing_summed(&self, minimum: &Minimum) -> Surroundings {
+        let [xx, yy] = self.size_m.map(|size_m| size_m * size_m / 12.0);
+        let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
+        let mut modes = [Mode::default(); MOST_VALLEYS];
+        modes[0] = Mode { weight: 1.0, mean: minimum.at, covariance: region };
+        Surroundings { modes, count: 1, region }
+    }
+}
+
+/// The mode of what lies nearest to a minimum; without a weight where that is nothing.
+fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
+    if moments.weight <= 0.0 {
+        return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
+    }
+    let (mean, covariance) = moments.mean_and_covariance();
+    Mode { weight: moments.weight, mean, covariance }
+}
+
+/// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
+fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
+    let [xx, xy, _, yy, ..] = *covariance;
+    let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
+    for leaf in &mut *leaves {
+        leaf.distance = factors.quadratic([leaf.at[0] - about[0], leaf.at[1] - about[1]]);
+    }
+    leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
+    let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
+    // Half of a leaf lies within the ellipse through its middle; between leaves the share is straight.
+    let (mut inside, mut last) = (0.0, (0.0, 0.0));
+    for leaf in &*leaves {
+        let held = (inside + 0.5 * leaf.weight) / all;
+        if held >= 0.95 {
+            let (distance, share) = last;
+            let part = if held > share { (0.95 - share) / (held - share) } else { 1.0 };
+            return (distance + part * (leaf.distance - distance)) / ELLIPSE_95;
+        }
+        inside += leaf.weight;
+        last = (leaf.distance, held);
+    }
+    1.0
+}
+
+/// A part of the surface that its middle stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    /// Its probability, but for a factor.
+    weight: f64,
+    /// x, y and the force that is best there.
+    at: [f64; 3],
+    /// Whose minimum is nearest.
+    mode: usize,
+    /// Squared, from the estimate, in standard deviations.
+    distance: f64,
+}
+
+/// A part of the surface, which is halved until its middle stands for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    middle_m: [f64; 2],
+    size_m: [f64; 2],
+    /// How far apart the whitened readings of its ends are, along and across.
+    length: [f64; 2],
+}
+
+impl Block {
+    /// About the least misfit within it, from that of its middle.
+    fn floor(&self, misfit: f64) -> f64 {
+        let reach = 0.5 * self.length[0].hypot(self.length[1]);
+        let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
+        closest * closest
+    }
+
+    /// Its halves along the longer way; `None` of one that is short both ways.
+    fn halves(&self) -> Option<[Self; 2]> {
+        let k = usize::from(self.length[1] > self.length[0]);
+        if self.length[k].is_nan() || self.length[k] <= FINE || self.size_m[k] <= LEAST_M {
+            return None;
+        }
+        let half = |side: f64| {
+            let mut block = *self;
+            block.size_m[k] *= 0.5;
+            block.length[k] *= 0.5;
+            block.middle_m[k] += side * 0.5 * block.size_m[k];
+            block
+        };
+        Some([half(-1.0), half(1.0)])
+    }
+}
+
+/// Which minimum is nearest to a place.
+fn nearest(minima: &[Minimum], at: [f64; 2]) -> usize {
+    if minima.len() == 1 {
+        return 0;
+    }
+    let square = |minimum: &Minimum| (minimum.at[0] - at[0]).powi(2) + (minimum.at[1] - at[1]).powi(2);
+    let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
+    minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
+}

@@ -1,0 +1,156 @@
+//! Several contacts at once.
+//!
+//! A reading of K contacts is Σ W_k·f(a_k). Given the places, the forces are a linear least-squares problem, so places
+//! are searched over pairs and triples of nodes with the forces worked out, then refined by Gauss–Newton on all 2K
+//! numbers. How many there are is decided by the extended Bayesian information criterion (Chen and Chen, Biometrika 95,
+//! 2008), which also charges for the number of places that a contact could have been at.
+
+use super::coarse::{COARSE, STRIDE};
+use super::likelihood::contact_fit;
+use super::scratch::Scratch;
+use super::search::Search;
+use crate::method::ContactFit;
+use ndarray::Array2;
+use palpate_core::{ContactEstimate, Uncertainty};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::small::{Ldl, dot};
+use palpate_numerics::{held_interval, normal_interval_95};
+
+/// Contacts that explain a reading together.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Together {
+    /// The contacts, strongest first; without uncertainty where the reading does not tell them.
+    pub contacts: Vec<ContactEstimate>,
+    /// χ² that is left.
+    pub misfit: f64,
+}
+
+impl Together {
+    /// What it costs by the extended Bayesian information criterion: χ² + 2K·ln S + 2K·ln P, for S channels and P
+    /// places that can be told apart.
+    pub fn criterion(&self, search: &Search) -> f64 {
+        criterion(self.misfit, self.contacts.len(), 2, search)
+    }
+}
+
+/// The criterion of [`Together::criterion`] for `contacts` with `unknowns` each.
+pub(super) fn criterion(misfit: f64, contacts: usize, unknowns: usize, search: &Search) -> f64 {
+    misfit + contacts as f64 * charge(unknowns, search.live.len())
+}
+
+/// What a contact with `unknowns` costs by the criterion, for `channels` channels.
+pub(super) fn charge(unknowns: usize, channels: usize) -> f64 {
+    unknowns as f64 * (channels as f64).ln() + 2.0 * (COARSE as f64).ln()
+}
+
+/// The best explanation of a whitened reading by `count` contacts, where that can be told at all.
+pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Option<Together> {
+    if 2 * count > search.live.len() {
+        return None;
+    }
+    let whitened = scratch.whitened.channels(search.live.len());
+    match count {
+        2 => refine::<2, 5>(search, whitened, best_nodes(search, whitened, pairs())?),
+        _ => refine::<3, 7>(search, whitened, best_nodes(search, whitened, triples())?),
+    }
+}
+
+/// Those of the `choices` of nodes whose influences explain the most, with every force greater than 0.
+fn best_nodes<const K: usize>(
+    search: &Search,
+    whitened: &[f64],
+    choices: impl Iterator<Item = [usize; K]>,
+) -> Option<[usize; K]> {
+    let column = |node: usize| search.table.at_node(STRIDE * node);
+    let gram = Array2::from_shape_fn((COARSE, COARSE), |(i, j)| dot(column(i), column(j)));
+    let pull: Vec<f64> = (0..COARSE).map(|node| dot(column(node), whitened)).collect();
+    let gains = choices.filter_map(|chosen| Some((gain(&gram, &pull, chosen)?, chosen)));
+    let best = gains.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    best.map(|(_, chosen)| chosen)
+}
+
+fn pairs() -> impl Iterator<Item = [usize; 2]> {
+    (0..COARSE).flat_map(|i| (i + 1..COARSE).map(move |j| [i, j]))
+}
+
+fn triples() -> impl Iterator<Item = [usize; 3]> {
+    pairs().flat_map(|[i, j]| (j + 1..COARSE).map(move |k| [i, j, k]))
+}
+
+/// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
+#[inline]
+fn gain<const K: usize>(gram: &Array2<f64>, pull: &[f64], chosen: [usize; K]) -> Option<f64> {
+    let pull = chosen.map(|node| pull[node]);
+    let force = Ldl::new(&chosen.map(|i| chosen.map(|j| gram[[i, j]])))?.solve(pull);
+    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &pull))
+}
+
+/// Gauss–Newton on the places and forces of K contacts from the best forces at `nodes`, with steps halved until the misfit
+/// falls. There are N = 1 + 2K unknowns, the first of which, the force of a surface's first mode, is held.
+fn refine<const K: usize, const N: usize>(
+    search: &Search,
+    whitened: &[f64],
+    nodes: [usize; K],
+) -> Option<Together> {
+    const MOST_STEPS: usize = 40;
+    let table = &search.table;
+    let fit = |contacts: [Contact; K]| -> ContactFit<N> {
+        contact_fit(table, whitened, contacts, |contact| search.variance_scale(contact.force_n), None)
+    };
+    let moved = |contacts: [Contact; K], step: [f64; N], share: f64| {
+        std::array::from_fn(|k| {
+            let Contact { position, force_n } = contacts[k];
+            let x_m = (position.x_m + share * step[1 + 2 * k]).clamp(0.0, table.length_m);
+            Contact { position: Position::along(x_m), force_n: force_n + share * step[2 + 2 * k] }
+        })
+    };
+    let spacing_m = STRIDE as f64 * table.spacing_m();
+    let pressed_by_nothing =
+        nodes.map(|node| Contact { position: Position::along(node as f64 * spacing_m), force_n: 0.0 });
+    let start = fit(pressed_by_nothing);
+    let forces = std::array::from_fn(|i| i > 0 && i % 2 == 0);
+    let step = Ldl::of_free(&start.information, forces)?.solve(start.pull);
+    let mut contacts = moved(pressed_by_nothing, step, 1.0);
+    let mut here = fit(contacts);
+    let free = std::array::from_fn(|i| i > 0);
+    for _ in 0..MOST_STEPS {
+        // Damped, where places and forces cannot be told apart.
+        let mut damped = here.information;
+        (0..N).for_each(|i| damped[i][i] *= 1.0 + 1e-9);
+        let step = Ldl::of_free(&damped, free)?.solve(here.pull);
+        let mut share = 1.0;
+        let next = loop {
+            let candidate = moved(contacts, step, share);
+            let next = fit(candidate);
+            if next.misfit <= here.misfit || share < 1e-3 {
+                break (candidate, next);
+            }
+            share *= 0.5;
+        };
+        let fell = here.misfit - next.1.misfit;
+        if fell < 0.0 {
+            break;
+        }
+        (contacts, here) = next;
+        if fell < 1e-6 {
+            break;
+        }
+    }
+    if contacts.iter().any(|contact| contact.force_n <= 0.0) {
+        return None;
+    }
+    let covariance = Ldl::of_free(&here.information, free).map(|factors| factors.inverse());
+    let estimate = |k: usize| {
+        let Contact { position, force_n } = contacts[k];
+        let (x, w) = (1 + 2 * k, 2 + 2 * k);
+        let uncertainty = covariance.map(|covariance| Uncertainty {
+            covariance: [covariance[x][x], 0.0, covariance[x][w], 0.0, 0.0, covariance[w][w]],
+            x_95_m: held_interval(normal_interval_95(position.x_m, covariance[x][x].sqrt()), table.length_m),
+            y_95_m: (0.0, 0.0),
+        });
+        ContactEstimate { position, force_n: Some(force_n), uncertainty }
+    };
+    let mut contacts: Vec<ContactEstimate> = (0..K).map(estimate).collect();
+    contacts.sort_by(|a, b| b.force_n.unwrap_or(0.0).total_cmp(&a.force_n.unwrap_or(0.0)));
+    Some(Together { contacts, misfit: here.misfit })
+}

@@ -1,0 +1,172 @@
+//! The cells of a surface, each of which carries a part of the load.
+
+use ndarray::Array2;
+
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::{Extent, midpoints};
+
+/// Cells along a line.
+const ON_A_LINE: usize = 80;
+/// Cells along the longer side of a plane.
+const ON_A_PLANE: usize = 20;
+/// Midpoints of a cell at which influence functions are averaged, along x and y.
+const POINTS_ON_A_LINE: [usize; 2] = [8, 1];
+const POINTS_ON_A_PLANE: [usize; 2] = [3, 3];
+
+/// A surface parted into equal cells, numbered along x and then along y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cells {
+    /// The surface.
+    pub extent: Extent,
+    /// Cells along x; at least 1.
+    pub columns: usize,
+    /// Cells along y; 1 on a line.
+    pub rows: usize,
+}
+
+impl Cells {
+    /// 80 cells on a line; on a plane 20 along the longer side, as square as they come.
+    pub fn over(extent: Extent) -> Self {
+        let Some(width_m) = extent.width_m else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
+        let most = ON_A_PLANE as f64;
+        let count = |side_m: f64| {
+            // A strip gets one row of cells at least, whatever its sides.
+            (most * side_m / extent.length_m.max(width_m)).round().clamp(1.0, most) as usize
+        };
+        Self { extent, columns: count(extent.length_m), rows: count(width_m) }
+    }
+
+    /// How many there are.
+    #[expect(clippy::len_without_is_empty, reason = "there is at least one")]
+    pub fn len(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The sides of a cell in metres; on a line the second is 0.
+    pub fn sides_m(&self) -> [f64; 2] {
+        let across = self.extent.width_m.map_or(0.0, |width_m| width_m / self.rows as f64);
+        [self.extent.length_m / self.columns as f64, across]
+    }
+
+    /// The length of a cell in metres, or on a plane its area in square metres.
+    pub fn measure(&self) -> f64 {
+        let [along, across] = self.sides_m();
+        if self.extent.width_m.is_some() { along * across } else { along }
+    }
+
+    /// The middle of a cell.
+    pub fn centre(&self, cell: usize) -> Position {
+        let (from, to) = self.corners(cell);
+        Position { x_m: from.x_m.midpoint(to.x_m), y_m: from.y_m.midpoint(to.y_m) }
+    }
+
+    /// The lower left and the upper right corner of a cell.
+    pub fn corners(&self, cell: usize) -> (Position, Position) {
+        let (column, row) = (cell % self.columns, cell / self.columns);
+        let [along, across] = self.sides_m();
+        let corner = |i: usize, j: usize| Position { x_m: along * i as f64, y_m: across * j as f64 };
+        (corner(column, row), corner(column + 1, row + 1))
+    }
+
+    /// The cells that share a side with a cell.
+    pub(super) fn neighbours(&self, cell: usize) -> impl Iterator<Item = usize> {
+        let (column, row) = (cell % self.columns, cell / self.columns);
+        let beside = [
+            (column > 0).then(|| cell - 1),
+            (column + 1 < self.columns).then_some(cell + 1),
+            (row > 0).then(|| cell - self.columns),
+            (row + 1 < self.rows).then_some(cell + self.columns),
+        ];
+        beside.into_iter().flatten()
+    }
+
+    /// Points of a cell whose mean is the mean over the cell.
+    pub(super) fn points(&self, cell: usize) -> Vec<Position> {
+        let (from, to) = self.corners(cell);
+        let counts = if self.extent.width_m.is_some() { POINTS_ON_A_PLANE } else { POINTS_ON_A_LINE };
+        midpoints(from, to, counts)
+    }
+
+    /// P: xᵀP·x is the sum of the squared second differences of x along the line, or the bending energy Σ x_uu² + 2·x_uv² +
+    /// x_vv² of x over the plane, lengths in units of a cell's first side. Beyond the edges x is 0, so P is positive definite.
+    pub(super) fn roughness(&self) -> Array2<f64> {
+        let mut roughness = Array2::zeros((self.len(), self.len()));
+        let [along, across] = self.sides_m();
+        let bend = |start: [isize; 2], step: [isize; 2]| {
+            let place = |k: isize| self.cell_at([start[0] + k * step[0], start[1] + k * step[1]]);
+            [(place(-1), 1.0), (place(0), -2.0), (place(1), 1.0)]
+        };
+        for [i, j] in self.cells_and_rim() {
+            add_square(&mut roughness, &bend([i, j], [1, 0]), 1.0);
+        }
+        if self.extent.width_m.is_some() {
+            let ratio = along / across;
+            for [i, j] in self.cells_and_rim() {
+                add_square(&mut roughness, &bend([i, j], [0, 1]), ratio.powi(4));
+                let corner = |a, b, sign| (self.cell_at([i + a, j + b]), sign);
+                let twist = [corner(0, 0, 1.0), corner(1, 0, -1.0), corner(0, 1, -1.0), corner(1, 1, 1.0)];
+                add_square(&mut roughness, &twist, 2.0 * ratio * ratio);
+            }
+        }
+        roughness
+    }
+
+    /// All cells with a rim of one cell around them.
+    fn cells_and_rim(&self) -> impl Iterator<Item = [isize; 2]> {
+        let (columns, rows) = (self.columns as isize, self.rows as isize);
+        (-1..=rows).flat_map(move |j| (-1..=columns).map(move |i| [i, j]))
+    }
+
+    fn cell_at(&self, [column, row]: [isize; 2]) -> Option<usize> {
+        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
+        (column < self.columns && row < self.rows).then(|| row * self.columns + column)
+    }
+}
+
+/// Adds weight·(Σ c_k·x_k)² to a quadratic form; terms without a cell are 0.
+fn add_square(form: &mut Array2<f64>, terms: &[(Option<usize>, f64)], weight: f64) {
+    let terms: Vec<(usize, f64)> = terms.iter().filter_map(|(cell, c)| Some((((*cell)?), *c))).collect();
+    for (i, a) in &terms {
+        for (j, b) in &terms {
+            form[[*i, *j]] += weight * a * b;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array1;
+
+    fn line(columns: usize) -> Cells {
+        Cells { extent: Extent { length_m: 0.4, width_m: None }, columns, rows: 1 }
+    }
+
+    #[test]
+    fn roughness_is_the_sum_of_squared_second_differences() {
+        let cells = line(7);
+        let x = Array1::from_shape_fn(7, |i| (1.3 * i as f64).sin());
+        let at = |i: isize| usize::try_from(i).ok().and_then(|i| x.get(i)).copied().unwrap_or(0.0);
+        let direct: f64 = (-1..=7).map(|i| (at(i - 1) - 2.0 * at(i) + at(i + 1)).powi(2)).sum();
+        assert!((x.dot(&cells.roughness().dot(&x)) - direct).abs() < 1e-12);
+    }
+
+    #[test]
+    fn on_a_plane_a_tilt_costs_nothing_inside() {
+        let extent = Extent { length_m: 0.3, width_m: Some(0.15) };
+        let cells = Cells::over(extent);
+        assert_eq!((cells.columns, cells.rows), (20, 10));
+        let tilt = Array1::from_shape_fn(cells.len(), |cell| {
+            let Position { x_m, y_m } = cells.centre(cell);
+            1.0 + 2.0 * x_m - 3.0 * y_m
+        });
+        let force = cells.roughness().dot(&tilt);
+        let inside = |cell: &usize| {
+            let (i, j) = (cell % 20, cell / 20);
+            (2..18).contains(&i) && (2..8).contains(&j)
+        };
+        assert!((0..cells.len()).filter(inside).all(|cell| force[cell].abs() < 1e-12));
+        assert_eq!(cells.neighbours(0).collect::<Vec<_>>(), [1, 20]);
+        assert!((cells.measure() * cells.len() as f64 - 0.3 * 0.15).abs() < 1e-12);
+    }
+}

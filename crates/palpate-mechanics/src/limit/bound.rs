@@ -1,0 +1,102 @@
+//! What the bound at one contact says.
+
+use std::f64::consts::FRAC_2_PI;
+
+use serde::Serialize;
+
+use super::information::inverse_information;
+use palpate_numerics::small::principal_variances;
+
+/// The Cramér–Rao bound at one contact: what no unbiased estimator can beat there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bound {
+    /// Least standard deviation of the position along the length, in metres.
+    pub sd_x_m: f64,
+    /// The same across the width; 0 on a one-dimensional surface.
+    pub sd_y_m: f64,
+    /// Covariance of the two, in m².
+    pub covariance_xy_m2: f64,
+    /// Least standard deviation of the force, in newtons; `None` where the force is known.
+    pub sd_force_n: Option<f64>,
+    /// √(sd_x² + sd_y²): the least root mean square distance of estimate and contact, in metres.
+    pub sd_position_m: f64,
+}
+
+impl Bound {
+    /// The bound of readings with independent noise of variance 1, from their derivatives along and across, per metre; the
+    /// force is known. `None` where they do not tell the place.
+    pub fn of_columns(columns: [Vec<f64>; 2]) -> Option<Self> {
+        Some(Self::new(inverse_information(columns)?, None))
+    }
+
+    pub(super) fn new(position: [[f64; 2]; 2], force: Option<f64>) -> Self {
+        let [[xx, xy], [_, yy]] = position;
+        Self {
+            sd_x_m: xx.sqrt(),
+            sd_y_m: yy.sqrt(),
+            covariance_xy_m2: xy,
+            sd_force_n: force.map(f64::sqrt),
+            sd_position_m: (xx + yy).sqrt(),
+        }
+    }
+
+    /// Mean distance of estimate and contact, in metres, for an efficient estimator with Gaussian errors.
+    ///
+    /// s₁·√(2/π)·E(1 − s₂²/s₁²), where s₁ ≥ s₂ are the standard deviations along the principal axes and E is the complete
+    /// elliptic integral of the second kind. On a one-dimensional surface s₂ = 0, E = 1, and it is σ·√(2/π).
+    pub fn mean_error_m(&self) -> f64 {
+        let (xx, yy) = (self.sd_x_m * self.sd_x_m, self.sd_y_m * self.sd_y_m);
+        let [larger, smaller] = principal_variances([xx, self.covariance_xy_m2, yy]);
+        if larger <= 0.0 {
+            return 0.0;
+        }
+        (larger * FRAC_2_PI).sqrt() * elliptic_e((smaller / larger).sqrt())
+    }
+}
+
+/// E(1 − k′²), the complete elliptic integral of the second kind by its complementary modulus 0 ≤ k′ ≤ 1, by the
+/// arithmetic–geometric mean (Abramowitz and Stegun, 17.6.4).
+fn elliptic_e(complement: f64) -> f64 {
+    // As k′ falls to 0, K grows like ln(4/k′) and 1 − Σ shrinks: their product is 1 to rounding long before it is 0/0.
+    if complement < 1e-9 {
+        return 1.0;
+    }
+    let (mut a, mut b) = (1.0, complement);
+    let mut sum = 0.5 * (1.0 - complement * complement);
+    let mut weight = 0.5;
+    while (a - b).abs() > 1e-15 * a {
+        let c = 0.5 * (a - b);
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        weight *= 2.0;
+        sum += weight * c * c;
+    }
+    std::f64::consts::FRAC_PI_2 / a * (1.0 - sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    #[test]
+    fn the_elliptic_integral_meets_tabled_values() {
+        // Abramowitz and Stegun, table 17.1: E(m) at m = 1 − k′².
+        for (m, e) in [(0.0, FRAC_PI_2), (0.5, 1.350_643_881), (0.9, 1.104_774_733), (0.99, 1.015_993_546)] {
+            assert!((elliptic_e((1.0_f64 - m).sqrt()) - e).abs() < 1e-9, "{m}");
+        }
+        assert_eq!(elliptic_e(0.0), 1.0);
+        assert!((elliptic_e(1e-8) - elliptic_e(1e-10)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_mean_error_is_known_on_a_line_and_in_a_round_plane() {
+        let line = Bound::new([[4e-6, 0.0], [0.0, 0.0]], None);
+        assert!((line.mean_error_m() - 2e-3 * (2.0 / PI).sqrt()).abs() < 1e-12);
+        let round = Bound::new([[4e-6, 0.0], [0.0, 4e-6]], None);
+        assert!((round.mean_error_m() - 2e-3 * (PI / 2.0).sqrt()).abs() < 1e-12);
+        // The same ellipse, turned.
+        let along = Bound::new([[9e-6, 0.0], [0.0, 1e-6]], None);
+        let turned = Bound::new([[5e-6, 4e-6], [4e-6, 5e-6]], None);
+        assert!((along.mean_error_m() - turned.mean_error_m()).abs() < 1e-12);
+    }
+}

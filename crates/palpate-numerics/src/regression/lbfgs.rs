@@ -1,0 +1,163 @@
+//! Minimising a smooth function of a few variables: L-BFGS (Nocedal and Wright, *Numerical Optimization*, algorithm
+//! 7.5) with a backtracking line search.
+
+use std::collections::VecDeque;
+
+use crate::small::dot;
+
+/// Pairs of steps and gradient changes that are remembered.
+const MEMORY: usize = 12;
+/// No step changes a variable by more than this; the variables are logarithms, so that is a factor of 7.
+const LONGEST_STEP: f64 = 2.0;
+/// The share of the decrease promised by the gradient that a step must bring.
+const SUFFICIENT: f64 = 1e-4;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop {
+    /// After this many evaluations.
+    pub evaluations: usize,
+    /// When two steps in a row bring less than this.
+    pub decrease: f64,
+}
+
+/// Where a search ended.
+#[derive(Clone, Debug)]
+pub(super) struct Minimum {
+    /// The variables.
+    pub point: Vec<f64>,
+    /// The function there.
+    pub value: f64,
+}
+
+/// The step taken and by how much the gradient changed over it.
+struct Pair {
+    step: Vec<f64>,
+    change: Vec<f64>,
+}
+
+/// Walks downhill from `start`. `function` writes its gradient and gives its value, an infinity where it has none;
+/// the search ends at once when it says `None`, and the result is `None` too.
+pub(super) fn minimise(
+    start: &[f64],
+    stop: Stop,
+    mut function: impl FnMut(&[f64], &mut [f64]) -> Option<f64>,
+) -> Option<Minimum> {
+    let mut point = start.to_vec();
+    let mut gradient = vec![0.0; point.len()];
+    let mut value = function(&point, &mut gradient)?;
+    let mut pairs: VecDeque<Pair> = VecDeque::new();
+    let (mut evaluations, mut small_steps) = (1, 0);
+    while value.is_finite() && evaluations < stop.evaluations && small_steps < 2 {
+        let direction = direction(&gradient, &pairs);
+        let slope = dot(&direction, &gradient);
+        // Not downhill: the memory is stale, or the gradient is rounding error.
+        if slope >= 0.0 || !slope.is_finite() {
+            if pairs.is_empty() {
+                break;
+            }
+            pairs.clear();
+            continue;
+        }
+        let longest = direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        let mut length = (LONGEST_STEP / longest).min(1.0);
+        let mut next_gradient = vec![0.0; point.len()];
+        let accepted = loop {
+            if evaluations >= stop.evaluations {
+                break None;
+            }
+            let next: Vec<f64> = point.iter().zip(&direction).map(|(x, d)| x + length * d).collect();
+            let next_value = function(&next, &mut next_gradient)?;
+            evaluations += 1;
+            if next_value <= value + SUFFICIENT * length * slope {
+                break Some((next, next_value));
+            }
+            length *= shrink(value, slope * length, next_value);
+            if length * longest < 1e-9 {
+                break None;
+            }
+        };
+        let Some((next, next_value)) = accepted else { break };
+        small_steps = if value - next_value < stop.decrease { small_steps + 1 } else { 0 };
+        let step: Vec<f64> = next.iter().zip(&point).map(|(a, b)| a - b).collect();
+        let change: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(a, b)| a - b).collect();
+        if dot(&step, &change) > 1e-10 * dot(&change, &change) {
+            pairs.truncate(MEMORY - 1);
+            pairs.push_front(Pair { step, change });
+        }
+        (point, value, gradient) = (next, next_value, next_gradient);
+    }
+    Some(Minimum { point, value })
+}
+
+/// −H·g, by the two loops.
+fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
+    let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
+    let mut shares = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        let share = dot(&pair.step, &q) / dot(&pair.step, &pair.change);
+        add(&mut q, -share, &pair.change);
+        shares.push(share);
+    }
+    let first_length = || 1.0 / dot(gradient, gradient).sqrt().max(1.0);
+    let scale =
+        pairs.front().map_or_else(first_length, |p| dot(&p.step, &p.change) / dot(&p.change, &p.change));
+    q.iter_mut().for_each(|q| *q *= scale);
+    for (pair, share) in pairs.iter().zip(&shares).rev() {
+        let correction = dot(&pair.change, &q) / dot(&pair.step, &pair.change);
+        add(&mut q, share - correction, &pair.step);
+    }
+    q
+}
+
+/// By what to shorten a step: to the minimum of the parabola through value, slope and next value.
+fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
+    let curvature = next_value - value - slope;
+    if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }
+}
+
+fn add(to: &mut [f64], factor: f64, other: &[f64]) {
+    for (to, other) in to.iter_mut().zip(other) {
+        *to += factor * other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STOP: Stop = Stop { evaluations: 300, decrease: 1e-14 };
+
+    #[test]
+    fn the_bottom_of_rosenbrocks_valley_is_found() {
+        let rosenbrock = |x: &[f64], g: &mut [f64]| {
+            let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
+            (g[0], g[1]) = (-2.0 * a - 400.0 * x[0] * b, 200.0 * b);
+            Some(a * a + 100.0 * b * b)
+        };
+        let minimum = minimise(&[-1.2, 1.0], STOP, rosenbrock).unwrap();
+        assert!(minimum.point.iter().all(|x| (x - 1.0).abs() < 1e-4), "{minimum:?}");
+    }
+
+    #[test]
+    fn a_cliff_is_backed_away_from() {
+        // Defined for x > 0 only, least at x = 0.01.
+        let cliff = |x: &[f64], g: &mut [f64]| {
+            g[0] = 1.0 - 0.01 / x[0];
+            Some(if x[0] > 0.0 { x[0] - 0.01 * x[0].ln() } else { f64::INFINITY })
+        };
+        let minimum = minimise(&[1.0], STOP, cliff).unwrap();
+        assert!((minimum.point[0] - 0.01).abs() < 1e-6, "{minimum:?}");
+    }
+
+    #[test]
+    fn it_stops_when_told() {
+        let mut left = 3;
+        let slope = |_: &[f64], g: &mut [f64]| {
+            g[0] = 1.0;
+            left -= 1;
+            (left > 0).then_some(f64::from(left))
+        };
+        assert!(minimise(&[0.0], STOP, slope).is_none());
+    }
+}
