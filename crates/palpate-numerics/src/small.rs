@@ -26,6 +26,7 @@ pub struct Ldl<const N: usize> {
     inverse_pivots: [f64; N],
 }
 
+#[expect(clippy::needless_range_loop, reason = "as the formulas have their indices")]
 impl<const N: usize> Ldl<N> {
     /// The factors of a positive definite matrix; `None` where it is not so, or only by [`ROUNDING`].
     #[inline]

@@ -7,6 +7,7 @@ use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{simulate, simulate_moving};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;
@@ -86,7 +87,7 @@ fn measure(locator: &Locator, rig: &Rig) {
 fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecording) -> f64 {
     let tracking = locator.tracking(&config).expect("an influence locator");
     let rows = &timed.recording.rows;
-    let mut rates: Vec<f64> = (0..ROUNDS)
+    let rates: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             let mut tracker = Tracker::new(tracking.likelihood(), config);
             let start = ThreadTime::now();
@@ -96,6 +97,5 @@ fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecordi
             rows.len() as f64 / start.elapsed().as_secs_f64()
         })
         .collect();
-    rates.sort_by(f64::total_cmp);
-    rates[ROUNDS / 2]
+    median(rates).expect("rounds")
 }

@@ -90,8 +90,8 @@ impl<const N: usize> Gaussian<N> {
         for i in 0..N {
             y[i] = grown.solve_lower(y[i]);
             let scaled: [f64; K] = std::array::from_fn(|c| y[i][c] * grown.inverse_pivots()[c]);
-            for j in 0..=i {
-                after.covariance[i][j] -= dot(&scaled, &y[j]);
+            for (j, other) in y.iter().enumerate().take(i + 1) {
+                after.covariance[i][j] -= dot(&scaled, other);
                 after.covariance[j][i] = after.covariance[i][j];
             }
         }
