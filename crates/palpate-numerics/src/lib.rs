@@ -9,6 +9,7 @@ pub mod regression;
 pub mod small;
 mod sparse_cholesky;
 mod statistics;
+pub mod watch;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{

@@ -10,7 +10,8 @@ use super::{
     Axis, Chart, HeatPanel, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
     heat_map_to_svg,
 };
-use palpate_estimators::evaluation::{Comparison, Located, limit_ratio, percentage_error, percentile};
+use palpate_estimators::estimator::Comparison;
+use palpate_estimators::evaluation::{Located, limit_ratio, percentage_error, percentile};
 use palpate_estimators::setup::Bench;
 
 /// What a comparison's report is made from.
@@ -86,7 +87,7 @@ impl ComparisonReport<'_> {
 
     fn table(&self, table: usize) -> Markup {
         let rows = self.comparisons.iter().filter_map(|comparison| {
-            let evaluation = &comparison.evaluation;
+            let evaluation = &comparison.tried.evaluation;
             let summary = evaluation.summary(None)?;
             let cell = |value: Option<f64>| text(number(value.unwrap_or(f64::NAN)));
             Some(vec![
@@ -99,8 +100,8 @@ impl ComparisonReport<'_> {
                 cell(Some(evaluation.effective_percent(self.tolerance_m))),
                 cell(evaluation.coverage_percent()),
                 cell(limit_ratio(self.bench, evaluation)),
-                cell(Some(comparison.fit_seconds * 1e3)),
-                cell(Some(comparison.locate_ns * 1e-3)),
+                cell(Some(comparison.tried.fit_seconds * 1e3)),
+                cell(Some(comparison.tried.locate_ns * 1e-3)),
             ])
         });
         Table {
@@ -150,7 +151,7 @@ impl ComparisonReport<'_> {
             label: comparison.estimator.kind().to_owned(),
             colour: i % COLOURS,
             kind: SeriesKind::Line {
-                points: points(&comparison.evaluation.located),
+                points: points(&comparison.tried.evaluation.located),
                 stroke: if i < COLOURS { Stroke::Solid } else { Stroke::Dashed },
             },
         };
@@ -166,11 +167,11 @@ const MOST_MAPS: usize = 9;
 
 fn errors_map(report: &ComparisonReport, width_m: f64) -> Figure {
     let length_m = report.bench.surface.extent().length_m;
-    let grid = ErrorGrid::of(report.comparisons.iter().map(|c| &c.evaluation), length_m, width_m);
+    let grid = ErrorGrid::of(report.comparisons.iter().map(|c| &c.tried.evaluation), length_m, width_m);
     let shown = &report.comparisons[..report.comparisons.len().min(MOST_MAPS)];
     let panel = |comparison: &Comparison| HeatPanel {
         name: comparison.estimator.kind().to_owned(),
-        values: grid.medians_mm(&comparison.evaluation.located),
+        values: grid.medians_mm(&comparison.tried.evaluation.located),
     };
     let panels: Vec<HeatPanel> = shown.iter().map(panel).collect();
     let map = grid.map(report.bench, "Median error over the surface", panels);

@@ -8,7 +8,7 @@ use super::{
     Axis, BandPoint, Chart, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
 };
 use palpate_estimators::estimator::Track;
-use palpate_estimators::evaluation::{SpeedErrors, TrackErrors, tracked_of};
+use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 

@@ -1,7 +1,7 @@
 //! Features as a recording fixes them.
 
 use super::{FeatureKind, NoFeatures};
-use crate::method::LocatorFault;
+use crate::fit::LocatorFault;
 use crate::recording::Recording;
 use palpate_numerics::mean_and_variance;
 

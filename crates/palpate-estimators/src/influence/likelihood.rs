@@ -11,7 +11,8 @@ use std::f64::consts::PI;
 
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
-use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood, Locate};
+use crate::fit::Locate;
+use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;

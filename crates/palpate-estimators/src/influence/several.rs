@@ -9,7 +9,7 @@ use super::coarse::{COARSE, STRIDE};
 use super::likelihood::contact_fit;
 use super::scratch::Scratch;
 use super::search::Search;
-use crate::method::ContactFit;
+use crate::likelihood::ContactFit;
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
