@@ -13,6 +13,7 @@ use palpate_estimators::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{mean, median, standard_error};
 
 /// Why a calibration cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -163,18 +164,14 @@ impl Trial<'_> {
 impl Verification {
     /// Sums up calibrations, at least one.
     pub(super) fn of(calibrated: &[Calibrated], contacts: &WeightedContacts) -> Self {
-        let mut errors: Vec<f64> =
+        let errors: Vec<f64> =
             calibrated.iter().map(|one| contacts.mean(one.errors_m.iter().copied())).collect();
-        let count = errors.len() as f64;
-        let mean_error_m = errors.iter().sum::<f64>() / count;
-        let squares: f64 = errors.iter().map(|error| (error - mean_error_m).powi(2)).sum();
-        errors.sort_by(f64::total_cmp);
         Self {
-            mean_error_m,
-            standard_error_m: (squares / (count - 1.0).max(1.0) / count).sqrt(),
-            median_error_m: 0.5 * (errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]),
-            within_tolerance_percent: 100.0 * calibrated.iter().map(|one| one.within).sum::<f64>() / count,
+            mean_error_m: mean(errors.iter().copied()),
+            standard_error_m: standard_error(&errors),
+            within_tolerance_percent: 100.0 * mean(calibrated.iter().map(|one| one.within)),
             calibrations: errors.len(),
+            median_error_m: median(errors).unwrap_or(f64::NAN),
         }
     }
 }

@@ -11,6 +11,7 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
 use palpate_numerics::watch::Watch;
 
@@ -113,7 +114,7 @@ impl Forward {
         };
         let process = Regression::default().fit(samples, watch)?;
         let outputs = process.outputs();
-        let signal_variance = (0..outputs).map(|j| process.signal_variance(j)).sum::<f64>() / outputs as f64;
+        let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
         Ok(Self { process, signal_variance, extent, force })
     }
 
@@ -171,7 +172,7 @@ fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
 fn at_one_force(recording: &Recording) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         recording.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
-    let mean = forces.as_ref().map(|forces| forces.iter().sum::<f64>() / forces.len() as f64);
+    let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
     let scaled = |(i, row): (usize, &palpate_estimators::recording::Row)| {
         let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
         row.reading.iter().map(|value| factor * value).collect()
@@ -190,7 +191,7 @@ fn scatter(recording: &Recording, readings: &[Vec<f64>], channel: usize) -> Opti
             .filter(|(row, _)| row.position == position)
             .map(|(_, reading)| reading[channel])
             .collect();
-        let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
+        let mean = mean(repeats.iter().copied());
         squares += repeats.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         freedom += repeats.len() - 1;
     }

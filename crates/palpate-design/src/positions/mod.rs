@@ -28,6 +28,7 @@ use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
+use palpate_numerics::mean;
 use search::{PatternSearch, evaluate};
 
 /// Readings that a calibration is judged by, about: while searching, and when verifying.
@@ -300,13 +301,12 @@ impl<'a> PositionProblem<'a> {
         let seeds = Seeds { first: self.budget.seed, count: self.budget.verifications };
         watch.stage(Stage::Verification.in_words(), share)?;
         let all = trial.calibrate(&positions, self.budget.repeats, seeds, watch)?;
-        let mean =
-            |contact: usize| all.iter().map(|one| one.errors_m[contact]).sum::<f64>() / all.len() as f64;
+        let mean_error_m = |contact: usize| mean(all.iter().map(|one| one.errors_m[contact]));
         Ok(Placed {
             placement,
             positions,
             verification: Verification::of(&all, &self.contacts),
-            errors_m: (0..self.contacts.len()).map(mean).collect(),
+            errors_m: (0..self.contacts.len()).map(mean_error_m).collect(),
         })
     }
 
