@@ -9,8 +9,8 @@ mod settings;
 mod tracking;
 
 pub use crate::distribution::{
-    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution,
-    patch_limits,
+    Cells, CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler,
+    Resolution, patch_limits,
 };
 pub use crate::method::ReadingError;
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};

@@ -2,19 +2,21 @@
 
 mod comparison;
 mod cross_validation;
+mod linear_theory;
 mod statistics;
 mod tracking;
 
 pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
 pub use cross_validation::{CrossValidationError, cross_validate};
-pub use statistics::{Spread, percentile};
+pub use linear_theory::LinearTheory;
+pub use statistics::{Spread, median, percentile};
 pub use tracking::{
     FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
     tracked_of,
 };
 
 use crate::contact::Position;
-use crate::estimator::{ContactEstimate, Locator, ReadingError};
+use crate::estimator::{Cells, ContactEstimate, Locator, ReadingError};
 use crate::mechanics::Extent;
 use crate::recording::Recording;
 
@@ -146,6 +148,38 @@ impl Evaluation {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+    }
+
+    /// The median error of the contacts in each cell, in metres; NaN where there is none.
+    pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
+        let mut errors: Vec<Vec<f64>> = vec![Vec::new(); cells.len()];
+        for located in &self.located {
+            errors[cells.cell_of(located.truth)].push(located.error_m());
+        }
+        errors.into_iter().map(|errors| median(errors).unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
+    /// for a stretch without contacts.
+    pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
+        let extent = Extent { length_m: self.length_m, width_m: None };
+        let cells = Cells { extent, columns: count, rows: 1 };
+        let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
+        for located in &self.located {
+            stretches[cells.cell_of(located.truth)].push(located);
+        }
+        let point = |stretch: &Vec<&Located>| {
+            let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
+            Some((mean_m, median(stretch.iter().map(|located| located.error_m()).collect())?))
+        };
+        stretches.iter().filter_map(point).collect()
+    }
+
+    /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
+    pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
+        let mut errors: Vec<f64> = self.located.iter().map(Located::error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
     /// Errors of each distinct position, by x and then y.

@@ -9,6 +9,12 @@ pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
     Some(low + (high - low) * place.fract())
 }
 
+/// The median of values in any order; `None` of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    percentile(&values, 50.0)
+}
+
 /// Where a figure lies over many seeds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Spread {
@@ -21,6 +27,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// The same spread in another unit, of which one of this makes `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
+    }
+
     /// The spread of some values, in any order; `None` of nothing.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
@@ -45,6 +56,7 @@ mod tests {
         assert_eq!(percentile(&values, 100.0), Some(16.0));
         assert_eq!(percentile(&[3.0], 95.0), Some(3.0));
         assert_eq!(percentile(&[], 50.0), None);
+        assert_eq!((median(vec![8.0, 1.0, 2.0]), median(vec![])), (Some(2.0), None));
     }
 
     #[test]

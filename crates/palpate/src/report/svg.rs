@@ -1,44 +1,69 @@
-//! Lines, shapes and texts in pixels; the one place that knows `plotters`.
-//!
-//! Its SVG backend rounds every coordinate and stroke width to whole units and leaves line joins sharp, so it is
-//! given a canvas [`FINE`] times finer than the pixels, inside an outer `svg` element that scales it back.
+//! An SVG document, written shape by shape in pixels.
 
 use super::geometry::{Point, Rect};
-use plotters::backend::SVGBackend;
-use plotters::coord::Shift;
-use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
-use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, Text};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, RGBAColor, RGBColor, ShapeStyle, TextStyle};
+use std::fmt::{self, Write};
 
-/// Steps of the backend's coordinates in one pixel.
-const FINE: f64 = 10.0;
-/// The backend writes a font size divided by this number.
-const BACKEND_FONT_FACTOR: f64 = 1.24;
-/// From the middle of the capitals down to where the backend centres a text, in units of the font size.
-const CAPITALS_DROP: f64 = 0.11;
+/// From the middle of the capitals down to the baseline, in units of the font size.
+const CAPITALS_HALF_HEIGHT: f64 = 0.36;
 
-pub(crate) const INK: RGBColor = RGBColor(34, 34, 34);
-pub(crate) const QUIET_INK: RGBColor = RGBColor(90, 90, 90);
-pub(crate) const REFERENCE: RGBColor = RGBColor(110, 110, 110);
-pub(crate) const GRID: RGBColor = RGBColor(228, 228, 228);
-pub(crate) const MINOR_GRID: RGBColor = RGBColor(243, 243, 243);
-pub(crate) const WHITE: RGBColor = RGBColor(255, 255, 255);
+/// A colour and how opaque it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Colour {
+    pub rgb: [u8; 3],
+    /// 0 to 1.
+    pub opacity: f64,
+}
+
+pub(crate) const INK: Colour = Colour::opaque(34, 34, 34);
+pub(crate) const QUIET_INK: Colour = Colour::opaque(90, 90, 90);
+pub(crate) const REFERENCE: Colour = Colour::opaque(110, 110, 110);
+pub(crate) const GRID: Colour = Colour::opaque(228, 228, 228);
+pub(crate) const MINOR_GRID: Colour = Colour::opaque(243, 243, 243);
+pub(crate) const WHITE: Colour = Colour::opaque(255, 255, 255);
+pub(crate) const BLACK: Colour = Colour::opaque(0, 0, 0);
 
 /// Okabe and Ito's colours, less the yellow that is lost on white.
-const PALETTE: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
+const PALETTE: [Colour; 7] = [
+    Colour::opaque(0, 114, 178),
+    Colour::opaque(213, 94, 0),
+    Colour::opaque(0, 158, 115),
+    Colour::opaque(204, 121, 167),
+    Colour::opaque(86, 180, 233),
+    Colour::opaque(230, 159, 0),
+    BLACK,
 ];
 
 /// The colour with that index; the palette starts over at its end.
-pub(crate) fn palette(index: usize) -> RGBColor {
+pub(crate) fn palette(index: usize) -> Colour {
     PALETTE[index % PALETTE.len()]
+}
+
+impl Colour {
+    pub const fn opaque(red: u8, green: u8, blue: u8) -> Self {
+        Self { rgb: [red, green, blue], opacity: 1.0 }
+    }
+
+    pub const fn with_opacity(self, opacity: f64) -> Self {
+        Self { opacity, ..self }
+    }
+}
+
+/// "#0072b2"; opacity is an attribute of its own.
+impl fmt::Display for Colour {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [red, green, blue] = self.rgb;
+        write!(out, "#{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+/// The fill of a shape, as attributes.
+struct Fill(Colour);
+
+impl fmt::Display for Fill {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "fill=\"{}\"", self.0)?;
+        if self.0.opacity < 1.0 { write!(out, " fill-opacity=\"{}\"", self.0.opacity) } else { Ok(()) }
+    }
 }
 
 /// Which part of a text stands at its position.
@@ -58,108 +83,119 @@ pub(crate) struct Label {
     pub anchor: Anchor,
     /// Font size in pixels.
     pub size: f64,
-    pub colour: RGBColor,
+    pub colour: Colour,
 }
 
-/// A canvas of some pixels; drawing beyond its edge is cut off.
-pub(crate) struct Canvas<'a> {
-    area: DrawingArea<SVGBackend<'a>, Shift>,
+/// An SVG document of some pixels; what lies beyond its edge is not seen.
+pub(crate) struct Svg {
+    text: String,
 }
 
-/// The SVG text of what `paint` draws on a white canvas.
-pub(crate) fn svg(width_px: u32, height_px: u32, paint: impl FnOnce(&Canvas<'_>)) -> String {
-    let fine = |pixels: u32| pixels * FINE as u32;
-    let mut drawing = String::new();
-    {
-        let area =
-            SVGBackend::with_string(&mut drawing, (fine(width_px), fine(height_px))).into_drawing_area();
-        let canvas = Canvas { area };
-        canvas.written(canvas.area.fill(&WHITE));
-        paint(&canvas);
-        canvas.written(canvas.area.present());
+impl Svg {
+    /// A white image. Texts are set in the reader's sans-serif font.
+    pub fn new(width_px: u32, height_px: u32) -> Self {
+        let text = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px}\" height=\"{height_px}\" viewBox=\"0 0 {width_px} \
+             {height_px}\" font-family=\"sans-serif\" stroke-linejoin=\"round\" stroke-linecap=\"round\">\n"
+        );
+        let mut svg = Self { text };
+        let image = Rect { left: 0.0, top: 0.0, right: width_px.into(), bottom: height_px.into() };
+        svg.rectangle(image, WHITE);
+        svg
     }
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px}\" height=\"{height_px}\" \
-         viewBox=\"0 0 {} {}\" stroke-linejoin=\"round\" stroke-linecap=\"round\">\n{drawing}</svg>\n",
-        fine(width_px),
-        fine(height_px)
-    )
-}
 
-impl Canvas<'_> {
+    /// The whole document.
+    pub fn finish(mut self) -> String {
+        self.text += "</svg>\n";
+        self.text
+    }
+
     /// A line through the points; nothing for fewer than two.
-    pub fn line(&self, points: &[Point], width: f64, colour: RGBColor) {
-        if points.len() > 1 {
-            self.written(self.area.draw(&PathElement::new(fine_points(points), stroke(width, colour))));
-        }
+    pub fn line(&mut self, points: &[Point], width: f64, colour: Colour) {
+        self.polyline(points, width, colour, "");
     }
 
     /// A broken line through the points.
-    pub fn dashed_line(&self, points: &[Point], width: f64, colour: RGBColor) {
-        let (dash, gap) = (6.0 * FINE, 5.0 * FINE);
-        self.written(self.area.draw(&DashedPathElement::new(
-            fine_points(points),
-            dash as i32,
-            gap as i32,
-            stroke(width, colour),
-        )));
+    pub fn dashed_line(&mut self, points: &[Point], width: f64, colour: Colour) {
+        self.polyline(points, width, colour, " stroke-dasharray=\"6 5\"");
+    }
+
+    fn polyline(&mut self, points: &[Point], width: f64, colour: Colour, dashes: &str) {
+        if points.len() > 1 {
+            let (points, width) = (point_list(points), decimal(width));
+            self.element(format_args!(
+                "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{dashes}/>"
+            ));
+        }
     }
 
     /// A filled polygon; nothing for fewer than three corners.
-    pub fn polygon(&self, points: &[Point], colour: RGBAColor) {
-        if points.len() > 2 {
-            self.written(self.area.draw(&Polygon::new(fine_points(points), colour.filled())));
+    pub fn polygon(&mut self, corners: &[Point], colour: Colour) {
+        if corners.len() > 2 {
+            let (corners, fill) = (point_list(corners), Fill(colour));
+            self.element(format_args!("<polygon points=\"{corners}\" {fill}/>"));
         }
     }
 
     /// A filled rectangle.
-    pub fn rectangle(&self, rect: Rect, colour: RGBAColor) {
-        let corners = [fine_point((rect.left, rect.top)), fine_point((rect.right, rect.bottom))];
-        self.written(self.area.draw(&Rectangle::new(corners, colour.filled())));
+    pub fn rectangle(&mut self, rect: Rect, colour: Colour) {
+        let [x, y, width, height] = [rect.left, rect.top, rect.width(), rect.height()].map(decimal);
+        let fill = Fill(colour);
+        self.element(format_args!(
+            "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" {fill}/>"
+        ));
     }
 
     /// A filled disc.
-    pub fn disc(&self, centre: Point, radius: f64, colour: RGBColor) {
-        self.written(self.area.draw(&Circle::new(
-            fine_point(centre),
-            (radius * FINE).round() as i32,
-            colour.filled(),
-        )));
+    pub fn disc(&mut self, (x, y): Point, radius: f64, colour: Colour) {
+        let [x, y, radius] = [x, y, radius].map(decimal);
+        let fill = Fill(colour);
+        self.element(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" {fill}/>"));
     }
 
     /// A text; characters that XML cannot hold become spaces.
-    pub fn text(&self, label: &Label) {
-        let text: String = label.text.chars().map(|c| if is_xml(c) { c } else { ' ' }).collect();
-        let horizontal = match label.anchor {
-            Anchor::Start => HPos::Left,
-            Anchor::Middle => HPos::Center,
-            Anchor::End => HPos::Right,
+    pub fn text(&mut self, label: &Label) {
+        let Label { text, at, anchor, size, colour } = label;
+        let [x, y, size] = [at.0, at.1 + CAPITALS_HALF_HEIGHT * size, *size].map(decimal);
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
         };
-        let style = TextStyle::from(("sans-serif", label.size * FINE * BACKEND_FONT_FACTOR))
-            .color(&label.colour)
-            .pos(Pos::new(horizontal, VPos::Center));
-        let at = (label.at.0, label.at.1 + CAPITALS_DROP * label.size);
-        self.written(self.area.draw(&Text::new(text, fine_point(at), style)));
+        let (text, fill) = (escaped(text), Fill(*colour));
+        self.element(format_args!(
+            "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\" font-size=\"{size}\" {fill}>{text}</text>"
+        ));
     }
 
-    /// The backend only appends to a `String`, so an error is one of this module.
-    fn written<E: std::error::Error + Send + Sync>(&self, result: Result<(), DrawingAreaErrorKind<E>>) {
-        result.expect("writing SVG into a String cannot fail");
+    fn element(&mut self, element: fmt::Arguments<'_>) {
+        writeln!(self.text, "{element}").expect("writing into a String cannot fail");
     }
 }
 
-fn stroke(width: f64, colour: RGBColor) -> ShapeStyle {
-    colour.stroke_width((width * FINE).round() as u32)
+/// A hundredth of a pixel is more than any screen shows.
+fn decimal(value: f64) -> String {
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-fn fine_point((x, y): Point) -> (i32, i32) {
-    ((x * FINE).round() as i32, (y * FINE).round() as i32)
+fn point_list(points: &[Point]) -> String {
+    let points: Vec<String> = points.iter().map(|&(x, y)| format!("{},{}", decimal(x), decimal(y))).collect();
+    points.join(" ")
 }
 
-fn fine_points(points: &[Point]) -> Vec<(i32, i32)> {
-    points.iter().copied().map(fine_point).collect()
-}
-
-fn is_xml(character: char) -> bool {
-    !character.is_control() && !matches!(character, '\u{fffe}' | '\u{ffff}')
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '\u{fffe}' | '\u{ffff}' => escaped.push(' '),
+            _ if character.is_control() => escaped.push(' '),
+            _ => escaped.push(character),
+        }
+    }
+    escaped
 }

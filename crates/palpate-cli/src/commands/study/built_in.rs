@@ -4,7 +4,7 @@ use super::Arguments;
 use crate::failure::{Complaint, Failure};
 use crate::output;
 use crate::progress::FitWatch;
-use palpate::report::{ReportError, ReportFile};
+use palpate::report::ReportFile;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub trait BuiltIn {
     /// What it finds; `None` when `keep_going` says no.
     fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<Self::Findings>, Self::Error>;
 
-    fn report(&self, findings: &Self::Findings) -> Result<Vec<ReportFile>, ReportError>;
+    fn report(&self, findings: &Self::Findings) -> Vec<ReportFile>;
 
     /// The findings for people.
     fn tell(findings: &Self::Findings) -> String;

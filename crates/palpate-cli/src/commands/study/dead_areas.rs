@@ -5,7 +5,7 @@ use super::built_in::BuiltIn;
 use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
-use palpate::report::{ReportError, ReportFile, dead_areas_report};
+use palpate::report::{ReportFile, dead_areas_report};
 use palpate::simulate::SimulateError;
 use palpate::study::dead_areas::{COUNTS, DeadAreaFindings, DeadAreas, RIG_TOML};
 use std::path::Path;
@@ -43,7 +43,7 @@ impl BuiltIn for DeadAreas {
         self.run(keep_going)
     }
 
-    fn report(&self, findings: &DeadAreaFindings) -> Result<Vec<ReportFile>, ReportError> {
+    fn report(&self, findings: &DeadAreaFindings) -> Vec<ReportFile> {
         dead_areas_report(self, findings)
     }
 
