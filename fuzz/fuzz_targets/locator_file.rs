@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate::estimator::Locator;
+use palpate_estimators::estimator::Locator;
 
 fuzz_target!(|text: &str| {
     if let Ok(locator) = Locator::from_json(text) {

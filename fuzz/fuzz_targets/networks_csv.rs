@@ -2,11 +2,11 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate::study::{NetworksCsv, PreparedStudy, Study};
+use palpate_studies::{NetworksCsv, PreparedStudy, Study};
 use std::sync::LazyLock;
 
 static STUDY: LazyLock<PreparedStudy> = LazyLock::new(|| {
-    let study = Study::from_toml(palpate::study::paper::STUDY_TOML).expect("the built-in study is one");
+    let study = Study::from_toml(palpate_studies::paper::STUDY_TOML).expect("the built-in study is one");
     let prepared = PreparedStudy::new(study, &mut |_, _| true).expect("the built-in study can be simulated");
         prepared.expect("nobody stopped it")
 });

@@ -2,8 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate::recording::ReadingParser;
-use palpate::rig::Rig;
+use palpate_estimators::recording::ReadingParser;
+use palpate_rig::Rig;
 use std::sync::LazyLock;
 
 static RIG: LazyLock<Rig> = LazyLock::new(|| {

@@ -4,5 +4,5 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
-    let _ = palpate::rig::Rig::from_toml(text);
+    let _ = palpate_rig::Rig::from_toml(text);
 });

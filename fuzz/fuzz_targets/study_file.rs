@@ -4,5 +4,5 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
-    let _ = palpate::study::Study::from_toml(text);
+    let _ = palpate_studies::Study::from_toml(text);
 });

@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
-    if let Ok(quantity) = text.parse::<palpate::units::Quantity>() {
+    if let Ok(quantity) = text.parse::<palpate_mechanics::units::Quantity>() {
         assert!(quantity.value.is_finite());
     }
 });

@@ -1,11 +1,11 @@
 //! Reading palpate's files, with complaints that point at the place.
 
 use crate::failure::{Complaint, Failure};
-use palpate::estimator::{Locator, LocatorFileError};
-use palpate::recording::CsvError;
-use palpate::rig::{Rig, RigError};
-use palpate::study::{Study, StudyError, StudyProblem};
-use palpate::units::{Dimension, Quantity};
+use palpate_estimators::estimator::{Locator, LocatorFileError};
+use palpate_estimators::recording::CsvError;
+use palpate_mechanics::units::{Dimension, Quantity};
+use palpate_rig::{Rig, RigError};
+use palpate_studies::{Study, StudyError, StudyProblem};
 use std::path::Path;
 
 /// The text of a file.

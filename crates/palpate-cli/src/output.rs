@@ -1,7 +1,7 @@
 //! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
 
 use crate::failure::{Complaint, Failure};
-use palpate::report::ReportFile;
+use palpate_report::ReportFile;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -57,7 +57,7 @@ pub fn make_folder(path: &Path) -> Result<(), Failure> {
 /// figure as PNG.
 pub fn write_report(folder: &Path, files: Vec<ReportFile>) -> Result<(), Failure> {
     #[cfg(feature = "png")]
-    let files = palpate::report::with_png_copies(files).map_err(Complaint::new)?;
+    let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
     make_folder(folder)?;
     for file in files {
         write_file(&folder.join(&file.name), &file.bytes)?;

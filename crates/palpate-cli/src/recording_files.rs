@@ -2,8 +2,8 @@
 
 use crate::failure::Failure;
 use crate::input::{csv_complaint, read_bytes};
-use palpate::bench::Bench;
-use palpate::recording::Recording;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
 use std::path::{Path, PathBuf};
 
 /// A recording: one file, or readings and contacts apart.

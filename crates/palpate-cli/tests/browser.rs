@@ -3,7 +3,7 @@
 
 mod support {
     pub mod browser;
-    #[path = "../../../palpate/tests/support/skip.rs"]
+    #[path = "../../../palpate-testing/src/skip.rs"]
     pub mod skip;
 }
 

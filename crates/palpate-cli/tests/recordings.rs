@@ -2,9 +2,9 @@
 #![forbid(unsafe_code)]
 
 mod support {
-    #[path = "../../../palpate/tests/support/data.rs"]
+    #[path = "../../../palpate-testing/src/data.rs"]
     pub mod data;
-    #[path = "../../../palpate/tests/support/skip.rs"]
+    #[path = "../../../palpate-testing/src/skip.rs"]
     pub mod skip;
 }
 

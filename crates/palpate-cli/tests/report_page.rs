@@ -3,17 +3,17 @@
 
 mod support {
     pub mod browser;
-    #[path = "../../../palpate/tests/support/skip.rs"]
+    #[path = "../../../palpate-testing/src/skip.rs"]
     pub mod skip;
 }
 
 use std::fs;
 
-use palpate::limit::{Force, Limit, LimitCurve, limit_warnings};
-use palpate::network::{InstructionSet, Precision};
-use palpate::report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
-use palpate::rig::Rig;
-use palpate::study::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};
+use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
+use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
+use palpate_rig::Rig;
+use palpate_studies::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};
 use support::browser::measure;
 use tempfile::TempDir;
 
@@ -47,13 +47,13 @@ fn pages() -> [Vec<ReportFile>; 2] {
         presentations_per_second: 1e7,
     };
     let report = StudyReport { study: &study, outcomes: &outcomes, results: &results, run: &run };
-    [paper_report(&report).unwrap(), study_report(&report).unwrap()]
+    [paper_report(&report), study_report(&report)]
 }
 
 /// The page of the limit of the paper's bench.
 fn limit_page() -> Vec<ReportFile> {
     let bench = Rig::from_toml(include_str!("../../../examples/paper.toml")).unwrap().bench;
-    let limit = Limit::of(&bench).unwrap();
+    let limit = bench.cramer_rao_bound().unwrap();
     let [known, unknown] =
         [Force::Known, Force::Unknown].map(|force| LimitCurve::over(&limit, 3.0, force).unwrap());
     let report = LimitReport {
@@ -66,7 +66,7 @@ fn limit_page() -> Vec<ReportFile> {
         warnings: &limit_warnings(&limit, 3.0, Force::Unknown).unwrap(),
         listed: &known.points.iter().step_by(50).map(|point| point.position).collect::<Vec<_>>(),
     };
-    limit_report(&report).unwrap()
+    limit_report(&report)
 }
 
 #[test]

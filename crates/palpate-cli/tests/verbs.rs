@@ -3,9 +3,9 @@
 
 mod support {
     pub mod command;
-    #[path = "../../../palpate/tests/support/data.rs"]
+    #[path = "../../../palpate-testing/src/data.rs"]
     pub mod data;
-    #[path = "../../../palpate/tests/support/skip.rs"]
+    #[path = "../../../palpate-testing/src/skip.rs"]
     pub mod skip;
 }
 

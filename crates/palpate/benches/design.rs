@@ -3,11 +3,12 @@
 //! same matrix of sines says `design_scipy.py` beside this file.
 
 use cpu_time::ThreadTime;
-use palpate::bench::Bench;
-use palpate::design::sensors::{SensorProblem, condition_number, pivoted_columns};
-use palpate::mechanics::{Beam, Surface, SurfaceSpec};
-use palpate::rig::{Rig, SensorDesign, Sites};
-use palpate::sensing::SensorKind;
+use palpate_design::sensors::{SensorDesign, Sites};
+use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_rig::Rig;
 
 const SITES: usize = 100_000;
 const SENSORS: usize = 8;
@@ -88,7 +89,7 @@ fn sines() -> Vec<Vec<f64>> {
 fn deflections(beam: &Beam) -> Vec<Vec<f64>> {
     let mut modes: Vec<Vec<f64>> = Vec::new();
     for k in 1..=SENSORS {
-        let at = |x: f64| palpate::contact::Position::along(x * beam.length_m);
+        let at = |x: f64| palpate_mechanics::contact::Position::along(x * beam.length_m);
         let shape = beam.influence_function(SensorKind::Deflection, at(k as f64 / 9.0));
         let mut mode: Vec<f64> = (0..SITES).map(|i| shape.at(at(site(i)))).collect();
         for _ in 0..2 {

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use cpu_time::ThreadTime;
-use palpate::network::{BatchNetwork, InstructionSet, NetworkConfig, PreparedNetwork, Topology};
+use palpate_estimators::network::{BatchNetwork, InstructionSet, NetworkConfig, PreparedNetwork, Topology};
 
 const ROUNDS: usize = 15;
 const READINGS: usize = 4096;

@@ -3,8 +3,8 @@
 
 use cpu_time::ThreadTime;
 use ndarray::Array2;
-use palpate::numerics::Cholesky;
-use palpate::regression::{Regression, Samples};
+use palpate_numerics::Cholesky;
+use palpate_numerics::regression::{Regression, Samples};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -3,14 +3,14 @@
 //! and what bounds a batch in `influence/batch.rs`.
 
 use cpu_time::ThreadTime;
-use palpate::bench::Bench;
-use palpate::contact::{Contact, Position};
-use palpate::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
-use palpate::method::FitTask;
-use palpate::recording::Recording;
-use palpate::rig::Rig;
-use palpate::simulate::{clean_reading, simulate};
 use palpate_core::{Estimate, Status};
+use palpate_estimators::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
+use palpate_estimators::method::FitTask;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::clean_reading;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_rig::Rig;
 
 const ROUNDS: usize = 201;
 const READINGS: usize = 1000;
@@ -18,7 +18,7 @@ const READINGS: usize = 1000;
 fn main() {
     let text = include_str!("../../../examples/paper.toml").replace("repeats = 1", "repeats = 10");
     let rig = Rig::from_toml(&text).expect("the paper's rig is sound");
-    let recording = simulate(&rig, 0).expect("the paper's rig can be simulated");
+    let recording = rig.simulate(0).expect("the paper's rig can be simulated");
     for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
         let config = InfluenceConfig { from, ..InfluenceConfig::default() };
         let mut times: Vec<f64> = (0..21)

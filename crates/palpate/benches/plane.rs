@@ -2,21 +2,21 @@
 //! uncertainty; one core, CPU time, medians.
 
 use cpu_time::ThreadTime;
-use palpate::arrangement::every;
-use palpate::bench::Bench;
-use palpate::contact::{Contact, Position};
-use palpate::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
-use palpate::mechanics::Extent;
-use palpate::method::FitTask;
-use palpate::recording::Recording;
-use palpate::rig::Rig;
-use palpate::simulate::{CleanSensors, simulate};
+use palpate_estimators::arrangement::every;
+use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
+use palpate_estimators::method::FitTask;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::{CleanSensors, simulate};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
+use palpate_rig::Rig;
 
 const ROUNDS: usize = 51;
 
 fn main() {
     let rig = Rig::from_toml(include_str!("../../../examples/plate.toml")).expect("the rig is sound");
-    let recording = simulate(&rig, 0).expect("the rig can be simulated");
+    let recording = rig.simulate(0).expect("the rig can be simulated");
     let mut times: Vec<f64> = (0..5)
         .map(|_| {
             let start = ThreadTime::now();

@@ -4,11 +4,11 @@
 use std::hint::black_box;
 
 use cpu_time::ProcessTime;
-use palpate::contact::Position;
-use palpate::mechanics::plate::{Edge, Edges, PlateSpec};
-use palpate::mechanics::{Plate, Surface};
-use palpate::numerics::EliminationOrder;
-use palpate::sensing::SensorKind;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
+use palpate_mechanics::surface::{Plate, Surface};
+use palpate_numerics::EliminationOrder;
 
 const SIDE_M: f64 = 0.3;
 const EVALUATIONS: usize = 4_000_000;

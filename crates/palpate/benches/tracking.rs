@@ -2,12 +2,12 @@
 //! medians; and how much closer the track is than its readings, at several speeds, in the mean of several recordings.
 
 use cpu_time::ThreadTime;
-use palpate::bench::Bench;
-use palpate::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
-use palpate::evaluation::{Followed, TrackErrors, follow};
-use palpate::recording::TimedRecording;
-use palpate::rig::Rig;
-use palpate::simulate::{simulate, simulate_moving};
+use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
+use palpate_estimators::recording::TimedRecording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::{simulate, simulate_moving};
+use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;
 /// Recordings of each motion, under noise of their own.
@@ -34,7 +34,7 @@ fn main() {
 
 fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
     let bench = Bench { force_n, ..rig.bench.clone() };
-    let recording = simulate(rig, 1).expect("the example can be simulated");
+    let recording = rig.simulate(1).expect("the example can be simulated");
     let fitting = Fitting::prepare(&bench, &rig.estimator, &recording).expect("the presses suit the bench");
     fitting.fit(0, &mut || true).expect("the presses suit the bench").expect("nobody stops it")
 }
@@ -42,7 +42,7 @@ fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
 fn measure(locator: &Locator, rig: &Rig) {
     let seeds = 2..2 + RECORDINGS;
     let moving: Vec<TimedRecording> =
-        seeds.map(|seed| simulate_moving(rig, seed).expect("the example can be moved")).collect();
+        seeds.map(|seed| rig.simulate_moving(seed).expect("the example can be moved")).collect();
     let beam = rig.motion.and_then(|moving| moving.beam);
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });

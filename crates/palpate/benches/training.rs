@@ -2,7 +2,7 @@
 //! CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
 
 use cpu_time::ThreadTime;
-use palpate::network::{
+use palpate_estimators::network::{
     BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, SeedQueue,
     Topology, TrainedNetwork, TrainingTask, train_many, train_one,
 };

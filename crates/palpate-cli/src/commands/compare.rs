@@ -4,9 +4,11 @@ use crate::failure::{Complaint, Failure};
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
-use palpate::evaluation::{Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator};
-use palpate::report::{ComparisonReport, comparison_report};
-use palpate::rig::Rig;
+use palpate_estimators::evaluation::{
+    Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator,
+};
+use palpate_report::{ComparisonReport, comparison_report};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -143,7 +145,7 @@ struct Trials {
 
 fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
     let Some(recording) = arguments.files.read(&rig.bench)? else {
-        let trials = Trial::by_simulation(rig, u64::from(arguments.calibrations), arguments.seed);
+        let trials = rig.trials(u64::from(arguments.calibrations), arguments.seed);
         let trials = trials.map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
                 .help("--data names a recording to compare on")
@@ -165,7 +167,7 @@ fn compare(
     trials: &[Trial],
 ) -> Result<(Vec<Comparison>, Vec<LeftOut>), Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
-    let mut contenders = contenders(rig, rows);
+    let mut contenders = contenders(&rig.bench, &rig.estimator, rows);
     let known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
     if let Some(unknown) = arguments.only.iter().find(|kind| !known.contains(&kind.as_str())) {
         let complaint = Complaint::new(format!("--only {unknown}: no estimator of this kind suits the rig"));

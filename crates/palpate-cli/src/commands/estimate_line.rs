@@ -1,9 +1,9 @@
 //! An estimate as a line of CSV or JSON.
 
 use crate::failure::{Complaint, Failure};
-use palpate::digit::DigitShape;
-use palpate::estimator::{ContactEstimate, Estimate};
-use palpate::recording::csv_row;
+use palpate_estimators::digit::DigitShape;
+use palpate_estimators::estimator::{ContactEstimate, Estimate};
+use palpate_estimators::recording::csv_row;
 
 /// The columns of [`csv`]. What a locator does not estimate stays empty.
 pub fn heading(plane: bool) -> &'static str {
@@ -87,7 +87,7 @@ pub fn json(
     plane: bool,
     shape: Option<&DigitShape>,
 ) -> Result<String, Failure> {
-    let mode = |mode: &palpate::estimator::Mode| JsonMode {
+    let mode = |mode: &palpate_estimators::estimator::Mode| JsonMode {
         contact: json_contact(&mode.contact, plane),
         probability: mode.probability,
     };
@@ -103,7 +103,7 @@ pub fn json(
 }
 
 fn json_shape(shape: &DigitShape) -> Vec<JsonShapePoint> {
-    let point = |point: &palpate::digit::ShapePoint| JsonShapePoint {
+    let point = |point: &palpate_estimators::digit::ShapePoint| JsonShapePoint {
         at_mm: point.at_m * 1e3,
         x_mm: point.x_m * 1e3,
         y_mm: point.y_m * 1e3,

@@ -5,13 +5,13 @@ use crate::progress::FitWatch;
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, output};
-use palpate::arrangement::all_over;
-use palpate::estimator::Locator;
-use palpate::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
-use palpate::recording::{Provenance, Recording};
-use palpate::report::{EvaluationReport, Judged, evaluation_report};
-use palpate::rig::Rig;
-use palpate::simulate::{SimulateError, simulate, simulate_at};
+use palpate_estimators::arrangement::all_over;
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
+use palpate_estimators::recording::{Provenance, Recording};
+use palpate_estimators::simulate::simulate_at;
+use palpate_report::{EvaluationReport, Judged, evaluation_report};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
@@ -126,11 +126,12 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     let rig = input::read_rig(&arguments.subject)?;
     let recording = match arguments.files.read(&rig.bench)? {
         Some(recording) => recording,
-        None => simulate(&rig, arguments.seed).map_err(simulation_complaint)?,
+        None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let mut watch = FitWatch::new(folds as u64 * rig.estimator.most_rounds());
-    let evaluation = cross_validate(&rig, &recording, folds, seed, &mut || watch.keep_going());
+    let evaluation =
+        cross_validate(&rig.bench, &rig.estimator, &recording, folds, seed, &mut || watch.keep_going());
     drop(watch);
     let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
@@ -151,7 +152,7 @@ fn located(arguments: &Arguments) -> Result<Answers, Failure> {
     Ok(Answers { evaluation, recording: recording.provenance, subject })
 }
 
-fn simulation_complaint(error: SimulateError) -> Complaint {
+fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
     Complaint::new(error).help("--data names a recording to judge by")
 }
 

@@ -4,13 +4,12 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::FitWatch;
 use crate::recording_files::RecordingFiles;
 use crate::{input, interrupt, output};
-use palpate::estimator::{EstimatorConfig, Fitting};
-use palpate::evaluation::choose;
-use palpate::network::{TrainingOutcome, TrainingStatus};
-use palpate::recording::Recording;
-use palpate::rig::Rig;
-use palpate::simulate::simulate;
-use palpate::units::{format_count, format_length_mm};
+use palpate_estimators::estimator::{EstimatorConfig, Fitting};
+use palpate_estimators::evaluation::choose;
+use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
+use palpate_estimators::recording::Recording;
+use palpate_mechanics::units::{format_count, format_length_mm};
+use palpate_rig::Rig;
 use std::path::PathBuf;
 
 /// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
@@ -39,7 +38,7 @@ struct Outcome<'a> {
     seed: u64,
     rows: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
-    training: Option<palpate::network::TrainingOutcome>,
+    training: Option<palpate_estimators::network::TrainingOutcome>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -47,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let recording = match arguments.files.read(&rig.bench)? {
         Some(recording) => recording,
-        None => simulate(&rig, arguments.seed).map_err(|error| {
+        None => rig.simulate(arguments.seed).map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
                 .help("--data names a recording to fit")
         })?,
@@ -97,7 +96,8 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
         return Ok(rig);
     }
     const FOLDS: usize = 5;
-    let choice = choose(&rig, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
+    let choice =
+        choose(&rig.bench, &rig.estimator, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
     let choice = choice.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
     let errors: Vec<String> = choice
         .mean_errors_m

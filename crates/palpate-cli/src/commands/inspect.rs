@@ -3,17 +3,18 @@
 use crate::failure::Failure;
 use crate::recording_files::read_recording;
 use crate::{input, output};
-use palpate::bench::Bench;
-use palpate::centroid::Weighing;
-use palpate::contact::Position;
-use palpate::estimator::Method;
-use palpate::influence::InfluenceLocator;
-use palpate::influence::measured::{HiddenRole, MeasuredLocator};
-use palpate::mechanics::{Extent, SurfaceSpec};
-use palpate::network::Topology;
-use palpate::rig::{Rig, Training};
-use palpate::sensing::Layout;
-use palpate::units::{Quantity, format_count, format_length_mm};
+use palpate_estimators::arrangement::Training;
+use palpate_estimators::centroid::Weighing;
+use palpate_estimators::estimator::Method;
+use palpate_estimators::influence::InfluenceLocator;
+use palpate_estimators::influence::measured::{HiddenRole, MeasuredLocator};
+use palpate_estimators::network::Topology;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
+use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Say in words what a file holds: a rig, a study, a locator, a recording or a study's networks.
@@ -60,21 +61,30 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(beam.length_m),
             format_length_mm(beam.width_m),
             format_length_mm(beam.thickness_m),
-            Quantity { value: beam.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
+            Quantity {
+                value: beam.youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            }
         ),
         SurfaceSpec::SupportedBeam(beam) => format!(
             "beam, {} long, {}; section {}; Young's modulus {}",
             format_length_mm(extent.length_m),
             beam.spec().supports_in_words(),
             beam.spec().sections_in_words(),
-            Quantity { value: beam.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus }
+            Quantity {
+                value: beam.spec().youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            }
         ),
         SurfaceSpec::Plate(plate) => format!(
             "plate, {} × {} × {}, Young's modulus {}, Poisson's ratio {}",
             format_length_mm(plate.spec().length_m),
             format_length_mm(plate.spec().width_m),
             format_length_mm(plate.spec().thickness_m),
-            Quantity { value: plate.spec().youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
+            Quantity {
+                value: plate.spec().youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            },
             plate.spec().poissons_ratio
         ),
         SurfaceSpec::Digit(digit) => format!(
@@ -82,7 +92,10 @@ fn bench(bench: &Bench) -> Vec<String> {
             format_length_mm(digit.length_m),
             format_length_mm(digit.width_m),
             format_length_mm(digit.thickness_m),
-            Quantity { value: digit.youngs_modulus_pa, dimension: palpate::units::Dimension::Modulus },
+            Quantity {
+                value: digit.youngs_modulus_pa,
+                dimension: palpate_mechanics::units::Dimension::Modulus
+            },
             digit.direction.name(),
             digit.characteristic_force_n()
         ),
@@ -106,7 +119,7 @@ fn layout(layout: &Layout, extent: Extent) -> String {
         .sensors
         .iter()
         .map(|sensor| match sensor.kind {
-            palpate::sensing::SensorKind::Raw => sensor.name.clone(),
+            palpate_mechanics::sensing::SensorKind::Raw => sensor.name.clone(),
             kind => format!("{kind} at {}", extent.place_in_words(sensor.position)),
         })
         .collect();
@@ -114,7 +127,7 @@ fn layout(layout: &Layout, extent: Extent) -> String {
 }
 
 fn training_words(training: &Training) -> String {
-    use palpate::arrangement::Arrangement;
+    use palpate_estimators::arrangement::Arrangement;
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
         Arrangement::Chebyshev => "at Chebyshev's nodes".to_owned(),

@@ -3,15 +3,15 @@
 use crate::failure::{Complaint, Failure};
 use crate::table::table;
 use crate::{input, output};
-use palpate::bench::Bench;
-use palpate::contact::{Contact, Position};
-use palpate::limit::{
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::{
     Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
 };
-use palpate::mechanics::Extent;
-use palpate::report::{LimitReport, limit_report};
-use palpate::sensing::NoiseError;
-use palpate::units::{Quantity, format_count, format_length_mm};
+use palpate_mechanics::sensing::NoiseError;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_report::{LimitReport, limit_report};
 use std::path::{Path, PathBuf};
 
 /// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, and what the bench cannot tell.
@@ -104,7 +104,7 @@ struct Limits<'a> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let bench = bench(arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
-    let limit = Limit::of(&bench).map_err(complain)?;
+    let limit = bench.cramer_rao_bound().map_err(complain)?;
     let limits = limits(&limit, &bench, arguments).map_err(complain)?;
     if let Some(out) = &arguments.out {
         write_report(&limits, &bench, arguments, out)?;

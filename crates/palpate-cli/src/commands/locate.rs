@@ -4,9 +4,9 @@ use super::estimate_line;
 use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
 use crate::{input, output};
-use palpate::bench::Bench;
-use palpate::estimator::Locator;
-use palpate::recording::{Column, Columns, Header, ReadingParser};
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
+use palpate_estimators::setup::Bench;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -8,15 +8,15 @@ use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
 use crate::{input, output};
 use findings::Findings;
-use palpate::bench::Bench;
-use palpate::estimator::{
+use palpate_estimators::estimator::{
     LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, bench_load_sensors, patch_limits,
 };
-use palpate::mechanics::UniformLoad;
-use palpate::recording::ReadingParser;
-use palpate::report::{ProfileReport, profile_report};
-use palpate::rig::Rig;
-use palpate::simulate::simulate_loads;
+use palpate_estimators::recording::ReadingParser;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::simulate_loads;
+use palpate_mechanics::surface::UniformLoad;
+use palpate_report::{ProfileReport, profile_report};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Tell how force is spread over the surface: total, centre of pressure and patches, with intervals and limits.

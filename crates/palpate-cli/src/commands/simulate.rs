@@ -2,11 +2,11 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::arrangement::{EveryError, every};
-use palpate::recording;
-use palpate::rig::Rig;
-use palpate::simulate::{simulate, simulate_at, simulate_moving};
-use palpate::units::format_count;
+use palpate_estimators::arrangement::{EveryError, every};
+use palpate_estimators::recording;
+use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::units::format_count;
+use palpate_rig::Rig;
 use std::path::PathBuf;
 
 /// Make a recording from the model, with the sensors' noise and faults.
@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return move_contact(arguments, &rig);
     }
     let recording = match arguments.every {
-        None => simulate(&rig, arguments.seed),
+        None => rig.simulate(arguments.seed).map_err(|error| error.to_string()),
         Some(every_m) => {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
             simulate_at(
@@ -43,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 repeats,
                 arguments.seed,
             )
+            .map_err(|error| error.to_string())
         }
     };
     let recording =
@@ -60,7 +61,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
-    let timed = simulate_moving(rig, arguments.seed)
+    let timed = rig
+        .simulate_moving(arguments.seed)
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
     let mut csv = Vec::new();
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());

@@ -4,17 +4,17 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::StageWatch;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
-use palpate::evaluation::Spread;
-use palpate::network::InstructionSet;
-use palpate::report::{StudyReport, paper_report, study_report};
-use palpate::study::dead_areas::DeadAreas;
-use palpate::study::elliott::Elliott;
-use palpate::study::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
-use palpate::study::{
+use palpate_estimators::evaluation::Spread;
+use palpate_estimators::network::InstructionSet;
+use palpate_mechanics::units::format_count;
+use palpate_report::{StudyReport, paper_report, study_report};
+use palpate_studies::dead_areas::DeadAreas;
+use palpate_studies::elliott::Elliott;
+use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
+use palpate_studies::{
     ArmOutcome, ArmResults, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults,
     StudyRunError, Trained,
 };
-use palpate::units::format_count;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

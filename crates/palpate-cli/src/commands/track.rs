@@ -6,13 +6,13 @@ use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
 use crate::table::table;
 use crate::{input, output};
-use palpate::contact::Contact;
-use palpate::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
-use palpate::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
-use palpate::mechanics::Extent;
-use palpate::mechanics::modal::ModalBeam;
-use palpate::recording::{CsvError, TimedParser, TimedReading};
-use palpate::report::{TrackReport, track_report};
+use palpate_estimators::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
+use palpate_estimators::recording::{CsvError, TimedParser, TimedReading};
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::surface::modal::ModalBeam;
+use palpate_report::{TrackReport, track_report};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use track_line::Columns;
@@ -90,9 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (filtered, smoothed) = stream.finish()?;
     stream.say_errors(&filtered, &smoothed);
     if let Some(folder) = &arguments.report {
-        let sweep = match (&rig, beam) {
-            (Some(rig), Some(_)) => {
-                sweep_speeds(&locator, config, rig, arguments.seed).map_err(Complaint::new)?
+        let sweep = match rig.as_ref().and_then(|rig| Some((rig, rig.motion.as_ref()?))) {
+            Some((rig, moving)) if beam.is_some() => {
+                sweep_speeds(&locator, config, &rig.pressed_bench(), moving, arguments.seed)
+                    .map_err(Complaint::new)?
             }
             _ => Vec::new(),
         };

@@ -10,9 +10,9 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::StageWatch;
 use crate::recording_files::RecordingFiles;
 use crate::{input, output};
-use palpate::design::positions::{Budget, Placed, PositionError, PositionProblem, Stage, best_placed};
-use palpate::report::{PositionDesignReport, position_design_report};
-use palpate::rig::Rig;
+use palpate_design::positions::{Budget, Placed, PositionError, PositionProblem, Stage, best_placed};
+use palpate_report::{PositionDesignReport, position_design_report};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -84,7 +84,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return next::run(arguments, &rig, &recording);
     }
     let complain = |error: PositionError| complaint(&error, &arguments.rig);
-    let problem = PositionProblem::new(&rig, budget(arguments, &rig)).map_err(complain)?;
+    let problem = PositionProblem::new(
+        &rig.bench,
+        rig.training.as_ref(),
+        &rig.estimator,
+        rig.design.as_ref(),
+        budget(arguments, &rig),
+    )
+    .map_err(complain)?;
     let watch = Mutex::new(StageWatch::new());
     let keep_going = |stage: Stage, share| {
         watch.lock().unwrap_or_else(PoisonError::into_inner).keep_going(stage.in_words(), share)

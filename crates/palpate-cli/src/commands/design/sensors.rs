@@ -10,13 +10,14 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::StageWatch;
 use crate::{input, output};
 use counts::{Counts, counts};
-use palpate::bench::Bench;
-use palpate::design::sensors::{
+use palpate_design::sensors::SensorDesign;
+use palpate_design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
-use palpate::limit::LimitError;
-use palpate::report::{SensorDesignReport, sensor_design_report};
-use palpate::rig::{Rig, SensorDesign};
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::limit::LimitError;
+use palpate_report::{SensorDesignReport, sensor_design_report};
+use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.

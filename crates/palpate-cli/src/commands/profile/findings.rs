@@ -1,7 +1,9 @@
 //! What is printed of a profile, in the units that people read.
 
-use palpate::estimator::{CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits};
-use palpate::mechanics::UniformLoad;
+use palpate_estimators::estimator::{
+    CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits,
+};
+use palpate_mechanics::surface::UniformLoad;
 
 /// All that a reading tells of the load; what it does not tell is null.
 #[derive(serde::Serialize)]

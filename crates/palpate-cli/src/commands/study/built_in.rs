@@ -4,7 +4,7 @@ use super::Arguments;
 use crate::failure::{Complaint, Failure};
 use crate::output;
 use crate::progress::FitWatch;
-use palpate::report::ReportFile;
+use palpate_report::ReportFile;
 use std::fmt::Display;
 use std::path::Path;
 

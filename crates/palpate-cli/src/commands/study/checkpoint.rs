@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::study::{ArmOutcome, CheckpointError, NetworksCsv, PreparedStudy, Trained};
+use palpate_studies::{ArmOutcome, CheckpointError, NetworksCsv, PreparedStudy, Trained};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;

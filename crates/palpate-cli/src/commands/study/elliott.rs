@@ -5,9 +5,9 @@ use super::built_in::BuiltIn;
 use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
-use palpate::evaluation::Spread;
-use palpate::report::{ReportFile, elliott_report};
-use palpate::study::elliott::{COMPONENTS, Elliott, ElliottError, ElliottFindings, PRESENTATIONS, RIG_TOML};
+use palpate_estimators::evaluation::Spread;
+use palpate_report::{ReportFile, elliott_report};
+use palpate_studies::elliott::{COMPONENTS, Elliott, ElliottError, ElliottFindings, PRESENTATIONS, RIG_TOML};
 use std::path::Path;
 
 /// Calibrations, unless `--seeds` says another number.

@@ -4,7 +4,7 @@ use super::checkpoint::CheckpointFile;
 use crate::failure::{Complaint, Failure};
 use crate::progress;
 use indicatif::ProgressBar;
-use palpate::study::{NetworksCsv, PreparedStudy, RunOptions, Trained, TrainedSeed};
+use palpate_studies::{NetworksCsv, PreparedStudy, RunOptions, Trained, TrainedSeed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 

@@ -1,8 +1,8 @@
 //! A track as a line of CSV or JSON.
 
 use crate::failure::{Complaint, Failure};
-use palpate::estimator::{Across, Track, Tracked};
-use palpate::recording::csv_row;
+use palpate_estimators::estimator::{Across, Track, Tracked};
+use palpate_estimators::recording::csv_row;
 
 /// What a line of CSV has room for; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]

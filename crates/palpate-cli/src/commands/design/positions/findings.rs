@@ -1,9 +1,9 @@
 //! Training positions as JSON.
 
 use super::Outcome;
-use palpate::contact::Position;
-use palpate::design::positions::{Placed, Placement};
-use palpate::limit::Force;
+use palpate_design::positions::{Placed, Placement};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Force;
 
 /// What is printed as JSON.
 #[derive(serde::Serialize)]

@@ -5,9 +5,9 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::StageWatch;
 use crate::table::table;
-use palpate::design::positions::{Advice, next_press};
-use palpate::recording::Recording;
-use palpate::rig::Rig;
+use palpate_design::positions::{Advice, next_press};
+use palpate_estimators::recording::Recording;
+use palpate_rig::Rig;
 
 /// Presses that a table shows.
 const SHOWN: usize = 5;

@@ -2,8 +2,8 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::contact::Position;
-use palpate::design::positions::Placed;
+use palpate_design::positions::Placed;
+use palpate_mechanics::contact::Position;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, Value, value};
 

@@ -4,9 +4,9 @@ use super::Outcome;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::table;
-use palpate::contact::in_words;
-use palpate::design::positions::{Placed, Placement, best_placed};
-use palpate::units::{format_count, format_length_mm};
+use palpate_design::positions::{Placed, Placement, best_placed};
+use palpate_mechanics::contact::in_words;
+use palpate_mechanics::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, budget) = (outcome.problem, outcome.problem.budget());

@@ -1,9 +1,9 @@
 //! Designs as JSON.
 
 use super::Outcome;
-use palpate::design::sensors::{Assessment, CountPoint, Designed, Method, Verification};
-use palpate::limit::Force;
-use palpate::sensing::{Sensor, SensorKind};
+use palpate_design::sensors::{Assessment, CountPoint, Designed, Method, Verification};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::{Sensor, SensorKind};
 
 /// What is printed as JSON. A limit that is not there, because the readings do not tell some contact, is null.
 #[derive(serde::Serialize)]

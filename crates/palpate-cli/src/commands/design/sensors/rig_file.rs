@@ -2,8 +2,8 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
-use palpate::sensing::{ChannelModel, Layout, Sensor, SensorKind};
-use palpate::units::Quantity;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::units::Quantity;
 use std::path::Path;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, value};
 

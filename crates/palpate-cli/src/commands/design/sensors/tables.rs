@@ -4,9 +4,9 @@ use super::Outcome;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::table;
-use palpate::design::sensors::{CountPoint, Designed, best_design, enough};
-use palpate::rig::DesignCriterion;
-use palpate::units::{format_count, format_length_mm};
+use palpate_design::sensors::DesignCriterion;
+use palpate_design::sensors::{CountPoint, Designed, best_design, enough};
+use palpate_mechanics::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
     let (problem, design) = (outcome.problem, outcome.problem.design());

@@ -1,6 +1,6 @@
 use super::*;
-use palpate::contact::Position;
-use palpate::rig::Rig;
+use palpate_mechanics::contact::Position;
+use palpate_rig::Rig;
 
 const RIG: &str = "\
 # My bench.

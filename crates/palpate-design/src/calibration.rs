@@ -1,0 +1,205 @@
+//! What calibrating comes to: simulated, fitted, asked and measured, with noise.
+
+use std::collections::VecDeque;
+
+use serde::Serialize;
+
+use super::sensors::WeightedContacts;
+use palpate_estimators::estimator::{
+    EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError,
+};
+use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::{SimulateError, simulate_at};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::ChannelModel;
+
+/// Why a calibration cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CalibrationError {
+    /// The bench cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The locator cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The locator does not take the readings.
+    #[error(transparent)]
+    Reading(#[from] ReadingError),
+}
+
+/// How far calibrated locators were off, on average over the contacts of a design.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Verification {
+    /// The mean error, in metres, over all calibrations.
+    pub mean_error_m: f64,
+    /// Its standard error, in metres, from how the calibrations differ.
+    pub standard_error_m: f64,
+    /// The median of the calibrations' mean errors, in metres.
+    pub median_error_m: f64,
+    /// Share of the contacts located within the tolerance, in %.
+    pub within_tolerance_percent: f64,
+    /// Calibrations.
+    pub calibrations: usize,
+}
+
+/// A bench that is calibrated again and again, and the contacts that its locators are asked about.
+pub(super) struct Trial<'a> {
+    /// The bench as it is pressed to calibrate.
+    pub pressed: Bench,
+    /// The same with the force of the contacts that are located afterwards.
+    pub touched: Bench,
+    /// What the locator knows: without a force where it is to be unknown.
+    pub used: Bench,
+    /// What is fitted.
+    pub estimator: &'a EstimatorConfig,
+    /// The contacts.
+    pub contacts: &'a WeightedContacts,
+    /// Readings of each contact in a calibration.
+    pub draws: usize,
+    /// An error up to this is good enough, in metres.
+    pub tolerance_m: f64,
+}
+
+/// Seeds one after the other: one calibration each.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seeds {
+    pub first: u64,
+    pub count: usize,
+}
+
+impl Seeds {
+    fn all(self) -> impl Iterator<Item = u64> {
+        (0..self.count as u64).map(move |k| self.first.wrapping_add(k))
+    }
+}
+
+/// One calibration's errors.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Calibrated {
+    /// The mean error at each contact, in metres.
+    pub errors_m: Vec<f64>,
+    /// Share of the contacts located within the tolerance, by their weights.
+    pub within: f64,
+}
+
+impl Trial<'_> {
+    /// Presses at `positions`, each `repeats` times, once a seed; fits, and asks. A seed has the same noise whatever the
+    /// positions. `None` when `keep_going` says no.
+    pub fn calibrate(
+        &self,
+        positions: &[Position],
+        repeats: usize,
+        seeds: Seeds,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<Calibrated>>, CalibrationError> {
+        let training: Vec<Position> =
+            positions.iter().flat_map(|at| std::iter::repeat_n(*at, repeats)).collect();
+        if self.is_clean() && matches!(self.estimator, EstimatorConfig::Network(_)) {
+            return self.train_side_by_side(&training, seeds, keep_going);
+        }
+        let mut calibrated = Vec::new();
+        for seed in seeds.all() {
+            let (recording, asked) = self.simulate(&training, seed)?;
+            let fitting = Fitting::prepare(&self.used, self.estimator, &recording)?;
+            let Some(locator) = fitting.fit(seed, keep_going)? else { return Ok(None) };
+            calibrated.push(self.ask(&locator, &asked)?);
+        }
+        Ok(Some(calibrated))
+    }
+
+    /// Without noise and faults all seeds press alike, and networks train in lanes.
+    fn train_side_by_side(
+        &self,
+        training: &[Position],
+        seeds: Seeds,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<Calibrated>>, CalibrationError> {
+        let (recording, asked) = self.simulate(training, seeds.first)?;
+        let fitting = Fitting::prepare(&self.used, self.estimator, &recording)?;
+        let mut queue = Queue { seeds: seeds.all().collect(), fitted: Vec::new(), keep_going };
+        fitting.fit_many(InstructionSet::best(), Precision::F64, &mut queue);
+        let mut fitted = queue.fitted;
+        if fitted.len() < seeds.count {
+            return Ok(None);
+        }
+        fitted.sort_by_key(|(seed, _)| *seed);
+        let asked = fitted.iter().map(|(_, locator)| self.ask(locator, &asked));
+        Ok(Some(asked.collect::<Result<_, _>>()?))
+    }
+
+    /// Whether channels tell the truth.
+    fn is_clean(&self) -> bool {
+        self.pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default())
+    }
+
+    /// The presses of one calibration, and the readings that are located afterwards by the same channels.
+    fn simulate(&self, training: &[Position], seed: u64) -> Result<(Recording, Recording), SimulateError> {
+        let contacts = &self.contacts.positions;
+        let asked = contacts.iter().flat_map(|at| std::iter::repeat_n(*at, self.draws));
+        let all: Vec<Position> = training.iter().copied().chain(asked).collect();
+        let (pressed, asked): (Vec<usize>, Vec<usize>) = (0..all.len()).partition(|i| *i < training.len());
+        let touched = simulate_at(&self.touched, &all, 1, seed)?;
+        let recording = if self.pressed.force_n == self.touched.force_n {
+            touched.subset(&pressed)
+        } else {
+            simulate_at(&self.pressed, training, 1, seed)?
+        };
+        Ok((recording, touched.subset(&asked)))
+    }
+
+    fn ask(&self, locator: &Locator, asked: &Recording) -> Result<Calibrated, ReadingError> {
+        let mut errors_m = vec![0.0; self.contacts.len()];
+        let mut within = 0.0;
+        for (i, row) in asked.rows.iter().enumerate() {
+            let contact = i / self.draws;
+            let off_m = locator.locate(&row.reading)?.contact.position.distance_m(row.position);
+            errors_m[contact] += off_m / self.draws as f64;
+            if off_m <= self.tolerance_m {
+                within += self.contacts.weights[contact] / self.draws as f64;
+            }
+        }
+        Ok(Calibrated { errors_m, within })
+    }
+}
+
+impl Verification {
+    /// Sums up calibrations, at least one.
+    pub(super) fn of(calibrated: &[Calibrated], contacts: &WeightedContacts) -> Self {
+        let mut errors: Vec<f64> =
+            calibrated.iter().map(|one| contacts.mean(one.errors_m.iter().copied())).collect();
+        let count = errors.len() as f64;
+        let mean_error_m = errors.iter().sum::<f64>() / count;
+        let squares: f64 = errors.iter().map(|error| (error - mean_error_m).powi(2)).sum();
+        errors.sort_by(f64::total_cmp);
+        Self {
+            mean_error_m,
+            standard_error_m: (squares / (count - 1.0).max(1.0) / count).sqrt(),
+            median_error_m: 0.5 * (errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]),
+            within_tolerance_percent: 100.0 * calibrated.iter().map(|one| one.within).sum::<f64>() / count,
+            calibrations: errors.len(),
+        }
+    }
+}
+
+/// The seeds of one calibration's networks, and what became of them.
+struct Queue<'a> {
+    seeds: VecDeque<u64>,
+    fitted: Vec<(u64, Locator)>,
+    keep_going: &'a mut dyn FnMut() -> bool,
+}
+
+impl LocatorQueue for Queue<'_> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.seeds.pop_front()
+    }
+
+    fn fitted(&mut self, seed: u64, locator: Locator) {
+        self.fitted.push((seed, locator));
+    }
+
+    fn keep_going(&mut self) -> bool {
+        (self.keep_going)()
+    }
+}

@@ -1,0 +1,201 @@
+//! What sensors read, as a Gaussian process of the contact's position, in units of their noise.
+
+use ndarray::Array2;
+
+use super::PositionError;
+use palpate_estimators::arrangement::cells;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::CleanSensors;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
+
+/// Positions at which a model is asked, along a line and along each side of a plane.
+const ASKED: usize = 60;
+const ASKED_ON_A_PLANE: usize = 14;
+/// Noise of a sensor whose channel has none, as a share of its full scale: what is then left is the error of
+/// interpolating.
+const NOMINAL_NOISE: f64 = 1e-4;
+/// Distinct positions without which nobody knows how smooth a function is.
+const FEWEST_POSITIONS: usize = 4;
+
+/// Whitened readings as functions of position.
+pub(super) struct Forward {
+    process: GaussianProcess,
+    /// The variance of the functions before any press, the sensors' mean.
+    signal_variance: f64,
+    extent: Extent,
+    force: Force,
+}
+
+/// What regressions see: one row a press.
+struct Whitened {
+    coordinates: Array2<f64>,
+    readings: Array2<f64>,
+}
+
+impl Forward {
+    /// Of a bench with a model, from its clean readings. `None` when `keep_going` says no.
+    pub fn of_model(
+        bench: &Bench,
+        force: Force,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Self>, PositionError> {
+        let surface = bench.surface.model().ok_or(PositionError::NoModel)?;
+        let force_n = bench.force_n.ok_or(PositionError::NoForce)?;
+        let extent = surface.extent();
+        let side = if extent.is_plane() { ASKED_ON_A_PLANE } else { ASKED };
+        let positions = cells(extent, side, if extent.is_plane() { side } else { 1 });
+        let sensors = CleanSensors::new(surface, &bench.layout);
+        let clean: Vec<Vec<f64>> =
+            positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
+        let full_scale = |s: usize| clean.iter().map(|reading| reading[s].abs()).fold(0.0, f64::max);
+        let sd = |s: usize| match bench.layout.sensors[s].channel.reading_sd() {
+            sd if sd > 0.0 => sd,
+            _ => (NOMINAL_NOISE * full_scale(s)).max(f64::MIN_POSITIVE),
+        };
+        let alive = living(&bench.layout);
+        let sds: Vec<f64> = alive.iter().map(|s| sd(*s)).collect();
+        let whitened = Whitened {
+            coordinates: coordinates(&positions, extent),
+            readings: Array2::from_shape_fn((positions.len(), alive.len()), |(row, j)| {
+                clean[row][alive[j]] / sds[j]
+            }),
+        };
+        // The model is exact: regressions take as much noise as rounding leaves.
+        Self::fit(&whitened, &vec![0.0; positions.len()], extent, force, keep_going)
+    }
+
+    /// Of a recording begun, whose noise its repeats tell, or else the layout.
+    pub fn of_recording(
+        recording: &Recording,
+        layout: &Layout,
+        extent: Extent,
+        force: Force,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Self>, PositionError> {
+        if recording.channels.len() != layout.len() {
+            return Err(PositionError::Channels { needed: layout.len(), found: recording.channels.len() });
+        }
+        let found = recording.distinct_positions().len();
+        if found < FEWEST_POSITIONS {
+            return Err(PositionError::TooFewPresses { found, needed: FEWEST_POSITIONS });
+        }
+        let alive = living(layout);
+        let scaled = at_one_force(recording);
+        let sds = alive.iter().map(|&s| {
+            let stated = layout.sensors[s].channel.reading_sd();
+            let sd = scatter(recording, &scaled, s).unwrap_or(stated);
+            if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
+        });
+        let sds: Vec<f64> = sds.collect::<Result<_, _>>()?;
+        let positions: Vec<Position> = recording.rows.iter().map(|row| row.position).collect();
+        let whitened = Whitened {
+            coordinates: coordinates(&positions, extent),
+            readings: Array2::from_shape_fn((scaled.len(), alive.len()), |(row, j)| {
+                scaled[row][alive[j]] / sds[j]
+            }),
+        };
+        Self::fit(&whitened, &vec![1.0; positions.len()], extent, force, keep_going)
+    }
+
+    fn fit(
+        rows: &Whitened,
+        noise: &[f64],
+        extent: Extent,
+        force: Force,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Self>, PositionError> {
+        let samples = Samples {
+            coordinates: rows.coordinates.view(),
+            outputs: rows.readings.view(),
+            noise_variance: Some(noise),
+        };
+        let Some(process) = Regression::default().fit(samples, keep_going)? else { return Ok(None) };
+        let outputs = process.outputs();
+        let signal_variance = (0..outputs).map(|j| process.signal_variance(j)).sum::<f64>() / outputs as f64;
+        Ok(Some(Self { process, signal_variance, extent, force }))
+    }
+
+    /// The covariance of a whitened reading's function at two positions before any press.
+    pub fn covariance(&self, a: Position, b: Position) -> f64 {
+        let scales = &self.process.hyperparameters().length_scales;
+        let r2: f64 =
+            [a.x_m - b.x_m, a.y_m - b.y_m].iter().zip(scales).map(|(d, scale)| (d / scale).powi(2)).sum();
+        self.signal_variance * Kernel::Matern52.correlation(r2)
+    }
+
+    /// The standard deviation, in metres, with which a reading tells a position once everything is calibrated: the limit by
+    /// the expected readings' slopes, combined with what the surface's size tells.
+    pub fn limit_m(&self, at: Position) -> f64 {
+        let (outputs, d) = (self.process.outputs(), self.process.coordinates());
+        let (mut means, mut slopes) = (vec![0.0; outputs], vec![0.0; outputs * d]);
+        let point = [at.x_m, at.y_m];
+        self.process.mean_and_gradient_into(
+            &point[..d],
+            &mut means,
+            &mut slopes,
+            &mut self.process.scratch(),
+        );
+        let dot = |f: &dyn Fn(usize) -> (f64, f64)| (0..outputs).map(f).map(|(a, b)| a * b).sum::<f64>();
+        // By ln W a reading that is linear in the force changes as much as it is.
+        let by_force = dot(&|j| (means[j], means[j])).max(f64::MIN_POSITIVE);
+        let information = |k: usize, l: usize| {
+            let plain = dot(&|j| (slopes[j * d + k], slopes[j * d + l]));
+            match self.force {
+                Force::Known => plain,
+                Force::Unknown => {
+                    let [a, b] = [k, l].map(|k| dot(&|j| (slopes[j * d + k], means[j])));
+                    plain - a * b / by_force
+                }
+            }
+        };
+        let prior = |side_m: f64| 12.0 / (side_m * side_m);
+        let xx = information(0, 0) + prior(self.extent.length_m);
+        let Some(width_m) = self.extent.width_m else { return 1.0 / xx.sqrt() };
+        let (yy, xy) = (information(1, 1) + prior(width_m), information(0, 1));
+        ((xx + yy) / (xx * yy - xy * xy)).sqrt()
+    }
+}
+
+fn living(layout: &Layout) -> Vec<usize> {
+    (0..layout.len()).filter(|s| !layout.sensors[*s].channel.dead).collect()
+}
+
+fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
+    let d = if extent.is_plane() { 2 } else { 1 };
+    Array2::from_shape_fn((positions.len(), d), |(row, k)| [positions[row].x_m, positions[row].y_m][k])
+}
+
+/// Readings brought to the mean force, where forces are known.
+fn at_one_force(recording: &Recording) -> Vec<Vec<f64>> {
+    let forces: Option<Vec<f64>> =
+        recording.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
+    let mean = forces.as_ref().map(|forces| forces.iter().sum::<f64>() / forces.len() as f64);
+    let scaled = |(i, row): (usize, &palpate_estimators::recording::Row)| {
+        let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
+        row.reading.iter().map(|value| factor * value).collect()
+    };
+    recording.rows.iter().enumerate().map(scaled).collect()
+}
+
+/// Standard deviation of a channel about its means at each position; `None` where no position was pressed twice.
+fn scatter(recording: &Recording, readings: &[Vec<f64>], channel: usize) -> Option<f64> {
+    let (mut squares, mut freedom) = (0.0, 0usize);
+    for position in recording.distinct_positions() {
+        let repeats: Vec<f64> = recording
+            .rows
+            .iter()
+            .zip(readings)
+            .filter(|(row, _)| row.position == position)
+            .map(|(_, reading)| reading[channel])
+            .collect();
+        let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
+        squares += repeats.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+        freedom += repeats.len() - 1;
+    }
+    (freedom > 0).then(|| (squares / freedom as f64).sqrt()).filter(|sd| *sd > 0.0)
+}

@@ -1,0 +1,123 @@
+//! The next press of a recording begun, and when to stop.
+
+use super::PositionError;
+use super::forward::Forward;
+use super::knowledge::Knowledge;
+use super::variance::Expectation;
+use crate::sensors::ContactPrior;
+use crate::sensors::WeightedContacts;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Force;
+
+/// Presses that are looked ahead, at most.
+const MOST_AHEAD: usize = 200;
+
+/// A press to come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NextPress {
+    /// Where.
+    pub position: Position,
+    /// The error that is expected after it, in metres.
+    pub error_m: f64,
+}
+
+/// What a recording begun is worth, and what more presses would add.
+///
+/// Errors are standard deviations, in metres, averaged over the contacts: the limit, where what is left unknown of the
+/// influence functions counts as noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advice {
+    /// Rows of the recording.
+    pub presses: usize,
+    /// Places that were pressed.
+    pub positions: usize,
+    /// The error that is expected of a locator fitted now.
+    pub error_m: f64,
+    /// The error after endlessly many presses: the limit.
+    pub endless_error_m: f64,
+    /// The next presses, each the one that helps most, until the rule says to stop; empty where it says so now, and
+    /// not longer than [`Advice::MOST_AHEAD`].
+    pub next: Vec<NextPress>,
+    /// The rule: stop once endlessly many presses would lower the error by less than this, in %.
+    pub stop_percent: f64,
+}
+
+impl Advice {
+    /// Presses that are looked ahead.
+    pub const MOST_AHEAD: usize = MOST_AHEAD;
+
+    /// By how much endlessly many presses would lower the error, in %.
+    pub fn to_gain_percent(&self) -> f64 {
+        100.0 * (1.0 - self.endless_error_m / self.error_m)
+    }
+
+    /// By how much the next press lowers the error, in %; `None` where there is none.
+    pub fn next_gain_percent(&self) -> Option<f64> {
+        self.next.first().map(|press| 100.0 * (1.0 - press.error_m / self.error_m))
+    }
+
+    /// Whether the rule says to stop.
+    pub fn is_enough(&self) -> bool {
+        self.to_gain_percent() < self.stop_percent
+    }
+
+    /// Whether the presses to come reach what the rule asks for.
+    pub fn gets_there(&self) -> bool {
+        let last_m = self.next.last().map_or(self.error_m, |press| press.error_m);
+        100.0 * (1.0 - self.endless_error_m / last_m) < self.stop_percent
+    }
+}
+
+/// Where to press next. `None` when `keep_going` says no.
+///
+/// Influence functions are Gaussian processes whose smoothness and noise the recording tells; the contacts are those of
+/// `contacts`, or come from all over the surface.
+///
+/// # Errors
+/// [`PositionError`] when the recording is not the bench's, or too short to learn from.
+pub fn next_press(
+    bench: &Bench,
+    contacts: Option<&ContactPrior>,
+    recording: &Recording,
+    stop_percent: f64,
+    keep_going: &mut dyn FnMut() -> bool,
+) -> Result<Option<Advice>, PositionError> {
+    let extent = bench.surface.extent();
+    let prior = contacts.cloned().unwrap_or_else(|| ContactPrior::all_over(extent));
+    let contacts = WeightedContacts::of(&prior, extent);
+    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let Some(forward) = Forward::of_recording(recording, &bench.layout, extent, force, keep_going)? else {
+        return Ok(None);
+    };
+    let mut expectation = Expectation::new(&forward, &contacts, extent);
+    let pressed = recording.distinct_positions();
+    let first = expectation.places.len();
+    expectation.places.extend(&pressed);
+    let mut knowledge = Knowledge::before(&forward, &expectation.places);
+    for (i, position) in pressed.iter().enumerate() {
+        let rows = recording.rows.iter().filter(|row| row.position == *position).count();
+        knowledge.press(first + i, 1.0 / rows as f64);
+    }
+    let mut advice = Advice {
+        presses: recording.rows.len(),
+        positions: pressed.len(),
+        error_m: expectation.error_m(|place| knowledge.variance(place)),
+        endless_error_m: expectation.error_m(|_| 0.0),
+        next: Vec::new(),
+        stop_percent,
+    };
+    if advice.is_enough() {
+        return Ok(Some(advice));
+    }
+    while advice.next.len() < MOST_AHEAD && !advice.gets_there() {
+        if !keep_going() {
+            return Ok(None);
+        }
+        let (site, error_m) = expectation.best(&knowledge, 1.0);
+        knowledge.press(site, 1.0);
+        advice.next.push(NextPress { position: expectation.places[site], error_m });
+    }
+    Ok(Some(advice))
+}

@@ -1,0 +1,159 @@
+//! Positions moved about while simulated calibrations get better.
+
+use super::PositionError;
+use palpate_estimators::simulate::CleanSensors;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::{Extent, Surface};
+
+/// A move must lower the score by more than this share of it.
+const LEAST_GAIN: f64 = 1e-3;
+/// The search ends with steps of this share of the length.
+const FINEST_STEP: f64 = 1e-3;
+/// Positions stay this share of the length apart from the edges.
+const EDGE: f64 = 1e-3;
+
+/// The score of an arrangement, the smaller the better; is told the share of the search that is done. `None` when it was
+/// interrupted.
+pub(super) type Score<'a> = dyn Fn(&[Position], f64) -> Result<Option<f64>, PositionError> + Sync + 'a;
+
+/// The scores of some arrangements, found side by side; `None` when one was interrupted.
+pub(super) fn evaluate(
+    score: &Score,
+    arrangements: &[Vec<Position>],
+    share: f64,
+) -> Result<Option<Vec<f64>>, PositionError> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut scores = Vec::with_capacity(arrangements.len());
+    for batch in arrangements.chunks(threads) {
+        let found: Vec<_> = std::thread::scope(|scope| {
+            let started: Vec<_> =
+                batch.iter().map(|positions| scope.spawn(move || score(positions, share))).collect();
+            started.into_iter().map(|thread| thread.join()).collect()
+        });
+        for one in found {
+            // A panic of a thread goes on in this one.
+            match one.unwrap_or_else(|panic| std::panic::resume_unwind(panic))? {
+                Some(score) => scores.push(score),
+                None => return Ok(None),
+            }
+        }
+    }
+    Ok(Some(scores))
+}
+
+/// Steps of one position at a time, or of one and its mirror image, ever smaller (pattern search: Hooke and Jeeves 1961).
+pub(super) struct PatternSearch {
+    pub extent: Extent,
+    /// Whether positions that mirror each other are moved together.
+    pub mirrored: bool,
+    /// Arrangements that may be tried.
+    pub most_trials: usize,
+}
+
+impl PatternSearch {
+    /// The best arrangement found from `start` with its score; `None` when a score was interrupted.
+    pub fn run(
+        &self,
+        score: &Score,
+        start: Vec<Position>,
+        start_score: f64,
+    ) -> Result<Option<Vec<Position>>, PositionError> {
+        let (mut best, mut best_score) = (start, start_score);
+        let groups = self.groups(&best);
+        let length_m = self.extent.length_m;
+        let per_side = if self.extent.is_plane() { (best.len() as f64).sqrt() } else { best.len() as f64 };
+        let mut step_m = 0.25 * length_m / per_side;
+        let mut trials = 0;
+        while step_m >= FINEST_STEP * length_m {
+            let mut improved = false;
+            for group in &groups {
+                let moved = self.moves(&best, group, step_m);
+                if trials + moved.len() > self.most_trials {
+                    return Ok(Some(best));
+                }
+                trials += moved.len();
+                let share = trials as f64 / self.most_trials as f64;
+                let Some(scores) = evaluate(score, &moved, share)? else { return Ok(None) };
+                let least = (0..moved.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b]));
+                if let Some(least) = least.filter(|least| scores[*least] < best_score * (1.0 - LEAST_GAIN)) {
+                    best.clone_from(&moved[least]);
+                    best_score = scores[least];
+                    improved = true;
+                }
+            }
+            if !improved {
+                step_m *= 0.5;
+            }
+        }
+        Ok(Some(best))
+    }
+
+    /// Positions that are moved together, by their places in the list: pairs where all of them mirror each other.
+    fn groups(&self, positions: &[Position]) -> Vec<(usize, Option<usize>)> {
+        let last = positions.len() - 1;
+        let slack_m = 1e-9 * self.extent.length_m;
+        let mirrors = |(i, at): (usize, &Position)| {
+            (positions[last - i].x_m - (self.extent.length_m - at.x_m)).abs() < slack_m
+        };
+        if self.mirrored && positions.iter().enumerate().all(mirrors) {
+            // A position in the middle stays there.
+            (0..positions.len() / 2).map(|i| (i, Some(last - i))).collect()
+        } else {
+            (0..positions.len()).map(|i| (i, None)).collect()
+        }
+    }
+
+    /// The arrangement with one group moved either way, on a plane along both sides; what would leave the surface or pass
+    /// another position is left out.
+    fn moves(
+        &self,
+        positions: &[Position],
+        group: &(usize, Option<usize>),
+        step_m: f64,
+    ) -> Vec<Vec<Position>> {
+        let steps: &[(f64, f64)] = if self.extent.is_plane() {
+            &[(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+        } else {
+            &[(1.0, 0.0), (-1.0, 0.0)]
+        };
+        let moved = steps.iter().map(|(x, y)| {
+            let mut moved = positions.to_vec();
+            moved[group.0].x_m += x * step_m;
+            moved[group.0].y_m += y * step_m;
+            if let Some(twin) = group.1 {
+                moved[twin].x_m -= x * step_m;
+            }
+            moved
+        });
+        moved.filter(|moved| self.is_sound(moved)).collect()
+    }
+
+    fn is_sound(&self, positions: &[Position]) -> bool {
+        let Extent { length_m, width_m } = self.extent;
+        let inside = |at_m: f64, side_m: f64| (EDGE * side_m..=(1.0 - EDGE) * side_m).contains(&at_m);
+        let on_surface =
+            |at: &Position| inside(at.x_m, length_m) && width_m.is_none_or(|width_m| inside(at.y_m, width_m));
+        let in_order = || positions.windows(2).all(|pair| pair[0].x_m + EDGE * length_m <= pair[1].x_m);
+        positions.iter().all(on_surface) && (self.extent.is_plane() || in_order())
+    }
+}
+
+/// Whether a bench along a line reads the same, sensors in reverse, when the contact is mirrored; up to signs, which slopes
+/// and the like change.
+pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
+    const ASKED: usize = 7;
+    let length_m = surface.extent().length_m;
+    let sensors = CleanSensors::new(surface, layout);
+    let reading = |x_m: f64| sensors.reading(Contact { position: Position::along(x_m), force_n });
+    (1..=ASKED).all(|i| {
+        let x_m = length_m * i as f64 / (2 * ASKED + 1) as f64;
+        let (here, there) = (reading(x_m), reading(length_m - x_m));
+        let scale = here.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        here.iter().zip(there.iter().rev()).all(|(a, b)| (a.abs() - b.abs()).abs() <= 1e-9 * scale)
+    }) && layout
+        .sensors
+        .iter()
+        .zip(layout.sensors.iter().rev())
+        .all(|(a, b)| a.channel == b.channel && a.kind == b.kind)
+}

@@ -1,0 +1,223 @@
+use super::knowledge::Knowledge;
+use super::search::reads_mirrored;
+use super::variance::Expectation;
+use super::*;
+use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::plate::PlateSpec;
+
+use crate::fixtures::{Example, noisy, paper, plate};
+
+fn budget(count: usize) -> Budget {
+    Budget { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, seed: 0 }
+}
+
+fn problem(example: &Example, budget: Budget) -> Result<PositionProblem<'_>, PositionError> {
+    PositionProblem::new(&example.bench, example.training.as_ref(), &example.estimator, None, budget)
+}
+
+/// The score of a layout of positions by themselves: how far each is from where it should be.
+fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<Option<f64>, PositionError> + Sync {
+    move |positions, _| {
+        Ok(Some(positions.iter().zip(wanted_m).map(|(at, wanted_m)| (at.x_m - wanted_m).powi(2)).sum()))
+    }
+}
+
+const BEAM: Extent = Extent { length_m: 0.4, width_m: None };
+
+#[test]
+fn positions_move_to_where_the_score_is_least() {
+    let wanted_m = [0.01, 0.08, 0.23, 0.39];
+    let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 10_000 };
+    let score = off(&wanted_m);
+    let found = search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap().unwrap();
+    for (at, wanted_m) in found.iter().zip(wanted_m) {
+        assert!((at.x_m - wanted_m).abs() < 2e-3, "{found:?}");
+    }
+}
+
+#[test]
+fn mirrored_positions_stay_mirrored() {
+    let search = PatternSearch { extent: BEAM, mirrored: true, most_trials: 10_000 };
+    let score = off(&[0.03, 0.1, 0.2, 0.3, 0.35]);
+    let found = search.run(&score, cells(BEAM, 5, 1), f64::INFINITY).unwrap().unwrap();
+    for (a, b) in found.iter().zip(found.iter().rev()) {
+        assert!((a.x_m + b.x_m - 0.4).abs() < 1e-12, "{found:?}");
+    }
+    // Between what the two of a pair ask for.
+    assert!((found[0].x_m - 0.04).abs() < 2e-3, "{found:?}");
+}
+
+#[test]
+fn a_search_keeps_to_its_trials() {
+    let asked = std::sync::atomic::AtomicUsize::new(0);
+    let score = |positions: &[Position], _: f64| {
+        asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        off(&[0.0; 4])(positions, 0.0)
+    };
+    let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 7 };
+    search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap().unwrap();
+    assert!(asked.into_inner() <= 7);
+}
+
+#[test]
+fn a_bench_is_mirrored_or_not() {
+    let bench = paper().bench;
+    let surface = bench.surface.model().unwrap();
+    assert!(reads_mirrored(surface, &bench.layout, 3.0));
+    let mut moved = bench.layout.clone();
+    moved.sensors[0].position.x_m += 1e-3;
+    assert!(!reads_mirrored(surface, &moved, 3.0));
+}
+
+fn forward(bench: &Bench) -> Forward {
+    Forward::of_model(bench, Force::Known, &mut || true).unwrap().unwrap()
+}
+
+#[test]
+fn presses_at_one_place_add_up_and_tell_their_neighbours() {
+    let forward = forward(&noisy().bench);
+    let places: Vec<Position> = [0.1, 0.12, 0.3].map(Position::along).into();
+    let before = Knowledge::before(&forward, &places);
+    let (mut twice, mut once) = (before.clone(), before.clone());
+    twice.press(0, 1.0);
+    twice.press(0, 1.0);
+    once.press(0, 0.5);
+    for place in 0..3 {
+        // What is left is the small difference of large numbers.
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-6 * before.variance(place);
+        let (a, b) = (twice.variance(place), once.variance(place));
+        assert!(close(a, b), "{a} {b}");
+        assert!(close(before.variance_after(place, 0, 0.5), b));
+    }
+    assert!(once.variance(0) < once.variance(1) && once.variance(1) < once.variance(2));
+    assert!(once.variance(2) < before.variance(2));
+}
+
+#[test]
+fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
+    let bench = noisy().bench;
+    let forward = forward(&bench);
+    let limit = bench.cramer_rao_bound().unwrap();
+    for x_m in [0.05, 0.13, 0.25, 0.33] {
+        let contact = palpate_mechanics::contact::Contact { position: Position::along(x_m), force_n: 3.0 };
+        let (ours, theirs) =
+            (forward.limit_m(contact.position), limit.at(contact, Force::Known).unwrap().sd_position_m);
+        assert!((ours / theirs - 1.0).abs() < 0.02, "{x_m}: {ours} {theirs}");
+    }
+}
+
+#[test]
+fn the_least_variance_is_less_than_the_even_positions() {
+    for (bench, count) in [(noisy().bench, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).bench, 9)] {
+        let forward = forward(&bench);
+        let extent = bench.surface.extent();
+        let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent);
+        let found = variance::least(&forward, &contacts, extent, &budget(count), &mut || true).unwrap();
+        let error_m = |positions: &[Position]| {
+            let mut expectation = Expectation::new(&forward, &contacts, extent);
+            let first = expectation.places.len();
+            expectation.places.extend(positions);
+            let mut knowledge = Knowledge::before(&forward, &expectation.places);
+            (first..first + positions.len()).for_each(|place| knowledge.press(place, 1.0));
+            expectation.error_m(|place| knowledge.variance(place))
+        };
+        let (columns, rows) = squarest(extent, count);
+        assert!(error_m(&found) < error_m(&cells(extent, columns, rows)), "{found:?}");
+    }
+}
+
+#[test]
+fn the_papers_network_is_better_calibrated_near_the_ends() {
+    let rig = paper();
+    let problem = problem(&rig, budget(10)).unwrap();
+    let error = |placement: Placement| {
+        let (_, positions) = problem.by_rule().unwrap().into_iter().find(|(of, _)| *of == placement).unwrap();
+        let placed = problem.verified(placement, positions, 0.0, &|_, _| true).unwrap().unwrap();
+        placed.verification.mean_error_m
+    };
+    assert!(error(Placement::Chebyshev) < 0.7 * error(Placement::Even));
+}
+
+#[test]
+fn an_interrupted_design_is_none() {
+    let rig = noisy();
+    let problem = problem(&rig, budget(4)).unwrap();
+    assert_eq!(problem.all(&|stage, _| stage == Stage::Variance), Ok(None));
+    assert_eq!(problem.all(&|_, _| false), Ok(None));
+}
+
+#[test]
+fn a_design_has_every_arrangement_once_and_is_the_same_again() {
+    let rig = noisy();
+    let problem = problem(&rig, budget(6)).unwrap();
+    let placed = problem.all(&|_, _| true).unwrap().unwrap();
+    let names: Vec<&str> = placed.iter().map(|placed| placed.placement.name()).collect();
+    assert_eq!(names, ["even", "edge-dense", "chebyshev", "variance-optimal", "optimal"]);
+    assert!(placed.iter().all(|placed| placed.positions.len() == 6));
+    assert_eq!(problem.all(&|_, _| true).unwrap().unwrap(), placed);
+}
+
+#[test]
+fn what_cannot_be_designed_is_refused() {
+    let refusal = |example: &Example, count: usize| {
+        problem(example, budget(count)).map(|_| ()).unwrap_err().to_string()
+    };
+    let network = "an estimator of kind `network` needs at least 2";
+    assert_eq!(refusal(&paper(), 1), format!("1 training position(s); {network}"));
+    let auto = Example { estimator: EstimatorConfig::Auto, ..noisy() };
+    assert!(refusal(&auto, 5).contains("positions are designed for one estimator"));
+    let mut unknown = Example { training: None, ..noisy() };
+    unknown.bench.force_n = None;
+    assert!(refusal(&unknown, 5).contains("the force of the presses is not known"));
+    let measured = Example { bench: Bench::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
+    assert!(refusal(&measured, 5).contains("has no model"));
+}
+
+fn begun(positions_m: &[f64], repeats: usize) -> (Bench, palpate_estimators::recording::Recording) {
+    let bench = noisy().bench;
+    let positions: Vec<Position> = positions_m.iter().map(|x_m| Position::along(*x_m)).collect();
+    let recording = simulate_at(&bench, &positions, repeats, 3).unwrap();
+    (bench, recording)
+}
+
+fn advised(positions_m: &[f64], repeats: usize) -> Advice {
+    let (bench, recording) = begun(positions_m, repeats);
+    next_press(&bench, None, &recording, 5.0, &mut || true).unwrap().unwrap()
+}
+
+#[test]
+fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
+    let advice = advised(&[0.02, 0.06, 0.1, 0.14, 0.18, 0.22], 5);
+    assert!(!advice.is_enough());
+    let first = advice.next[0];
+    assert!(first.position.x_m > 0.25, "{first:?}");
+    assert!(first.error_m < 0.5 * advice.error_m);
+    assert!(advice.next.windows(2).all(|pair| pair[1].error_m < pair[0].error_m));
+    assert!(advice.endless_error_m < advice.next.last().unwrap().error_m);
+}
+
+#[test]
+fn enough_is_said_when_little_is_left_to_gain() {
+    let all: Vec<f64> = (0..40).map(|i| 0.005 + 0.01 * f64::from(i)).collect();
+    let advice = advised(&all, 10);
+    assert!(advice.is_enough() && advice.gets_there() && advice.next.is_empty(), "{advice:?}");
+    assert!(advice.to_gain_percent() < 5.0);
+}
+
+#[test]
+fn a_recording_that_tells_too_little_is_refused() {
+    let (bench, recording) = begun(&[0.1, 0.2, 0.3], 2);
+    let refused = |bench: &Bench, recording: &palpate_estimators::recording::Recording| {
+        next_press(bench, None, recording, 5.0, &mut || true).unwrap_err().to_string()
+    };
+    assert!(refused(&bench, &recording).contains("3 distinct positions; at least 4"));
+    let (mut bench, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
+    for sensor in &mut bench.layout.sensors {
+        sensor.channel = ChannelModel::default();
+    }
+    assert!(refused(&bench, &recording).contains("how noisy channel 1 is"));
+    bench.layout.sensors.pop();
+    assert!(refused(&bench, &recording).contains("8 channels, the rig 7"));
+    assert_eq!(bench.layout.kinds()[0], SensorKind::Deflection);
+}

@@ -1,0 +1,117 @@
+//! Positions that leave the least variance of influence functions learnt as Gaussian processes.
+//!
+//! With noise of 1 a reading and a variance v left in what it should be, a locator sees noise of √(1 + v): it is off by the
+//! limit times that. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal
+//! of Machine Learning Research* 9, 2008, choose sensors of fields so).
+
+use super::Budget;
+use super::forward::Forward;
+use super::knowledge::Knowledge;
+use crate::sensors::WeightedContacts;
+use palpate_estimators::arrangement::cells;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+
+/// Where could be pressed, along a line and along each side of a plane.
+const SITES: usize = 200;
+const SITES_ON_A_PLANE: usize = 20;
+/// Contacts that are looked at, at most.
+const MOST_CONTACTS: usize = 400;
+/// Rounds of exchange, far more than any search takes.
+const MOST_ROUNDS: usize = 50;
+
+/// Sites to press at, contacts to locate, and what is expected of the error there.
+pub(super) struct Expectation {
+    /// The sites, then the contacts.
+    pub places: Vec<Position>,
+    sites: usize,
+    weights: Vec<f64>,
+    limits_m: Vec<f64>,
+}
+
+impl Expectation {
+    pub fn new(forward: &Forward, contacts: &WeightedContacts, extent: Extent) -> Self {
+        let side = if extent.is_plane() { SITES_ON_A_PLANE } else { SITES };
+        let mut places = cells(extent, side, if extent.is_plane() { side } else { 1 });
+        let sites = places.len();
+        let step = contacts.len().div_ceil(MOST_CONTACTS);
+        let kept: Vec<usize> = (0..contacts.len()).step_by(step).collect();
+        let share: f64 = kept.iter().map(|i| contacts.weights[*i]).sum();
+        places.extend(kept.iter().map(|i| contacts.positions[*i]));
+        Self {
+            sites,
+            weights: kept.iter().map(|i| contacts.weights[*i] / share).collect(),
+            limits_m: places[sites..].iter().map(|at| forward.limit_m(*at)).collect(),
+            places,
+        }
+    }
+
+    /// Which places can be pressed.
+    pub fn sites(&self) -> std::ops::Range<usize> {
+        0..self.sites
+    }
+
+    /// The mean over the contacts of limit × √(1 + v), in metres; `variance` is of a place.
+    pub fn error_m(&self, variance: impl Fn(usize) -> f64) -> f64 {
+        let contacts = self.weights.iter().zip(&self.limits_m).enumerate();
+        contacts
+            .map(|(i, (weight, limit_m))| weight * limit_m * (1.0 + variance(self.sites + i)).sqrt())
+            .sum()
+    }
+
+    /// The site at which presses help most, and the error that is then expected.
+    pub fn best(&self, knowledge: &Knowledge, noise: f64) -> (usize, f64) {
+        let after = |site: usize| self.error_m(|place| knowledge.variance_after(place, site, noise));
+        let all = self.sites().map(|site| (site, after(site)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
+    }
+}
+
+/// The positions; `None` when `keep_going` says no.
+pub(super) fn least(
+    forward: &Forward,
+    contacts: &WeightedContacts,
+    extent: Extent,
+    budget: &Budget,
+    keep_going: &mut dyn FnMut() -> bool,
+) -> Option<Vec<Position>> {
+    let expectation = Expectation::new(forward, contacts, extent);
+    let before = Knowledge::before(forward, &expectation.places);
+    let noise = 1.0 / budget.repeats as f64;
+    let after = |sites: &[usize]| {
+        let mut knowledge = before.clone();
+        sites.iter().for_each(|site| knowledge.press(*site, noise));
+        knowledge
+    };
+    let (mut chosen, mut knowledge) = (Vec::new(), before.clone());
+    let mut error_m = f64::INFINITY;
+    while chosen.len() < budget.count {
+        if !keep_going() {
+            return None;
+        }
+        let (site, left_m) = expectation.best(&knowledge, noise);
+        knowledge.press(site, noise);
+        chosen.push(site);
+        error_m = left_m;
+    }
+    let mut unchanged = 0;
+    for step in 0..MOST_ROUNDS * budget.count {
+        if unchanged == budget.count {
+            break;
+        }
+        if !keep_going() {
+            return None;
+        }
+        let slot = step % budget.count;
+        let mut others = chosen.clone();
+        let leaving = others.remove(slot);
+        let (site, left_m) = expectation.best(&after(&others), noise);
+        let improves = site != leaving && left_m < error_m * (1.0 - 1e-9);
+        if improves {
+            (chosen[slot], error_m) = (site, left_m);
+        }
+        unchanged = if improves { 0 } else { unchanged + 1 };
+    }
+    chosen.sort_unstable();
+    Some(chosen.into_iter().map(|site| expectation.places[site]).collect())
+}

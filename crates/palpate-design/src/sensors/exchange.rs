@@ -1,0 +1,277 @@
+//! Greedy choice and exchange: the main search.
+//!
+//! Sensors are added one at a time, each the one that improves the score most; then each in turn is exchanged for the best
+//! other one, until no exchange improves (Fedorov 1972 for designs of experiments; greedy choice of sensors by their
+//! information: Krause, Singh and Guestrin, *Journal of Machine Learning Research* 9, 2008). What it ends in no single exchange
+//! improves; several starts make it likely that nothing else does either.
+//!
+//! Of very many sites a coarse sample is searched from all starts, and a finer one from the best layout of these. Then the
+//! layout is exchanged among the neighbours of its sites, which settles it to the last site, and among all units, which finds
+//! what the samples missed; these two again and again, until the latter finds nothing that matters.
+
+use super::objective::{ForceBelief, Objective, State, score_of, state_of};
+use super::pool::Pool;
+use super::starts;
+use crate::sensors::{KeepGoing, Stage};
+
+/// With more units than this, searches begin in samples of them: coarse ones from every start, of this size from the best.
+const SAMPLE: usize = 2000;
+const COARSE_SAMPLE: usize = 250;
+/// Random layouts from which the exchange starts too.
+const RANDOM_STARTS: u64 = 6;
+/// An exchange must improve the score by more than this share of it.
+const LEAST_GAIN: f64 = 1e-10;
+/// The same of an exchange for one of very many: a millionth of a limit of 2 mm is 2 nm, and nobody drills a hole so finely
+/// that it mattered.
+const LEAST_GAIN_OF_MANY: f64 = 1e-6;
+/// Units that are judged for every slot while their rows are in the processor's nearer caches.
+const CHUNK: usize = 64;
+/// Rounds of exchange, far more than any search takes.
+const MOST_ROUNDS: usize = 100;
+
+/// A layout and its score.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Found {
+    pub selection: Vec<usize>,
+    pub score: f64,
+}
+
+impl Found {
+    pub fn of(pool: &Pool, objective: &dyn Objective, selection: Vec<usize>) -> Self {
+        let score = score_of(objective, &pool.candidates(&selection));
+        Self { selection, score }
+    }
+
+    /// The better of the two.
+    pub fn or_better(self, other: Option<Self>) -> Self {
+        match other {
+            Some(other) if other.score < self.score => other,
+            _ => self,
+        }
+    }
+}
+
+/// The best layout of several starts; `packed` is one that keeps all constraints. `None` when `keep_going` says no.
+pub(super) fn search(
+    pool: &Pool,
+    objective: &dyn Objective,
+    packed: &[usize],
+    seed: u64,
+    keep_going: &mut KeepGoing,
+) -> Option<Found> {
+    if pool.units.len() <= SAMPLE {
+        let all: Vec<usize> = (0..pool.units.len()).collect();
+        return from_starts(pool, objective, &all, packed, seed, keep_going);
+    }
+    let coarse = sample(pool, COARSE_SAMPLE, packed);
+    let found = from_starts(pool, objective, &coarse, packed, seed, keep_going)?;
+    let fine = sample(pool, SAMPLE, &found.selection);
+    let found = exchange(pool, objective, &fine, found.selection, keep_going)?;
+    exchange_among_many(pool, objective, found, keep_going)
+}
+
+/// The best layout of several starts.
+fn from_starts(
+    pool: &Pool,
+    objective: &dyn Objective,
+    among: &[usize],
+    packed: &[usize],
+    seed: u64,
+    keep_going: &mut KeepGoing,
+) -> Option<Found> {
+    let starts = [greedy(pool, objective, among), starts::spread(pool, among), Some(packed.to_vec())];
+    let random = (0..RANDOM_STARTS).map(|k| starts::random(pool, among, seed.wrapping_add(k)));
+    let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
+    let mut best: Option<Found> = None;
+    for (done, start) in starts.iter().enumerate() {
+        if !keep_going(Stage::Exchange, done as f64 / starts.len() as f64) {
+            return None;
+        }
+        let found = exchange(pool, objective, among, start.clone(), keep_going)?;
+        best = Some(found.or_better(best));
+    }
+    best
+}
+
+/// Exchanges units for neighbours until nothing improves and then for any others, until none of these gains enough.
+fn exchange_among_many(
+    pool: &Pool,
+    objective: &dyn Objective,
+    mut found: Found,
+    keep_going: &mut KeepGoing,
+) -> Option<Found> {
+    for _ in 0..MOST_ROUNDS {
+        for _ in 0..MOST_ROUNDS {
+            let before = found.score;
+            found = exchange(pool, objective, &nearby(pool, &found.selection), found.selection, keep_going)?;
+            if found.score == before {
+                break;
+            }
+        }
+        let bests = best_of_each_slot(pool, objective, &found, keep_going)?;
+        let mut improved = false;
+        for (slot, unit) in bests {
+            improved |= exchange_one(pool, objective, &[unit], &mut found, slot, LEAST_GAIN_OF_MANY);
+        }
+        if !improved {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// For each slot that may change the unit that it is best exchanged for, the slot that gains most first. One pass over all
+/// units serves all slots, since fetching so many rows takes about as long as judging one. `None` when `keep_going` says no.
+fn best_of_each_slot(
+    pool: &Pool,
+    objective: &dyn Objective,
+    found: &Found,
+    keep_going: &mut KeepGoing,
+) -> Option<Vec<(usize, usize)>> {
+    let slots: Vec<usize> = (pool.fixed.len()..found.selection.len()).collect();
+    let without: Vec<Without> =
+        slots.iter().map(|slot| Without::slot(pool, objective, found, *slot)).collect();
+    let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
+    let all: Vec<usize> = (0..pool.units.len()).collect();
+    for chunk in all.chunks(CHUNK) {
+        if !keep_going(Stage::Exchange, f64::NAN) {
+            return None;
+        }
+        for (best, without) in bests.iter_mut().zip(&without) {
+            let better = without.best(pool, objective, chunk);
+            if better.is_some_and(|(_, score)| best.is_none_or(|(_, least)| score < least)) {
+                *best = better;
+            }
+        }
+    }
+    let mut bests: Vec<(usize, (usize, f64))> =
+        slots.into_iter().zip(bests).filter_map(|(slot, best)| Some((slot, best?))).collect();
+    bests.sort_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b));
+    Some(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
+}
+
+/// The units between a layout's own and the next ones of the sample.
+fn nearby(pool: &Pool, layout: &[usize]) -> Vec<usize> {
+    let count = pool.units.len();
+    let step = count.div_ceil(SAMPLE);
+    let around = |unit: &usize| unit.saturating_sub(step)..(unit + step + 1).min(count);
+    let mut nearby: Vec<usize> = layout.iter().flat_map(around).collect();
+    nearby.sort_unstable();
+    nearby.dedup();
+    nearby
+}
+
+/// About so many units evenly out of all of them, with those of a layout.
+fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
+    let count = pool.units.len();
+    let mut sample: Vec<usize> = (0..count).step_by(count.div_ceil(size)).collect();
+    sample.extend(layout);
+    sample.sort_unstable();
+    sample.dedup();
+    sample
+}
+
+/// The layout that grows by the best unit at a time; `None` where it gets stuck.
+pub(super) fn greedy(pool: &Pool, objective: &dyn Objective, among: &[usize]) -> Option<Vec<usize>> {
+    let mut selection = pool.fixed.clone();
+    while pool.size(&selection) < pool.design.count {
+        // Two sensors are the least that tell a position and a force.
+        let early = pool.size(&selection) < 3;
+        let belief = if early { ForceBelief::Rough } else { ForceBelief::Vague };
+        let state = state_of(objective, &pool.candidates(&selection), belief);
+        let joinable = pool.joinable(&selection, among, None);
+        selection.push(best_of(pool, objective, &state, &joinable)?.0);
+    }
+    Some(selection)
+}
+
+/// Exchanges one unit after the other for the best, until nothing improves. `None` when `keep_going` says no.
+pub(super) fn exchange(
+    pool: &Pool,
+    objective: &dyn Objective,
+    among: &[usize],
+    selection: Vec<usize>,
+    keep_going: &mut KeepGoing,
+) -> Option<Found> {
+    let mut found = Found::of(pool, objective, selection);
+    let fixed = pool.fixed.len();
+    let mut unchanged = 0;
+    let slots = found.selection.len() - fixed;
+    for step in 0..MOST_ROUNDS * slots {
+        if unchanged == slots {
+            break;
+        }
+        if !keep_going(Stage::Exchange, f64::NAN) {
+            return None;
+        }
+        let slot = fixed + step % slots;
+        let improved = exchange_one(pool, objective, among, &mut found, slot, LEAST_GAIN);
+        unchanged = if improved { 0 } else { unchanged + 1 };
+    }
+    Some(found)
+}
+
+/// Exchanges the unit in one slot for the best of its size, if that improves the score by more than this share of it.
+fn exchange_one(
+    pool: &Pool,
+    objective: &dyn Objective,
+    among: &[usize],
+    found: &mut Found,
+    slot: usize,
+    least_gain: f64,
+) -> bool {
+    let without = Without::slot(pool, objective, found, slot);
+    let Some((unit, score)) = without.best(pool, objective, among) else { return false };
+    let improves = unit != without.leaving && score < found.score - least_gain * found.score.abs();
+    if improves {
+        found.selection[slot] = unit;
+        found.score = score;
+    }
+    improves
+}
+
+/// A layout but for one unit.
+struct Without {
+    leaving: usize,
+    others: Vec<usize>,
+    state: State,
+}
+
+impl Without {
+    fn slot(pool: &Pool, objective: &dyn Objective, found: &Found, slot: usize) -> Self {
+        let mut others = found.selection.clone();
+        let leaving = others.remove(slot);
+        let state = state_of(objective, &pool.candidates(&others), ForceBelief::Vague);
+        Self { leaving, others, state }
+    }
+
+    /// The best unit to fill the gap, of the size of the one that left.
+    fn best(&self, pool: &Pool, objective: &dyn Objective, among: &[usize]) -> Option<(usize, f64)> {
+        let joinable = pool.joinable(&self.others, among, Some(pool.units[self.leaving].size()));
+        best_of(pool, objective, &self.state, &joinable)
+    }
+}
+
+/// The unit whose addition scores best, the first of equals.
+fn best_of(pool: &Pool, objective: &dyn Objective, state: &State, units: &[usize]) -> Option<(usize, f64)> {
+    let mut best: Option<(usize, f64)> = None;
+    for unit in units {
+        let score = score_with(pool, objective, state, *unit);
+        if best.is_none_or(|(_, least)| score < least) {
+            best = Some((*unit, score));
+        }
+    }
+    best
+}
+
+/// The score with one more unit.
+pub(super) fn score_with(pool: &Pool, objective: &dyn Objective, state: &State, unit: usize) -> f64 {
+    let unit = pool.units[unit];
+    match unit.twin {
+        None => objective.score_with(state, objective.row(unit.first)),
+        Some(twin) => {
+            let with_first = objective.with(state, objective.row(unit.first));
+            objective.score_with(&with_first, objective.row(twin))
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The limit as a criterion: a few numbers a contact say how much the sensors so far leave unknown, and one sensor more
+//! changes them by a rank-1 term.
+//!
+//! At a contact the unknowns are θ = (ln W, x, y), of which a known force W and a line's y are left out: P of them. A sensor
+//! with derivatives j = ∂y/∂θ / σ adds j·jᵀ to the information (see [`palpate_mechanics::limit`]). Beforehand something is known as well:
+//! that the contact is on the surface, which has the variance l²/12 of a flat prior along each side, and next to nothing of
+//! the force (a standard deviation of 1000 times its value). So the covariance C = (prior + Σ j·jᵀ)⁻¹ exists for every
+//! layout, and along a line its entry of the position is 1/(1/s² + 12/l²), where s is the limit: never above the prior's,
+//! also where a layout cannot tell. One more sensor makes it
+//!
+//! ```text
+//! C − (C·j)·(C·j)ᵀ / (1 + jᵀ·C·j)        (Sherman and Morrison)
+//! ```
+//!
+//! which for P ≤ 3 is some twenty multiplications a contact, so that all candidates are judged in one pass over their rows.
+
+mod lanes;
+mod sums;
+
+use std::sync::Arc;
+
+use super::objective::{Block, ForceBelief, LANES, Objective, State};
+use crate::sensors::DesignCriterion;
+use sums::{Mean, Shrinking, Sums, Without, Worst};
+
+/// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
+const VAGUE: f64 = 1e-6;
+const ROUGH: f64 = 1.0;
+/// Where the criterion does not tell two layouts apart, their mean limits do, by this share of its size.
+const TIE_BREAK: f64 = 1e-3;
+
+/// Rows of all candidates, and the criterion.
+pub(super) struct LimitObjective<const P: usize, const FIRST: usize> {
+    /// [candidate][unknown][block of contacts]
+    table: Arc<Vec<Block>>,
+    /// Blocks of contacts.
+    blocks: usize,
+    weights: Vec<Block>,
+    /// 12/l² of each side, 0 for the force, whose belief varies.
+    prior: [f64; P],
+    criterion: DesignCriterion,
+    /// The variance at the tolerance.
+    good_enough: f64,
+    /// The prior's standard deviation of the position.
+    unknown_m: f64,
+}
+
+impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
+    /// `table` holds a row of P·⌈contacts/8⌉ blocks a candidate; `sides_m` are the surface's sides, as many as there are
+    /// unknowns of the position.
+    pub fn new(
+        table: Arc<Vec<Block>>,
+        weights: &[f64],
+        sides_m: &[f64],
+        criterion: DesignCriterion,
+        tolerance_m: f64,
+    ) -> Self {
+        let information =
+            |k: usize| if k < FIRST { 0.0 } else { 12.0 / (sides_m[k - FIRST] * sides_m[k - FIRST]) };
+        let prior: [f64; P] = std::array::from_fn(information);
+        let variance: f64 = prior[FIRST..].iter().map(|information| 1.0 / information).sum();
+        Self {
+            table,
+            blocks: weights.len().div_ceil(LANES),
+            weights: padded(weights),
+            prior,
+            criterion,
+            good_enough: 1.0 / (1.0 / (tolerance_m * tolerance_m) + 1.0 / variance),
+            unknown_m: variance.sqrt(),
+        }
+    }
+
+    /// See [`lanes::folded`].
+    fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
+        lanes::folded::<P, FIRST, S>(&state.values, row, &self.weights, sums)
+    }
+
+    /// The sums for a sensor, or for none.
+    fn sums(&self, state: &State, row: &[Block]) -> [f64; 2] {
+        match self.criterion {
+            DesignCriterion::MeanLimit => self.folded(state, row, &Mean),
+            DesignCriterion::WorstLimit => self.folded(state, row, &Worst),
+            DesignCriterion::WithinTolerance => self.folded(state, row, &Without(self.good_enough)),
+            DesignCriterion::DOptimality => {
+                let [sum, _] = self.folded(state, row, &Shrinking);
+                [state.constant + sum, 0.0]
+            }
+        }
+    }
+
+    fn silent_row(&self) -> Vec<Block> {
+        vec![[0.0; LANES]; P * self.blocks]
+    }
+
+    /// The whole of a score from its sums.
+    fn search_score(&self, [sum, mean_m]: [f64; 2]) -> f64 {
+        match self.criterion {
+            DesignCriterion::MeanLimit | DesignCriterion::DOptimality => sum,
+            DesignCriterion::WorstLimit => sum.sqrt() + TIE_BREAK * mean_m,
+            DesignCriterion::WithinTolerance => sum + TIE_BREAK * mean_m / self.unknown_m,
+        }
+    }
+}
+
+impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> {
+    fn row(&self, candidate: usize) -> &[Block] {
+        let size = P * self.blocks;
+        &self.table[candidate * size..(candidate + 1) * size]
+    }
+
+    fn state(&self, rows: &[&[Block]], belief: ForceBelief) -> State {
+        let n = self.blocks;
+        let mut values = vec![[0.0; LANES]; packed(P, 0) * n];
+        let mut prior = self.prior;
+        if FIRST == 1 {
+            prior[0] = if belief == ForceBelief::Rough { ROUGH } else { VAGUE };
+        }
+        let mut constant = 0.0;
+        for at in 0..n {
+            for lane in 0..LANES {
+                let mut information = [[0.0; P]; P];
+                for (k, prior) in prior.iter().enumerate() {
+                    information[k][k] = *prior;
+                }
+                for row in rows {
+                    let j: [f64; P] = std::array::from_fn(|k| row[k * n + at][lane]);
+                    for (i, line) in information.iter_mut().enumerate() {
+                        for (k, entry) in line.iter_mut().enumerate() {
+                            *entry += j[i] * j[k];
+                        }
+                    }
+                }
+                let (covariance, determinant) = inverse(&information);
+                for i in 0..P {
+                    for k in 0..=i {
+                        values[packed(i, k) * n + at][lane] = covariance[i][k];
+                    }
+                }
+                constant -= 0.5 * self.weights[at][lane] * determinant.ln();
+            }
+        }
+        // Padding counts for nothing, also where only the largest variance counts.
+        for block in values.chunks_exact_mut(n.max(1)) {
+            for (value, weight) in block.iter_mut().flatten().zip(self.weights.iter().flatten()) {
+                if *weight == 0.0 {
+                    *value = 0.0;
+                }
+            }
+        }
+        State { values, constant }
+    }
+
+    fn score(&self, state: &State) -> f64 {
+        self.score_with(state, &self.silent_row())
+    }
+
+    fn score_with(&self, state: &State, row: &[Block]) -> f64 {
+        self.search_score(self.sums(state, row))
+    }
+
+    #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
+    fn with(&self, state: &State, row: &[Block]) -> State {
+        let n = self.blocks;
+        let mut with = state.clone();
+        for at in 0..n {
+            for lane in 0..LANES {
+                let covariance = |i: usize, k: usize| state.values[packed(i, k) * n + at][lane];
+                let told: [f64; P] =
+                    std::array::from_fn(|i| (0..P).map(|k| covariance(i, k) * row[k * n + at][lane]).sum());
+                let shrink = 1.0 + (0..P).map(|k| row[k * n + at][lane] * told[k]).sum::<f64>();
+                for i in 0..P {
+                    for k in 0..=i {
+                        with.values[packed(i, k) * n + at][lane] -= told[i] * told[k] / shrink;
+                    }
+                }
+                with.constant -= 0.5 * self.weights[at][lane] * shrink.ln();
+            }
+        }
+        with
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        let [sum, _] = self.sums(state, &self.silent_row());
+        if self.criterion == DesignCriterion::WorstLimit { sum.sqrt() } else { sum }
+    }
+}
+
+/// Where entry (i, k) of a symmetric matrix stands in its lower triangle, row by row.
+const fn packed(i: usize, k: usize) -> usize {
+    if i >= k { i * (i + 1) / 2 + k } else { k * (k + 1) / 2 + i }
+}
+
+/// The values in blocks, the last one filled up with zeros.
+pub(super) fn padded(values: &[f64]) -> Vec<Block> {
+    let block = |values: &[f64]| std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0));
+    values.chunks(LANES).map(block).collect()
+}
+
+/// The inverse of a symmetric positive definite matrix and its determinant, by Cholesky factors.
+#[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
+fn inverse<const P: usize>(matrix: &[[f64; P]; P]) -> ([[f64; P]; P], f64) {
+    let mut lower = [[0.0; P]; P];
+    let mut determinant = 1.0;
+    for i in 0..P {
+        for k in 0..=i {
+            let known: f64 = (0..k).map(|m| lower[i][m] * lower[k][m]).sum();
+            let rest = matrix[i][k] - known;
+            if i == k {
+                // What rounding leaves of a pivot is never below what it takes away.
+                let pivot = rest.max(f64::EPSILON * matrix[i][i]);
+                determinant *= pivot;
+                lower[i][i] = pivot.sqrt();
+            } else {
+                lower[i][k] = rest / lower[k][k];
+            }
+        }
+    }
+    // Columns of L⁻¹.
+    let mut undone = [[0.0; P]; P];
+    for column in 0..P {
+        for i in column..P {
+            let unit = if i == column { 1.0 } else { 0.0 };
+            let known: f64 = (column..i).map(|m| lower[i][m] * undone[m][column]).sum();
+            undone[i][column] = (unit - known) / lower[i][i];
+        }
+    }
+    let entry = |i: usize, k: usize| (0..P).map(|m| undone[m][i] * undone[m][k]).sum();
+    (std::array::from_fn(|i| std::array::from_fn(|k| entry(i, k))), determinant)
+}
+
+#[cfg(test)]
+mod tests;

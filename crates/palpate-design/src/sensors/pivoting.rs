@@ -1,0 +1,187 @@
+//! Sites by QR factorisation with column pivoting, as PySensors chooses them.
+//!
+//! Of a matrix with a column a site and a row a mode, the column that reaches farthest out of those chosen before is chosen
+//! next (Businger and Golub, *Numerische Mathematik* 7, 1965; for sensors Manohar, Brunton, Kutz and Brunton, *IEEE Control
+//! Systems* 38, 2018). With q the unit vector of what is new in that column, every column's distance² falls by (q·column)²:
+//! as q is at right angles to all before, the columns themselves need not be touched, and a step costs one product.
+
+use ndarray::Array2;
+
+use super::pool::Pool;
+use palpate_numerics::symmetric_eigen;
+
+/// Columns that are worked on at once, so that their distances stay in the nearest cache.
+const BLOCK: usize = 1024;
+/// A column that reaches less far than this share of the longest lies in the span of those before.
+const NOTHING_NEW: f64 = 1e-20;
+
+/// Columns of a matrix, and how far each reaches out of the span of those chosen.
+struct Pivoting<'a> {
+    /// A row a mode.
+    modes: &'a [Vec<f64>],
+    /// Squared distances from the span.
+    left: Vec<f64>,
+    /// Unit vectors of the span.
+    span: Vec<Vec<f64>>,
+    longest: f64,
+}
+
+impl<'a> Pivoting<'a> {
+    fn new(modes: &'a [Vec<f64>]) -> Self {
+        let left = squares(modes);
+        let longest = left.iter().copied().fold(0.0, f64::max);
+        Self { modes, left, span: Vec::new(), longest }
+    }
+
+    /// How far a column reaches, squared; where the span is everything, of the column itself.
+    fn reach(&self, column: usize) -> f64 {
+        self.left[column]
+    }
+
+    /// Whether no column reaches out of the span any more.
+    fn is_exhausted(&self) -> bool {
+        self.span.len() == self.modes.len()
+            || self.left.iter().all(|left| *left <= NOTHING_NEW * self.longest)
+    }
+
+    /// Begins anew, as for the first column.
+    fn restart(&mut self) {
+        self.left = squares(self.modes);
+        self.span.clear();
+    }
+
+    fn choose(&mut self, column: usize) {
+        let mut unit: Vec<f64> = self.modes.iter().map(|mode| mode[column]).collect();
+        // Twice is enough for full orthogonality (Giraud et al. 2005).
+        for _ in 0..2 {
+            for other in &self.span {
+                let share: f64 = unit.iter().zip(other).map(|(a, b)| a * b).sum();
+                unit.iter_mut().zip(other).for_each(|(value, other)| *value -= share * other);
+            }
+        }
+        let length = unit.iter().map(|value| value * value).sum::<f64>().sqrt();
+        if length * length <= NOTHING_NEW * self.longest {
+            return;
+        }
+        unit.iter_mut().for_each(|value| *value /= length);
+        let mut along = [0.0; BLOCK];
+        for (block, left) in self.left.chunks_mut(BLOCK).enumerate() {
+            let along = &mut along[..left.len()];
+            along.fill(0.0);
+            for (unit, mode) in unit.iter().zip(self.modes) {
+                let mode = &mode[block * BLOCK..][..left.len()];
+                along.iter_mut().zip(mode).for_each(|(along, value)| *along += unit * value);
+            }
+            left.iter_mut().zip(&*along).for_each(|(left, along)| *left = (*left - along * along).max(0.0));
+        }
+        self.span.push(unit);
+    }
+}
+
+fn squares(modes: &[Vec<f64>]) -> Vec<f64> {
+    let mut squares = vec![0.0; modes.first().map_or(0, Vec::len)];
+    for mode in modes {
+        squares.iter_mut().zip(mode).for_each(|(square, value)| *square += value * value);
+    }
+    squares
+}
+
+/// The first `count` pivots of the matrix with these rows, at most as many as it has rows; the first of equals.
+pub fn pivoted_columns(modes: &[Vec<f64>], count: usize) -> Vec<usize> {
+    let mut pivoting = Pivoting::new(modes);
+    let mut pivots = Vec::new();
+    while pivots.len() < count && !pivoting.is_exhausted() {
+        let farthest = (0..pivoting.left.len())
+            .reduce(|best, column| if pivoting.left[column] > pivoting.left[best] { column } else { best });
+        let Some(column) = farthest else { break };
+        pivoting.choose(column);
+        // What rounding leaves of its own distance must not let it be chosen again.
+        pivoting.left[column] = 0.0;
+        pivots.push(column);
+    }
+    pivots
+}
+
+/// The ratio of the largest and the least singular value of some columns of the matrix with these rows, as many as there are
+/// rows at least; infinite where they do not span them.
+pub fn condition_number(modes: &[Vec<f64>], columns: &[usize]) -> f64 {
+    let chosen = Array2::from_shape_fn((modes.len(), columns.len()), |(i, k)| modes[i][columns[k]]);
+    let (squares, _) = symmetric_eigen(&chosen.dot(&chosen.t()));
+    match (squares.first(), squares.last()) {
+        (Some(largest), Some(least)) if *least > 0.0 => (largest / least).sqrt(),
+        _ => f64::INFINITY,
+    }
+}
+
+/// A layout by pivoting on the first modes, as many as it has sensors, each step among the units that may join; `None` where
+/// it gets stuck.
+pub(super) fn search(pool: &Pool, modes: &[Vec<f64>]) -> Option<Vec<usize>> {
+    let modes = &modes[..modes.len().min(pool.design.count)];
+    let mut pivoting = Pivoting::new(modes);
+    for candidate in pool.candidates(&pool.fixed) {
+        pivoting.choose(candidate);
+    }
+    let all: Vec<usize> = (0..pool.units.len()).collect();
+    let mut selection = pool.fixed.clone();
+    while pool.size(&selection) < pool.design.count {
+        if pivoting.is_exhausted() {
+            pivoting.restart();
+        }
+        let reach = |unit: usize| -> f64 {
+            let members = pool.units[unit].members().map(|candidate| pivoting.reach(candidate));
+            members.sum::<f64>() / pool.units[unit].size() as f64
+        };
+        let joinable = pool.joinable(&selection, &all, None);
+        let unit = joinable.into_iter().reduce(|a, b| if reach(b) > reach(a) { b } else { a })?;
+        for candidate in pool.units[unit].members() {
+            pivoting.choose(candidate);
+        }
+        selection.push(unit);
+    }
+    Some(selection)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sines(modes: usize, sites: usize) -> Vec<Vec<f64>> {
+        let at = |i: usize| (i as f64 + 1.0) / (sites as f64 + 1.0);
+        let mode = |k: usize| (0..sites).map(|i| (k as f64 * std::f64::consts::PI * at(i)).sin()).collect();
+        (1..=modes).map(mode).collect()
+    }
+
+    /// The definition: at every step the column farthest from the span of those before, by Gram and Schmidt on all columns.
+    #[test]
+    fn every_pivot_reaches_farthest_out_of_those_before() {
+        let modes = sines(6, 97);
+        let mut columns: Vec<Vec<f64>> =
+            (0..97).map(|i| modes.iter().map(|mode| mode[i]).collect()).collect();
+        for pivot in pivoted_columns(&modes, 6) {
+            let length = |column: &Vec<f64>| column.iter().map(|v| v * v).sum::<f64>();
+            let farthest = columns.iter().map(length).fold(0.0, f64::max);
+            assert!(length(&columns[pivot]) >= farthest * (1.0 - 1e-9), "{pivot}");
+            let size = length(&columns[pivot]).sqrt();
+            let unit: Vec<f64> = columns[pivot].iter().map(|v| v / size).collect();
+            for column in &mut columns {
+                let share: f64 = column.iter().zip(&unit).map(|(a, b)| a * b).sum();
+                column.iter_mut().zip(&unit).for_each(|(value, unit)| *value -= share * unit);
+            }
+        }
+    }
+
+    #[test]
+    fn condition_numbers_of_known_matrices() {
+        let stretched = vec![vec![3.0, 0.0, 9.0], vec![0.0, 2.0, 9.0]];
+        assert!((condition_number(&stretched, &[0, 1]) - 1.5).abs() < 1e-12);
+        assert_eq!(condition_number(&stretched, &[0]), f64::INFINITY);
+        // Sines at the multiples of a ninth are at right angles and equally long.
+        assert!((condition_number(&sines(8, 8), &[0, 1, 2, 3, 4, 5, 6, 7]) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_matrix_has_no_more_pivots_than_rank() {
+        let same = vec![vec![1.0, 2.0, 3.0], vec![2.0, 4.0, 6.0]];
+        assert_eq!(pivoted_columns(&same, 2), [2]);
+    }
+}

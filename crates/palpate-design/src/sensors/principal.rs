@@ -1,0 +1,126 @@
+//! Principal components of what sensors read at all candidate sites, and how well a layout reconstructs them.
+//!
+//! Tongpadungrod et al. chose sensing positions by the principal components of a beam's readings: so that from a few sensors
+//! the readings everywhere else can be told. Here, with X the whitened readings (contacts × candidates, each row times the
+//! root of its contact's share), X = U·S·Vᵀ; the columns of V are the components (about 0, so that no mean has to be learnt),
+//! and s_j² is the variance of the reading pattern along component j. Readings of a layout, with noise of variance 1, leave of
+//! that variance what the best linear reconstruction cannot tell: the score is the share of it that is left.
+
+use ndarray::Array2;
+
+use super::limit_objective::padded;
+use super::objective::{Block, ForceBelief, LANES, Objective, State};
+use palpate_numerics::symmetric_eigen;
+
+/// Components beyond these carry nothing that noise would leave to be seen.
+const MOST_COMPONENTS: usize = 24;
+/// Components with less than this share of the largest variance are rounding.
+const LEAST_SHARE: f64 = 1e-12;
+
+/// Principal components of readings.
+pub(super) struct PrincipalComponents {
+    /// A component's value at every candidate, the components from the largest down.
+    pub modes: Vec<Vec<f64>>,
+    /// The variance of each.
+    pub variances: Vec<f64>,
+}
+
+impl PrincipalComponents {
+    /// Of readings, a contact a row.
+    pub fn of(readings: &Array2<f64>) -> Self {
+        let (squares, contacts) = symmetric_eigen(&readings.dot(&readings.t()));
+        let least = LEAST_SHARE * squares.first().copied().unwrap_or(0.0);
+        let kept = squares.iter().take_while(|square| **square > least).count().min(MOST_COMPONENTS);
+        let mode = |k: usize| {
+            let along = readings.t().dot(&contacts.column(k));
+            (along / squares[k].sqrt()).to_vec()
+        };
+        Self { modes: (0..kept).map(mode).collect(), variances: squares.iter().take(kept).copied().collect() }
+    }
+}
+
+/// The share of variance that a layout leaves untold.
+pub(super) struct Reconstruction {
+    /// [candidate][block of components]
+    rows: Vec<Block>,
+    /// Blocks of components.
+    blocks: usize,
+    variances: Vec<f64>,
+}
+
+impl Reconstruction {
+    pub fn new(components: &PrincipalComponents) -> Self {
+        let candidates = components.modes.first().map_or(0, Vec::len);
+        let row = |i: usize| components.modes.iter().map(|mode| mode[i]).collect::<Vec<f64>>();
+        Self {
+            rows: (0..candidates).flat_map(|i| padded(&row(i))).collect(),
+            blocks: components.modes.len().div_ceil(LANES),
+            variances: components.variances.clone(),
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.variances.iter().sum()
+    }
+
+    fn trace(&self, state: &State) -> f64 {
+        (0..self.variances.len()).map(|i| state.values[i * self.blocks + i / LANES][i % LANES]).sum()
+    }
+
+    /// C·j, and 1 + jᵀ·C·j.
+    fn told(&self, state: &State, row: &[Block]) -> (Vec<f64>, f64) {
+        let told: Vec<f64> = state.values.chunks_exact(self.blocks).map(|line| dot(line, row)).collect();
+        let signal: f64 = told.iter().zip(row.iter().flatten()).map(|(a, b)| a * b).sum();
+        (told, 1.0 + signal)
+    }
+}
+
+impl Objective for Reconstruction {
+    fn row(&self, candidate: usize) -> &[Block] {
+        &self.rows[candidate * self.blocks..(candidate + 1) * self.blocks]
+    }
+
+    fn state(&self, rows: &[&[Block]], _: ForceBelief) -> State {
+        let mut values = vec![[0.0; LANES]; self.variances.len() * self.blocks];
+        for (i, variance) in self.variances.iter().enumerate() {
+            values[i * self.blocks + i / LANES][i % LANES] = *variance;
+        }
+        let start = State { values, constant: 0.0 };
+        rows.iter().fold(start, |state, row| self.with(&state, row))
+    }
+
+    fn score(&self, state: &State) -> f64 {
+        self.trace(state) / self.total()
+    }
+
+    fn score_with(&self, state: &State, row: &[Block]) -> f64 {
+        let (told, shrink) = self.told(state, row);
+        let gain: f64 = told.iter().map(|told| told * told).sum();
+        (self.trace(state) - gain / shrink) / self.total()
+    }
+
+    fn with(&self, state: &State, row: &[Block]) -> State {
+        let (told, shrink) = self.told(state, row);
+        let mut with = state.clone();
+        for (line, own) in with.values.chunks_exact_mut(self.blocks).zip(&told) {
+            for (value, other) in line.iter_mut().flatten().zip(&told) {
+                *value -= own * other / shrink;
+            }
+        }
+        with
+    }
+
+    fn value(&self, state: &State) -> f64 {
+        self.score(state)
+    }
+}
+
+fn dot(a: &[Block], b: &[Block]) -> f64 {
+    let mut lanes = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for lane in 0..LANES {
+            lanes[lane] += a[lane] * b[lane];
+        }
+    }
+    lanes.iter().sum()
+}

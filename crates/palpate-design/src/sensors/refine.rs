@@ -1,0 +1,131 @@
+//! Positions between the candidate sites.
+
+use super::candidates::{PlacedSensor, mirrored, reads_something};
+use super::objective::{Block, ForceBelief, State};
+use super::pool::exclusion;
+use super::{KeepGoing, SensorProblem, Stage};
+use crate::sensors::Sites;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+
+/// Steps begin at the distance of sites and are halved as often; on a plane, where each is a solution, less often.
+const HALVINGS: usize = 9;
+const HALVINGS_ON_A_PLANE: usize = 3;
+/// Rounds over all sensors for one step size, at most.
+const MOST_ROUNDS: usize = 20;
+
+/// A compass search: each sensor in turn goes a step along each direction if that improves the score; when none does, the step
+/// is halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other go together, and those of a
+/// kind stay as far apart as sites are. `None` when
+/// `keep_going` says no.
+pub(super) fn refine(
+    problem: &SensorProblem,
+    selection: &[usize],
+    keep_going: &mut KeepGoing,
+) -> Option<Vec<PlacedSensor>> {
+    let pool = &problem.pool;
+    let mut groups: Vec<Vec<PlacedSensor>> = selection
+        .iter()
+        .map(|unit| pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect())
+        .collect();
+    let Some(mut step_m) = site_distance(&pool.design.sites, pool.extent.length_m) else {
+        return Some(groups.concat());
+    };
+    let halvings = if pool.extent.is_plane() { HALVINGS_ON_A_PLANE } else { HALVINGS };
+    for halving in 0..halvings {
+        for _ in 0..MOST_ROUNDS {
+            if !keep_going(Stage::Refinement, halving as f64 / halvings as f64) {
+                return None;
+            }
+            let mut moved = false;
+            for group in pool.fixed.len()..groups.len() {
+                moved |= improve(problem, &mut groups, group, step_m);
+            }
+            if !moved {
+                break;
+            }
+        }
+        step_m *= 0.5;
+    }
+    Some(groups.concat())
+}
+
+/// `None` where the sites are those listed and no others.
+fn site_distance(sites: &Sites, length_m: f64) -> Option<f64> {
+    match sites {
+        Sites::Every(every_m) => Some(*every_m),
+        Sites::Count(count) => Some(length_m / (*count + 1) as f64),
+        Sites::At(_) => None,
+    }
+}
+
+/// Moves one group by a step, if that improves the score.
+fn improve(problem: &SensorProblem, groups: &mut [Vec<PlacedSensor>], index: usize, step_m: f64) -> bool {
+    let pool = &problem.pool;
+    if pool.design.offers[groups[index][0].offer].kind == SensorKind::Reaction {
+        return false;
+    }
+    let others: Vec<PlacedSensor> =
+        groups.iter().enumerate().filter(|(i, _)| *i != index).flat_map(|(_, group)| group.clone()).collect();
+    let rows: Vec<Vec<Block>> = others.iter().map(|sensor| problem.row(sensor)).collect();
+    let state =
+        problem.objective.state(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>(), ForceBelief::Vague);
+    let mut least = score(problem, &state, &groups[index]);
+    let mut moved = false;
+    for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+        if y != 0.0 && !pool.extent.is_plane() {
+            continue;
+        }
+        let group = shifted(problem, &groups[index], [x * step_m, y * step_m]);
+        if !is_allowed(problem, &group, &others) {
+            continue;
+        }
+        let score = score(problem, &state, &group);
+        if score < least {
+            (least, moved) = (score, true);
+            groups[index] = group;
+        }
+    }
+    moved
+}
+
+/// The first of a group moved, and its twin as its mirror image. One alone in the middle of a layout that mirrors itself stays
+/// there along the length.
+fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]) -> Vec<PlacedSensor> {
+    let extent = problem.pool.extent;
+    let is_mirrored = problem.pool.design.symmetry == crate::sensors::Symmetry::Wanted;
+    let x_m = if is_mirrored && group.len() == 1 { 0.0 } else { x_m };
+    let Position { x_m: at_m, y_m: beside_m } = group[0].position;
+    let position = Position {
+        x_m: (at_m + x_m).clamp(0.0, extent.length_m),
+        y_m: (beside_m + y_m).clamp(0.0, extent.width_m.unwrap_or(0.0)),
+    };
+    let twin = |sensor: &PlacedSensor| PlacedSensor { position: mirrored(position, extent), ..*sensor };
+    std::iter::once(PlacedSensor { position, ..group[0] }).chain(group[1..].iter().map(twin)).collect()
+}
+
+fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
+    let pool = &problem.pool;
+    // Sites keep sensors of a kind apart; without them nothing would stop them from meeting in one place.
+    let apart_m = site_distance(&pool.design.sites, pool.extent.length_m).unwrap_or(0.0);
+    let slack_m = 1e-9 * pool.extent.length_m;
+    let together = |a: &PlacedSensor, b: &PlacedSensor| {
+        let crowded = a.offer == b.offer && a.position.distance_m(b.position) < apart_m - slack_m;
+        !crowded && exclusion(a, b, &pool.design, pool.extent).is_none()
+    };
+    let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
+    group.iter().enumerate().all(|(i, sensor)| {
+        pool.design.keep_out.iter().all(|zone| !zone.holds(sensor.position, pool.extent))
+            && reads_something(problem.touches.surface, kind(sensor), sensor.position)
+            && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
+    })
+}
+
+fn score(problem: &SensorProblem, state: &State, group: &[PlacedSensor]) -> f64 {
+    let rows: Vec<Vec<Block>> = group.iter().map(|sensor| problem.row(sensor)).collect();
+    match rows.as_slice() {
+        [one] => problem.objective.score_with(state, one),
+        [one, twin] => problem.objective.score_with(&problem.objective.with(state, one), twin),
+        _ => f64::INFINITY,
+    }
+}

@@ -1,0 +1,148 @@
+//! What a sensor tells of each contact: the rows that criteria work on.
+
+use std::sync::Arc;
+
+use ndarray::Array2;
+
+use super::candidates::PlacedSensor;
+use super::contacts::WeightedContacts;
+use super::error::DesignError;
+use super::limit_objective::LimitObjective;
+use super::objective::{Block, LANES, Objective};
+use super::{KeepGoing, Stage};
+use crate::sensors::{DesignCriterion, SensorDesign};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::{ChannelModel, SensorKind};
+use palpate_mechanics::surface::{Extent, ResponseGradient, Surface};
+
+/// More bytes than the rows of all candidates may take.
+const MOST_BYTES: f64 = 4e9;
+/// Candidates between two questions whether to go on.
+const ASK_EVERY: usize = 64;
+/// Contacts that principal components are taken over, at most.
+const MOST_SNAPSHOTS: usize = 64;
+
+/// The contacts with their force: what rows are made for.
+#[derive(Clone)]
+pub(super) struct Touches<'a> {
+    pub surface: &'a dyn Surface,
+    pub contacts: WeightedContacts,
+    pub force_n: f64,
+    pub force: Force,
+}
+
+impl Touches<'_> {
+    fn extent(&self) -> Extent {
+        self.surface.extent()
+    }
+
+    /// How many unknowns a contact has.
+    fn unknowns(&self) -> usize {
+        usize::from(self.force == Force::Unknown) + if self.extent().is_plane() { 2 } else { 1 }
+    }
+
+    /// How many blocks the row of a sensor has.
+    fn row_size(&self) -> usize {
+        self.unknowns() * self.contacts.len().div_ceil(LANES)
+    }
+
+    /// The row of a sensor: derivatives of its whitened reading by ln W where the force is unknown, by x, and by y on a plane.
+    /// Where the sensor is saturated it tells nothing.
+    pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
+        let mut row = vec![[0.0; LANES]; self.row_size()];
+        self.fill(&mut row, kind, position, channel);
+        row
+    }
+
+    /// Writes the row of a sensor where zeros are.
+    fn fill(&self, row: &mut [Block], kind: SensorKind, position: Position, channel: &ChannelModel) {
+        let response = self.surface.response_function(kind, position);
+        let sd = channel.reading_sd();
+        let blocks = self.contacts.len().div_ceil(LANES);
+        let first = usize::from(self.force == Force::Known);
+        let unknown = first..first + self.unknowns();
+        for (i, &position) in self.contacts.positions.iter().enumerate() {
+            let contact = Contact { position, force_n: self.force_n };
+            let free = channel.range.is_none_or(|(low, high)| {
+                let reading = response.at(contact);
+                low < reading && reading < high
+            });
+            let weight = if free { 1.0 / sd } else { 0.0 };
+            let ResponseGradient { position: [along, across], force } = response.gradient(contact);
+            let told = [self.force_n * force, along, across];
+            for (column, value) in told[unknown.clone()].iter().enumerate() {
+                row[column * blocks + i / LANES][i % LANES] = weight * value;
+            }
+        }
+    }
+
+    /// The rows of all candidates, one after the other; `None` when `keep_going` says no.
+    pub fn table(
+        &self,
+        sensors: &[PlacedSensor],
+        design: &SensorDesign,
+        keep_going: &mut KeepGoing,
+    ) -> Result<Option<Vec<Block>>, DesignError> {
+        let (sites, contacts) = (sensors.len(), self.contacts.len());
+        let size = self.row_size();
+        let bytes = (sites * size * LANES * 8) as f64;
+        if bytes > MOST_BYTES {
+            return Err(DesignError::TooLarge { sites, contacts, bytes, most: MOST_BYTES });
+        }
+        let mut table = vec![[0.0; LANES]; sites * size];
+        for (done, (sensor, row)) in sensors.iter().zip(table.chunks_exact_mut(size.max(1))).enumerate() {
+            if done.is_multiple_of(ASK_EVERY) && !keep_going(Stage::Candidates, done as f64 / sites as f64) {
+                return Ok(None);
+            }
+            let offer = &design.offers[sensor.offer];
+            self.fill(row, offer.kind, sensor.position, &offer.channel);
+        }
+        Ok(Some(table))
+    }
+
+    /// A criterion on such rows.
+    pub fn objective(
+        &self,
+        table: Arc<Vec<Block>>,
+        criterion: DesignCriterion,
+        tolerance_m: f64,
+    ) -> Box<dyn Objective> {
+        let Extent { length_m, width_m } = self.extent();
+        let sides: Vec<f64> = [Some(length_m), width_m].into_iter().flatten().collect();
+        let weights = &self.contacts.weights;
+        match (self.force, width_m) {
+            (Force::Known, None) => {
+                Box::new(LimitObjective::<1, 0>::new(table, weights, &sides, criterion, tolerance_m))
+            }
+            (Force::Unknown, None) => {
+                Box::new(LimitObjective::<2, 1>::new(table, weights, &sides, criterion, tolerance_m))
+            }
+            (Force::Known, Some(_)) => {
+                Box::new(LimitObjective::<2, 0>::new(table, weights, &sides, criterion, tolerance_m))
+            }
+            (Force::Unknown, Some(_)) => {
+                Box::new(LimitObjective::<3, 1>::new(table, weights, &sides, criterion, tolerance_m))
+            }
+        }
+    }
+
+    /// Whitened readings of all candidates, a contact a row, each row times the root of the contact's share; of many contacts
+    /// an even sample.
+    pub fn readings(&self, sensors: &[PlacedSensor], design: &SensorDesign) -> Array2<f64> {
+        let step = self.contacts.len().div_ceil(MOST_SNAPSHOTS);
+        let kept: Vec<usize> = (0..self.contacts.len()).step_by(step).collect();
+        let share: f64 = kept.iter().map(|i| self.contacts.weights[*i]).sum();
+        let mut readings = Array2::zeros((kept.len(), sensors.len()));
+        for (column, sensor) in sensors.iter().enumerate() {
+            let offer = &design.offers[sensor.offer];
+            let response = self.surface.response_function(offer.kind, sensor.position);
+            for (row, i) in kept.iter().enumerate() {
+                let contact = Contact { position: self.contacts.positions[*i], force_n: self.force_n };
+                let weight = (self.contacts.weights[*i] / share).sqrt();
+                readings[[row, column]] = weight * response.at(contact) / offer.channel.reading_sd();
+            }
+        }
+        readings
+    }
+}

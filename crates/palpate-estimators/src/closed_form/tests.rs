@@ -1,0 +1,211 @@
+//! Clean readings over the whole beam, noise against its propagation, and what the closed form must not claim.
+
+use super::*;
+use crate::method::{Fit, FitTask, Locate};
+use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_core::Status;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, Sensor, SensorKind, measure};
+use palpate_mechanics::surface::{Beam, Extent, Surface, SurfaceSpec};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
+
+fn bench(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> Bench {
+    let sensors = sensors.iter().enumerate().map(|(i, (kind, x_m))| Sensor {
+        kind: *kind,
+        position: Position::along(*x_m),
+        name: format!("c{i}"),
+        channel: ChannelModel { noise_sd, ..ChannelModel::default() },
+    });
+    let layout = Layout { sensors: sensors.collect() };
+    Bench { surface: SurfaceSpec::Beam(BEAM), layout, force_n, columns: None }
+}
+
+fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
+    (1..=count).map(|i| (kind, 0.4 * i as f64 / (count + 1) as f64)).collect()
+}
+
+const SCALES: [(SensorKind, f64); 2] = [(SensorKind::Reaction, 0.0), (SensorKind::Reaction, 0.4)];
+
+fn fit(bench: &Bench) -> Result<ClosedFormLocator, ClosedFormFitError> {
+    let row = Row {
+        position: Position::along(0.1),
+        force_n: None,
+        hidden: None,
+        reading: vec![0.0; bench.layout.len()],
+    };
+    let provenance = Provenance { source: "test".into(), rows: 1, digests: vec![], seed: None };
+    let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
+    let recording = Recording { channels, kinds, rows: vec![row], provenance };
+    let task = FitTask { bench, recording: &recording, seed: 0 };
+    let locator = ClosedFormConfig.fit(task, &mut || true)?.unwrap();
+    assert_eq!(locator.check(bench), Ok(()));
+    Ok(locator)
+}
+
+fn clean(bench: &Bench, x_m: f64, force_n: f64) -> Vec<f64> {
+    let contact = Position::along(x_m);
+    let sensors = bench.layout.sensors.iter();
+    sensors.map(|s| force_n * BEAM.influence(s.kind, s.position, contact)).collect()
+}
+
+/// Distance from the truth to the nearest place that the estimate names, in metres.
+fn nearest_m(bench: &Bench, locator: &ClosedFormLocator, x_m: f64, force_n: f64) -> f64 {
+    let estimate = locator.locate(&clean(bench, x_m, force_n));
+    assert!(matches!(estimate.status, Status::Located | Status::Ambiguous), "{x_m}: {estimate:?}");
+    let places = std::iter::once(estimate.contact).chain(estimate.modes.as_slice().iter().map(|m| m.contact));
+    places.map(|contact| (contact.position.x_m - x_m).abs()).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn clean_reactions_give_every_position_and_force() {
+    let bench = bench(&SCALES, 0.0, None);
+    let locator = fit(&bench).unwrap();
+    for x_mm in 0..=400 {
+        let x_m = f64::from(x_mm) * 1e-3;
+        let contact = locator.locate(&clean(&bench, x_m, 2.5)).contact;
+        assert!((contact.position.x_m - x_m).abs() < 1e-12 && (contact.force_n.unwrap() - 2.5).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn clean_deflections_give_every_position_at_unknown_force() {
+    for count in [2, 3, 8] {
+        let bench = bench(&even(SensorKind::Deflection, count), 0.0, None);
+        let locator = fit(&bench).unwrap();
+        for x_mm in 5..=395 {
+            let x_m = f64::from(x_mm) * 1e-3;
+            let off_m = nearest_m(&bench, &locator, x_m, 1.7);
+            assert!(off_m < 1e-7, "{count} sensors, {x_mm} mm: {off_m}");
+        }
+    }
+}
+
+#[test]
+fn clean_deflections_give_every_position_at_known_force() {
+    for count in [1, 2, 8] {
+        let bench = bench(&even(SensorKind::Deflection, count), 0.0, Some(3.0));
+        let locator = fit(&bench).unwrap();
+        for x_mm in 1..=399 {
+            let x_m = f64::from(x_mm) * 1e-3;
+            let off_m = nearest_m(&bench, &locator, x_m, 3.0);
+            // One sensor at mid-span reads a maximum there, which roots in double precision know to half their digits.
+            let bound_m = if count == 1 { 1e-6 } else { 1e-9 };
+            assert!(off_m < bound_m, "{count} sensors, {x_mm} mm: {off_m}");
+        }
+    }
+}
+
+#[test]
+fn one_sensor_sees_the_mirror_image_and_says_so() {
+    let bench = bench(&even(SensorKind::Deflection, 1), 5e-6, Some(3.0));
+    let estimate = fit(&bench).unwrap().locate(&clean(&bench, 0.1, 3.0));
+    assert_eq!(estimate.status, Status::Ambiguous);
+    let [mode] = estimate.modes.as_slice() else { panic!("{estimate:?}") };
+    let sum_m = estimate.contact.position.x_m + mode.contact.position.x_m;
+    assert!((sum_m - 0.4).abs() < 1e-9 && (mode.probability - 0.5).abs() < 1e-6, "{estimate:?}");
+}
+
+#[test]
+fn two_strains_see_between_them_and_are_blind_outside() {
+    let bench = bench(&even(SensorKind::Strain, 2), 1e-7, None);
+    let locator = fit(&bench).unwrap();
+    for x_mm in (140..=260).step_by(10) {
+        let x_m = f64::from(x_mm) * 1e-3;
+        assert!(nearest_m(&bench, &locator, x_m, 3.0) < 1e-9, "{x_mm} mm");
+    }
+    let blind = locator.locate(&clean(&bench, 0.05, 3.0));
+    assert_eq!(blind.status, Status::Ambiguous);
+    let (low, high) = blind.contact.uncertainty.unwrap().x_95_m;
+    assert!(low < 0.001 && high > 0.4 / 3.0, "{blind:?}");
+}
+
+/// Mean and standard deviation of position errors over noise, the mean propagated sd, and the share within the 95 % interval.
+fn monte_carlo(bench: &Bench, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
+    let locator = fit(bench).unwrap();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    let truth = clean(bench, x_m, force_n);
+    let (mut sum, mut squares, mut sd, mut covered) = (0.0, 0.0, 0.0, 0.0);
+    let draws = 2000;
+    for _ in 0..draws {
+        let reading = measure(&bench.layout, &truth, &ChannelErrors::none(&bench.layout), &mut rng);
+        let contact = locator.locate(&reading).contact;
+        let (error, uncertainty) = (contact.position.x_m - x_m, contact.uncertainty.unwrap());
+        sum += error;
+        squares += error * error;
+        sd += uncertainty.covariance[0].sqrt();
+        covered += f64::from(u8::from(uncertainty.x_95_m.0 <= x_m && x_m <= uncertainty.x_95_m.1));
+    }
+    let count = f64::from(draws);
+    let mean = sum / count;
+    (mean, (squares / count - mean * mean).sqrt(), sd / count, covered / count)
+}
+
+#[test]
+fn noise_spreads_as_much_as_was_propagated() {
+    let cases = [
+        (bench(&SCALES, 0.01, None), 0.13, 3.0),
+        (bench(&SCALES, 0.01, Some(3.0)), 0.13, 3.0),
+        (bench(&even(SensorKind::Deflection, 8), 5e-6, Some(3.0)), 0.05, 3.0),
+        (bench(&even(SensorKind::Deflection, 8), 5e-6, None), 0.17, 3.0),
+        (bench(&even(SensorKind::Deflection, 2), 1e-6, None), 0.17, 3.0),
+        (bench(&even(SensorKind::Strain, 2), 1e-7, None), 0.17, 3.0),
+    ];
+    for (i, (bench, x_m, force_n)) in cases.into_iter().enumerate() {
+        let (mean, spread, propagated, covered) = monte_carlo(&bench, x_m, force_n);
+        // 2000 draws know a standard deviation to 1.6 % and a coverage of 0.95 to 0.005.
+        assert!((spread / propagated - 1.0).abs() < 0.06, "case {i}: {spread} against {propagated}");
+        assert!(mean.abs() < 0.1 * spread, "case {i}: mean {mean}, sd {spread}");
+        assert!((covered - 0.95).abs() < 0.02, "case {i}: {covered}");
+    }
+}
+
+#[test]
+fn what_no_contact_explains_is_not_located() {
+    let deflections = bench(&even(SensorKind::Deflection, 8), 5e-6, None);
+    let locator = fit(&deflections).unwrap();
+    assert_eq!(locator.locate(&[3e-6, -4e-6, 1e-6, 0.0, 2e-6, -6e-6, 5e-6, 1e-6]).status, Status::NoContact);
+    let pulled: Vec<f64> = clean(&deflections, 0.2, 3.0).iter().map(|r| -r).collect();
+    assert_eq!(locator.locate(&pulled).status, Status::OutsideModel);
+    let two = clean(&deflections, 0.1, 3.0).into_iter().zip(clean(&deflections, 0.3, 3.0));
+    let two: Vec<f64> = two.map(|(a, b)| a + b).collect();
+    assert_eq!(locator.locate(&two).status, Status::OutsideModel);
+
+    let scales = fit(&bench(&SCALES, 0.01, None)).unwrap();
+    assert_eq!(scales.locate(&[0.01, -0.005]).status, Status::NoContact);
+    assert_eq!(scales.locate(&[-0.5, 2.5]).status, Status::OutsideSurface);
+    assert_eq!(scales.locate(&[-1.0, -2.0]).status, Status::OutsideModel);
+    // Noise may carry a contact at the edge beyond it.
+    let edge = scales.locate(&[-0.01, 3.0]);
+    assert_eq!((edge.status, edge.contact.position.x_m), (Status::Located, 0.4));
+}
+
+#[test]
+fn a_dead_channel_is_left_out() {
+    let mut deflections = bench(&even(SensorKind::Deflection, 8), 5e-6, None);
+    deflections.layout.sensors[3].channel.dead = true;
+    let mut reading = clean(&deflections, 0.17, 3.0);
+    reading[3] = 0.0;
+    let estimate = fit(&deflections).unwrap().locate(&reading);
+    assert_eq!(estimate.status, Status::Located);
+    assert!((estimate.contact.position.x_m - 0.17).abs() < 1e-9);
+}
+
+#[test]
+fn what_does_not_suit_is_named() {
+    let message = |bench: &Bench| fit(bench).unwrap_err().to_string();
+    let mut measured = bench(&SCALES, 0.0, None);
+    measured.surface = SurfaceSpec::Measured(Extent { length_m: 0.4, width_m: None });
+    assert!(message(&measured).contains("no model"));
+    assert_eq!(
+        message(&bench(&[(SensorKind::Raw, 0.1)], 0.0, None)),
+        "the closed form needs deflection, slope, strain or reaction sensors; the layout has a raw channel"
+    );
+    assert_eq!(
+        message(&bench(&even(SensorKind::Deflection, 1), 0.0, None)),
+        "the closed form needs at least 2 sensors that see a contact (the force is unknown); the layout has 1"
+    );
+}

@@ -1,0 +1,209 @@
+//! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
+
+mod comparison;
+mod cross_validation;
+mod linear_theory;
+mod statistics;
+mod tracking;
+
+pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
+pub use cross_validation::{CrossValidationError, cross_validate};
+pub use linear_theory::LinearTheory;
+pub use statistics::{Spread, median, percentile};
+pub use tracking::{
+    FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
+    tracked_of,
+};
+
+use crate::estimator::{Cells, ContactEstimate, Locator, ReadingError};
+use crate::recording::Recording;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+
+/// One reading whose contact was known, and where the locator saw it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Located {
+    /// Where the contact was.
+    pub truth: Position,
+    /// How hard it was, in newtons, where that is known.
+    pub force_n: Option<f64>,
+    /// Where the locator saw it.
+    pub estimate: Position,
+    /// Whether the locator's 95 % region held it, where the locator has one.
+    pub covered: Option<bool>,
+}
+
+impl Located {
+    /// The distance between the two, in metres.
+    pub fn error_m(&self) -> f64 {
+        self.truth.distance_m(self.estimate)
+    }
+}
+
+/// A locator's answers to a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evaluation {
+    /// Length of the surface in metres, which percentage errors refer to.
+    pub length_m: f64,
+    /// The answers, in the recording's order.
+    pub located: Vec<Located>,
+}
+
+/// A part of the surface along its length, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Portion {
+    /// Where it begins, in metres.
+    pub from_m: f64,
+    /// Where it ends, in metres.
+    pub to_m: f64,
+}
+
+impl Portion {
+    /// Its name in tables, in mm: "20_380" for 20–380 mm.
+    pub fn key(&self) -> String {
+        format!("{}_{}", self.from_m * 1e3, self.to_m * 1e3)
+    }
+
+    /// Whether a position lies in it; a rounding error of 10⁻⁹ m is forgiven.
+    pub fn contains(&self, position: Position) -> bool {
+        (self.from_m - 1e-9..=self.to_m + 1e-9).contains(&position.x_m)
+    }
+}
+
+/// Location errors in short.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ErrorSummary {
+    /// Answers that it is of.
+    pub count: usize,
+    /// Mean, in metres.
+    pub average_m: f64,
+    /// Median, in metres.
+    pub median_m: f64,
+    /// 95th percentile, in metres.
+    pub p95_m: f64,
+    /// Largest, in metres.
+    pub largest_m: f64,
+    /// Root of the mean square, in metres.
+    pub rmse_m: f64,
+}
+
+/// Percentage error of the length l: e = |a − a′| / l · 100 (paper, eq. 2).
+pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
+    error_m / length_m * 100.0
+}
+
+/// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
+/// (e − t)ᵀ·C⁻¹·(e − t) ≤ 5.991, the 95th percentile of χ² with two degrees of freedom.
+fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
+    let uncertainty = contact.uncertainty?;
+    if extent.width_m.is_none() {
+        let (low, high) = uncertainty.x_95_m;
+        return Some((low..=high).contains(&truth.x_m));
+    }
+    let [xx, xy, _, yy, ..] = uncertainty.covariance;
+    let (dx, dy) = (contact.position.x_m - truth.x_m, contact.position.y_m - truth.y_m);
+    let determinant = xx * yy - xy * xy;
+    Some((dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) <= 5.991 * determinant)
+}
+
+impl Evaluation {
+    /// Locates every reading of a recording.
+    ///
+    /// # Errors
+    /// [`ReadingError`] when the recording's channels are not the locator's.
+    pub fn of(locator: &Locator, recording: &Recording) -> Result<Self, ReadingError> {
+        let locate = |row: &crate::recording::Row| {
+            let contact = locator.locate(&row.reading)?.contact;
+            Ok(Located {
+                truth: row.position,
+                force_n: row.force_n,
+                estimate: contact.position,
+                covered: covered(&contact, row.position, locator.bench.surface.extent()),
+            })
+        };
+        let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
+        Ok(Self { length_m: locator.bench.surface.extent().length_m, located })
+    }
+
+    /// The errors within a portion, or everywhere; `None` where nothing was located.
+    pub fn summary(&self, portion: Option<Portion>) -> Option<ErrorSummary> {
+        let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
+        let mut errors: Vec<f64> = self.located.iter().filter(inside).map(Located::error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        let count = errors.len();
+        Some(ErrorSummary {
+            count,
+            average_m: errors.iter().sum::<f64>() / count as f64,
+            median_m: percentile(&errors, 50.0)?,
+            p95_m: percentile(&errors, 95.0)?,
+            largest_m: *errors.last()?,
+            rmse_m: (errors.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
+        })
+    }
+
+    /// Share of the contacts whose error is at most `tolerance_m`, in %. With contacts evenly along the surface it is
+    /// the paper's effective length.
+    pub fn effective_percent(&self, tolerance_m: f64) -> f64 {
+        let good = self.located.iter().filter(|located| located.error_m() <= tolerance_m).count();
+        100.0 * good as f64 / self.located.len() as f64
+    }
+
+    /// Share of the 95 % regions that hold their contact, in %; `None` where the locator has none.
+    pub fn coverage_percent(&self) -> Option<f64> {
+        let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
+        let held = told.iter().filter(|covered| **covered).count();
+        (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+    }
+
+    /// The median error of the contacts in each cell, in metres; NaN where there is none.
+    pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
+        let mut errors: Vec<Vec<f64>> = vec![Vec::new(); cells.len()];
+        for located in &self.located {
+            errors[cells.cell_of(located.truth)].push(located.error_m());
+        }
+        errors.into_iter().map(|errors| median(errors).unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
+    /// for a stretch without contacts.
+    pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
+        let extent = Extent { length_m: self.length_m, width_m: None };
+        let cells = Cells { extent, columns: count, rows: 1 };
+        let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
+        for located in &self.located {
+            stretches[cells.cell_of(located.truth)].push(located);
+        }
+        let point = |stretch: &Vec<&Located>| {
+            let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
+            Some((mean_m, median(stretch.iter().map(|located| located.error_m()).collect())?))
+        };
+        stretches.iter().filter_map(point).collect()
+    }
+
+    /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
+    pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
+        let mut errors: Vec<f64> = self.located.iter().map(Located::error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
+    }
+
+    /// Errors of each distinct position, by x and then y.
+    pub fn by_position(&self) -> Vec<(Position, ErrorSummary)> {
+        let key = |p: &Position| (p.x_m, p.y_m);
+        let order = |a: &Position, b: &Position| {
+            let ((ax, ay), (bx, by)) = (key(a), key(b));
+            ax.total_cmp(&bx).then(ay.total_cmp(&by))
+        };
+        let mut sorted = self.located.clone();
+        sorted.sort_by(|a, b| order(&a.truth, &b.truth));
+        let groups = sorted.chunk_by(|a, b| key(&a.truth) == key(&b.truth));
+        let summaries = groups.filter_map(|group| {
+            let part = Self { length_m: self.length_m, located: group.to_vec() };
+            Some((group[0].truth, part.summary(None)?))
+        });
+        summaries.collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,147 @@
+//! Setups that tests of several modules share: those of the examples, as values.
+
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::ChannelModel;
+use palpate_mechanics::sensing::SensorKind::{Deflection, Strain};
+use palpate_mechanics::surface::modal::ModalBeam;
+use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
+use palpate_mechanics::surface::{Beam, Digit, ForceDirection, Motion, Plate};
+use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
+
+use crate::arrangement::Training;
+use crate::recording::{Columns, Frame, Recording};
+use crate::setup::Bench;
+
+/// A setup, and how it is pressed to calibrate.
+#[derive(Clone, Debug)]
+pub(crate) struct Example {
+    pub bench: Bench,
+    pub training: Training,
+}
+
+impl Example {
+    pub fn simulate(&self, seed: u64) -> Recording {
+        self.bench.simulate(&self.training, seed).unwrap()
+    }
+
+    pub fn pressed_bench(&self) -> Bench {
+        self.bench.pressed_by(&self.training)
+    }
+}
+
+/// The founding paper's beam.
+pub(crate) fn beam() -> Beam {
+    Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap()
+}
+
+/// The founding paper's beam with eight deflection sensors, pressed with its known force at ten places.
+pub(crate) fn paper(noise_m: f64, repeats: usize) -> Example {
+    faulty_paper(ChannelModel { noise_sd: noise_m, ..ChannelModel::default() }, repeats)
+}
+
+/// The same with these faults of every channel.
+pub(crate) fn faulty_paper(channel: ChannelModel, repeats: usize) -> Example {
+    let setup = Bench::new(beam()).sensors(Deflection.evenly(8).channel(channel));
+    let bench = setup.and_then(|setup| setup.known_force(newtons(3.0))).unwrap();
+    Example { bench, training: Training::even(10).repeated(repeats) }
+}
+
+/// A steel plate, simply supported all around, over this grid of deflection sensors; pressed with its known force at 6 × 6
+/// places, five times each.
+pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
+    let plate = Plate::new(PlateSpec {
+        length_m: mm(300.0),
+        width_m: mm(300.0),
+        thickness_m: mm(0.8),
+        youngs_modulus_pa: gpa(200.0),
+        poissons_ratio: 0.3,
+        edges: Edges::all(Edge::Simple),
+        supports: Vec::new(),
+        elements,
+    });
+    let setup = Bench::new(plate.unwrap()).sensors(Deflection.grid(3, 3).channel(channel));
+    let bench = setup.and_then(|setup| setup.known_force(newtons(5.0))).unwrap();
+    Example { bench, training: Training::grid(6, 6).repeated(5) }
+}
+
+/// A finger with five strain gauges whose force is not known, pressed with `force_n` at 24 places, twice each.
+pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
+    let digit = Digit {
+        length_m: mm(120.0),
+        width_m: mm(10.0),
+        thickness_m: mm(0.5),
+        youngs_modulus_pa: gpa(200.0),
+        direction,
+    };
+    let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
+    let bench = Bench::new(digit).sensors(gauges).unwrap();
+    Example { bench, training: Training::even(24).repeated(2).with_force(force_n) }
+}
+
+/// To and fro four times between two places, at 0.5 m/s.
+pub(crate) fn to_and_fro(from: Position, to: Position) -> Motion {
+    Motion { from, to, speed_m_per_s: 0.5, turn_m: mm(100.0), passes: 4, lifted_s: 0.0, touch_s: 0.1 }
+}
+
+/// The motion of a load along the paper's beam.
+pub(crate) fn along_the_beam() -> Motion {
+    to_and_fro(Position::along(mm(50.0)), Position::along(mm(350.0)))
+}
+
+/// The motion of a contact over the plate.
+pub(crate) fn over_the_plate() -> Motion {
+    let at = |x: f64, y: f64| Position { x_m: mm(x), y_m: mm(y) };
+    to_and_fro(at(50.0, 80.0), at(250.0, 210.0))
+}
+
+/// The paper's beam of steel, which swings.
+pub(crate) fn swinging_beam() -> ModalBeam {
+    ModalBeam { beam: beam(), density_kg_per_m3: 7850.0, damping_ratio: 0.01 }
+}
+
+/// The paper's beam as it is calibrated to follow a moving load.
+pub(crate) fn moving_beam() -> Example {
+    paper(um(20.0), 50)
+}
+
+/// Two loads on the paper's beam, read by deflections and strains; their forces are not known.
+pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
+    let setup = Bench::new(beam())
+        .sensors(Deflection.evenly(8).noise(um(20.0)))
+        .and_then(|setup| setup.sensors(Strain.evenly(8).noise(microstrain(5.0))));
+    let training = Training::even(10).repeated(50).with_force(newtons(3.0));
+    let motion = |from_mm: f64, to_mm: f64, speed_m_per_s: f64, passes: usize| Motion {
+        from: Position::along(mm(from_mm)),
+        to: Position::along(mm(to_mm)),
+        speed_m_per_s,
+        turn_m: 0.2 * mm(to_mm - from_mm),
+        passes,
+        lifted_s: 0.0,
+        touch_s: 0.1,
+    };
+    let second = Motion { lifted_s: 0.5, touch_s: 0.05, ..motion(250.0, 340.0, 0.1, 3) };
+    (Example { bench: setup.unwrap(), training }, [motion(60.0, 150.0, 0.2, 6), second])
+}
+
+/// The plate on a mesh that is solved at once, as it is calibrated to follow a contact that slides over it.
+pub(crate) fn moving_plate() -> Example {
+    let mut example = plate(24, ChannelModel { noise_sd: um(20.0), ..ChannelModel::default() });
+    example.training = Training::grid(6, 6).repeated(50);
+    example
+}
+
+/// A strip over a channel with two pressure sensors, known by recordings only.
+pub(crate) fn strip() -> Bench {
+    let depth = Unit::from_symbol("mm").unwrap();
+    let columns = Columns::along("X", ["Pl", "Pr"]).force("F").hidden("depth", depth);
+    Bench::measured(mm(100.0), &["Pl", "Pr"]).unwrap().recorded_as(columns)
+}
+
+/// A magnetic pad of fifteen channels, known by recordings only.
+pub(crate) fn pad() -> Bench {
+    let names: Vec<String> = (1..=15).map(|i| format!("raw_{i}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let origin = Position { x_m: mm(274.0), y_m: mm(-115.0) };
+    let columns = Columns::plane(2, 3, 2..=16usize).in_frame(Frame { origin, round_m: Some(mm(1.0)) });
+    Bench::measured_plane(mm(30.0), mm(30.0), &names).unwrap().recorded_as(columns)
+}

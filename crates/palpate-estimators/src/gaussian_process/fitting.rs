@@ -1,0 +1,48 @@
+//! From a recording to a locator.
+
+use ndarray::Array2;
+
+use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
+use crate::features::{FeatureKind, Features};
+use crate::method::{Fit, FitTask};
+use palpate_numerics::regression::{Regression, Samples};
+
+/// Distinct positions without which a position cannot be a function of anything.
+const LEAST_POSITIONS: usize = 2;
+
+impl Fit for GaussianProcessConfig {
+    type Locator = GaussianProcessLocator;
+    type Error = GaussianProcessError;
+
+    fn fit(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<GaussianProcessLocator>, GaussianProcessError> {
+        let FitTask { bench, recording, seed } = task;
+        recording.check_distinct_positions(LEAST_POSITIONS)?;
+        let kind = self.features.unwrap_or_else(|| FeatureKind::for_bench(bench));
+        let features = Features::fit(kind, recording)?;
+        let extent = bench.surface.extent();
+        let rows = recording.rows.len();
+        let mut coordinates = Array2::zeros((rows, features.len()));
+        for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
+            out.iter_mut().zip(features.apply(&row.reading)).for_each(|(out, feature)| *out = feature);
+        }
+        let outputs = Array2::from_shape_fn((rows, extent.width_m.map_or(1, |_| 2)), |(row, j)| {
+            let position = recording.rows[row].position;
+            if j == 0 { position.x_m } else { position.y_m }
+        });
+        let samples =
+            Samples { coordinates: coordinates.view(), outputs: outputs.view(), noise_variance: None };
+        let regression =
+            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
+        let process = regression.fit(samples, keep_going)?;
+        Ok(process.map(|process| GaussianProcessLocator {
+            features,
+            process,
+            extent,
+            force_n: bench.force_n,
+        }))
+    }
+}

@@ -1,0 +1,243 @@
+//! The method on simulated benches, and on other people's recordings by the protocol that comes with them.
+
+use palpate_core::Status;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
+use crate::method::{Fit, FitTask, Locate};
+use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
+use palpate_testing::data::recording;
+
+const EXTENT: Extent = Extent { length_m: 0.4, width_m: None };
+
+fn bench(extent: Extent, channels: usize, force_n: Option<f64>) -> Bench {
+    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m);
+    Bench { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
+}
+
+fn recording_of(rows: Vec<Row>) -> Recording {
+    let channels = rows.first().map_or(0, |row| row.reading.len());
+    Recording {
+        channels: (0..channels).map(|c| format!("c{c}")).collect(),
+        kinds: vec![SensorKind::Raw; channels],
+        provenance: Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None },
+        rows,
+    }
+}
+
+fn fit(bench: &Bench, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
+    let task = FitTask { bench, recording, seed: 1 };
+    GaussianProcessConfig::default().fit(task, &mut || true).map(|locator| locator.unwrap())
+}
+
+/// Four bell-shaped sensors along 400 mm, and noise.
+fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
+    let mut channel = |i: usize| {
+        let error: f64 = StandardNormal.sample(rng);
+        let off = (x_m - 0.05 - 0.1 * i as f64) / 0.12;
+        force_n * (-off * off).exp() + noise * error
+    };
+    let reading = (0..4).map(&mut channel).collect();
+    Row { position: Position::along(x_m), force_n: None, hidden: None, reading }
+}
+
+#[test]
+fn it_locates_and_its_intervals_cover() {
+    for force_n in [Some(3.0), None] {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
+        let press = |rng: &mut Xoshiro256PlusPlus| {
+            let force_n = force_n.unwrap_or_else(|| rng.random_range(1.0..5.0));
+            let x_m = rng.random_range(0.0..0.4);
+            bells(x_m, force_n, 0.01, rng)
+        };
+        let bench = bench(EXTENT, 4, force_n);
+        let recording = recording_of((0..200).map(|_| press(&mut rng)).collect());
+        let locator = fit(&bench, &recording).unwrap();
+        assert_eq!(locator.check(&bench), Ok(()));
+        let (mut covered, mut square_m2) = (0, 0.0);
+        for _ in 0..400 {
+            let row = press(&mut rng);
+            let estimate = locator.locate(&row.reading);
+            let (low_m, high_m) = estimate.contact.uncertainty.unwrap().x_95_m;
+            covered += i32::from((low_m..high_m).contains(&row.position.x_m));
+            square_m2 += (estimate.contact.position.x_m - row.position.x_m).powi(2) / 400.0;
+            assert_eq!(estimate.contact.force_n, force_n);
+        }
+        assert!(square_m2.sqrt() < 2e-3, "{force_n:?}: {} m", square_m2.sqrt());
+        assert!((370..=396).contains(&covered), "{force_n:?}: {covered} of 400");
+    }
+}
+
+#[test]
+fn a_pad_is_two_dimensional() {
+    let extent = Extent { length_m: 0.2, width_m: Some(0.1) };
+    let rows = (0..120).map(|i| {
+        let (x_m, y_m) = (0.02 * f64::from(i % 11), 0.01 * f64::from(i / 11));
+        let (u, v) = (x_m / 0.2, y_m / 0.1);
+        let mut reading = vec![(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v, 5.0];
+        reading[..4].iter_mut().for_each(|value| *value *= 0.4 + 0.2 * f64::from(i % 4));
+        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading }
+    });
+    let bench = bench(extent, 5, None);
+    let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
+    assert_eq!(locator.check(&bench), Ok(()));
+    // Between the grid's points, with half a newton, and the dead channel reading otherwise.
+    let estimate = locator.locate(&[0.375, 0.125, 0.375, 0.125, 0.0].map(|r: f64| 0.5 * r));
+    assert!((estimate.contact.position.x_m - 0.05).abs() < 1e-3, "{estimate:?}");
+    assert!((estimate.contact.position.y_m - 0.05).abs() < 1e-3, "{estimate:?}");
+    let uncertainty = estimate.contact.uncertainty.unwrap();
+    assert!(uncertainty.y_95_m.0 < 0.05 && 0.05 < uncertainty.y_95_m.1);
+    assert_eq!(estimate.status, Status::Located);
+}
+
+#[test]
+fn a_position_beyond_the_edge_is_said_to_be_one() {
+    // Presses as far as the edge, and a reading that a press beyond it would give.
+    let rows = (0..41).map(|i| {
+        let x_m = 0.01 * f64::from(i);
+        Row { position: Position::along(x_m), force_n: None, hidden: None, reading: vec![x_m, 1.0 - x_m] }
+    });
+    let bench = bench(EXTENT, 2, Some(1.0));
+    let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
+    assert_eq!(locator.locate(&[0.42, 0.58]).status, Status::OutsideSurface);
+    assert_eq!(locator.locate(&[0.2, 0.8]).status, Status::Located);
+}
+
+#[test]
+fn recordings_that_say_nothing_are_refused() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let bench = bench(EXTENT, 4, None);
+    let one_place = recording_of((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());
+    assert!(matches!(fit(&bench, &one_place), Err(GaussianProcessError::Positions(_))));
+    let mut still = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
+    still.rows[1].reading = still.rows[0].reading.clone();
+    assert!(matches!(fit(&bench, &still), Err(GaussianProcessError::Features(_))));
+    still.rows[1].reading[0] = f64::NAN;
+    assert!(fit(&bench, &still).is_err());
+    let two = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
+    assert!(fit(&bench, &two).is_ok());
+}
+
+#[test]
+fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+    let recording = recording_of((0..40).map(|i| bells(0.01 * f64::from(i), 1.0, 1e-3, &mut rng)).collect());
+    let bench_4 = bench(EXTENT, 4, Some(1.0));
+    let locator = fit(&bench_4, &recording).unwrap();
+    let text = serde_json::to_string(&locator).unwrap();
+    let back: GaussianProcessLocator = serde_json::from_str(&text).unwrap();
+    assert_eq!(back.check(&bench_4), Ok(()));
+    let reading = bells(0.123, 1.0, 0.0, &mut rng).reading;
+    let (here, there) = (locator.locate(&reading), back.locate(&reading));
+    assert!((here.contact.position.x_m - there.contact.position.x_m).abs() < 1e-9);
+    assert!(back.check(&bench(EXTENT, 2, Some(1.0))).is_err());
+    assert!(back.check(&bench(Extent { width_m: Some(0.1), ..EXTENT }, 4, Some(1.0))).is_err());
+    let mut damaged = back;
+    damaged.features.features.pop();
+    assert!(damaged.check(&bench_4).is_err());
+}
+
+/// Median, mean and root mean square of the distance in mm, and the share of x within its interval, pooled over five
+/// folds by position.
+struct Pooled {
+    median_mm: f64,
+    mean_mm: f64,
+    rmse_mm: f64,
+    coverage: f64,
+}
+
+fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
+    let (mut errors_mm, mut covered) = (Vec::new(), 0);
+    for fold in recording.folds(5).unwrap() {
+        let locator = fit(bench, &recording.subset(&fold.training)).unwrap();
+        for row in fold.held_out.iter().map(|i| &recording.rows[*i]) {
+            let contact = locator.locate(&row.reading).contact;
+            errors_mm.push(1e3 * contact.position.distance_m(row.position));
+            let (low_m, high_m) = contact.uncertainty.unwrap().x_95_m;
+            covered += usize::from((low_m..high_m).contains(&row.position.x_m));
+        }
+    }
+    errors_mm.sort_by(f64::total_cmp);
+    let count = errors_mm.len() as f64;
+    Pooled {
+        median_mm: errors_mm[errors_mm.len() / 2],
+        mean_mm: errors_mm.iter().sum::<f64>() / count,
+        rmse_mm: (errors_mm.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
+        coverage: covered as f64 / count,
+    }
+}
+
+/// The numbers of a CSV in the folder of other people's recordings, or `None` where the folder is absent and may be.
+fn numbers(file: &str) -> Option<Vec<Vec<f64>>> {
+    let path = recording(file)?;
+    let text = std::fs::read_to_string(path).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with('X'));
+    Some(rows.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
+}
+
+/// A strip of `tactile-fsi`: X in mm, two pressures, force, depth.
+fn strip(file: &str) -> Option<(Bench, Recording)> {
+    let row = |cells: &Vec<f64>| Row {
+        position: Position::along(1e-3 * cells[0]),
+        force_n: None,
+        hidden: None,
+        reading: cells[1..3].to_vec(),
+    };
+    let rows = numbers(&format!("tactile-fsi/{file}"))?.iter().map(row).collect();
+    Some((bench(Extent { length_m: 0.1, width_m: None }, 2, None), recording_of(rows)))
+}
+
+/// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
+const SLACK: f64 = 1.01;
+
+/// Fails when median and mean are beyond scikit-learn's. One error for the whole strip stands for noise that is not the
+/// same everywhere, so intervals cover what they promise only roughly: 90, 96 and 94 % over water, oil and air.
+fn check_strip(file: &str, median_mm: f64, mean_mm: f64) {
+    let Some((bench, recording)) = strip(file) else { return };
+    let found = five_folds(&bench, &recording);
+    let Pooled { median_mm: median, mean_mm: mean, rmse_mm: rmse, coverage } = found;
+    eprintln!("{file}: median {median:.3} mean {mean:.3} rmse {rmse:.3} mm, coverage {coverage:.3}");
+    let as_good = median <= SLACK * median_mm && mean <= SLACK * mean_mm;
+    assert!(as_good, "{file}: {median:.4} {mean:.4}");
+    assert!((0.88..0.98).contains(&coverage), "{file}: {coverage}");
+}
+
+#[test]
+fn a_strip_over_water_is_as_scikit_learn_has_it() {
+    check_strip("1d-water-1.5mm.csv", 0.565, 0.844);
+}
+
+#[test]
+fn a_strip_over_oil_is_as_scikit_learn_has_it() {
+    check_strip("1d-oil-1.0mm.csv", 0.438, 0.902);
+}
+
+#[test]
+fn a_strip_over_air_is_as_scikit_learn_has_it() {
+    check_strip("1d-air-2.0mm.csv", 0.600, 0.824);
+}
+
+/// Five exact processes of 3,844 rows take most of a minute.
+#[test]
+#[ignore = "takes a minute"]
+fn a_magnetic_pad_is_as_scikit_learn_has_it() {
+    let Some(contacts) = numbers("eflesh/fixed-depth-contacts.csv") else { return };
+    let Some(readings) = numbers("eflesh/fixed-depth-readings.csv") else { return };
+    let least = |k: usize| contacts.iter().map(|c| c[k].round()).fold(f64::MAX, f64::min);
+    let (left, low) = (least(1), least(2));
+    let rows = contacts.iter().zip(&readings).map(|(contact, reading)| {
+        let (x_m, y_m) = (1e-3 * (contact[1].round() - left), 1e-3 * (contact[2].round() - low));
+        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading: reading[1..].to_vec() }
+    });
+    let recording = recording_of(rows.collect());
+    let bench = bench(Extent { length_m: 0.03, width_m: Some(0.03) }, 15, None);
+    let Pooled { median_mm, mean_mm, rmse_mm, coverage } = five_folds(&bench, &recording);
+    eprintln!("eflesh: median {median_mm:.3} mean {mean_mm:.3} rmse {rmse_mm:.3} mm, coverage {coverage:.3}");
+    assert!(median_mm <= SLACK * 0.312 && mean_mm <= SLACK * 0.343, "{median_mm} {mean_mm}");
+}

@@ -1,0 +1,242 @@
+//! From minima of the misfit to an estimate that owns up to what it does not know.
+
+use super::batch::Rows;
+use super::coarse::{COARSE, MOST_MINIMA, Profile};
+use super::lanes::{self, Array, Eight};
+use super::scratch::Scratch;
+use super::search::{Minimum, Search, worst_misfit};
+use super::several::{criterion, explain};
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_numerics::{NORMAL_95, normal_distribution};
+
+/// Another place with at least this share of the probability is said.
+const MODE_THAT_MATTERS: f64 = 0.01;
+/// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
+const MOST_SPACINGS: f64 = 1.5;
+
+/// An estimate of nothing, to be written over.
+pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
+
+/// The estimate of one contact.
+pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
+    let mut estimate = NOTHING;
+    let rows = Rows { readings: reading, channels: reading.len() };
+    lanes::locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
+    estimate
+}
+
+/// Writes the estimate of one contact, and of a used estimate no more than what is read.
+#[inline(always)]
+pub(super) fn locate_into<V: Eight>(
+    search: &Search,
+    reading: &[f64],
+    scratch: &mut Scratch,
+    estimate: &mut Estimate,
+) {
+    let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
+    let (minima, count) = search.minima::<V>(square, scratch);
+    conclude(search, square, &minima[..count], &scratch.profile, estimate);
+}
+
+/// Writes the estimate from the minima of a reading that was whitened to length `square`.
+#[inline(always)]
+pub(super) fn conclude(
+    search: &Search,
+    square: f64,
+    minima: &[Minimum],
+    profile: &Profile,
+    estimate: &mut Estimate,
+) {
+    let best = &minima[0];
+    estimate.modes.clear();
+    estimate.further.clear();
+    if is_no_contact(search, square, best.misfit) {
+        estimate.contact =
+            ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
+        estimate.status = Status::NoContact;
+        return;
+    }
+    let sd_m = best.covariance[0].sqrt();
+    let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
+    let narrow = sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite();
+    if minima.len() == 1 && clear && narrow {
+        let half_m = NORMAL_95 * sd_m;
+        estimate.contact = contact(search, best, (best.x_m - half_m, best.x_m + half_m));
+        estimate.status = Status::Located;
+    } else {
+        weigh(search, minima, profile.misfits(), estimate);
+    }
+    if best.misfit > search.worst_misfit {
+        estimate.status = Status::OutsideModel;
+    }
+}
+
+/// Writes the estimate from minima that compete, or one that is wide or near an end.
+#[cold]
+fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
+    let shares = shares(minima, search.table.length_m);
+    let x_95_m = interval(search, minima, &shares, misfits);
+    estimate.contact = contact(search, &minima[0], x_95_m);
+    estimate.status = Status::Located;
+    for (minimum, share) in minima.iter().zip(&shares).skip(1) {
+        if *share >= MODE_THAT_MATTERS {
+            let alone = single_interval(minimum, search.table.length_m);
+            let mode = Mode { contact: contact(search, minimum, alone), probability: *share };
+            estimate.modes.push(mode);
+            estimate.status = Status::Ambiguous;
+        }
+    }
+}
+
+/// The estimate of as many contacts as the reading shows, up to `most`.
+pub(super) fn locate_several(
+    search: &Search,
+    most: usize,
+    reading: &[f64],
+    scratch: &mut Scratch,
+) -> Estimate {
+    let one = locate_one(search, reading, scratch);
+    if one.status != Status::OutsideModel {
+        return one;
+    }
+    let square = scratch.whitened.channels(search.live.len()).iter().map(|d| d * d).sum();
+    let single = search.minima::<Array>(square, scratch).0[0];
+    let mut least = criterion(single.misfit, 1, search.force.unknowns(), search);
+    let mut best = None;
+    for count in 2..=most {
+        let Some(together) = explain(search, scratch, count) else { break };
+        let (cost, misfit) = (together.criterion(search), together.misfit);
+        if cost < least {
+            (least, best) = (cost, Some(together));
+        }
+        // One more contact costs this much, and cannot take off more misfit than there is.
+        if criterion(0.0, 1, 2, search) > misfit {
+            break;
+        }
+    }
+    let Some(together) = best else { return one };
+    let mut contacts = together.contacts(search.table.length_m).into_iter();
+    let Some(strongest) = contacts.next() else { return one };
+    let mut estimate = Estimate::of_contact(strongest, Status::Located);
+    for contact in contacts {
+        estimate.further.push(contact);
+    }
+    let freedom = search.live.len() - 2 * (1 + estimate.further.as_slice().len());
+    if together.misfit > worst_misfit(freedom) {
+        estimate.status = Status::OutsideModel;
+    }
+    estimate
+}
+
+/// Whether noise alone explains a reading of whitened length `square`, and better than a contact whose best misfit is
+/// `misfit`, by the criterion that also counts several contacts.
+#[inline(always)]
+fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
+    square <= misfit + search.charge && square <= search.worst_noise
+}
+
+#[inline(always)]
+fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEstimate {
+    let [xx, xf, ff] = minimum.covariance;
+    // On a line of length l nothing is known less than of a uniform distribution.
+    let most = search.table.length_m.powi(2) / 12.0;
+    let uncertainty =
+        Uncertainty { covariance: [xx.min(most), 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
+    ContactEstimate {
+        position: Position::along(minimum.x_m),
+        force_n: Some(minimum.force_n),
+        uncertainty: Some(uncertainty),
+    }
+}
+
+/// Each minimum's share of the probability, by Laplace's approximation within the surface's ends.
+fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
+    let mut shares = [0.0; MOST_MINIMA];
+    if minima.len() == 1 {
+        shares[0] = 1.0;
+        return shares;
+    }
+    let best = minima[0].misfit;
+    for (share, minimum) in shares.iter_mut().zip(minima) {
+        let sd_m = minimum.covariance[0].sqrt().min(length_m);
+        *share = (0.5 * (best - minimum.misfit)).exp() * sd_m * mass(minimum.x_m, sd_m, length_m);
+    }
+    let sum: f64 = shares.iter().sum();
+    shares.map(|share| share / sum)
+}
+
+/// How much of a normal distribution lies on the surface.
+fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
+    normal_distribution((length_m - mean_m) / sd_m) - normal_distribution(-mean_m / sd_m)
+}
+
+/// The 95 % interval of the position over all minima.
+fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64; COARSE]) -> (f64, f64) {
+    let length_m = search.table.length_m;
+    let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > MOST_SPACINGS * search.spacing.h_m;
+    if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
+        return interval_of_profile(misfits, length_m);
+    }
+    if minima.len() == 1 {
+        return single_interval(&minima[0], length_m);
+    }
+    let cumulative = |x_m: f64| {
+        let parts = minima.iter().zip(shares).map(|(minimum, share)| {
+            let sd_m = minimum.covariance[0].sqrt();
+            let below = |x_m: f64| normal_distribution((x_m - minimum.x_m) / sd_m);
+            share * (below(x_m) - below(0.0)) / mass(minimum.x_m, sd_m, length_m).max(f64::MIN_POSITIVE)
+        });
+        parts.sum::<f64>()
+    };
+    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+}
+
+/// The 95 % interval of one minimum, held to the surface.
+fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
+    let sd_m = minimum.covariance[0].sqrt();
+    let (left, right) = (minimum.x_m / sd_m, (length_m - minimum.x_m) / sd_m);
+    if left > 4.0 && right > 4.0 {
+        return (minimum.x_m - NORMAL_95 * sd_m, minimum.x_m + NORMAL_95 * sd_m);
+    }
+    let (low, high) = (normal_distribution(-left), normal_distribution(right));
+    let cumulative = |x_m: f64| (normal_distribution((x_m - minimum.x_m) / sd_m) - low) / (high - low);
+    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+}
+
+/// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
+/// is flat in the position and in the size of the signal.
+fn interval_of_profile(misfits: &[f64; COARSE], length_m: f64) -> (f64, f64) {
+    /// A density of less than e⁻⁵⁰ of the highest adds nothing.
+    const NOTHING_THERE: f64 = 100.0;
+    let best = misfits.iter().copied().fold(f64::INFINITY, f64::min);
+    let density = |misfit: f64| {
+        let above = misfit - best;
+        if above < NOTHING_THERE { (-0.5 * above).exp() } else { 0.0 }
+    };
+    let mut cumulative = [0.0; COARSE];
+    let mut left = density(misfits[0]);
+    for node in 1..COARSE {
+        let right = density(misfits[node]);
+        cumulative[node] = cumulative[node - 1] + 0.5 * (left + right);
+        left = right;
+    }
+    let all = cumulative[COARSE - 1];
+    let quantile = |share: f64| {
+        let after = cumulative.partition_point(|c| *c < share * all).clamp(1, COARSE - 1);
+        let (low, high) = (cumulative[after - 1], cumulative[after]);
+        let part = if high > low { (share * all - low) / (high - low) } else { 0.0 };
+        (after as f64 - 1.0 + part) * length_m / (COARSE - 1) as f64
+    };
+    (quantile(0.025), quantile(0.975))
+}
+
+/// Where a rising function of the position reaches `share`.
+fn bisect(length_m: f64, share: f64, cumulative: &dyn Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, length_m);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if cumulative(middle) < share { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}

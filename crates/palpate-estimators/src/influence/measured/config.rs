@@ -1,0 +1,65 @@
+//! How the surface is to be learnt, and why it cannot be.
+
+use super::Scale;
+use crate::recording::TooFewPositions;
+use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::regression::{Kernel, RegressionError, Trend};
+
+/// How readings are to be learnt as a function of position and hidden coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeasuredConfig {
+    /// On which scale readings are learnt; `None` for logarithms where every reading is greater than 0.
+    pub readings: Option<Scale>,
+    /// On which scale the hidden coordinate is held; `None` for logarithms where every value is greater than 0.
+    pub hidden: Option<Scale>,
+    /// How smooth the readings are.
+    pub kernel: Kernel,
+    /// What the readings return to far from every press.
+    pub trend: Trend,
+    /// The hyperparameters are found from at most this many distinct presses, drawn at random; at least 2.
+    pub search_points: usize,
+}
+
+impl Default for MeasuredConfig {
+    fn default() -> Self {
+        Self {
+            readings: None,
+            hidden: None,
+            kernel: Kernel::Matern52,
+            trend: Trend::Constant,
+            search_points: 400,
+        }
+    }
+}
+
+/// Why a surface cannot be learnt from a recording.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum MeasuredError {
+    /// There is nothing between which to interpolate.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// Logarithms were asked for, but a value has none.
+    #[error("{what} of row {row} is {value}, which has no logarithm; it must be greater than 0")]
+    NoLogarithm {
+        /// Reading or hidden coordinate.
+        what: &'static str,
+        /// Which row, from 1.
+        row: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The hidden coordinate, or the force, is known in some rows but not in all.
+    #[error("the {what} of row {row} is unknown, though others are known")]
+    HiddenMissing {
+        /// Force or hidden coordinate.
+        what: &'static str,
+        /// Which row, from 1.
+        row: usize,
+    },
+    /// What the regression has to say.
+    #[error(transparent)]
+    Regression(#[from] RegressionError),
+    /// The noise of the channels has no whitening.
+    #[error("the noise covariance of the channels cannot be factored: {0}")]
+    Noise(#[from] NotPositiveDefinite),
+}

@@ -1,0 +1,272 @@
+//! From a recording to a locator.
+
+use std::collections::HashMap;
+
+use ndarray::{Array1, Array2};
+
+use super::misfit::misfit;
+use super::noise::Noise;
+use super::posterior::Posterior;
+use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
+use crate::method::{Fit, FitTask};
+use crate::recording::Recording;
+use crate::setup::Bench;
+use palpate_numerics::chi_squared_bound;
+use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
+
+/// Distinct positions without which a reading cannot be a function of anything.
+const LEAST_POSITIONS: usize = 2;
+/// Most nodes along a one-dimensional surface, along either axis of a plane, and along the hidden coordinate.
+const MOST_ALONG: usize = 400;
+const MOST_OF_PLANE: usize = 80;
+const MOST_HIDDEN: usize = 64;
+const MOST_HIDDEN_OF_PLANE: usize = 16;
+/// The least variance of noise, over the signal's.
+const LEAST_NOISE: f64 = 1e-10;
+
+impl Fit for MeasuredConfig {
+    type Locator = MeasuredLocator;
+    type Error = MeasuredError;
+
+    fn fit(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<MeasuredLocator>, MeasuredError> {
+        let FitTask { bench, recording, seed } = task;
+        recording.check_distinct_positions(LEAST_POSITIONS)?;
+        let (role, hidden) = hidden_coordinate(bench, recording)?;
+        let presses = Presses::of(self, bench, recording, hidden.as_deref())?;
+        let samples = Samples {
+            coordinates: presses.coordinates.view(),
+            outputs: presses.means.view(),
+            noise_variance: None,
+        };
+        let regression =
+            Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
+        let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
+        let whitening = presses.whitening(&process, role)?;
+        // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
+        let whitening = match misfit(&presses, &regression, &process, &whitening)? {
+            Some(factor) => whitening.widened(factor),
+            None => whitening,
+        };
+        let axes = presses.axes(&process, bench);
+        let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
+        let finer = presses.finer(axes, coarse.too_coarse());
+        let table =
+            if finer == axes { Some(coarse) } else { presses.table(finer, &process, &whitening, keep_going) };
+        let Some(table) = table else { return Ok(None) };
+        // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
+        let factor = table.too_coarse();
+        let (table, whitening) = (table.widened(factor), whitening.widened(factor));
+        let mut locator = MeasuredLocator {
+            readings: presses.readings,
+            whitening,
+            table,
+            role,
+            hidden: presses.hidden,
+            residual_limit: f64::INFINITY,
+            force_n: bench.force_n,
+        };
+        locator.residual_limit = residual_limit(&locator, recording);
+        Ok(Some(locator))
+    }
+}
+
+/// What shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
+fn hidden_coordinate(
+    bench: &Bench,
+    recording: &Recording,
+) -> Result<(HiddenRole, Option<Vec<f64>>), MeasuredError> {
+    let all = |what, values: Vec<Option<f64>>| {
+        if values.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let known = values
+            .iter()
+            .enumerate()
+            .map(|(i, value)| value.ok_or(MeasuredError::HiddenMissing { what, row: i + 1 }));
+        known.collect::<Result<Vec<f64>, _>>().map(Some)
+    };
+    let named = all("hidden coordinate", recording.rows.iter().map(|row| row.hidden).collect())?;
+    if named.is_some() {
+        return Ok((HiddenRole::Other, named));
+    }
+    // A force that is known, or always the same, shapes nothing.
+    if bench.force_n.is_some() {
+        return Ok((HiddenRole::None, None));
+    }
+    let force = all("force", recording.rows.iter().map(|row| row.force_n).collect())?;
+    Ok((if force.is_some() { HiddenRole::Force } else { HiddenRole::None }, force))
+}
+
+/// The recording as the process sees it: repeats of a press, at the same position and hidden coordinate, are one.
+///
+/// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
+/// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
+pub(super) struct Presses {
+    readings: Scale,
+    hidden: Scale,
+    /// Position along, across where the surface has a width, and hidden where there is one: n×d.
+    pub coordinates: Array2<f64>,
+    /// Mean scaled readings, n×m.
+    pub means: Array2<f64>,
+    /// To which press each row belongs.
+    pub places: Vec<usize>,
+    /// Scaled readings, row by row.
+    pub outputs: Array2<f64>,
+    pub has_hidden: bool,
+}
+
+impl Presses {
+    fn of(
+        config: &MeasuredConfig,
+        bench: &Bench,
+        recording: &Recording,
+        hidden: Option<&[f64]>,
+    ) -> Result<Self, MeasuredError> {
+        let rows = &recording.rows;
+        let values = || rows.iter().flat_map(|row| row.reading.iter().copied());
+        let readings = config.readings.unwrap_or_else(|| Scale::for_values(values()));
+        let hidden_values = || hidden.unwrap_or_default().iter().copied();
+        let hidden_scale = config.hidden.unwrap_or_else(|| Scale::for_values(hidden_values()));
+
+        let channels = rows.first().map_or(0, |row| row.reading.len());
+        let mut outputs = Array2::zeros((rows.len(), channels));
+        for ((i, j), output) in outputs.indexed_iter_mut() {
+            *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
+        }
+        let wide = bench.surface.extent().width_m.is_some();
+        let mut distinct: Vec<Vec<f64>> = Vec::new();
+        let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
+        let mut places = Vec::with_capacity(rows.len());
+        for (i, row) in rows.iter().enumerate() {
+            let mut at = vec![row.position.x_m];
+            at.extend(wide.then_some(row.position.y_m));
+            if let Some(hidden) = hidden {
+                at.push(scaled(hidden_scale, "the hidden coordinate", i, hidden[i])?);
+            }
+            let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
+            places.push(*known.entry(bits).or_insert_with(|| {
+                distinct.push(at);
+                distinct.len() - 1
+            }));
+        }
+        let coordinates =
+            Array2::from_shape_fn((distinct.len(), distinct.first().map_or(0, Vec::len)), |(i, k)| {
+                distinct[i][k]
+            });
+        let mut means = Array2::<f64>::zeros((distinct.len(), channels));
+        let mut counts = vec![0.0; distinct.len()];
+        for (place, output) in places.iter().zip(outputs.outer_iter()) {
+            means.row_mut(*place).scaled_add(1.0, &output);
+            counts[*place] += 1.0;
+        }
+        for (mut mean, count) in means.outer_iter_mut().zip(counts) {
+            mean /= count;
+        }
+        let has_hidden = hidden.is_some();
+        Ok(Self { readings, hidden: hidden_scale, coordinates, means, places, outputs, has_hidden })
+    }
+
+    /// The noise from repeats, or what the process calls noise where there are too few; the signal from the process.
+    fn whitening(&self, process: &GaussianProcess, role: HiddenRole) -> Result<Whitening, MeasuredError> {
+        let channels = self.means.ncols();
+        let with_gain = role == HiddenRole::None && self.readings == Scale::Linear;
+        let signal: Array1<f64> = (0..channels).map(|j| process.signal_variance(j)).collect();
+        // A channel that is dead, or never errs, must not make the noise singular.
+        let most = signal.iter().copied().fold(0.0, f64::max);
+        let floor: Vec<f64> = signal
+            .iter()
+            .map(|signal| if most > 0.0 { LEAST_NOISE * signal.max(LEAST_NOISE * most) } else { 1.0 })
+            .collect();
+        let repeats = Noise::of_repeats(&self.places, &self.outputs, &self.means, &floor, with_gain)?;
+        let fitted = || {
+            let variances = (0..channels).map(|j| process.noise_variance(j).unwrap_or_default() + floor[j]);
+            Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
+        };
+        Ok(Whitening::of(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
+    }
+
+    /// The process at every node; `None` when `keep_going` says no.
+    fn table(
+        &self,
+        axes: [Axis; 3],
+        process: &GaussianProcess,
+        whitening: &Whitening,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Option<Table> {
+        let [x, y, hidden] = axes;
+        let channels = self.means.ncols();
+        let nodes = x.count * y.count * hidden.count;
+        let (mut means, mut variances) = (Vec::with_capacity(nodes * channels), Vec::with_capacity(nodes));
+        let mut scratch = process.scratch();
+        let (mut mean, mut variance) = (vec![0.0; channels], vec![0.0; channels]);
+        let mut white = vec![0.0; channels];
+        let signal = process.signal_variance(0);
+        for node in 0..nodes {
+            if node % 64 == 0 && !keep_going() {
+                return None;
+            }
+            let place = node / hidden.count;
+            let mut at = vec![x.at((place / y.count) as f64)];
+            at.extend(
+                (process.coordinates() - usize::from(self.has_hidden) == 2)
+                    .then(|| y.at((place % y.count) as f64)),
+            );
+            at.extend(self.has_hidden.then(|| hidden.at((node % hidden.count) as f64)));
+            process.predict_into(&at, &mut mean, &mut variance, &mut scratch);
+            whitening.apply(&mean, &mut white);
+            means.extend_from_slice(&white);
+            variances.push(if signal > 0.0 { variance[0] / signal } else { 0.0 });
+        }
+        Some(Table::new(axes, means, variances, channels))
+    }
+
+    /// The axes of position with about `factor` times the nodes, as far as there may be so many.
+    fn finer(&self, [x, y, hidden]: [Axis; 3], factor: f64) -> [Axis; 3] {
+        let most = if y.count > 1 { MOST_OF_PLANE } else { MOST_ALONG };
+        [x.finer(factor, most), y.finer(factor, most), hidden]
+    }
+
+    fn axes(&self, process: &GaussianProcess, bench: &Bench) -> [Axis; 3] {
+        let extent = bench.surface.extent();
+        let lengths = &process.hyperparameters().length_scales;
+        let axis = |k: usize, bounds, most| {
+            let values = self.coordinates.column(k).to_vec();
+            Axis::over(values, bounds, lengths[k], most)
+        };
+        let plane = extent.width_m.is_some();
+        let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
+        let along = axis(0, (0.0, extent.length_m), if plane { MOST_OF_PLANE } else { MOST_ALONG });
+        let across = extent.width_m.map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
+        let most_hidden = if plane { MOST_HIDDEN_OF_PLANE } else { MOST_HIDDEN };
+        let hidden = self.has_hidden.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_hidden));
+        [along, across.unwrap_or(Axis::NONE), hidden.unwrap_or(Axis::NONE)]
+    }
+}
+
+fn scaled(scale: Scale, what: &'static str, row: usize, value: f64) -> Result<f64, MeasuredError> {
+    scale.of(value).ok_or(MeasuredError::NoLogarithm { what, row: row + 1, value })
+}
+
+/// The squared residual that a contact's reading hardly ever has: what one in a million would leave of normal noise,
+/// and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
+fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
+    /// Readings that are tried.
+    const TRIED: usize = 400;
+    let table = &locator.table;
+    let fitted = [table.x, table.y, table.hidden].iter().filter(|axis| axis.count > 1).count();
+    let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
+    let every = recording.rows.len().div_ceil(TRIED);
+    let tried = recording.rows.iter().step_by(every);
+    let mut residuals: Vec<f64> = tried
+        .filter_map(|row| locator.whitened(&row.reading))
+        .map(|reading| Posterior::of(locator, &reading).residual())
+        .filter(|residual| residual.is_finite())
+        .collect();
+    residuals.sort_by(f64::total_cmp);
+    let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);
+    chi_squared_bound(1e-6, freedom).max(2.0 * usual)
+}

@@ -1,0 +1,151 @@
+//! Influence functions, and their inversion: learn what each sensor reads as a function of where the contact is, a
+//! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
+
+mod answer;
+mod batch;
+mod belief;
+mod bend;
+mod channels;
+mod coarse;
+mod config;
+mod fitting;
+mod hyperparameters;
+mod lanes;
+mod learning;
+mod likelihood;
+mod locator;
+pub mod measured;
+mod plane;
+mod posterior;
+mod presses;
+mod prior;
+mod rays;
+mod refine;
+mod scratch;
+mod search;
+mod several;
+mod table;
+mod table_function;
+
+pub use belief::ForceBelief;
+pub use config::{InfluenceConfig, InfluenceSource};
+pub use fitting::InfluenceFitError;
+pub use likelihood::BeamLikelihood;
+pub use locator::BeamLocator;
+pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
+pub use scratch::Scratch;
+pub use table::InfluenceTable;
+pub use table_function::FittedInfluence;
+
+use crate::method::{Fit, FitTask, Locate, LocatorFault};
+use crate::setup::Bench;
+use measured::{MeasuredConfig, MeasuredLocator};
+use palpate_core::Estimate;
+use serde::{Deserialize, Serialize};
+
+/// Influence functions, inverted: of a surface with a model, or of one that is known by its recording alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InfluenceLocator {
+    /// Of a line with a model.
+    Beam(Box<BeamLocator>),
+    /// Of a plane with a model.
+    Plane(Box<PlaneLocator>),
+    /// Of a surface without one.
+    Measured(Box<MeasuredLocator>),
+}
+
+impl Fit for InfluenceConfig {
+    type Locator = InfluenceLocator;
+    type Error = InfluenceFitError;
+
+    fn fit(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<InfluenceLocator>, InfluenceFitError> {
+        if task.bench.surface.model().is_none() {
+            self.check_measured()?;
+            let fitted = MeasuredConfig::default().fit(task, keep_going)?;
+            return Ok(fitted.map(|locator| InfluenceLocator::Measured(Box::new(locator))));
+        }
+        if task.bench.surface.extent().is_plane() {
+            let fitted = self.fit_plane(task, keep_going)?;
+            return Ok(fitted.map(|locator| InfluenceLocator::Plane(Box::new(locator))));
+        }
+        let fitted = self.fit_beam(task, keep_going)?;
+        Ok(fitted.map(|locator| InfluenceLocator::Beam(Box::new(locator))))
+    }
+}
+
+impl InfluenceConfig {
+    /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
+    /// correct.
+    fn check_measured(&self) -> Result<(), InfluenceFitError> {
+        match self {
+            Self { from: InfluenceSource::Mechanics, .. } => Err(InfluenceFitError::NoModel),
+            Self { contacts: 2.., .. } => {
+                Err(InfluenceFitError::NotOnMeasured { what: "telling several contacts apart" })
+            }
+            Self { force_sd_n: Some(_), .. } => Err(InfluenceFitError::NotOnMeasured { what: "`force_sd`" }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Fits the influence functions of a plane with a model; `None` when `keep_going`, asked now and then, says no.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError`] when the surface has no model, several contacts are to be told apart, or the recording says
+    /// too little.
+    pub fn fit_plane(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<PlaneLocator>, InfluenceFitError> {
+        plane::fit_plane(*self, task, keep_going)
+    }
+
+    /// Fits the influence functions of a line with a model; `None` when `keep_going`, asked now and then, says no.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
+    pub fn fit_beam(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<BeamLocator>, InfluenceFitError> {
+        fitting::fit_modelled(*self, task, keep_going)
+    }
+}
+
+impl InfluenceLocator {
+    /// Leaves channel `channel` (from 0) out of all sums from now on; false, and no change, where that cannot be.
+    pub fn leave_out(&mut self, channel: usize) -> bool {
+        match self {
+            Self::Beam(beam) => beam.leave_out(channel),
+            Self::Plane(plane) => plane.leave_out(channel),
+            Self::Measured(_) => false,
+        }
+    }
+}
+
+impl Locate for InfluenceLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        match self {
+            Self::Beam(beam) => beam.locate(reading),
+            Self::Plane(plane) => plane.locate(reading),
+            Self::Measured(measured) => measured.locate(reading),
+        }
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        match self {
+            Self::Beam(beam) => beam.check(bench),
+            Self::Plane(plane) => plane.check(bench),
+            Self::Measured(measured) => measured.check(bench),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

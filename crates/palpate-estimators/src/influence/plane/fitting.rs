@@ -1,0 +1,30 @@
+//! From presses to a table of influence functions over a plane.
+
+use super::locator::PlaneLocator;
+use super::table::PlaneTable;
+use crate::influence::InfluenceConfig;
+use crate::influence::fitting::{InfluenceFitError, dead, force_belief};
+use crate::influence::learning::{Learnt, learn};
+use crate::method::FitTask;
+use palpate_mechanics::contact::Position;
+
+/// Fits the influence functions of a plane with a model; `None` when `keep_going` says no.
+pub(in crate::influence) fn fit_plane(
+    config: InfluenceConfig,
+    task: FitTask,
+    keep_going: &mut dyn FnMut() -> bool,
+) -> Result<Option<PlaneLocator>, InfluenceFitError> {
+    if config.contacts > 1 {
+        return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
+    }
+    let mut table = PlaneTable::empty(task.bench.layout.len(), task.bench.surface.extent());
+    let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();
+    let fill = &mut |s: usize, learnt: &Learnt| {
+        for node in 0..table.nodes() {
+            table.values[node * table.sensors + s] = learnt.mean(node);
+            table.variances[node * table.sensors + s] = learnt.variance(node);
+        }
+    };
+    let Some(channels) = learn(config.from, task, &places, fill, keep_going)? else { return Ok(None) };
+    Ok(Some(PlaneLocator::new(table, channels, dead(task.bench), force_belief(config, task.bench))))
+}

@@ -1,0 +1,98 @@
+//! How well a contact explains a reading, by the table of a plane's influence functions: what tracking asks.
+//!
+//! Symbols as in [`super::search`].
+
+use super::locator::PlaneLocator;
+use super::refine::solve;
+use super::search::Search;
+use crate::influence::belief::ForceBelief;
+use crate::method::{ContactFit, Geometry, Likelihood, Locate, PlaneLikelihood};
+use palpate_core::Estimate;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
+
+/// The likelihood of a [`PlaneLocator`], ready to be asked often.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlateLikelihood {
+    locator: PlaneLocator,
+    /// The locator's, without what is believed of an unknown force: that is told once, and not with every reading.
+    search: Search,
+}
+
+impl PlateLikelihood {
+    /// The likelihood of the channels that a locator does not leave out.
+    pub fn new(locator: &PlaneLocator) -> Self {
+        let force = match locator.force() {
+            ForceBelief::Known(force_n) => ForceBelief::Known(force_n),
+            ForceBelief::Unknown | ForceBelief::Normal { .. } => ForceBelief::Unknown,
+        };
+        Self { locator: locator.clone(), search: locator.search_with(force) }
+    }
+}
+
+impl PlaneLikelihood for PlateLikelihood {
+    fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3> {
+        let at = [contact.position.x_m, contact.position.y_m, contact.force_n];
+        let equations = self.search.equations(whitened, at, None);
+        ContactFit { misfit: equations.misfit, pull: equations.right, information: equations.information }
+    }
+}
+
+impl Likelihood for PlateLikelihood {
+    fn geometry(&self) -> Geometry<'_> {
+        Geometry::Plane(self)
+    }
+
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+        self.search.whiten_into(reading, whitened);
+    }
+
+    fn fit_nothing(&self, whitened: &[f64], _mode_n: f64) -> ContactFit<1> {
+        ContactFit { misfit: whitened.iter().map(|d| d * d).sum(), ..ContactFit::NOTHING }
+    }
+
+    fn signal(&self, contact: Contact) -> f64 {
+        self.search.signal(contact)
+    }
+
+    /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ w²·v·j·jᵀ, j the derivatives of W·f by place and unknown force.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
+        let mut left = [[0.0; 3]; 2];
+        let free = [true, true, self.known_force_n().is_none()];
+        for (left, contact) in left.iter_mut().zip(contacts) {
+            let [a, b] = self.search.calibration(*contact);
+            let column = |k: usize| {
+                let mut unit = [0.0; 3];
+                unit[k] = 1.0;
+                solve(a, unit, free)
+            };
+            if let (Some(x), Some(y)) = (column(0), column(1)) {
+                let spread = |p: [f64; 3], q: [f64; 3]| -> f64 {
+                    (0..3).map(|i| p[i] * (0..3).map(|j| b[i][j] * q[j]).sum::<f64>()).sum()
+                };
+                *left = [spread(x, x), spread(x, y), spread(y, y)];
+            }
+        }
+        left
+    }
+
+    fn locate_alone(&self, reading: &[f64]) -> Estimate {
+        self.locator.locate(reading)
+    }
+
+    fn extent(&self) -> Extent {
+        let [length_m, width_m] = self.search.size_m;
+        Extent { length_m, width_m: Some(width_m) }
+    }
+
+    fn known_force_n(&self) -> Option<f64> {
+        match self.search.force {
+            ForceBelief::Known(force_n) => Some(force_n),
+            ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
+        }
+    }
+
+    fn most_contacts(&self) -> usize {
+        1
+    }
+}

@@ -1,0 +1,129 @@
+//! A fitted influence locator of a plane with a model.
+
+use super::answer::locate;
+use super::search::{Scratch, Search};
+use super::table::PlaneTable;
+use crate::influence::belief::ForceBelief;
+use crate::influence::channels::{self, Channels};
+use crate::method::{Locate, LocatorFault};
+use crate::setup::Bench;
+use palpate_core::Estimate;
+use serde::{Deserialize, Serialize};
+
+/// Influence functions over a plane, ready to be inverted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct PlaneLocator {
+    stored: Stored,
+    search: Search,
+}
+
+/// What a locator file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    /// Influence functions.
+    table: PlaneTable,
+    /// Offset of each channel, in its SI unit.
+    offsets: Vec<f64>,
+    /// Noise of each channel, in its SI unit.
+    noise_sd: Vec<f64>,
+    /// Channels that are left out.
+    dead: Vec<bool>,
+    force: ForceBelief,
+    /// Mean force of the calibration, in newtons.
+    reference_force_n: f64,
+}
+
+/// Memory for locating readings on a plane, to be used again.
+#[derive(Clone, Debug, Default)]
+pub struct PlaneScratch(Scratch);
+
+impl PlaneLocator {
+    pub(super) fn new(table: PlaneTable, channels: Channels, dead: Vec<bool>, force: ForceBelief) -> Self {
+        let Channels { offsets, noise_sd, reference_force_n } = channels;
+        let stored = Stored { table, offsets, noise_sd, dead, force, reference_force_n };
+        Self { search: stored.search(), stored }
+    }
+
+    /// The influence functions.
+    pub fn table(&self) -> &PlaneTable {
+        &self.stored.table
+    }
+
+    /// What is known of the force.
+    pub fn force(&self) -> ForceBelief {
+        self.stored.force
+    }
+
+    /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
+    /// nothing changes.
+    pub fn leave_out(&mut self, channel: usize) -> bool {
+        let Some(dead) = channels::without(&self.stored.dead, channel) else { return false };
+        let stored = Stored { dead, ..self.stored.clone() };
+        *self = Self { search: stored.search(), stored };
+        true
+    }
+
+    /// What is searched, with something else known of the force.
+    pub(super) fn search_with(&self, force: ForceBelief) -> Search {
+        Stored { force, ..self.stored.clone() }.search()
+    }
+
+    /// [`Locate::locate`] with memory of the caller's.
+    pub fn locate_with(&self, reading: &[f64], scratch: &mut PlaneScratch) -> Estimate {
+        locate(&self.search, reading, &mut scratch.0)
+    }
+}
+
+impl Locate for PlaneLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        self.locate_with(reading, &mut PlaneScratch::default())
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("channels", bench.layout.len(), self.stored.table.sensors)
+    }
+}
+
+impl Stored {
+    fn search(&self) -> Search {
+        let Self { table, offsets, noise_sd, dead, force, reference_force_n } = self;
+        Search::new(table, offsets, noise_sd, dead, *force, *reference_force_n)
+    }
+
+    /// Checks what a file may have got wrong.
+    fn check(&self) -> Result<(), LocatorFault> {
+        let Self { table, offsets, noise_sd, dead, force, reference_force_n } = self;
+        let count = LocatorFault::check_count;
+        let cells = table.sensors.saturating_mul(table.columns).saturating_mul(table.rows);
+        count("influence values", cells, table.values.len())?;
+        count("influence variances", cells, table.variances.len())?;
+        channels::check(table.sensors, offsets, noise_sd, dead, *force)?;
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        let sides = [table.columns, table.rows].map(|side| side as f64);
+        let is_side = |side: f64| side >= PlaneTable::LEAST_SIDE as f64 && side % 2.0 == 1.0;
+        numbers("side of the grid", &sides, is_side, "odd and at least 9")?;
+        numbers("influence value", &table.values, |_| true, "a finite number")?;
+        numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
+        let positive = [table.length_m, table.width_m, *reference_force_n];
+        numbers("length, width or force", &positive, |x| x > 0.0, "greater than 0")
+    }
+}
+
+impl TryFrom<Stored> for PlaneLocator {
+    type Error = LocatorFault;
+
+    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+        stored.check()?;
+        Ok(Self { search: stored.search(), stored })
+    }
+}
+
+impl From<PlaneLocator> for Stored {
+    fn from(locator: PlaneLocator) -> Self {
+        locator.stored
+    }
+}

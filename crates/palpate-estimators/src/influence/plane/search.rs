@@ -1,0 +1,338 @@
+//! Where one contact on a plane is: whitened search over the table, then Levenberg's steps.
+//!
+//! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, (x, y) position,
+//! e = d − W·f the residual, w weights 1/(1 + v) with v the calibration's variance of a reading over the noise's,
+//! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
+
+use super::coarse::{Coarse, MOST_VALLEYS, Profile};
+use super::modes::{Block, Leaf};
+use super::patches::{Lanes, Patches};
+use super::table::PlaneTable;
+use crate::influence::belief::ForceBelief;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::chi_squared_bound;
+
+/// A table that is ready to be searched: whitened, and without the channels that are left out.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Search {
+    /// The channels in use.
+    pub live: Vec<usize>,
+    offsets: Vec<f64>,
+    inverse_sd: Vec<f64>,
+    pub patches: Patches,
+    /// Variance of f at every node, in groups of eight channels.
+    variances: Vec<Lanes>,
+    /// 1/(1 + v) at every node, for the known force or the calibration's, in groups of eight channels.
+    weights: Vec<Lanes>,
+    /// Σ ln(1 + v) at every node.
+    spreads: Vec<f64>,
+    /// The least weight in the middle of every coarse cell.
+    least_weights: Vec<f64>,
+    /// The force of these weights, in newtons.
+    weights_force_n: f64,
+    pub coarse: Coarse,
+    pub force: ForceBelief,
+    /// Length and width, in metres.
+    pub size_m: [f64; 2],
+    /// What a contact costs, by the criterion that counts contacts (Chen and Chen, Biometrika 95, 2008).
+    pub charge: f64,
+    /// A misfit of one contact is larger than this once in ten thousand readings; infinite where none can be.
+    pub worst_misfit: f64,
+    /// |d|² of noise alone is larger than this once in ten thousand readings.
+    pub worst_noise: f64,
+}
+
+/// Memory for locating readings.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    pub whitened: Vec<f64>,
+    pub profile: Profile,
+    /// Parts of the surface that are still to be looked at.
+    pub blocks: Vec<Block>,
+    /// Those that hold the probability.
+    pub leaves: Vec<Leaf>,
+}
+
+/// x and y in metres, and the force in newtons.
+pub(super) type Unknowns = [f64; 3];
+
+/// A minimum of the misfit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Minimum {
+    pub at: Unknowns,
+    /// χ² there.
+    pub misfit: f64,
+    /// JᵀwJ there, J the derivatives of W·f by x, y and W.
+    pub information: [[f64; 3]; 3],
+}
+
+/// A channel so many standard deviations off is nothing that a contact does.
+const LOUDEST: f64 = 1e15;
+
+/// A minimum this much above the best has a share of e⁻¹² of the probability.
+const NEGLIGIBLE: f64 = 24.0;
+
+impl Search {
+    /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
+    pub fn new(
+        table: &PlaneTable,
+        offsets: &[f64],
+        noise_sd: &[f64],
+        dead: &[bool],
+        force: ForceBelief,
+        reference_force_n: f64,
+    ) -> Self {
+        let live: Vec<usize> = (0..table.sensors).filter(|s| !dead[*s]).collect();
+        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
+        let patches = Patches::new(table, &live, &inverse_sd);
+        let mut variances = vec![[0.0; 8]; table.nodes() * patches.groups];
+        for node in 0..table.nodes() {
+            for (i, (s, inverse)) in live.iter().zip(&inverse_sd).enumerate() {
+                variances[node * patches.groups + i / 8][i % 8] =
+                    table.variances[node * table.sensors + s] * inverse * inverse;
+            }
+        }
+        // Offsets are as uncertain as influences at the calibration's force, so a softer touch counts as one of that force.
+        let weights_force_n = match force {
+            ForceBelief::Known(force_n) => force_n.max(reference_force_n),
+            _ => reference_force_n,
+        };
+        let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
+        let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
+        let coarse = Coarse::new(table, &patches, live.len(), force);
+        // Channels that only fill a group up have v = 0, and a weight of 1.
+        let node = |node: usize| weights[node * patches.groups..][..patches.groups].as_flattened().iter();
+        let spreads = (0..table.nodes()).map(|n| node(n).map(|w| -w.ln()).sum()).collect();
+        let least = |cell: usize| {
+            let [x_m, y_m] = coarse.middle_m(cell);
+            node(patches.nearest(x_m, y_m)).copied().fold(1.0, f64::min)
+        };
+        let least_weights = (0..coarse.cells()).map(least).collect();
+        let unknowns = 1 + force.unknowns();
+        let channels = live.len();
+        Self {
+            offsets: live.iter().map(|s| offsets[*s]).collect(),
+            charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
+            worst_misfit: match channels.saturating_sub(unknowns) {
+                0 => f64::INFINITY,
+                freedom => chi_squared_bound(1e-4, freedom),
+            },
+            worst_noise: chi_squared_bound(1e-4, channels),
+            size_m: [table.length_m, table.width_m],
+            live,
+            inverse_sd,
+            patches,
+            variances,
+            weights,
+            spreads,
+            least_weights,
+            weights_force_n,
+            coarse,
+            force,
+        }
+    }
+
+    /// Puts d into the scratch; |d|².
+    pub fn whiten(&self, reading: &[f64], scratch: &mut Scratch) -> f64 {
+        self.whiten_into(reading, &mut scratch.whitened);
+        scratch.whitened.iter().map(|d| d * d).sum()
+    }
+
+    /// Writes d over `whitened`; a reading that is absurdly loud, at the loudness whose squares are still numbers.
+    pub fn whiten_into(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+        whitened.clear();
+        let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
+        let finite = |d: f64| d.clamp(f64::MIN, f64::MAX);
+        whitened.extend(channels.map(|((s, offset), inverse)| finite((reading[*s] - offset) * inverse)));
+        let loudest = whitened.iter().fold(0.0, |most: f64, d| most.max(d.abs()));
+        if loudest > LOUDEST {
+            let scale = LOUDEST / loudest;
+            whitened.iter_mut().for_each(|d| *d *= scale);
+        }
+    }
+
+    /// The minima that matter, best first, of a reading that was whitened to length `square`.
+    pub fn minima(&self, square: f64, scratch: &mut Scratch) -> ([Minimum; MOST_VALLEYS], usize) {
+        self.coarse.scan(&scratch.whitened, square, self.force, &mut scratch.profile);
+        let (valleys, count) = self.coarse.valleys(&scratch.profile);
+        let mut found = [NOWHERE; MOST_VALLEYS];
+        let (mut kept, mut best) = (0, f64::INFINITY);
+        for valley in &valleys[..count] {
+            if self.floor(&scratch.profile, valley.cell) > best + NEGLIGIBLE {
+                continue;
+            }
+            let minimum = self.refine(&scratch.whitened, self.coarse.middle_m(valley.cell));
+            best = best.min(minimum.misfit);
+            match found[..kept].iter().position(|other| self.same(&scratch.whitened, other, &minimum)) {
+                Some(i) if minimum.misfit < found[i].misfit => found[i] = minimum,
+                Some(_) => {}
+                None => {
+                    found[kept] = minimum;
+                    kept += 1;
+                }
+            }
+        }
+        found[..kept].sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+        let matters = |minimum: &&Minimum| minimum.misfit <= found[0].misfit + NEGLIGIBLE;
+        (found, found[..kept].iter().take_while(matters).count().max(1))
+    }
+
+    /// About the least misfit in a coarse cell, of which the profile holds that without weights.
+    pub fn floor(&self, profile: &Profile, cell: usize) -> f64 {
+        let reach = profile.force_n(cell, self.force) * self.coarse.reaches[cell];
+        let closest = (profile.misfits()[cell].max(0.0).sqrt() - reach).max(0.0);
+        self.least_weights[cell] * closest * closest
+    }
+
+    /// Whether two minima lie in one valley: on the straight way between them the misfit hardly rises.
+    fn same(&self, whitened: &[f64], a: &Minimum, b: &Minimum) -> bool {
+        const STEPS: usize = 8;
+        const RISE: f64 = 1.0;
+        let close = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < 0.1 * self.coarse.cell_m[k]);
+        close
+            || (1..STEPS).all(|step| {
+                let t = step as f64 / STEPS as f64;
+                let at = |k: usize| a.at[k] + t * (b.at[k] - a.at[k]);
+                let [x_m, y_m] = [at(0), at(1)];
+                self.profiled(whitened, [x_m, y_m]).1 <= a.misfit.max(b.misfit) + RISE
+            })
+    }
+
+    /// The best force at a place, and the misfit with it.
+    #[inline]
+    pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> (f64, f64) {
+        let place = self.patches.place(x_m, y_m);
+        let weights = self.near(&self.weights, [x_m, y_m]);
+        let mut sums = [[0.0; 8]; 3];
+        for (group, (chunk, weights)) in whitened.chunks(8).zip(weights).enumerate() {
+            let f = self.patches.value(&place, group);
+            let mut d = [0.0; 8];
+            d[..chunk.len()].copy_from_slice(chunk);
+            for lane in 0..8 {
+                let (weighted_d, weighted_f) = (weights[lane] * d[lane], weights[lane] * f[lane]);
+                sums[0][lane] += weighted_d * d[lane];
+                sums[1][lane] += weighted_d * f[lane];
+                sums[2][lane] += weighted_f * f[lane];
+            }
+        }
+        let [square, product, norm] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        if let ForceBelief::Known(force_n) = self.force {
+            return (force_n, square + force_n * (force_n * norm - 2.0 * product));
+        }
+        let (mean, precision) = self.force.mean_and_precision();
+        let (pull, norm) = (product + mean * precision, norm + precision);
+        let force_n = if norm > 0.0 { (pull / norm).max(0.0) } else { 0.0 };
+        (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * pull))
+    }
+
+    /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.
+    pub fn spread(&self, [x_m, y_m]: [f64; 2]) -> f64 {
+        self.spreads[self.patches.nearest(x_m, y_m)]
+    }
+
+    /// The best force at a place.
+    pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
+        match self.force {
+            ForceBelief::Known(force_n) => force_n,
+            _ => self.profiled(whitened, at).0,
+        }
+    }
+
+    /// The groups of the node nearest to a place.
+    #[inline]
+    fn near<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
+        &groups[self.patches.nearest(x_m, y_m) * self.patches.groups..][..self.patches.groups]
+    }
+
+    /// Σ (W·f)² at a contact.
+    pub fn signal(&self, contact: Contact) -> f64 {
+        let place = self.patches.place(contact.position.x_m, contact.position.y_m);
+        let squares = (0..self.patches.groups).flat_map(|group| self.patches.value(&place, group));
+        contact.force_n.powi(2) * squares.map(|f| f * f).sum::<f64>()
+    }
+
+    /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
+    pub fn calibration(&self, contact: Contact) -> [[[f64; 3]; 3]; 2] {
+        let Contact { position: Position { x_m, y_m }, force_n } = contact;
+        let place = self.patches.place(x_m, y_m);
+        let variances = self.near(&self.variances, [x_m, y_m]);
+        let scale = force_n.max(self.weights_force_n).powi(2);
+        let mut sums = [[[0.0; 3]; 3]; 2];
+        for (group, variances) in variances.iter().enumerate() {
+            let values = self.patches.values(&place, group);
+            for (lane, own) in variances.iter().enumerate() {
+                let variance = scale * own;
+                let weight = 1.0 / (1.0 + variance);
+                let j = [force_n * values.along[lane], force_n * values.across[lane], values.f[lane]];
+                for (sum, factor) in sums.iter_mut().zip([weight, weight * weight * variance]) {
+                    for p in 0..3 {
+                        (0..3).for_each(|q| sum[p][q] += factor * j[p] * j[q]);
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// The normal equations; the calibration's variances are those `near` some place, or where the contact is.
+    pub fn equations(&self, whitened: &[f64], at: Unknowns, near: Option<[f64; 2]>) -> Equations {
+        let [x_m, y_m, force_n] = at;
+        let place = self.patches.place(x_m, y_m);
+        let near = near.unwrap_or([x_m, y_m]);
+        let (weights, variances) = (self.near(&self.weights, near), self.near(&self.variances, near));
+        let harder = (force_n > self.weights_force_n).then_some(force_n * force_n);
+        let mut sums = [[0.0; 8]; 10];
+        for (group, chunk) in whitened.chunks(8).enumerate() {
+            let values = self.patches.values(&place, group);
+            let mut d = [0.0; 8];
+            d[..chunk.len()].copy_from_slice(chunk);
+            for lane in 0..8 {
+                let weight = match harder {
+                    None => weights[group][lane],
+                    Some(scale) => 1.0 / (1.0 + scale * variances[group][lane]),
+                };
+                let (f, gx, gy) =
+                    (values.f[lane], force_n * values.along[lane], force_n * values.across[lane]);
+                let e = d[lane] - force_n * f;
+                let (we, wx, wy) = (weight * e, weight * gx, weight * gy);
+                let terms = [
+                    we * e,
+                    we * gx,
+                    we * gy,
+                    we * f,
+                    wx * gx,
+                    wx * gy,
+                    wx * f,
+                    wy * gy,
+                    wy * f,
+                    weight * f * f,
+                ];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[lane] += term;
+                }
+            }
+        }
+        let [misfit, ex, ey, ef, xx, xy, xf, yy, yf, ff] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        let mut equations = Equations {
+            misfit,
+            right: [ex, ey, ef],
+            information: [[xx, xy, xf], [xy, yy, yf], [xf, yf, ff]],
+        };
+        if let ForceBelief::Normal { mean_n, sd_n } = self.force {
+            equations.misfit += ((force_n - mean_n) / sd_n).powi(2);
+            equations.right[2] -= (force_n - mean_n) / (sd_n * sd_n);
+            equations.information[2][2] += 1.0 / (sd_n * sd_n);
+        }
+        equations
+    }
+}
+
+/// JᵀwJ and Jᵀwe at some unknowns.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equations {
+    pub misfit: f64,
+    pub right: [f64; 3],
+    pub information: [[f64; 3]; 3],
+}
+
+const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };

@@ -1,0 +1,325 @@
+//! The estimator on the plate of `examples/plate.toml`, against the limit.
+
+use super::*;
+use crate::arrangement::cells;
+use crate::fixtures::{Example, plate};
+use crate::influence::{ForceBelief, InfluenceConfig, InfluenceFitError, InfluenceSource};
+use crate::method::{FitTask, Locate};
+use crate::recording::Recording;
+use crate::setup::Bench;
+use crate::simulate::CleanSensors;
+use palpate_core::Status;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::surface::plate::PlateSpec;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+fn rig() -> Example {
+    plate(PlateSpec::DEFAULT_ELEMENTS, NOISE)
+}
+
+const NOISE: ChannelModel = ChannelModel {
+    noise_sd: 5e-6,
+    resolution: 0.0,
+    gain_error: 0.0,
+    offset_error: 0.0,
+    position_error_m: 0.0,
+    range: None,
+    dead: false,
+};
+
+fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> PlaneLocator {
+    config.fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
+}
+
+fn sensors(bench: &Bench) -> CleanSensors<'_> {
+    CleanSensors::new(bench.surface.model().unwrap(), &bench.layout)
+}
+
+/// The middles of `side` × `side` cells of the inner 90 % of the area: the rectangle about the same centre with sides √0.9
+/// times as long.
+fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
+    let share = 0.9f64.sqrt();
+    let width_m = extent.width_m.unwrap();
+    let inner = Extent { length_m: share * extent.length_m, width_m: Some(share * width_m) };
+    let margin = |size_m: f64| 0.5 * (1.0 - share) * size_m;
+    let moved =
+        |at: Position| Position { x_m: at.x_m + margin(extent.length_m), y_m: at.y_m + margin(width_m) };
+    cells(inner, side, side).into_iter().map(moved).collect()
+}
+
+/// Calibrations that are tried, and cells a side of the inner 90 % in whose middles the plate is touched.
+const CALIBRATIONS: u64 = 2;
+const SIDE: usize = 28;
+
+/// Locators from [`CALIBRATIONS`] calibrations with 5 N.
+fn calibrated(rig: &Example, from: InfluenceSource) -> Vec<PlaneLocator> {
+    let config = InfluenceConfig { from, ..InfluenceConfig::default() };
+    (0..CALIBRATIONS).map(|seed| fit(config, &rig.bench, &rig.simulate(seed))).collect()
+}
+
+/// The same locator, to which nothing is known of the force.
+fn without_force(locator: &PlaneLocator) -> PlaneLocator {
+    let json = serde_json::to_string(locator).unwrap().replace("{\"known\":5.0}", "\"unknown\"");
+    let changed: PlaneLocator = serde_json::from_str(&json).unwrap();
+    assert_eq!(changed.force(), ForceBelief::Unknown);
+    changed
+}
+
+/// One located touch.
+#[derive(Clone, Copy, Debug)]
+struct Touch {
+    error_m: f64,
+    /// The limit: standard deviation, and mean error.
+    limit_m: [f64; 2],
+    /// Whether the 95 % ellipse holds the contact; `None` where the locator says that nothing touches.
+    is_covered: Option<bool>,
+}
+
+/// Touches of 5 N all over the inner 90 % of the plate.
+fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
+    let limit = rig.bench.cramer_rao_bound().unwrap();
+    let (clean, errors) = (sensors(&rig.bench), ChannelErrors::none(&rig.bench.layout));
+    let mut scratch = PlaneScratch::default();
+    let mut touches = Vec::new();
+    for (locator, seed) in locators.iter().zip(1000..) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        for position in inner_positions(rig.bench.surface.extent(), SIDE) {
+            let contact = Contact { position, force_n: 5.0 };
+            let reading = measure(&rig.bench.layout, &clean.reading(contact), &errors, &mut rng);
+            let Some(bound) = limit.at(contact, force) else { continue };
+            let found = locator.locate_with(&reading, &mut scratch).contact;
+            let (dx, dy) = (found.position.x_m - position.x_m, found.position.y_m - position.y_m);
+            let is_covered = found.uncertainty.map(|uncertainty| {
+                let [xx, xy, _, yy, ..] = uncertainty.covariance;
+                let square = dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx;
+                square <= super::modes::ELLIPSE_95 * (xx * yy - xy * xy)
+            });
+            let limit_m = [bound.sd_position_m, bound.mean_error_m()];
+            touches.push(Touch { error_m: dx.hypot(dy), limit_m, is_covered });
+        }
+    }
+    touches
+}
+
+/// Mean error over that of the limit, and share of covered contacts, of touches whose limit is within `range_mm`.
+fn summed(touches: &[Touch], range_mm: std::ops::Range<f64>) -> (f64, f64) {
+    let inside = || touches.iter().filter(|touch| range_mm.contains(&(touch.limit_m[0] * 1e3)));
+    let (error_m, limit_m) = (
+        inside().map(|touch| touch.error_m).sum::<f64>(),
+        inside().map(|touch| touch.limit_m[1]).sum::<f64>(),
+    );
+    let told = inside().filter_map(|touch| touch.is_covered).count().max(1) as f64;
+    let covered = inside().filter(|touch| touch.is_covered == Some(true)).count() as f64 / told;
+    let count = inside().count();
+    eprintln!(
+        "  limit {range_mm:?} mm: {count} touches, {told} told, mean error {:.2} mm, {:.3} × limit, {:.1} % covered",
+        error_m * 1e3 / count as f64,
+        error_m / limit_m,
+        100.0 * covered
+    );
+    (error_m / limit_m, covered)
+}
+
+const SOURCES: [InfluenceSource; 3] =
+    [InfluenceSource::Corrected, InfluenceSource::Mechanics, InfluenceSource::Recording];
+
+#[test]
+fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
+    let rig = rig();
+    let ranges = [0.0..3.0, 3.0..10.0, 10.0..15.0, 15.0..f64::INFINITY];
+    for from in SOURCES {
+        let known = calibrated(&rig, from);
+        let unknown: Vec<PlaneLocator> = known.iter().map(without_force).collect();
+        for (force, locators) in [(Force::Known, known), (Force::Unknown, unknown)] {
+            eprintln!("{from:?}, force {}", force.name());
+            let touches = touches(&rig, &locators, force);
+            let _ = ranges.clone().map(|range| summed(&touches, range));
+            // Where an unbiased estimator can be off by more than the plate, the limit is far above any error, and so the
+            // ratio is held where the limit is a bound, too.
+            let (everywhere, covered) = summed(&touches, 0.0..f64::INFINITY);
+            let (where_it_binds, _) = summed(&touches, 0.0..10.0);
+            assert!(everywhere <= 1.2 && where_it_binds <= 1.2, "{from:?}, {force:?}");
+            // Without mechanics the remainder's evidence, from 36 places, is itself uncertain.
+            let least = if from == InfluenceSource::Recording { 0.91 } else { 0.93 };
+            assert!((least..=0.97).contains(&covered), "{from:?}, {force:?}: {covered}");
+        }
+    }
+}
+
+/// Readings of contacts (x, y in mm and newtons) with the bench's noise.
+fn noisy(
+    bench: &Bench,
+    clean: &CleanSensors,
+    contacts: &[(f64, f64, f64)],
+    rng: &mut Xoshiro256PlusPlus,
+) -> Vec<f64> {
+    let mut sum = vec![0.0; bench.layout.len()];
+    for &(x_mm, y_mm, force_n) in contacts {
+        let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
+        let reading = clean.reading(Contact { position, force_n });
+        sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
+    }
+    measure(&bench.layout, &sum, &ChannelErrors::none(&bench.layout), rng)
+}
+
+#[test]
+fn no_contact_and_two_contacts_are_no_single_contact() {
+    let rig = rig();
+    let recording = rig.simulate(3);
+    let clean = sensors(&rig.bench);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    for force_n in [Some(5.0), None] {
+        let bench = Bench { force_n, ..rig.bench.clone() };
+        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        for _ in 0..50 {
+            let nothing = locator.locate(&noisy(&rig.bench, &clean, &[], &mut rng));
+            assert_eq!(nothing.status, Status::NoContact, "{force_n:?}: {nothing:?}");
+            let two = locator.locate(&noisy(
+                &rig.bench,
+                &clean,
+                &[(80.0, 90.0, 5.0), (220.0, 200.0, 5.0)],
+                &mut rng,
+            ));
+            assert_eq!(two.status, Status::OutsideModel, "{force_n:?}: {two:?}");
+            let one = locator.locate(&noisy(&rig.bench, &clean, &[(80.0, 90.0, 5.0)], &mut rng));
+            assert_eq!(one.status, Status::Located);
+            assert!((one.contact.force_n.unwrap() - 5.0).abs() < 0.5, "{force_n:?}: {one:?}");
+        }
+    }
+}
+
+#[test]
+fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
+    let mut rig = rig();
+    rig.bench.layout.sensors.truncate(2);
+    for (sensor, y_m) in rig.bench.layout.sensors.iter_mut().zip([0.15, 0.075]) {
+        sensor.position = Position { x_m: 0.15, y_m };
+    }
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let clean = sensors(&rig.bench);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    for _ in 0..20 {
+        let estimate = locator.locate(&noisy(&rig.bench, &clean, &[(60.0, 90.0, 5.0)], &mut rng));
+        assert_eq!(estimate.status, Status::Ambiguous, "{estimate:?}");
+        let all = estimate.modes.as_slice().iter().map(|mode| mode.contact).chain([estimate.contact]);
+        let xs: Vec<f64> = all.map(|contact| contact.position.x_m).collect();
+        assert!(xs.iter().any(|x_m| *x_m < 0.15) && xs.iter().any(|x_m| *x_m > 0.15), "{xs:?}");
+        let total: f64 = estimate.modes.as_slice().iter().map(|mode| mode.probability).sum();
+        assert!(total < 1.0, "{estimate:?}");
+    }
+}
+
+#[test]
+fn absurd_readings_are_outside_the_model() {
+    let rig = rig();
+    let known = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(0));
+    for locator in [&known, &without_force(&known)] {
+        for loud in [1e3, 1e9, -1e150, 1e300, f64::MAX, -f64::MAX] {
+            let mut one = [0.0; 9];
+            one[4] = loud;
+            for reading in [[loud; 9], one] {
+                let estimate = locator.locate(&reading);
+                assert_eq!(estimate.status, Status::OutsideModel, "{reading:?}: {estimate:?}");
+                let Position { x_m, y_m } = estimate.contact.position;
+                assert!(
+                    (0.0..=0.3).contains(&x_m) && (0.0..=0.3).contains(&y_m),
+                    "{reading:?}: {estimate:?}"
+                );
+                let uncertainty = estimate.contact.uncertainty.unwrap();
+                assert!(uncertainty.covariance.iter().all(|value| value.is_finite()), "{estimate:?}");
+                assert!(estimate.contact.force_n.unwrap().is_finite());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dead_channel_is_left_out_and_the_last_is_kept() {
+    let rig = rig();
+    let mut locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let clean = sensors(&rig.bench);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    assert!(locator.leave_out(4));
+    let mut reading = noisy(&rig.bench, &clean, &[(100.0, 170.0, 5.0)], &mut rng);
+    reading[4] = 0.0;
+    let estimate = locator.locate(&reading);
+    assert_eq!(estimate.status, Status::Located);
+    assert!(estimate.contact.position.distance_m(Position { x_m: 0.1, y_m: 0.17 }) < 5e-3, "{estimate:?}");
+    assert!((0..9).filter(|channel| locator.leave_out(*channel)).count() == 8);
+}
+
+#[test]
+fn faults_that_a_calibration_shows_are_corrected() {
+    let mut rig =
+        plate(PlateSpec::DEFAULT_ELEMENTS, ChannelModel { gain_error: 0.05, offset_error: 20e-6, ..NOISE });
+    let told = rig.bench.clone();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
+    for sensor in &mut rig.bench.layout.sensors {
+        sensor.position.x_m += 1e-3 * rng.random_range(-1.0..=1.0);
+        sensor.position.y_m += 1e-3 * rng.random_range(-1.0..=1.0);
+    }
+    let limit = told.cramer_rao_bound().unwrap();
+    let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
+    let clean = sensors(&rig.bench);
+    let mut recording = rig.simulate(0);
+    for row in &mut recording.rows {
+        let reading = clean.reading(Contact { position: row.position, force_n: 5.0 });
+        row.reading = measure(&rig.bench.layout, &reading, &errors, &mut rng);
+    }
+    let locator = fit(InfluenceConfig::default(), &told, &recording);
+    let (mut error_m, mut limit_m) = (0.0, 0.0);
+    for position in inner_positions(told.surface.extent(), 12) {
+        let contact = Contact { position, force_n: 5.0 };
+        let Some(bound) = limit.at(contact, Force::Known).filter(|bound| bound.sd_position_m < 5e-3) else {
+            continue;
+        };
+        for _ in 0..5 {
+            let reading = measure(&rig.bench.layout, &clean.reading(contact), &errors, &mut rng);
+            error_m += locator.locate(&reading).contact.position.distance_m(position);
+            limit_m += bound.mean_error_m();
+        }
+    }
+    eprintln!("gains, offsets and places off: {:.3} × limit", error_m / limit_m);
+    assert!(error_m < 1.3 * limit_m, "{:.3} × limit", error_m / limit_m);
+}
+
+#[test]
+fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
+    let rig = rig();
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let json = serde_json::to_string(&locator).unwrap();
+    assert_eq!(serde_json::from_str::<PlaneLocator>(&json).unwrap(), locator);
+    let replaced = [
+        ("\"columns\":49", "\"columns\":48"),
+        ("\"sensors\":9", "\"sensors\":8"),
+        ("\"width_m\":0.3", "\"width_m\":-0.3"),
+        ("{\"known\":5.0}", "{\"known\":-5.0}"),
+    ];
+    for (good, bad) in replaced {
+        assert!(json.contains(good), "{good}");
+        assert!(serde_json::from_str::<PlaneLocator>(&json.replace(good, bad)).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn what_a_plane_cannot_do_is_refused_in_words() {
+    let rig = rig();
+    let mut recording = rig.simulate(1);
+    let refuse = |config: InfluenceConfig, recording: &Recording| {
+        let task = FitTask { bench: &rig.bench, recording, seed: 0 };
+        config.fit_plane(task, &mut || true).unwrap_err()
+    };
+    let several = refuse(InfluenceConfig { contacts: 2, ..InfluenceConfig::default() }, &recording);
+    assert_eq!(
+        several.to_string(),
+        "the surface is a plane: telling several contacts apart works on a line, such as a beam, only"
+    );
+    recording.rows.truncate(25);
+    let from = InfluenceSource::Recording;
+    let few = refuse(InfluenceConfig { from, ..InfluenceConfig::default() }, &recording);
+    assert_eq!(few, InfluenceFitError::TooFewPositions { needed: 6, found: 5 });
+}

@@ -1,0 +1,104 @@
+//! A batch against readings one by one, and every instruction set against plain arrays.
+
+use super::{fit, noisy};
+use crate::fixtures::paper;
+use crate::influence::InfluenceConfig;
+use crate::influence::answer::NOTHING;
+use crate::influence::batch::Rows;
+use crate::influence::belief::ForceBelief;
+use crate::influence::lanes::{InstructionSet, locate_rows_by};
+use crate::influence::scratch::Scratch;
+use crate::method::Locate;
+use crate::setup::Bench;
+use palpate_core::{Estimate, Status};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Readings of every kind: nothing, one contact all along the beam and at its very ends, weak ones, and two at once.
+fn readings(bench: &Bench) -> Vec<Vec<f64>> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+    let mut readings = Vec::new();
+    for i in 0..600 {
+        let x_m = 0.4 * f64::from(i * 7 % 600) / 599.0;
+        readings.push(noisy(bench, &[(x_m, 3.0)], &mut rng));
+        match i % 6 {
+            0 => readings.push(noisy(bench, &[], &mut rng)),
+            1 => readings.push(noisy(bench, &[(1e-3, 3.0)], &mut rng)),
+            2 => readings.push(noisy(bench, &[(0.399, 3.0)], &mut rng)),
+            3 => readings.push(noisy(bench, &[(x_m, 3.0), (0.4 - x_m, 2.0)], &mut rng)),
+            4 => readings.push(noisy(bench, &[(x_m, 0.02)], &mut rng)),
+            _ => readings.push(noisy(bench, &[(x_m, 7.0)], &mut rng)),
+        }
+    }
+    readings
+}
+
+/// The paper's bench with what is known of the force, and up to how many contacts.
+fn benches() -> Vec<(Bench, InfluenceConfig)> {
+    let bench = paper(5e-6, 10).bench;
+    let unknown = Bench { force_n: None, ..bench.clone() };
+    let config = InfluenceConfig::default();
+    vec![
+        (bench.clone(), config),
+        (unknown.clone(), config),
+        (bench, InfluenceConfig { force_sd_n: Some(0.5), ..config }),
+        (unknown, InfluenceConfig { contacts: 2, ..config }),
+    ]
+}
+
+#[test]
+fn a_batch_answers_as_readings_one_by_one_do() {
+    let recording = paper(5e-6, 10).simulate(3);
+    let mut seen = Vec::new();
+    for (bench, config) in benches() {
+        let locator = fit(config, &bench, &recording);
+        let readings = readings(&bench);
+        let single: Vec<Estimate> = readings.iter().map(|reading| locator.locate(reading)).collect();
+        // Twice, the second time over estimates of other readings.
+        let mut estimates = vec![NOTHING; readings.len()];
+        let mut scratch = Scratch::default();
+        for order in [readings.iter().rev().flatten().copied().collect::<Vec<f64>>(), readings.concat()] {
+            assert_eq!(locator.locate_batch(&order, &mut scratch, &mut estimates), readings.len());
+        }
+        assert_eq!(estimates, single, "{:?}", locator.force());
+        seen.extend(single.iter().map(|estimate| estimate.status));
+    }
+    for status in [Status::Located, Status::NoContact, Status::Ambiguous, Status::OutsideModel] {
+        assert!(seen.contains(&status), "{status:?}");
+    }
+}
+
+#[test]
+fn every_instruction_set_answers_as_plain_arrays_do() {
+    let recording = paper(5e-6, 10).simulate(3);
+    for (bench, config) in benches() {
+        for dead in [None, Some(2)] {
+            let mut locator = fit(config, &bench, &recording);
+            assert!(dead.is_none_or(|channel| locator.leave_out(channel)));
+            let readings = readings(&bench);
+            let flat = readings.concat();
+            let rows = Rows { readings: &flat, channels: 8 };
+            let by = |set| {
+                let mut estimates = vec![NOTHING; readings.len()];
+                locate_rows_by(set, locator.search(), rows, &mut Scratch::default(), &mut estimates);
+                estimates
+            };
+            let plain = by(InstructionSet::Portable);
+            for set in InstructionSet::available() {
+                assert_eq!(by(set), plain, "{set:?}, {:?}", locator.force());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_batch_locates_as_many_as_there_are() {
+    let rig = paper(5e-6, 2);
+    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    assert!(matches!(locator.force(), ForceBelief::Known(_)));
+    let mut estimates = vec![NOTHING; 3];
+    let mut scratch = Scratch::default();
+    assert_eq!(locator.locate_batch(&[0.0; 39], &mut scratch, &mut estimates), 3);
+    assert_eq!(locator.locate_batch(&[0.0; 15], &mut scratch, &mut estimates), 1);
+    assert_eq!(locator.locate_batch(&[], &mut scratch, &mut estimates), 0);
+}

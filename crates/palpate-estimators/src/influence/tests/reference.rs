@@ -1,0 +1,121 @@
+//! The search against an exhaustive one: readings of every odd kind, and the misfit at two thousand places.
+
+use super::{clean, fit, noisy};
+use crate::fixtures::paper;
+use crate::influence::InfluenceConfig;
+use crate::influence::belief::ForceBelief;
+use crate::influence::lanes::Array;
+use crate::influence::scratch::Scratch;
+use crate::influence::search::{Minimum, Search};
+use crate::influence::table::InfluenceTable;
+use crate::setup::Bench;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Places in a cell of the table.
+const PARTS: usize = 16;
+
+/// Kinds of readings that are mostly noise.
+const ROUGH: [&str; 2] = ["rough", "all noise"];
+
+/// A kind of reading, and one of it.
+type Odd = (&'static str, Vec<f64>);
+
+/// Readings that one contact does not explain, or hardly.
+fn odd_readings(bench: &Bench, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
+    let mut place = |low: f64, high: f64| rng.random_range(low..high);
+    let contacts = [
+        ("one", vec![(place(0.0, 0.4), place(0.5, 8.0))]),
+        ("two", vec![(place(0.0, 0.4), place(0.5, 5.0)), (place(0.0, 0.4), place(0.5, 5.0))]),
+        ("three", (0..3).map(|_| (place(0.0, 0.4), place(0.5, 5.0))).collect()),
+        ("near the left end", vec![(place(0.0, 2e-3), 3.0)]),
+        ("near the right end", vec![(place(0.398, 0.4), 3.0)]),
+        ("hardly any force", vec![(place(0.0, 0.4), place(0.0, 0.05))]),
+        ("a great force", vec![(place(0.0, 0.4), place(30.0, 100.0))]),
+        ("pulled", vec![(place(0.0, 0.4), -2.0)]),
+        ("nothing", vec![]),
+    ];
+    let mut readings: Vec<Odd> =
+        contacts.iter().map(|(kind, contacts)| (*kind, noisy(bench, contacts, rng))).collect();
+    for (kind, size_m) in ROUGH.into_iter().zip([50e-6, 2e-3]) {
+        let mut reading = clean(bench, &[(rng.random_range(0.0..0.4), 3.0)]);
+        reading.iter_mut().for_each(|value| *value += size_m * rng.random_range(-1.0..1.0));
+        readings.push((kind, reading));
+    }
+    readings
+}
+
+/// −2 ln of a contact's likelihood, but for a constant: χ² with the calibration's variance at its force, and what that
+/// variance costs. Where the force is neither known nor given, the best.
+fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f64 {
+    let (table, reference_n) = (&search.table, search.variance_scale(0.0).sqrt());
+    let cell = table.cell(x_m);
+    let node = cell.node as usize;
+    let at = |force_n: f64| {
+        let (mut cost, mut pull, mut norm) = (0.0, 0.0, 0.0);
+        let scale = search.variance_scale(force_n);
+        table.for_each(cell, |s, f, _| {
+            let variance = |node: usize| table.variances[node * table.sensors + s];
+            let weight = 1.0 / (1.0 + scale * 0.5 * (variance(node) + variance(node + 1)));
+            cost += weight * (whitened[s] - force_n * f).powi(2) - weight.ln();
+            pull += weight * whitened[s] * f;
+            norm += weight * f * f;
+        });
+        (cost, pull, norm)
+    };
+    let (mean, precision) = match search.force {
+        ForceBelief::Known(known_n) => return at(known_n).0,
+        belief => belief.mean_and_precision(),
+    };
+    let mut force = force_n.unwrap_or(reference_n);
+    for _ in 0..if force_n.is_none() { 8 } else { 0 } {
+        let (_, pull, norm) = at(force);
+        force = if norm > 0.0 { ((pull + mean * precision) / (norm + precision)).max(0.0) } else { mean };
+    }
+    at(force).0 + precision * (force - mean).powi(2)
+}
+
+/// The lowest misfit on the surface and where it is.
+fn exhaustive(search: &Search, whitened: &[f64]) -> (f64, f64) {
+    let places = (InfluenceTable::NODES - 1) * PARTS;
+    let place_m = |i: usize| search.table.length_m * i as f64 / places as f64;
+    let costs = (0..=places).map(|i| (cost(search, whitened, place_m(i), None), place_m(i)));
+    costs.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
+}
+
+/// What the search finds, and the whitened reading.
+fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
+    let mut scratch = Scratch::default();
+    let square = search.whiten::<Array>(reading, scratch.whitened.room(search.groups()));
+    let whitened = scratch.whitened.channels(search.live.len()).to_vec();
+    (search.minima::<Array>(square, &mut scratch).0[0], whitened)
+}
+
+#[test]
+fn the_lowest_misfit_is_found_in_odd_readings() {
+    let recording = paper(5e-6, 10).simulate(3);
+    let bench = paper(5e-6, 10).bench;
+    let unknown = Bench { force_n: None, ..bench.clone() };
+    let config = InfluenceConfig::default();
+    let believed = InfluenceConfig { force_sd_n: Some(0.5), ..config };
+    for (bench, config) in [(bench.clone(), config), (unknown, config), (bench, believed)] {
+        for dead in [&[][..], &[3], &[0, 5, 6]] {
+            let mut locator = fit(config, &bench, &recording);
+            assert!(dead.iter().all(|channel| locator.leave_out(*channel)));
+            let search = locator.search();
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
+            for (kind, reading) in (0..8).flat_map(|_| odd_readings(&bench, &mut rng)) {
+                // Noise as large as a signal is best explained by an immense force next to a support, where the
+                // calibration says least; the search looks where the noise alone says.
+                if !matches!(search.force, ForceBelief::Known(_)) && ROUGH.contains(&kind) {
+                    continue;
+                }
+                let (minimum, whitened) = found(search, &reading);
+                let (least, best_m) = exhaustive(search, &whitened);
+                let cost = cost(search, &whitened, minimum.x_m, Some(minimum.force_n));
+                let told = format!("{kind}, {:?}, without {dead:?}: {minimum:?}", search.force);
+                assert!(cost < least + 2.0 + 1e-2 * least, "{told} costs {cost}, {best_m} m costs {least}");
+            }
+        }
+    }
+}

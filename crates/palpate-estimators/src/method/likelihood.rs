@@ -1,0 +1,110 @@
+//! How probable a reading is under contacts: what a filter over time asks of a locator.
+
+use palpate_core::Estimate;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::surface::Extent;
+
+/// A fitted method that can say how well contacts explain a reading.
+pub trait Likelihood: Send + Sync {
+    /// What contacts on this surface are fitted by.
+    fn geometry(&self) -> Geometry<'_>;
+
+    /// A reading as the fits want it, written over `whitened`.
+    fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
+
+    /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u
+    /// (see [`LineLikelihood`]), which a plane does not have.
+    fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
+
+    /// How far a contact moves the reading in balance: the sum of (W·f)² over the noise's variance, of all channels.
+    fn signal(&self, contact: Contact) -> f64;
+
+    /// Covariance of the position of each contact, xx, xy and yy in m², that calibration leaves and no further reading takes
+    /// away; on a line xx alone.
+    fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2];
+
+    /// The contacts that explain a reading by itself: the best estimate, and its other modes.
+    fn locate_alone(&self, reading: &[f64]) -> Estimate;
+
+    /// How far the surface reaches.
+    fn extent(&self) -> Extent;
+
+    /// The force of every contact in newtons, where it is known exactly.
+    fn known_force_n(&self) -> Option<f64>;
+
+    /// The most contacts that may touch at once.
+    fn most_contacts(&self) -> usize;
+}
+
+/// Whether contacts lie on a line or on a plane, with the fits that go with that.
+#[derive(Clone, Copy)]
+pub enum Geometry<'a> {
+    /// Contacts have one coordinate.
+    Line(&'a dyn LineLikelihood),
+    /// Contacts have two.
+    Plane(&'a dyn PlaneLikelihood),
+}
+
+/// How well contacts on a line explain a reading.
+///
+/// A surface that swings is bent by its first mode's force u = m·ω²·q where one in balance is bent by the contacts' share
+/// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
+/// faster modes are taken to be in balance.
+pub trait LineLikelihood {
+    /// How well a contact explains it; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
+    fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
+
+    /// How well two contacts explain it; the unknowns are u, place and force of the first, place and force of the second.
+    fn fit_two(&self, whitened: &[f64], contacts: [Contact; 2], mode_n: Option<f64>) -> ContactFit<5>;
+
+    /// The first mode's shape φ at a place, and its slope per metre.
+    fn first_mode(&self, x_m: f64) -> [f64; 2];
+}
+
+/// How well a contact on a plane in balance explains a reading.
+pub trait PlaneLikelihood {
+    /// The unknowns are x, y and force.
+    fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3>;
+}
+
+/// The misfit χ² of K unknowns and its second-order expansion about them, by Gauss and Newton: moved by δ it is about
+/// χ² − 2·gᵀδ + δᵀ·A·δ. The log-likelihood is −χ²/2, up to what is the same for all unknowns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactFit<const K: usize> {
+    /// χ².
+    pub misfit: f64,
+    /// g, per unit of each unknown.
+    pub pull: [f64; K],
+    /// A: the Fisher information of each pair of unknowns.
+    pub information: [[f64; K]; K],
+}
+
+impl<const K: usize> ContactFit<K> {
+    /// The fit of no data at all.
+    pub const NOTHING: Self = Self { misfit: 0.0, pull: [0.0; K], information: [[0.0; K]; K] };
+
+    /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
+    pub fn add(&mut self, residual: f64, derivatives: &[f64; K], weight: f64) {
+        self.misfit += weight * residual * residual;
+        for i in 0..K {
+            let weighed = weight * derivatives[i];
+            self.pull[i] += weighed * residual;
+            for j in i..K {
+                self.information[i][j] += weighed * derivatives[j];
+            }
+        }
+    }
+
+    /// With the information's lower triangle as its upper one.
+    #[must_use]
+    pub fn mirrored(mut self) -> Self {
+        for i in 0..K {
+            for j in 0..i {
+                self.information[i][j] = self.information[j][i];
+            }
+        }
+        self
+    }
+}

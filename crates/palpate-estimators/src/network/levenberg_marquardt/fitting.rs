@@ -1,0 +1,193 @@
+//! From a recording to an ensemble of networks.
+
+use ndarray::Array2;
+
+use super::training::{Trained, Training};
+use super::{LevenbergMarquardtLocator, Member, NetworkInputs, OutputScale};
+use crate::features::NoFeatures;
+use crate::method::{Fit, FitTask};
+use crate::network::{Activation, Topology};
+use crate::recording::{Recording, TooFewPositions};
+use crate::setup::Bench;
+
+/// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
+///
+/// Outputs are the position and, where the bench does not know the force but every row of the recording does, the force.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LevenbergMarquardtConfig {
+    /// Nodes of each hidden layer, input side first; at least 1 each.
+    pub hidden: Vec<usize>,
+    /// Networks in the ensemble, at least 1: those with the greatest evidence of twice as many that are trained.
+    pub ensemble: usize,
+    /// Each training is capped after this many iterations.
+    pub max_iterations: u32,
+}
+
+impl Default for LevenbergMarquardtConfig {
+    fn default() -> Self {
+        Self { hidden: vec![10], ensemble: 5, max_iterations: 200 }
+    }
+}
+
+/// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
+/// *Analyzing bagging*, Annals of Statistics 30, 2002): a step costs presses × weights², and what more presses tell goes into the
+/// ensemble.
+const MOST_PRESSES: usize = 1000;
+
+/// Why networks cannot be fitted to a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LevenbergMarquardtFitError {
+    /// One position has nothing to teach.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// A layer or an ensemble of nothing.
+    #[error("a network with {what} 0 cannot be trained; it must be at least 1")]
+    Zero {
+        /// What is 0.
+        what: &'static str,
+    },
+    /// Readings that never change.
+    #[error(transparent)]
+    Features(#[from] NoFeatures),
+    /// Readings that differ by no more than noise.
+    #[error(
+        "the recording's readings do not differ by more than noise; a network has nothing to tell positions by"
+    )]
+    Alike,
+    /// No training kept to the numbers.
+    #[error("none of {trainings} trainings gave a network with finite weights")]
+    Diverged {
+        /// How many were tried.
+        trainings: usize,
+    },
+}
+
+impl Fit for LevenbergMarquardtConfig {
+    type Locator = LevenbergMarquardtLocator;
+    type Error = LevenbergMarquardtFitError;
+
+    fn fit(
+        &self,
+        task: FitTask,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<LevenbergMarquardtLocator>, LevenbergMarquardtFitError> {
+        self.check()?;
+        task.recording.check_distinct_positions(2)?;
+        let inputs = NetworkInputs::of(&task.bench.layout, task.recording)?;
+        let input_rows = input_rows(&inputs, task.recording)?;
+        let scales = output_scales(task.bench, task.recording);
+        let targets = target_rows(task.bench, task.recording, &scales);
+        let topology = self.topology(inputs.axes.len(), scales.len());
+        let training = Training {
+            topology: &topology,
+            inputs: input_rows,
+            targets,
+            max_iterations: self.max_iterations,
+        };
+        let Some(members) = self.ensemble(&training, task.seed, keep_going)? else { return Ok(None) };
+        Ok(Some(LevenbergMarquardtLocator {
+            extent: task.bench.surface.extent(),
+            force_n: task.bench.force_n,
+            inputs,
+            topology,
+            scales,
+            members,
+        }))
+    }
+}
+
+impl LevenbergMarquardtConfig {
+    fn check(&self) -> Result<(), LevenbergMarquardtFitError> {
+        let zero = |what| Err(LevenbergMarquardtFitError::Zero { what });
+        match self {
+            Self { hidden, .. } if hidden.contains(&0) => zero("hidden nodes"),
+            Self { ensemble: 0, .. } => zero("networks in its ensemble"),
+            _ => Ok(()),
+        }
+    }
+
+    fn topology(&self, inputs: usize, outputs: usize) -> Topology {
+        let sizes = std::iter::once(inputs).chain(self.hidden.iter().copied()).chain([outputs]);
+        Topology {
+            sizes: sizes.collect(),
+            biases: true,
+            hidden_activation: Activation::Tanh,
+            output_activation: Activation::Linear,
+        }
+    }
+
+    /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little.
+    fn ensemble(
+        &self,
+        training: &Training,
+        seed: u64,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<Member>>, LevenbergMarquardtFitError> {
+        let trainings = 2 * self.ensemble;
+        let mut trained: Vec<Trained> = Vec::new();
+        for i in 0..trainings as u64 {
+            let seed = seed.wrapping_mul(trainings as u64).wrapping_add(i);
+            let mut stopped = false;
+            let mut ask = || {
+                stopped = stopped || !keep_going();
+                !stopped
+            };
+            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, &mut ask));
+            if stopped {
+                return Ok(None);
+            }
+        }
+        if trained.is_empty() {
+            return Err(LevenbergMarquardtFitError::Diverged { trainings });
+        }
+        trained.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        trained.truncate(self.ensemble);
+        Ok(Some(trained.into_iter().map(Member::of).collect()))
+    }
+}
+
+fn input_rows(
+    inputs: &NetworkInputs,
+    recording: &Recording,
+) -> Result<Array2<f64>, LevenbergMarquardtFitError> {
+    let width = inputs.axes.len();
+    if width == 0 {
+        return Err(LevenbergMarquardtFitError::Alike);
+    }
+    let mut rows = Array2::zeros((recording.rows.len(), width));
+    for (i, row) in recording.rows.iter().enumerate() {
+        rows.row_mut(i).iter_mut().zip(inputs.values(&row.reading)).for_each(|(input, value)| *input = value);
+    }
+    Ok(rows)
+}
+
+/// x, y where the surface has one, and the force where it is an output.
+fn truths<'a>(bench: &Bench, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
+    let rows = &recording.rows;
+    let mut truths: Vec<Box<dyn Fn(usize) -> f64>> = vec![Box::new(|i| rows[i].position.x_m)];
+    if bench.surface.extent().width_m.is_some() {
+        truths.push(Box::new(|i| rows[i].position.y_m));
+    }
+    if bench.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
+        truths.push(Box::new(|i| rows[i].force_n.unwrap_or_default()));
+    }
+    truths
+}
+
+/// Mean and standard deviation of every output over the recording.
+fn output_scales(bench: &Bench, recording: &Recording) -> Vec<OutputScale> {
+    let count = recording.rows.len();
+    let scale = |truth: &dyn Fn(usize) -> f64| {
+        let mean = (0..count).map(truth).sum::<f64>() / count as f64;
+        let variance = (0..count).map(|i| (truth(i) - mean).powi(2)).sum::<f64>() / count as f64;
+        OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
+    };
+    truths(bench, recording).iter().map(|truth| scale(truth.as_ref())).collect()
+}
+
+fn target_rows(bench: &Bench, recording: &Recording, scales: &[OutputScale]) -> Array2<f64> {
+    let truths = truths(bench, recording);
+    Array2::from_shape_fn((recording.rows.len(), scales.len()), |(i, k)| {
+        (truths[k](i) - scales[k].mean) / scales[k].sd
+    })
+}

@@ -1,0 +1,114 @@
+//! The fields of one line, found and read with errors that know their place.
+
+use super::columns::{Column, Header};
+use super::csv_error::{CsvError, CsvProblem, Place};
+use super::fields::{self, Field};
+use palpate_mechanics::units::Unit;
+
+/// One line of a CSV file, cut into fields.
+pub(super) struct Cells<'a> {
+    source: &'a str,
+    line: usize,
+    text: &'a str,
+    fields: Vec<Field<'a>>,
+}
+
+impl<'a> Cells<'a> {
+    /// Cuts line number `line` of `source`.
+    pub fn parse(source: &'a str, line: usize, text: &'a str) -> Result<Self, CsvError> {
+        match fields::split(text) {
+            Ok(fields) => Ok(Self { source, line, text, fields }),
+            Err(open) => {
+                let place = Place { line, column: None, text: text.to_owned(), span: open.span };
+                Err(CsvProblem::OpenQuote.at(source, place))
+            }
+        }
+    }
+
+    /// How many fields there are.
+    pub fn width(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// Refuses a row that has more or fewer fields than `expected`.
+    pub fn check_width(&self, expected: usize) -> Result<(), CsvError> {
+        let found = self.width();
+        if found == expected {
+            Ok(())
+        } else {
+            Err(self.line_error(CsvProblem::RowLength { found, expected }))
+        }
+    }
+
+    /// Which field of every line `column` is, as this first line of the file tells.
+    pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
+        match (column, header) {
+            (Column::Number(number), _) => self.find_number(*number),
+            (Column::Name(name), Header::Present) => self.find_name(name),
+            (Column::Name(name), Header::Absent) => {
+                let (wanted, count) = (name.clone(), self.width());
+                Err(self.line_error(CsvProblem::NameWithoutHeader { wanted, count }))
+            }
+        }
+    }
+
+    fn find_number(&self, wanted: usize) -> Result<usize, CsvError> {
+        let count = self.width();
+        match wanted.checked_sub(1) {
+            Some(index) if index < count => Ok(index),
+            _ => Err(self.line_error(CsvProblem::NoSuchColumn { wanted, count })),
+        }
+    }
+
+    fn find_name(&self, name: &str) -> Result<usize, CsvError> {
+        let mut same = (0..self.width()).filter(|i| self.fields[*i].value == name);
+        match (same.next(), same.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(first), Some(second)) => {
+                let name = name.to_owned();
+                Err(self.error(
+                    second,
+                    CsvProblem::DuplicateColumn { name, first: first + 1, second: second + 1 },
+                ))
+            }
+            (None, _) => {
+                let present = self.fields.iter().map(|field| field.value.clone().into_owned()).collect();
+                Err(self.line_error(CsvProblem::MissingColumn { wanted: name.to_owned(), present }))
+            }
+        }
+    }
+
+    /// Whether some field is called `column`, or has its number.
+    pub fn has(&self, column: &Column) -> bool {
+        match column {
+            Column::Name(name) => self.fields.iter().any(|field| field.value == name.as_str()),
+            Column::Number(number) => (1..=self.width()).contains(number),
+        }
+    }
+
+    /// The finite number in field `index`, in SI units.
+    pub fn number(&self, index: usize, unit: Unit) -> Result<f64, CsvError> {
+        let Some(field) = self.fields.get(index) else {
+            return Err(self.line_error(CsvProblem::RowLength { found: self.width(), expected: index + 1 }));
+        };
+        match unit.parse_si(&field.value) {
+            Some(value) if value.is_finite() => Ok(value),
+            Some(_) => Err(self.error(index, CsvProblem::NotFinite { text: field.value.to_string() })),
+            None if field.value.is_empty() => Err(self.error(index, CsvProblem::EmptyField)),
+            None => Err(self.error(index, CsvProblem::NotANumber { text: field.value.to_string() })),
+        }
+    }
+
+    /// A problem with field `index`.
+    pub fn error(&self, index: usize, problem: CsvProblem) -> CsvError {
+        let span = self.fields.get(index).map_or(0..self.text.len(), |field| field.span.clone());
+        let place = Place { line: self.line, column: Some(index + 1), text: self.text.to_owned(), span };
+        problem.at(self.source, place)
+    }
+
+    /// A problem with the whole line.
+    fn line_error(&self, problem: CsvProblem) -> CsvError {
+        let span = 0..self.text.len();
+        problem.at(self.source, Place { line: self.line, column: None, text: self.text.to_owned(), span })
+    }
+}

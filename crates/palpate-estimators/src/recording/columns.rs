@@ -1,0 +1,230 @@
+//! Which column of a CSV file plays which role.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::Unit;
+
+/// Which column is what. Columns that have no role are ignored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Columns {
+    /// Whether the first line names the columns.
+    pub header: Header,
+    /// Where the contact position stands.
+    pub position: PositionColumns,
+    /// The unit of length of the position columns.
+    pub position_unit: Unit,
+    /// How the file's coordinates become positions on the surface.
+    #[serde(default)]
+    pub frame: Frame,
+    /// One column for each sensor, in the layout's order.
+    pub channels: Vec<ValueColumn>,
+    /// Where the contact force stands, if anywhere.
+    pub force: Option<ForceColumn>,
+    /// Where the hidden coordinate stands, if anywhere; see [`Row::hidden`](super::Row::hidden).
+    #[serde(default)]
+    pub hidden: Option<ValueColumn>,
+}
+
+/// How a file's coordinates become positions on the surface: rounded, then less the origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frame {
+    /// The file's coordinates of the surface's left support or lower left corner, in metres.
+    pub origin: Position,
+    /// Coordinates are rounded to whole multiples of this, in metres, greater than 0, so that presses of one place that
+    /// were logged a little apart have one position; `None` to take them as they are.
+    pub round_m: Option<f64>,
+}
+
+impl Frame {
+    /// Where on the surface the file's (x, y), in metres, is.
+    pub fn position(&self, x_m: f64, y_m: f64) -> Position {
+        let rounded = |value_m: f64| match self.round_m {
+            Some(step_m) => (value_m / step_m).round() * step_m,
+            None => value_m,
+        };
+        Position { x_m: rounded(x_m) - self.origin.x_m, y_m: rounded(y_m) - self.origin.y_m }
+    }
+}
+
+/// Whether a CSV file's first line names its columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Header {
+    /// It does.
+    Present,
+    /// It is a row like the others; columns are known by their numbers.
+    Absent,
+}
+
+/// A column by its name in the header, or by its number.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Column {
+    /// The name in the header, without the spaces around it.
+    Name(String),
+    /// The number, from 1.
+    Number(usize),
+}
+
+impl fmt::Display for Column {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => write!(f, "`{name}`"),
+            Self::Number(number) => write!(f, "number {number}"),
+        }
+    }
+}
+
+impl From<&str> for Column {
+    fn from(name: &str) -> Self {
+        Self::Name(name.trim().to_owned())
+    }
+}
+
+impl From<usize> for Column {
+    fn from(number: usize) -> Self {
+        Self::Number(number)
+    }
+}
+
+/// The column or columns of the contact position.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PositionColumns {
+    /// Along a one-dimensional surface.
+    Along(Column),
+    /// Along and across a surface.
+    Plane {
+        /// Along the length.
+        x: Column,
+        /// Across the width.
+        y: Column,
+    },
+}
+
+/// A column of numbers and their unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ValueColumn {
+    /// Which column.
+    pub column: Column,
+    /// The unit of its numbers.
+    pub unit: Unit,
+}
+
+/// The column of the contact force.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForceColumn {
+    /// Which column, and its unit of force.
+    pub values: ValueColumn,
+    /// What to do with a file that lacks it.
+    pub need: Need,
+}
+
+/// Whether a file may lack a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Need {
+    /// A file without it is refused.
+    Required,
+    /// A file without it leaves the value unknown.
+    Optional,
+}
+
+impl Columns {
+    /// A file whose positions, in millimetres, stand in one column, and whose raw channels stand in these, by name or by
+    /// number from 1. Where any is a number, the file has no header.
+    ///
+    /// ```
+    /// use palpate_estimators::recording::Columns;
+    /// use palpate_mechanics::units::Unit;
+    ///
+    /// let columns = Columns::along("X", ["Pl", "Pr"]).force("F");
+    /// assert_eq!(columns.position_unit, Unit::from_symbol("mm").unwrap());
+    /// ```
+    pub fn along<C: Into<Column>>(
+        position: impl Into<Column>,
+        channels: impl IntoIterator<Item = C>,
+    ) -> Self {
+        Self::of(PositionColumns::Along(position.into()), channels)
+    }
+
+    /// The same with positions in two columns, along and across.
+    pub fn plane<C: Into<Column>>(
+        x: impl Into<Column>,
+        y: impl Into<Column>,
+        channels: impl IntoIterator<Item = C>,
+    ) -> Self {
+        Self::of(PositionColumns::Plane { x: x.into(), y: y.into() }, channels)
+    }
+
+    fn of<C: Into<Column>>(position: PositionColumns, channels: impl IntoIterator<Item = C>) -> Self {
+        let channels: Vec<ValueColumn> = channels
+            .into_iter()
+            .map(|column| ValueColumn { column: column.into(), unit: Unit::NONE })
+            .collect();
+        let numbered = channels.iter().any(|channel| matches!(channel.column, Column::Number(_)));
+        Self {
+            header: if numbered { Header::Absent } else { Header::Present },
+            position,
+            position_unit: Unit::from_symbol("mm").unwrap_or(Unit::NONE),
+            frame: Frame::default(),
+            channels,
+            force: None,
+            hidden: None,
+        }
+    }
+
+    /// The same with the contact force, in newtons, in this column.
+    #[must_use]
+    pub fn force(self, column: impl Into<Column>) -> Self {
+        let values = ValueColumn { column: column.into(), unit: SensorKind::Reaction.unit() };
+        Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
+    }
+
+    /// The same with a hidden coordinate in this column and unit; see [`Row::hidden`](super::Row::hidden).
+    #[must_use]
+    pub fn hidden(self, column: impl Into<Column>, unit: Unit) -> Self {
+        Self { hidden: Some(ValueColumn { column: column.into(), unit }), ..self }
+    }
+
+    /// The same with coordinates of the file's own frame.
+    #[must_use]
+    pub fn in_frame(self, frame: Frame) -> Self {
+        Self { frame, ..self }
+    }
+
+    /// The columns that palpate itself writes: `position_mm` (or `x_mm`, `y_mm`), `force_n` where it is known, and
+    /// for each channel its name and unit, as in `deflection_1_mm`; a raw channel has just its name.
+    ///
+    /// `channels` and `kinds` are the names and kinds of the sensors, one each.
+    pub fn own(channels: &[String], kinds: &[SensorKind], extent: Extent) -> Self {
+        let millimetre = SensorKind::Deflection.unit();
+        let name = |name: &str| Column::Name(name.to_owned());
+        let position = match extent.width_m {
+            None => PositionColumns::Along(name("position_mm")),
+            Some(_) => PositionColumns::Plane { x: name("x_mm"), y: name("y_mm") },
+        };
+        let channels = channels.iter().zip(kinds).map(|(channel, kind)| {
+            let unit = kind.unit();
+            let suffix = if unit == Unit::NONE { "" } else { "_" };
+            let column = Column::Name(format!("{channel}{suffix}{}", unit.symbol().to_lowercase()));
+            ValueColumn { column, unit }
+        });
+        let force = ValueColumn { column: name("force_n"), unit: SensorKind::Reaction.unit() };
+        Self {
+            header: Header::Present,
+            position,
+            position_unit: millimetre,
+            frame: Frame::default(),
+            channels: channels.collect(),
+            force: Some(ForceColumn { values: force, need: Need::Optional }),
+            hidden: None,
+        }
+    }
+}

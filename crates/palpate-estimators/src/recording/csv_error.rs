@@ -1,0 +1,170 @@
+//! What can be wrong with a CSV file, and where.
+
+use std::fmt;
+use std::ops::Range;
+
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+
+/// A CSV file that cannot be read as a recording.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{problem}", Prefix(source_name, place.as_deref()))]
+pub struct CsvError {
+    /// The name of the file, as the caller gave it.
+    pub source_name: String,
+    /// Where the problem is; `None` when it concerns the whole file.
+    pub place: Option<Box<Place>>,
+    /// What is wrong.
+    #[source]
+    pub problem: CsvProblem,
+}
+
+/// A place in a CSV file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The line, from 1.
+    pub line: usize,
+    /// The column, from 1; `None` when the whole line is meant.
+    pub column: Option<usize>,
+    /// The line's text.
+    pub text: String,
+    /// The bytes of `text` that are meant.
+    pub span: Range<usize>,
+}
+
+/// What is wrong with a CSV file.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvProblem {
+    /// The bytes cannot be had.
+    #[error("cannot be read: {0}")]
+    Unreadable(#[source] std::io::Error),
+    /// There is not a single line with something in it.
+    #[error("the file is empty; a recording has at least 1 row")]
+    Empty,
+    /// There is a header but nothing below it.
+    #[error("there are 0 rows below the header; a recording has at least 1")]
+    NoRows,
+    /// The text is not UTF-8.
+    #[error("the text is not UTF-8")]
+    NotUtf8,
+    /// A quote stays open to the end of the line.
+    #[error("a quoted field does not end on this line")]
+    OpenQuote,
+    /// The header lacks a column.
+    #[error("there is no column `{wanted}`; there are {}", list(present))]
+    MissingColumn {
+        /// The name that was looked for.
+        wanted: String,
+        /// The names that are there.
+        present: Vec<String>,
+    },
+    /// A column number is 0 or beyond the last column.
+    #[error("there is no column number {wanted}; columns are numbered from 1 to {count}")]
+    NoSuchColumn {
+        /// The number that was looked for.
+        wanted: usize,
+        /// How many columns there are.
+        count: usize,
+    },
+    /// A column is meant by name, but the file has no header.
+    #[error(
+        "column `{wanted}` is given by name, but the file has no header; give its number, from 1 to {count}"
+    )]
+    NameWithoutHeader {
+        /// The name that was looked for.
+        wanted: String,
+        /// How many columns there are.
+        count: usize,
+    },
+    /// Two columns have the name of one that is needed.
+    #[error("columns {first} and {second} are both named `{name}`")]
+    DuplicateColumn {
+        /// The name.
+        name: String,
+        /// The first one's number, from 1.
+        first: usize,
+        /// The second one's number, from 1.
+        second: usize,
+    },
+    /// A row has more or fewer fields than the header (or the first row).
+    #[error("the row has {found} fields; it must have {expected}")]
+    RowLength {
+        /// How many fields the row has.
+        found: usize,
+        /// How many it must have.
+        expected: usize,
+    },
+    /// A field that must be a number is empty.
+    #[error("the field is empty; it must be a number")]
+    EmptyField,
+    /// A field is not a number.
+    #[error("`{text}` is not a number")]
+    NotANumber {
+        /// The field.
+        text: String,
+    },
+    /// A field is NaN, infinite, or too large.
+    #[error("`{text}` is not a finite number")]
+    NotFinite {
+        /// The field.
+        text: String,
+    },
+    /// A contact lies off the surface.
+    #[error("the position {} is off the surface; it must be within {}", extent.place_in_words(*position), extent.bounds_in_words())]
+    OffSurface {
+        /// Where the contact is said to be.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// The readings and the contacts are not equally many.
+    #[error("there are {readings} readings but {contacts} contacts; row by row they must pair")]
+    RowsDiffer {
+        /// Rows of the readings' file.
+        readings: usize,
+        /// Rows of the contacts' file.
+        contacts: usize,
+    },
+    /// The columns are not as many as the sensors.
+    #[error("{columns} columns are channels, but the layout has {sensors} sensors; they must be as many")]
+    ChannelCount {
+        /// Columns that hold channels.
+        columns: usize,
+        /// Sensors of the layout.
+        sensors: usize,
+    },
+}
+
+impl CsvProblem {
+    /// This problem, at a place of the file `source`.
+    pub(super) fn at(self, source: &str, place: Place) -> CsvError {
+        CsvError { source_name: source.to_owned(), place: Some(Box::new(place)), problem: self }
+    }
+
+    /// This problem, which concerns the whole file `source`.
+    pub(super) fn of_file(self, source: &str) -> CsvError {
+        CsvError { source_name: source.to_owned(), place: None, problem: self }
+    }
+}
+
+/// `file:line:column: `, as far as it is known.
+struct Prefix<'a>(&'a str, Option<&'a Place>);
+
+impl fmt::Display for Prefix<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(source, place) = self;
+        f.write_str(source)?;
+        if let Some(place) = place {
+            write!(f, ":{}", place.line)?;
+            if let Some(column) = place.column {
+                write!(f, ":{column}")?;
+            }
+        }
+        f.write_str(": ")
+    }
+}
+
+fn list(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    quoted.join(", ")
+}

@@ -1,0 +1,91 @@
+//! Writing recordings as CSV.
+
+use std::io::{self, Write};
+
+use super::columns::{Column, Columns, PositionColumns};
+use super::{Recording, Row};
+use palpate_mechanics::surface::Extent;
+
+/// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the force
+/// column is written where every row has a force, a hidden coordinate never. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes from, in a
+/// first line that begins with `#`.
+///
+/// # Errors
+/// Whatever `out` reports.
+pub fn write(recording: &Recording, extent: Extent, comment: &str, mut out: impl Write) -> io::Result<()> {
+    let columns = Columns::own(&recording.channels, &recording.kinds, extent);
+    let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
+    let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
+    writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
+    out.write_all(csv_row(header(&columns)).as_bytes())?;
+    for row in &recording.rows {
+        out.write_all(csv_row(record(row, &columns)).as_bytes())?;
+    }
+    out.flush()
+}
+
+/// A line of CSV with its end: the fields with commas between them, and quotes around one that holds a comma, a quote or the end of a
+/// line (RFC 4180).
+pub fn csv_row(fields: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let mut line = String::new();
+    for (i, field) in fields.into_iter().enumerate() {
+        if i > 0 {
+            line.push(',');
+        }
+        let field = field.as_ref();
+        if field.contains([',', '"', '\r', '\n']) {
+            line.push('"');
+            line += &field.replace('"', "\"\"");
+            line.push('"');
+        } else {
+            line += field;
+        }
+    }
+    line.push('\n');
+    line
+}
+
+pub(super) fn header(columns: &Columns) -> Vec<String> {
+    let position = match &columns.position {
+        PositionColumns::Along(x) => vec![x],
+        PositionColumns::Plane { x, y } => vec![x, y],
+    };
+    let force = columns.force.iter().map(|force| &force.values.column);
+    let channels = columns.channels.iter().map(|channel| &channel.column);
+    let all = position.into_iter().chain(force).chain(channels);
+    let name = |column: &Column| match column {
+        Column::Name(name) => name.clone(),
+        Column::Number(number) => number.to_string(),
+    };
+    all.map(name).collect()
+}
+
+pub(super) fn record(row: &Row, columns: &Columns) -> Vec<String> {
+    let mut record = vec![columns.position_unit.format_si(row.position.x_m)];
+    if let PositionColumns::Plane { .. } = columns.position {
+        record.push(columns.position_unit.format_si(row.position.y_m));
+    }
+    if let (Some(force), Some(force_n)) = (&columns.force, row.force_n) {
+        record.push(force.values.unit.format_si(force_n));
+    }
+    record.extend(
+        columns.channels.iter().zip(&row.reading).map(|(channel, value)| channel.unit.format_si(*value)),
+    );
+    record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::csv_row;
+    use crate::recording::fields::split;
+
+    #[test]
+    fn a_field_is_quoted_where_it_must_be() {
+        let fields = ["plain", "with, comma", "with \"quotes\"", "", "5 µm", " spaced "];
+        let line = csv_row(fields);
+        assert_eq!(line, "plain,\"with, comma\",\"with \"\"quotes\"\"\",,5 µm, spaced \n");
+        let read: Vec<_> = split(line.trim_end_matches('\n')).unwrap().into_iter().map(|f| f.value).collect();
+        assert_eq!(read, fields.map(str::trim));
+        assert_eq!(csv_row(["two\nlines", "b"]), "\"two\nlines\",b\n");
+    }
+}

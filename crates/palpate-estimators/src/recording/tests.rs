@@ -1,0 +1,252 @@
+use proptest::prelude::*;
+
+use super::*;
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::Unit;
+
+const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
+
+fn named(name: &str) -> Column {
+    Column::Name(name.to_owned())
+}
+
+fn channel(column: Column) -> ValueColumn {
+    ValueColumn { column, unit: Unit::NONE }
+}
+
+/// Someone else's bench: position `X` in mm, two raw channels, force `F`.
+fn foreign() -> Columns {
+    Columns {
+        header: Header::Present,
+        position: PositionColumns::Along(named("X")),
+        position_unit: Unit::from_symbol("mm").unwrap(),
+        channels: vec![channel(named("Pl")), channel(named("Pr"))],
+        force: Some(ForceColumn {
+            values: ValueColumn { column: named("F"), unit: Unit::from_symbol("N").unwrap() },
+            need: Need::Required,
+        }),
+        frame: Frame::default(),
+        hidden: None,
+    }
+}
+
+fn numbered() -> Columns {
+    let number = |number| channel(Column::Number(number));
+    Columns {
+        header: Header::Absent,
+        position: PositionColumns::Plane { x: Column::Number(2), y: Column::Number(3) },
+        channels: vec![number(2), number(4)],
+        force: None,
+        ..foreign()
+    }
+}
+
+fn read_as(columns: &Columns, bytes: &[u8]) -> Result<Recording, CsvError> {
+    let layout = Layout::even(SensorKind::Raw, 2, 0.1);
+    read("bench.csv", bytes, &Schema { columns, layout: &layout, extent: STRIP, known_force_n: None })
+}
+
+#[test]
+fn columns_are_mapped_and_others_ignored() {
+    let text = "note, X ,Pr,F,Pl\r\n\"a, b\",10,2.5,1,1.5\r\n\r\n,12,2.25,3,1.25\r\n";
+    let recording = read_as(&foreign(), text.as_bytes()).unwrap();
+    let row = |x_m, force_n, reading: [f64; 2]| Row {
+        position: Position::along(x_m),
+        force_n: Some(force_n),
+        hidden: None,
+        reading: reading.to_vec(),
+    };
+    assert_eq!(recording.rows, [row(0.01, 1.0, [1.5, 2.5]), row(0.012, 3.0, [1.25, 2.25])]);
+    assert_eq!(recording.channels, ["raw_1", "raw_2"]);
+    assert_eq!((recording.provenance.source.as_str(), recording.provenance.rows), ("bench.csv", 2));
+    assert_eq!(recording.provenance.digests[0].len(), 64);
+}
+
+#[test]
+fn readings_and_contacts_in_two_files_without_headers_pair_row_by_row() {
+    let layout = Layout::even(SensorKind::Raw, 2, 0.1);
+    let extent = Extent { length_m: 0.1, width_m: Some(0.1) };
+    let columns = numbered();
+    let schema = Schema { columns: &columns, layout: &layout, extent, known_force_n: Some(2.0) };
+    let readings = "1.0,7,8,9\n1.1,5,6,7\n";
+    let contacts = "1.0,10,20,0\n1.1,30,40,0\n";
+    let pair =
+        |contacts: &str| read_pair(("r.csv", readings.as_bytes()), ("c.csv", contacts.as_bytes()), &schema);
+    let recording = pair(contacts).unwrap();
+    assert_eq!(recording.rows[1].position, Position { x_m: 0.03, y_m: 0.04 });
+    assert_eq!(recording.rows[1].reading, [5.0, 7.0]);
+    assert_eq!(recording.rows[1].contact().map(|contact| contact.force_n), Some(2.0));
+    assert_eq!(recording.provenance.digests.len(), 2);
+    let message = pair("1.0,10,20,0\n").unwrap_err().to_string();
+    assert_eq!(message, "c.csv: there are 2 readings but 1 contacts; row by row they must pair");
+}
+
+#[test]
+fn columns_survive_json() {
+    for columns in [foreign(), numbered()] {
+        let json = serde_json::to_string(&columns).unwrap();
+        assert_eq!(serde_json::from_str::<Columns>(&json).unwrap(), columns, "{json}");
+    }
+}
+
+/// The message, then the line with a mark under what is meant.
+fn pointed(error: &CsvError) -> String {
+    let Some(place) = &error.place else { return error.to_string() };
+    let before = place.text.get(..place.span.start).unwrap().chars().count();
+    let marked = place.text.get(place.span.clone()).unwrap().chars().count();
+    format!("{error}\n  {}\n  {}{}", place.text, " ".repeat(before), "^".repeat(marked.max(1)))
+}
+
+#[test]
+fn a_bad_file_is_refused_with_line_and_column() {
+    let bad: [&[u8]; 14] = [
+        b"",
+        b"\n  \n",
+        b"X,Pl,Pr,F\n",
+        b"X,Pl,F\n10,1,2\n",
+        b"X,Pl,Pr,F,Pl\n10,1,2,3,4\n",
+        b"X,Pl,Pr,F\n10,1,2,3\n12,1,two,3\n",
+        b"X,Pl,Pr,F\n10,1,NaN,3\n",
+        b"X,Pl,Pr,F\n10, inf ,2,3\n",
+        b"X,Pl,Pr,F\n10,1e999,2,3\n",
+        b"X,Pl,Pr,F\n110,1,2,3\n",
+        b"X,Pl,Pr,F\n10,1,2\n",
+        b"X,Pl,Pr,F\n10,1,2,\n",
+        b"X,Pl,Pr,F\n10,1,\"2,3\n",
+        b"X,Pl,Pr,F\n10,1,\xff,3\n",
+    ];
+    let messages: Vec<String> =
+        bad.iter().map(|bytes| pointed(&read_as(&foreign(), bytes).unwrap_err())).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn a_file_without_a_header_is_refused_with_line_and_column() {
+    let names = Columns { header: Header::Absent, ..foreign() };
+    let along = PositionColumns::Along(Column::Number(5));
+    let beyond = Columns { position: along, ..numbered() };
+    let messages = [names, beyond].map(|columns| pointed(&read_as(&columns, b"1,2,3,4\n").unwrap_err()));
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn a_stream_goes_on_after_a_bad_line() {
+    let mut parser = ReadingParser::new("stdin", &foreign());
+    assert!(parser.awaits_columns());
+    assert_eq!(parser.parse_line(b"Pr,time,Pl\r\n").unwrap(), None);
+    assert!(!parser.awaits_columns());
+    assert_eq!(parser.parse_line(b"2,0,1\r\n").unwrap(), Some(vec![1.0, 2.0]));
+    assert_eq!(parser.parse_line(b"\n").unwrap(), None);
+    let error = parser.parse_line(b"nan,0,1\n").unwrap_err();
+    assert_eq!(error.to_string(), "stdin:4:1: `nan` is not a finite number");
+    assert_eq!(
+        parser.parse_line(b"2,1").unwrap_err().to_string(),
+        "stdin:5: the row has 2 fields; it must have 3"
+    );
+    assert_eq!(parser.parse_line(b"4,0,3").unwrap(), Some(vec![3.0, 4.0]));
+
+    let mut parser = ReadingParser::new("stdin", &numbered());
+    assert_eq!(parser.parse_line(b"0,1,2,3").unwrap(), Some(vec![1.0, 3.0]));
+    assert!(parser.parse_line(b"0,1,2").is_err());
+}
+
+#[test]
+fn folds_hold_out_every_position_once_with_all_its_rows() {
+    let text: String = (0..23).map(|i| format!("{},{i},0,1\n", (i * 7) % 11)).collect();
+    let recording = read_as(&foreign(), format!("X,Pl,Pr,F\n{text}").as_bytes()).unwrap();
+    let folds = recording.folds(5).unwrap();
+    let mut seen = vec![0; 23];
+    for (k, fold) in folds.iter().enumerate() {
+        assert_eq!(fold.training.len() + fold.held_out.len(), 23);
+        for row in &fold.held_out {
+            seen[*row] += 1;
+            assert_eq!((row * 7) % 11 % 5, k);
+        }
+    }
+    assert_eq!(seen, [1; 23]);
+    assert_eq!(recording.subset(&folds[0].held_out).distinct_positions().len(), 3);
+    assert_eq!(recording.folds(12), Err(TooFewPositions { found: 11, needed: 12 }));
+}
+
+/// A recording of two channels at ten positions, five sweeps over them, with a ripple as noise.
+fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
+    let rows = (0..50).map(|row| Row {
+        position: Position::along(0.01 * (row % 10) as f64),
+        force_n: None,
+        hidden: None,
+        reading: vec![(row % 10) as f64 + 0.001 * ((row * 7919) % 13) as f64, reading(row % 10, row / 10)],
+    });
+    let provenance = Provenance { source: "sweeps".to_owned(), rows: 50, digests: Vec::new(), seed: None };
+    Recording {
+        channels: vec!["good".to_owned(), "bad".to_owned()],
+        kinds: vec![SensorKind::Raw; 2],
+        rows: rows.collect(),
+        provenance,
+    }
+}
+
+#[test]
+fn channels_that_look_wrong_are_named() {
+    let ripple = |position: usize, sweep: usize| 0.01 * ((position * 31 + sweep * 17) % 7) as f64;
+    let dead = sweeps(|_, _| 0.25);
+    let saturated = sweeps(|position, sweep| (position as f64 + ripple(position, sweep)).min(6.0));
+    let disagreeing = sweeps(|position, sweep| {
+        position as f64 + ripple(position, sweep) + if (position, sweep) == (3, 2) { 2.0 } else { 0.0 }
+    });
+    let drifting = sweeps(|position, sweep| position as f64 + ripple(position, sweep) + 0.1 * sweep as f64);
+    let fine = sweeps(|position, sweep| position as f64 + ripple(position, sweep));
+    let warnings = [dead, saturated, disagreeing, drifting, fine].map(|recording| recording.warnings());
+    assert_eq!(warnings[4], []);
+    let messages: Vec<String> = warnings.iter().flatten().map(Warning::to_string).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+fn number() -> impl Strategy<Value = f64> {
+    proptest::num::f64::NORMAL.prop_filter("what can be written in all units", |value| value.abs() < 1e290)
+}
+
+proptest! {
+    #[test]
+    fn a_recording_survives_writing_and_reading(
+        rows in proptest::collection::vec((0.0..=0.1, number(), [number(), number()]), 1..20),
+    ) {
+        let kind = SensorKind::Deflection;
+        let layout = Layout::even(kind, 2, 0.1);
+        let rows = rows.into_iter().map(|(x_m, force_n, reading)| Row {
+            position: Position::along(x_m),
+            force_n: Some(force_n),
+            hidden: None,
+            reading: reading.to_vec(),
+        });
+        let rows: Vec<Row> = rows.collect();
+        let provenance = Provenance { source: String::new(), rows: rows.len(), digests: Vec::new(), seed: None };
+        let recording = Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance };
+        let mut bytes = Vec::new();
+        write(&recording, STRIP, "a\ntest", &mut bytes).unwrap();
+        let columns = Columns::own(&recording.channels, &recording.kinds, STRIP);
+        let schema = Schema { columns: &columns, layout: &layout, extent: STRIP, known_force_n: None };
+        prop_assert_eq!(read("", bytes.as_slice(), &schema).unwrap().rows, recording.rows);
+    }
+
+    #[test]
+    fn no_bytes_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        never_panics(&bytes);
+    }
+
+    #[test]
+    fn no_text_like_a_recording_panics(text in "(X,Pl,Pr,F\n)?([0-9.eE\"µ -]{0,4},?){0,6}\n([0-9a-f.\" ]{0,3},?\n?){0,20}") {
+        never_panics(text.as_bytes());
+    }
+}
+
+fn never_panics(bytes: &[u8]) {
+    let _ = read_as(&numbered(), bytes).map(|recording| recording.warnings());
+    if let Err(error) = read_as(&foreign(), bytes) {
+        let _ = pointed(&error);
+    }
+    let mut parser = ReadingParser::new("", &foreign());
+    let _ = parser.parse_line(b"Pl,Pr").and_then(|_| parser.parse_line(bytes));
+    let _ = ReadingParser::new("", &foreign()).parse_line(bytes);
+    let _ = ReadingParser::new("", &numbered()).parse_line(bytes);
+}

@@ -1,0 +1,225 @@
+//! What looks wrong with a recording, though it can be used.
+
+use std::fmt;
+
+use super::{Recording, Row};
+use palpate_mechanics::units::Quantity;
+
+/// Something about a channel that the bench's owner should look at.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// The channel has the same value in every row.
+    Dead {
+        /// The channel's name.
+        channel: String,
+        /// The value.
+        value: Quantity,
+    },
+    /// The channel is exactly at its highest or lowest value in at least a tenth of the rows, at three or more
+    /// distinct positions.
+    Saturated {
+        /// The channel's name.
+        channel: String,
+        /// The extreme value.
+        at: Quantity,
+        /// Rows that have it.
+        rows: usize,
+        /// Rows of the recording.
+        of: usize,
+    },
+    /// Rows lie further from the median of their repeats than 8 standard deviations of a repeat and than 1 % of the
+    /// channel's span.
+    ///
+    /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
+    /// the difference between one repeat and the next, so that a few bad rows do not hide themselves.
+    RepeatsDisagree {
+        /// The channel's name.
+        channel: String,
+        /// How many rows lie that far out.
+        rows: usize,
+        /// Rows that have repeats.
+        of: usize,
+        /// The row that lies furthest out, counted from 1 below the header.
+        worst_row: usize,
+        /// How far it lies from the median of its repeats.
+        deviation: Quantity,
+        /// The standard deviation of a repeat.
+        spread: Quantity,
+    },
+    /// The later of two repeats is mostly on the same side of the earlier one.
+    ///
+    /// The sign test of Cox and Stuart (1955), pooled over the positions: each repeat of the first half is paired with one of
+    /// the second half; D is the number of pairs that rise less those that fall. It is a drift when |D| is at least half of
+    /// the pairs and at least 4·√pairs. Repeats that follow one another at once do not show a slow drift.
+    Drift {
+        /// The channel's name.
+        channel: String,
+        /// Median change from the earlier to the later repeat.
+        change: Quantity,
+        /// Pairs that changed in that direction.
+        agreeing: usize,
+        /// All the pairs.
+        pairs: usize,
+    },
+}
+
+const SATURATED_SHARE: f64 = 0.1;
+const SATURATED_POSITIONS: usize = 3;
+const FAR_OUT_DEVIATIONS: f64 = 8.0;
+const FAR_OUT_SPAN: f64 = 0.01;
+const DRIFT_SHARE: f64 = 0.5;
+const DRIFT_DEVIATIONS: f64 = 4.0;
+
+impl Recording {
+    /// What looks wrong, channel by channel; see [`Warning`] for the rules.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let repeats = self.repeats();
+        let channels = (0..self.channels.len()).filter_map(|index| Channel::of(self, index));
+        channels.flat_map(|channel| channel.warnings(&repeats)).collect()
+    }
+
+    /// Row indices in groups of two or more with the same position and force, each in the order of recording.
+    fn repeats(&self) -> Vec<Vec<usize>> {
+        let key = |i: &usize| {
+            let row: &Row = &self.rows[*i];
+            [row.position.x_m, row.position.y_m, row.force_n.unwrap_or(f64::NEG_INFINITY)]
+        };
+        let mut order: Vec<usize> = (0..self.rows.len()).collect();
+        order.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+        let groups = order.chunk_by(|a, b| key(a) == key(b)).filter(|group| group.len() > 1);
+        groups.map(<[usize]>::to_vec).collect()
+    }
+}
+
+/// One channel of a recording.
+struct Channel<'a> {
+    recording: &'a Recording,
+    index: usize,
+    values: Vec<f64>,
+    lowest: f64,
+    highest: f64,
+}
+
+impl<'a> Channel<'a> {
+    /// `None` where some row has no value for it, or there are no rows.
+    fn of(recording: &'a Recording, index: usize) -> Option<Self> {
+        let values: Option<Vec<f64>> =
+            recording.rows.iter().map(|row| row.reading.get(index).copied()).collect();
+        let values = values.filter(|values| !values.is_empty())?;
+        let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Some(Self { recording, index, values, lowest, highest })
+    }
+
+    fn warnings(&self, repeats: &[Vec<usize>]) -> Vec<Warning> {
+        if self.lowest == self.highest {
+            let dead = Warning::Dead { channel: self.name(), value: self.quantity(self.lowest) };
+            return if self.values.len() > 1 { vec![dead] } else { Vec::new() };
+        }
+        let saturated = [self.lowest, self.highest].into_iter().filter_map(|extreme| self.saturated(extreme));
+        saturated.chain(self.repeats_disagree(repeats)).chain(self.drift(repeats)).collect()
+    }
+
+    fn saturated(&self, extreme: f64) -> Option<Warning> {
+        let there: Vec<usize> = (0..self.values.len()).filter(|i| self.values[*i] == extreme).collect();
+        let (rows, of) = (there.len(), self.values.len());
+        let positions = self.recording.subset(&there).distinct_positions().len();
+        let much = rows as f64 >= SATURATED_SHARE * of as f64 && positions >= SATURATED_POSITIONS;
+        much.then(|| Warning::Saturated { channel: self.name(), at: self.quantity(extreme), rows, of })
+    }
+
+    fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
+        let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
+        let steps = pairs.map(|pair| (self.values[pair[1]] - self.values[pair[0]]).abs()).collect();
+        let spread = 1.4826 / std::f64::consts::SQRT_2 * median(steps)?;
+        let bound = (FAR_OUT_DEVIATIONS * spread).max(FAR_OUT_SPAN * (self.highest - self.lowest));
+        let mut rows = 0;
+        let mut worst = (0, 0.0);
+        for group in repeats {
+            let Some(middle) = median(group.iter().map(|i| self.values[*i]).collect()) else { continue };
+            for i in group {
+                let deviation = self.values[*i] - middle;
+                rows += usize::from(deviation.abs() > bound);
+                if deviation.abs() > f64::abs(worst.1) {
+                    worst = (*i, deviation);
+                }
+            }
+        }
+        (rows > 0).then(|| Warning::RepeatsDisagree {
+            channel: self.name(),
+            rows,
+            of: repeats.iter().map(Vec::len).sum(),
+            worst_row: worst.0 + 1,
+            deviation: self.quantity(worst.1),
+            spread: self.quantity(spread),
+        })
+    }
+
+    fn drift(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
+        let mut changes = Vec::new();
+        for rows in repeats {
+            let (earlier, later) = (&rows[..rows.len() / 2], &rows[rows.len().div_ceil(2)..]);
+            changes.extend(earlier.iter().zip(later).map(|(a, b)| self.values[*b] - self.values[*a]));
+        }
+        let pairs = changes.len();
+        let rising = changes.iter().filter(|change| **change > 0.0).count();
+        let falling = changes.iter().filter(|change| **change < 0.0).count();
+        let difference = rising.abs_diff(falling) as f64;
+        let is_drift = difference >= DRIFT_SHARE * pairs as f64
+            && difference >= DRIFT_DEVIATIONS * (pairs as f64).sqrt();
+        let change = self.quantity(median(changes)?);
+        is_drift.then(|| Warning::Drift {
+            channel: self.name(),
+            change,
+            agreeing: rising.max(falling),
+            pairs,
+        })
+    }
+
+    fn name(&self) -> String {
+        self.recording.channels[self.index].clone()
+    }
+
+    fn quantity(&self, value: f64) -> Quantity {
+        let dimension = self
+            .recording
+            .kinds
+            .get(self.index)
+            .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
+        Quantity { value, dimension }
+    }
+}
+
+/// The middle value, or the mean of the two middle ones; `None` of nothing.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let half = values.len() / 2;
+    let upper = values.get(half)?;
+    if values.len() % 2 == 1 { Some(*upper) } else { Some(0.5 * (values[half - 1] + upper)) }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Dead { channel, value } => {
+                write!(f, "channel `{channel}` reads {value} in every row: is it connected?")
+            }
+            Self::Saturated { channel, at, rows, of } => {
+                write!(
+                    f,
+                    "channel `{channel}` is at {at}, its extreme, in {rows} of {of} rows: does it saturate?"
+                )
+            }
+            Self::RepeatsDisagree { channel, rows, of, worst_row, deviation, spread } => write!(
+                f,
+                "channel `{channel}` disagrees with its repeats in {rows} of {of} rows, most in row {worst_row}, by {deviation} where \
+                 {spread} is usual"
+            ),
+            Self::Drift { channel, change, agreeing, pairs } => write!(
+                f,
+                "channel `{channel}` drifts: {agreeing} of {pairs} later repeats lie on the same side of the earlier ones, by \
+                 {change} in the median"
+            ),
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! What a reading comes from: surface, sensors, contact, and how its recordings are laid out.
+
+use std::io::Read;
+
+use serde::{Deserialize, Serialize};
+
+use crate::arrangement::inner_grid;
+use crate::recording::{self, Columns, CsvError, Recording, Schema};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::{Limit, LimitError};
+use palpate_mechanics::sensing::{Layout, Placement, Sensor, SensorGroup, SensorKind, even_positions};
+use palpate_mechanics::surface::{Extent, NothingToRead, SurfaceSpec};
+
+/// A surface with its sensors, all checked. A rig describes it, and a locator keeps it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bench {
+    /// The surface that is touched.
+    pub surface: SurfaceSpec,
+    /// Its sensors, one a channel of a reading.
+    pub layout: Layout,
+    /// The contact force in newtons, greater than 0, where it is known.
+    pub force_n: Option<f64>,
+    /// Which column of a recording is what; `None` for the columns that palpate itself writes.
+    pub columns: Option<Columns>,
+}
+
+/// A sensor, or a force, that does not go with its surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SetupError {
+    /// A sensor beside the surface.
+    #[error(
+        "sensor {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
+    )]
+    OffSurface {
+        /// Which sensor of its group, from 1.
+        number: usize,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A reaction sensor where nothing supports the surface.
+    #[error("reaction sensor {number} is at {}, where no support takes up force", extent.place_in_words(*position))]
+    NoSupport {
+        /// Which sensor of its group, from 1.
+        number: usize,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+    /// A sensor that reads nothing, wherever the surface is touched.
+    #[error(
+        "{kind} sensor {number} is at {} and would read nothing: {reason}",
+        extent.place_in_words(*position)
+    )]
+    Insensitive {
+        /// Which sensor of its group, from 1.
+        number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+        /// Why.
+        reason: NothingToRead,
+    },
+    /// A sensor on a digit that is no strain gauge.
+    #[error("a digit is read by strain gauges, not by {kind} sensors")]
+    NotAGauge {
+        /// What it measures.
+        kind: SensorKind,
+    },
+    /// A raw channel on a surface with a model.
+    #[error("a raw channel has no model; only a measured surface has raw channels")]
+    RawOnModel,
+    /// A grid of sensors on a line.
+    #[error("a grid of sensors needs a plane; this surface is a line")]
+    GridOnLine,
+    /// A number of sensors, on a plane, where it does not say where they are.
+    #[error("{count} sensors along a length do not say where on a plane they are; place them by a grid")]
+    EvenlyOnPlane {
+        /// How many.
+        count: usize,
+    },
+    /// No sensor.
+    #[error("a group of 0 sensors; at least 1 is needed")]
+    NoSensors,
+    /// A number that is not in its range.
+    #[error("{what} is {value}; it must be {bound}")]
+    OutOfRange {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its bound.
+        bound: &'static str,
+    },
+}
+
+/// Checks that a sensor of this `kind` at `position` goes with a surface; `number` is its number in messages, from 1.
+///
+/// # Errors
+/// [`SetupError`] off the surface, where it would read nothing, or for a kind that does not go with the surface.
+pub fn check_sensor(
+    surface: &SurfaceSpec,
+    kind: SensorKind,
+    number: usize,
+    position: Position,
+) -> Result<(), SetupError> {
+    let extent = surface.extent();
+    if kind != SensorKind::Strain && matches!(surface, SurfaceSpec::Digit(_)) {
+        return Err(SetupError::NotAGauge { kind });
+    }
+    if !extent.contains(position) {
+        return Err(SetupError::OffSurface { number, position, extent });
+    }
+    let Some(model) = surface.model() else { return Ok(()) };
+    if kind == SensorKind::Raw {
+        return Err(SetupError::RawOnModel);
+    }
+    if kind == SensorKind::Reaction && !model.is_supported_at(position) {
+        return Err(SetupError::NoSupport { number, position, extent });
+    }
+    match model.nothing_to_read(kind, position) {
+        Some(reason) => Err(SetupError::Insensitive { number, kind, position, extent, reason }),
+        None => Ok(()),
+    }
+}
+
+impl Bench {
+    /// A surface without sensors yet, touched by contacts of unknown force.
+    ///
+    /// ```
+    /// use palpate_estimators::setup::Bench;
+    /// use palpate_mechanics::sensing::SensorKind::Deflection;
+    /// use palpate_mechanics::surface::Beam;
+    /// use palpate_mechanics::units::{gpa, mm, newtons, um};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// assert_eq!(setup.layout.len(), 8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn new(surface: impl Into<SurfaceSpec>) -> Self {
+        Self { surface: surface.into(), layout: Layout::default(), force_n: None, columns: None }
+    }
+
+    /// A surface without a model, `length_m` metres long, with these raw channels, known by recordings only.
+    ///
+    /// # Errors
+    /// [`SetupError`] without channels, or for a length that is not greater than 0 and finite.
+    pub fn measured(length_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
+        Self::of_extent(Extent { length_m, width_m: None }, channels)
+    }
+
+    /// A plane without a model, known by recordings only; see [`Bench::measured`].
+    ///
+    /// # Errors
+    /// [`SetupError`] without channels, or for a length or width that is not greater than 0 and finite.
+    pub fn measured_plane(length_m: f64, width_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
+        Self::of_extent(Extent { length_m, width_m: Some(width_m) }, channels)
+    }
+
+    fn of_extent(extent: Extent, channels: &[&str]) -> Result<Self, SetupError> {
+        let sizes = [
+            ("the length in metres", extent.length_m),
+            ("the width in metres", extent.width_m.unwrap_or(1.0)),
+        ];
+        for (what, value) in sizes {
+            check(what, value, |size| size > 0.0, "greater than 0 and finite")?;
+        }
+        let positions = vec![Position::default(); channels.len()];
+        let mut setup = Self::new(extent).sensors(SensorKind::Raw.at_positions(positions))?;
+        for (sensor, name) in setup.layout.sensors.iter_mut().zip(channels) {
+            (*name).clone_into(&mut sensor.name);
+        }
+        Ok(setup)
+    }
+
+    /// The same with further sensors; each kind is numbered by itself: "deflection_1", "strain_1".
+    ///
+    /// # Errors
+    /// [`SetupError`] for a sensor that does not go with the surface, or numbers of its channel out of their range.
+    pub fn sensors(mut self, group: SensorGroup) -> Result<Self, SetupError> {
+        let SensorGroup { kind, ref channel, .. } = group;
+        let positive = "at least 0 and finite";
+        for (what, value) in [
+            ("the noise", channel.noise_sd),
+            ("the resolution", channel.resolution),
+            ("the offset error", channel.offset_error),
+            ("the position error in metres", channel.position_error_m),
+        ] {
+            check(what, value, |size| size >= 0.0, positive)?;
+        }
+        check(
+            "the gain error",
+            channel.gain_error,
+            |gain| (0.0..1.0).contains(&gain),
+            "at least 0 and below 1",
+        )?;
+        let positions = positions_of(&group.placement, self.surface.extent())?;
+        let before = self.layout.sensors.iter().filter(|sensor| sensor.kind == kind).count();
+        for (i, position) in positions.into_iter().enumerate() {
+            check_sensor(&self.surface, kind, i + 1, position)?;
+            let name = format!("{kind}_{}", before + i + 1);
+            self.layout.sensors.push(Sensor { kind, position, name, channel: group.channel });
+        }
+        Ok(self)
+    }
+
+    /// The same, touched by contacts of this known force in newtons.
+    ///
+    /// # Errors
+    /// [`SetupError::OutOfRange`] for a force that is not greater than 0 and finite.
+    pub fn known_force(self, force_n: f64) -> Result<Self, SetupError> {
+        check("the force in newtons", force_n, |force| force > 0.0, "greater than 0 and finite")?;
+        Ok(Self { force_n: Some(force_n), ..self })
+    }
+
+    /// The same, whose recordings have these columns.
+    #[must_use]
+    pub fn recorded_as(self, columns: Columns) -> Self {
+        Self { columns: Some(columns), ..self }
+    }
+
+    /// The Cramér–Rao bound of this bench.
+    ///
+    /// # Errors
+    /// [`LimitError`] for a measured surface, for a live sensor without noise, and when none is alive.
+    pub fn cramer_rao_bound(&self) -> Result<Limit<'_>, LimitError> {
+        Limit::new(self.surface.model().ok_or(LimitError::NoModel)?, &self.layout)
+    }
+
+    /// Which column of a recording is what: those that were named, or those that palpate itself writes.
+    pub fn recording_columns(&self) -> Columns {
+        match &self.columns {
+            Some(columns) => columns.clone(),
+            None => Columns::own(&self.layout.names(), &self.layout.kinds(), self.surface.extent()),
+        }
+    }
+
+    /// Reads a recording of this bench; see [`recording::read`]. Where the file has no force, the bench's holds.
+    ///
+    /// # Errors
+    /// [`CsvError`], with line and column.
+    pub fn read_recording(&self, source: &str, bytes: impl Read) -> Result<Recording, CsvError> {
+        recording::read(source, bytes, &self.schema(&self.recording_columns()))
+    }
+
+    /// Reads a recording of this bench from two files; see [`recording::read_pair`].
+    ///
+    /// # Errors
+    /// [`CsvError`], with line and column.
+    pub fn read_recording_pair(
+        &self,
+        readings: (&str, impl Read),
+        contacts: (&str, impl Read),
+    ) -> Result<Recording, CsvError> {
+        recording::read_pair(readings, contacts, &self.schema(&self.recording_columns()))
+    }
+
+    /// What a file must agree with to be a recording of this bench, by columns such as [`Bench::recording_columns`].
+    pub fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
+        let extent = self.surface.extent();
+        Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }
+    }
+}
+
+fn check(
+    what: &'static str,
+    value: f64,
+    good: impl Fn(f64) -> bool,
+    bound: &'static str,
+) -> Result<(), SetupError> {
+    if value.is_finite() && good(value) { Ok(()) } else { Err(SetupError::OutOfRange { what, value, bound }) }
+}
+
+fn positions_of(placement: &Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {
+    let positions = match placement {
+        Placement::Evenly(count) if extent.is_plane() => {
+            return Err(SetupError::EvenlyOnPlane { count: *count });
+        }
+        Placement::Evenly(count) => even_positions(*count, extent.length_m).collect(),
+        Placement::Grid(..) if !extent.is_plane() => return Err(SetupError::GridOnLine),
+        Placement::Grid(columns, rows) => inner_grid(extent, *columns, *rows),
+        Placement::At(positions) => positions.clone(),
+    };
+    if positions.is_empty() { Err(SetupError::NoSensors) } else { Ok(positions) }
+}

@@ -1,0 +1,176 @@
+//! Recordings made by the model of a surface instead of its bench.
+
+mod moving;
+
+use std::sync::Arc;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::arrangement::{ArrangementError, Training};
+use crate::recording::{Provenance, Recording, Row};
+use crate::setup::Bench;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
+use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
+
+pub use moving::{MovingContact, MovingContacts, simulate_moving};
+
+/// Why a rig cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// The surface has no model.
+    #[error("a measured surface has no model to simulate; it needs a recording")]
+    NoModel,
+    /// The contact force is not given.
+    #[error("a simulation needs the contact force; there is no [contact] force")]
+    NoForce,
+    /// The training positions cannot be laid out.
+    #[error(transparent)]
+    Arrangement(#[from] ArrangementError),
+    /// A position does not lie on the surface.
+    #[error(
+        "position {number} is at {}, off the surface; it must be within {}",
+        extent.place_in_words(*position),
+        extent.bounds_in_words()
+    )]
+    OffSurface {
+        /// Which position, from 1.
+        number: usize,
+        /// Where it is.
+        position: Position,
+        /// The surface.
+        extent: Extent,
+    },
+}
+
+/// The sensors of a layout under a surface with a model, each with its response function.
+pub struct CleanSensors<'a> {
+    functions: Vec<Arc<dyn ResponseFunction + 'a>>,
+}
+
+impl<'a> CleanSensors<'a> {
+    /// The response functions of all sensors of `layout`.
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
+        let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
+        Self { functions: layout.sensors.iter().map(function).collect() }
+    }
+
+    /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
+    pub fn reading(&self, contact: Contact) -> Vec<f64> {
+        self.functions.iter().map(|function| function.at(contact)).collect()
+    }
+}
+
+/// What the sensors of `layout` would read without any fault when `contact` touches `surface`; for more than one contact
+/// of the same surface see [`CleanSensors`].
+pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -> Vec<f64> {
+    CleanSensors::new(surface, layout).reading(contact)
+}
+
+impl Bench {
+    /// The bench as it is when pressed to calibrate: with the force of these presses.
+    pub fn pressed_by(&self, training: &Training) -> Self {
+        Self { force_n: training.force_n.or(self.force_n), ..self.clone() }
+    }
+
+    /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
+    /// faulty channels report; see [`simulate_at`].
+    ///
+    /// # Errors
+    /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
+    pub fn simulate(&self, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
+        let positions = training.positions(self.surface.extent())?;
+        simulate_at(&self.pressed_by(training), &positions, training.repeats, seed)
+    }
+}
+
+/// Presses the bench's simulated surface with its force at each of `positions`, `repeats` times in a row, and records what its
+/// faulty channels report. Gains, offsets and the places of sensors are drawn once for the recording, noise for each reading.
+///
+/// The same seed gives the same recording.
+///
+/// # Errors
+/// [`SimulateError`] when the bench lacks a model or a force, or a position lies off the surface.
+pub fn simulate_at(
+    bench: &Bench,
+    positions: &[Position],
+    repeats: usize,
+    seed: u64,
+) -> Result<Recording, SimulateError> {
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
+    let mut places = rng.clone();
+    places.jump();
+    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
+    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let mut rows = Vec::new();
+    for (i, position) in positions.iter().copied().enumerate() {
+        if !surface.contains(position) {
+            return Err(SimulateError::OffSurface { number: i + 1, position, extent: surface.extent() });
+        }
+        let clean = sensors.reading(Contact { position, force_n });
+        for _ in 0..repeats {
+            let reading = measure(&bench.layout, &clean, &errors, &mut rng);
+            rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
+        }
+    }
+    let source = "simulation".to_owned();
+    let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
+    Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
+}
+
+/// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
+/// report. Gains, offsets and the places of sensors are drawn once, noise for each reading.
+///
+/// The same seed gives the same readings.
+///
+/// # Errors
+/// [`SimulateError::NoModel`] for a measured surface.
+pub fn simulate_loads(
+    bench: &Bench,
+    loads: &[UniformLoad],
+    repeats: usize,
+    seed: u64,
+) -> Result<Vec<Vec<f64>>, SimulateError> {
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut places = rng.clone();
+    places.jump();
+    let placed = displaced(&bench.layout, surface.extent(), &mut places);
+    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let clean = clean_reading_of_loads(surface, &placed, loads);
+    Ok((0..repeats).map(|_| measure(&bench.layout, &clean, &errors, &mut rng)).collect())
+}
+
+/// What the sensors of `layout` would read without any fault under all of `loads` at once, by superposition, in the SI unit of
+/// each sensor.
+fn clean_reading_of_loads(surface: &dyn Surface, layout: &Layout, loads: &[UniformLoad]) -> Vec<f64> {
+    let reading = |sensor: &Sensor| {
+        let function = surface.influence_function(sensor.kind, sensor.position);
+        loads.iter().map(|load| load.force_n * load.mean(&*function)).sum()
+    };
+    layout.sensors.iter().map(reading).collect()
+}
+
+/// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
+/// surface's edge. A perfectly placed sensor stays where it is.
+pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
+    let mut placed = layout.clone();
+    for sensor in &mut placed.sensors {
+        let error_m = sensor.channel.position_error_m;
+        let mut beside =
+            |at_m: f64, size_m: f64| (at_m + error_m * rng.random_range(-1.0..=1.0)).clamp(0.0, size_m);
+        if error_m > 0.0 {
+            let Position { x_m, y_m } = sensor.position;
+            let y_m = extent.width_m.map_or(y_m, |width_m| beside(y_m, width_m));
+            sensor.position = Position { x_m: beside(x_m, extent.length_m), y_m };
+        }
+    }
+    placed
+}
+
+#[cfg(test)]
+mod tests;

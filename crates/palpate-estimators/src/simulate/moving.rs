@@ -1,0 +1,129 @@
+//! A moving contact, on a beam that swings or on a plate in balance.
+
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{CleanSensors, SimulateError};
+use crate::recording::{Provenance, Recording, Row, TimedRecording};
+use crate::setup::Bench;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
+use palpate_mechanics::surface::Motion;
+use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
+
+/// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
+const MODES: usize = 10;
+
+/// Contacts that move over a surface: one or two, and what swings under them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingContacts {
+    /// The contact, or the first of two.
+    pub first: MovingContact,
+    /// The other one.
+    pub second: Option<MovingContact>,
+    /// The beam with its inertia and damping; nothing for a plate, which is in balance at every reading.
+    pub beam: Option<ModalBeam>,
+    /// Readings a second, in hertz; greater than 0.
+    pub rate_hz: f64,
+}
+
+/// One contact that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingContact {
+    /// Where it goes.
+    pub motion: Motion,
+    /// Its force in newtons, where that is not the one of the rig's presses.
+    pub force_n: Option<f64>,
+}
+
+impl MovingContacts {
+    /// How long it takes until every contact has arrived, in seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.moving().map(|contact| contact.motion.duration_s()).fold(0.0, f64::max)
+    }
+
+    /// The contacts at `time_s`; `force_n` is the force, in newtons, of those that have none of their own.
+    pub fn contacts_at(&self, time_s: f64, force_n: f64) -> Vec<Contact> {
+        let at =
+            |contact: MovingContact| contact.motion.contact_at(time_s, contact.force_n.unwrap_or(force_n));
+        self.moving().map(at).collect()
+    }
+
+    /// The same contacts, the first at another speed between its turns.
+    #[must_use]
+    pub fn at_speed(self, speed_m_per_s: f64) -> Self {
+        let motion = Motion { speed_m_per_s, ..self.first.motion };
+        Self { first: MovingContact { motion, ..self.first }, ..self }
+    }
+
+    fn moving(&self) -> impl Iterator<Item = MovingContact> {
+        std::iter::once(self.first).chain(self.second)
+    }
+}
+
+/// Moves contacts over the bench's simulated surface, and records what the faulty channels report: over a beam that swings,
+/// from its balance under them, or over a plate that is in balance at every reading. Gains and offsets are drawn once for
+/// the recording, noise for each reading. While a contact is lifted its force is 0, and its position is where it comes down
+/// again.
+///
+/// The same seed gives the same recording.
+///
+/// # Errors
+/// [`SimulateError`] when the bench has no force or no model.
+pub fn simulate_moving(
+    bench: &Bench,
+    moving: &MovingContacts,
+    seed: u64,
+) -> Result<TimedRecording, SimulateError> {
+    let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
+    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let layout = &bench.layout;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let errors = ChannelErrors::draw(layout, &mut rng);
+    let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;
+    let times_s: Vec<f64> = (0..count).map(|i| i as f64 / moving.rate_hz).collect();
+    let mut under = match moving.beam {
+        Some(beam) => Under::Swings(beam.at_rest(MODES, &moving.contacts_at(0.0, force_n))),
+        None => Under::Balances(CleanSensors::new(surface, layout)),
+    };
+    let (mut rows, mut second) = (Vec::with_capacity(count), Vec::new());
+    for (i, time_s) in times_s.iter().enumerate() {
+        let contacts = moving.contacts_at(*time_s, force_n);
+        let since_s = if i > 0 { 1.0 / moving.rate_hz } else { 0.0 };
+        let clean = under.reading(layout, &contacts, since_s);
+        let reading = measure(layout, &clean, &errors, &mut rng);
+        let Contact { position, force_n } = contacts[0];
+        rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
+        second.extend(contacts.get(1));
+    }
+    let provenance =
+        Provenance { source: "simulation".to_owned(), rows: count, digests: Vec::new(), seed: Some(seed) };
+    let recording = Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance };
+    Ok(TimedRecording { recording, times_s, second })
+}
+
+/// What is under the contacts.
+enum Under<'a> {
+    Swings(ModalResponse),
+    Balances(CleanSensors<'a>),
+}
+
+impl Under<'_> {
+    /// What the sensors would read without any fault, `since_s` seconds after the reading before; 0 for the first one.
+    fn reading(&mut self, layout: &Layout, contacts: &[Contact], since_s: f64) -> Vec<f64> {
+        match self {
+            Self::Swings(response) => {
+                if since_s > 0.0 {
+                    response.advance(contacts, since_s);
+                }
+                let clean = |sensor: &Sensor| response.reading(sensor.kind, sensor.position);
+                layout.sensors.iter().map(clean).collect()
+            }
+            Self::Balances(sensors) => {
+                let readings = contacts.iter().map(|contact| sensors.reading(*contact));
+                let sum = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a + b).collect();
+                readings.reduce(sum).unwrap_or_default()
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+use super::*;
+use palpate_mechanics::sensing::SensorKind;
+
+use crate::fixtures::{Example, faulty_paper, paper, strip};
+use palpate_mechanics::sensing::ChannelModel;
+
+fn noisy() -> Example {
+    let faults =
+        ChannelModel { noise_sd: 5e-6, gain_error: 0.05, offset_error: 2e-6, ..ChannelModel::default() };
+    faulty_paper(faults, 3)
+}
+
+#[test]
+fn a_clean_simulation_is_force_times_influence() {
+    let rig = paper(0.0, 1);
+    let recording = rig.simulate(1);
+    assert_eq!(recording.rows.len(), 10);
+    let surface = rig.bench.surface.model().unwrap();
+    for (i, row) in recording.rows.iter().enumerate() {
+        assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
+        for (sensor, value) in rig.bench.layout.sensors.iter().zip(&row.reading) {
+            let influence = surface.influence(SensorKind::Deflection, sensor.position, row.position);
+            assert_eq!(*value, 3.0 * influence);
+        }
+    }
+}
+
+#[test]
+fn one_seed_gives_one_recording_and_another_seed_another() {
+    let rig = noisy();
+    let recording = rig.simulate(7);
+    assert_eq!(recording.rows.len(), 30);
+    assert_eq!(rig.simulate(7), recording);
+    assert_ne!(rig.simulate(8).rows, recording.rows);
+    assert_eq!(recording.provenance.seed, Some(7));
+}
+
+#[test]
+fn a_simulation_survives_its_file_bit_for_bit() {
+    let rig = noisy();
+    let recording = rig.simulate(7);
+    let mut bytes = Vec::new();
+    crate::recording::write(&recording, rig.bench.surface.extent(), "a simulation", &mut bytes).unwrap();
+    assert!(bytes.starts_with(b"# a simulation\nposition_mm,force_n,deflection_1_mm,deflection_2_mm,"));
+    assert_eq!(rig.bench.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_the_reason() {
+    let measured = strip();
+    let mut no_force = paper(5e-6, 1);
+    no_force.bench.force_n = None;
+    let here = [Position::along(0.1)];
+    let messages = [
+        simulate_at(&measured, &here, 1, 1).unwrap_err().to_string(),
+        no_force.bench.simulate(&no_force.training, 1).unwrap_err().to_string(),
+        simulate_at(&paper(5e-6, 1).bench, &[Position::along(0.1), Position::along(0.401)], 1, 1)
+            .unwrap_err()
+            .to_string(),
+    ];
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
+    let line = Extent { length_m: 0.4, width_m: None };
+    let mut here = Layout::even(SensorKind::Deflection, 8, 0.4);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    assert_eq!(displaced(&here, line, &mut rng), here);
+    here.sensors[0].position.x_m = 0.0;
+    here.sensors.iter_mut().for_each(|sensor| sensor.channel.position_error_m = 5e-4);
+    let mut moved = Vec::new();
+    for _ in 0..200 {
+        let placed = displaced(&here, line, &mut rng);
+        assert!(placed.sensors[0].position.x_m >= 0.0);
+        moved.extend(
+            placed.sensors[1..].iter().zip(&here.sensors[1..]).map(|(p, h)| p.position.x_m - h.position.x_m),
+        );
+        assert!(placed.sensors.iter().all(|sensor| sensor.position.y_m == 0.0));
+    }
+    let largest = moved.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
+    let mean = moved.iter().sum::<f64>() / moved.len() as f64;
+    assert!(largest <= 5e-4 && largest > 4.9e-4 && mean.abs() < 5e-5, "{largest} {mean}");
+}

@@ -1,0 +1,228 @@
+//! What is believed of a surface with no, one or two contacts; on a plane there is at most one.
+
+use super::bank::Bank;
+use super::gaussian::Gaussian;
+use super::on_plane::{self, OnPlane};
+use super::step::{OnLine, Step, V, W, X, contact, contacts, seen_on_line};
+use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood};
+use palpate_mechanics::contact::{Contact, Position};
+
+/// A bank of a surface with as many contacts.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one contact is the rule, and a box would cost it an allocation a reading"
+)]
+pub(super) enum Belief {
+    Nothing(Bank<2, 1>),
+    One(Bank<6, 3>),
+    Two(Box<Bank<10, 9>>),
+    OnPlane(Box<Bank<{ on_plane::NUMBERS }, 3>>),
+}
+
+/// A belief as one Gaussian.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one contact is the rule, and a box would cost it an allocation a reading"
+)]
+pub(super) enum Mixed {
+    Nothing(Gaussian<2>),
+    One(Gaussian<6>),
+    Two(Gaussian<10>),
+    OnPlane(Gaussian<{ on_plane::NUMBERS }>),
+}
+
+/// A reading, and what the surface says about it.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub likelihood: &'a dyn Likelihood,
+    pub whitened: &'a [f64],
+    /// Whether the surface swings.
+    pub swings: bool,
+}
+
+/// One contact of a belief: mean and variances of position, speed and force, and then of position and speed across, which
+/// are zeros on a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moments {
+    pub mean: [f64; 5],
+    pub variance: [f64; 5],
+    /// Covariance of the positions along and across, in m².
+    pub covariance_m2: f64,
+}
+
+impl Belief {
+    /// A surface at rest that nothing touches.
+    pub fn nothing() -> Self {
+        Self::Nothing(Bank::of(Gaussian::default()))
+    }
+
+    /// Becomes the mixture with another belief that nothing touches, whose share is `share`.
+    pub fn absorb(&mut self, other: &Self, share: f64) {
+        if let (Self::Nothing(own), Self::Nothing(other)) = (self, other) {
+            let parts = [(1.0 - share, own.mixed()), (share, other.mixed())];
+            *own = Bank::of(Gaussian::mixed(parts.into_iter()));
+        }
+    }
+
+    pub fn contacts(&self) -> usize {
+        match self {
+            Self::Nothing(_) => 0,
+            Self::One(_) => 1,
+            Self::Two(_) => 2,
+            Self::OnPlane(_) => 1,
+        }
+    }
+
+    /// After a step and before its reading.
+    pub fn predicted(&self, step: &Step, geometry: Geometry) -> Self {
+        match (self, geometry) {
+            (Self::Nothing(bank), Geometry::Line(likelihood)) => {
+                Self::Nothing(bank.predicted(&OnLine { step, likelihood }))
+            }
+            (Self::One(bank), Geometry::Line(likelihood)) => {
+                Self::One(bank.predicted(&OnLine { step, likelihood }))
+            }
+            (Self::Two(bank), Geometry::Line(likelihood)) => {
+                Self::Two(Box::new(bank.predicted(&OnLine { step, likelihood })))
+            }
+            (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&OnPlane(step)))),
+            // A plane in balance that nothing touches stays as it is.
+            (belief, Geometry::Plane(_)) => belief.clone(),
+        }
+    }
+
+    /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
+    pub fn updated(&self, seen: Seen) -> Option<(Self, f64)> {
+        let extent = seen.likelihood.extent();
+        let length_m = extent.length_m;
+        Some(match (self, seen.likelihood.geometry()) {
+            (Self::Nothing(bank), _) => {
+                let expand = |about: &[f64; 1]| seen.fit_nothing(about);
+                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
+                (Self::Nothing(bank), evidence)
+            }
+            (Self::One(bank), Geometry::Line(line)) => {
+                let expand = |about: &[f64; 3]| seen.fit_one(line, about);
+                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
+                (Self::One(bank), evidence)
+            }
+            (Self::Two(bank), Geometry::Line(line)) => {
+                let expand = |about: &[f64; 5]| seen.fit_two(line, about);
+                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
+                (Self::Two(Box::new(bank)), evidence)
+            }
+            (Self::OnPlane(bank), Geometry::Plane(plane)) => {
+                let expand = |about: &[f64; 3]| on_plane::fit(plane, seen.whitened, about);
+                let (bank, evidence) = bank.updated(&on_plane::seen(extent), expand, None)?;
+                (Self::OnPlane(Box::new(bank)), evidence)
+            }
+            // Contacts of a line are not believed in on a plane, nor the other way round.
+            (Self::One(_) | Self::Two(_), Geometry::Plane(_)) | (Self::OnPlane(_), Geometry::Line(_)) => {
+                return None;
+            }
+        })
+    }
+
+    /// What is left when contact `k` lets go; the surface swings on.
+    pub fn without(&self, k: usize) -> Option<Self> {
+        match self {
+            Self::Nothing(_) => None,
+            Self::One(bank) => Some(Self::Nothing(bank.without(k))),
+            Self::Two(bank) => Some(Self::One(bank.without(k))),
+            Self::OnPlane(_) => Some(Self::nothing()),
+        }
+    }
+
+    pub fn mixed(&self) -> Mixed {
+        match self {
+            Self::Nothing(bank) => Mixed::Nothing(bank.mixed()),
+            Self::One(bank) => Mixed::One(bank.mixed()),
+            Self::Two(bank) => Mixed::Two(bank.mixed()),
+            Self::OnPlane(bank) => Mixed::OnPlane(bank.mixed()),
+        }
+    }
+
+    /// What it was before a step, given what it was `later` after it, if that has as many contacts.
+    pub fn smoothed(&self, step: &Step, geometry: Geometry, later: &Self) -> Option<Self> {
+        match (self, later, geometry) {
+            (Self::Nothing(bank), Self::Nothing(later), Geometry::Line(likelihood)) => {
+                Some(Self::Nothing(bank.smoothed(&OnLine { step, likelihood }, later)))
+            }
+            (Self::One(bank), Self::One(later), Geometry::Line(likelihood)) => {
+                Some(Self::One(bank.smoothed(&OnLine { step, likelihood }, later)))
+            }
+            (Self::Two(bank), Self::Two(later), Geometry::Line(likelihood)) => {
+                Some(Self::Two(Box::new(bank.smoothed(&OnLine { step, likelihood }, later))))
+            }
+            (Self::OnPlane(bank), Self::OnPlane(later), _) => {
+                Some(Self::OnPlane(Box::new(bank.smoothed(&OnPlane(step), later))))
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Mixed {
+    /// The moments of each contact.
+    pub fn contacts(&self) -> Vec<Moments> {
+        match self {
+            Self::Nothing(belief) => moments(belief),
+            Self::One(belief) => moments(belief),
+            Self::Two(belief) => moments(belief),
+            Self::OnPlane(belief) => vec![on_plane::moments(belief)],
+        }
+    }
+}
+
+impl Moments {
+    /// The contact at the mean.
+    pub fn contact(&self) -> Contact {
+        let [x_m, _, force_n, y_m, _] = self.mean;
+        Contact { position: Position { x_m, y_m }, force_n }
+    }
+
+    /// Whether two are of one contact: closer than their own doubt in place, speed and force.
+    pub fn is_one_with(&self, other: &Self) -> bool {
+        const CLOSE: f64 = 2.0;
+        (0..self.mean.len()).all(|i| {
+            let doubt = self.variance[i] + other.variance[i];
+            (self.mean[i] - other.mean[i]).powi(2) <= CLOSE * CLOSE * doubt
+        })
+    }
+}
+
+impl Seen<'_> {
+    fn fit_nothing(&self, about: &[f64; 1]) -> ContactFit<1> {
+        self.likelihood.fit_nothing(self.whitened, about[0])
+    }
+
+    pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {
+        let [mode_n, x_m, force_n] = *about;
+        line.fit_one(self.whitened, at(x_m, force_n), self.swings.then_some(mode_n))
+    }
+
+    pub fn fit_two(&self, line: &dyn LineLikelihood, about: &[f64; 5]) -> ContactFit<5> {
+        let [mode_n, x_m, force_n, other_m, other_n] = *about;
+        let contacts = [at(x_m, force_n), at(other_m, other_n)];
+        line.fit_two(self.whitened, contacts, self.swings.then_some(mode_n))
+    }
+}
+
+fn at(x_m: f64, force_n: f64) -> Contact {
+    Contact { position: Position::along(x_m), force_n }
+}
+
+fn moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
+    let of = |k: usize| {
+        let [x, v, w] = [X, V, W].map(|i| contact(k) + i);
+        let variance = |i: usize| belief.covariance[i][i].max(0.0);
+        Moments {
+            mean: [belief.mean[x], belief.mean[v], belief.mean[w], 0.0, 0.0],
+            variance: [variance(x), variance(v), variance(w), 0.0, 0.0],
+            covariance_m2: 0.0,
+        }
+    };
+    (0..contacts(N)).map(of).collect()
+}

@@ -1,0 +1,231 @@
+//! The paper's beam, in balance under a contact that moves, lets go and comes down again.
+
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::*;
+use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
+use crate::influence::{BeamLikelihood, InfluenceConfig};
+use crate::method::{FitTask, Likelihood, LineLikelihood};
+use crate::setup::Bench;
+use crate::simulate::{CleanSensors, clean_reading};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{ChannelErrors, measure};
+use palpate_mechanics::surface::Motion;
+
+const RATE_HZ: f64 = 1000.0;
+
+fn rig() -> Example {
+    moving_beam()
+}
+
+fn likelihood(rig: &Example, force_n: Option<f64>) -> BeamLikelihood {
+    let recording = rig.simulate(1);
+    let bench = Bench { force_n, ..rig.bench.clone() };
+    let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
+    BeamLikelihood::new(&InfluenceConfig::default().fit_beam(task, &mut || true).unwrap().unwrap())
+}
+
+/// When, the true contact, and the reading.
+pub(super) type Timed = (f64, Contact, Vec<f64>);
+
+/// Contacts along a motion with a force, and readings in balance.
+pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: u64) -> Vec<Timed> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let layout = &rig.bench.layout;
+    let errors = ChannelErrors::none(layout);
+    let sensors = CleanSensors::new(rig.bench.surface.model().unwrap(), layout);
+    let at = |i: usize| {
+        let time_s = i as f64 / RATE_HZ;
+        let contact = motion.contact_at(time_s, force_n);
+        (time_s, contact, measure(layout, &sensors.reading(contact), &errors, &mut rng))
+    };
+    (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
+}
+
+/// How many readings a tracker takes for a contact where there is none, or the other way round.
+pub(super) fn wrongly_touching(likelihood: &dyn Likelihood, readings: &[Timed]) -> usize {
+    let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
+    let mut wrong = 0;
+    for (time_s, truth, reading) in readings {
+        let track = tracker.follow(*time_s, reading).unwrap();
+        let touching = !track.contacts.is_empty();
+        assert_eq!(touching, track.touching() > 0.5);
+        wrong += usize::from(touching != (truth.force_n > 0.0));
+    }
+    wrong
+}
+
+fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
+    timed_readings(rig, motion, 3.0, seed)
+}
+
+/// Mean errors of single readings, of the filter and of the smoother, and the shares that the latter two cover.
+fn errors(likelihood: &BeamLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2]) {
+    let mut tracker = SmoothTracker::new(likelihood, TrackerConfig::default());
+    for (time_s, _, reading) in readings {
+        tracker.follow(*time_s, reading).unwrap();
+    }
+    let (mut errors, mut covered) = ([0.0; 3], [0.0; 2]);
+    let smoothed = tracker.smoothed();
+    for ((track, smooth), (_, truth, _)) in tracker.filtered().iter().zip(&smoothed).zip(readings) {
+        let x_m = truth.position.x_m;
+        errors[0] += (track.alone.contact.position.x_m - x_m).abs();
+        for (i, tracked) in [track.contacts[0], smooth.contacts[0]].into_iter().enumerate() {
+            errors[i + 1] += (tracked.x_m - x_m).abs();
+            covered[i] += f64::from(u8::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m)));
+        }
+    }
+    let count = readings.len() as f64;
+    (errors.map(|sum| sum / count), covered.map(|sum| sum / count))
+}
+
+#[test]
+fn a_track_is_several_times_closer_than_its_readings() {
+    let rig = rig();
+    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..along_the_beam() };
+    let readings = readings(&rig, motion, 2);
+    for (force_n, filter, smoother) in [(Some(3.0), 3.0, 5.0), (None, 4.0, 6.0)] {
+        let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
+        assert!(single / filtered > filter, "{force_n:?}: {single} {filtered}");
+        assert!(single / smoothed > smoother, "{force_n:?}: {single} {smoothed}");
+        assert!((0.88..1.0).contains(&covered), "{force_n:?}: {covered}");
+    }
+}
+
+#[test]
+fn a_contact_that_lets_go_is_lost_and_found_again() {
+    let rig = rig();
+    let motion = Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..along_the_beam() };
+    let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
+    // Only while the force is too small to be told from noise.
+    assert!(wrong <= 15, "{wrong}");
+}
+
+#[test]
+fn a_beam_that_swings_is_explained_by_its_first_mode() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, Some(3.0));
+    let load = |x_m: f64| Contact { position: Position::along(x_m), force_n: 3.0 };
+    // Bent as by a load in the middle, which has just jumped elsewhere.
+    let mut response = swinging_beam().at_rest(1, &[load(0.2)]);
+    response.change_loads(&[load(0.1)]);
+    let sensors = &rig.bench.layout.sensors;
+    let reading: Vec<f64> =
+        sensors.iter().map(|sensor| response.reading(sensor.kind, sensor.position)).collect();
+    let mut whitened = Vec::new();
+    likelihood.whiten(&reading, &mut whitened);
+    let misfit = |mode_n: Option<f64>| likelihood.fit_one(&whitened, load(0.1), mode_n).misfit;
+    assert!(misfit(Some(3.0)) < 2.0, "{}", misfit(Some(3.0)));
+    assert!(misfit(None) > 1e3, "{}", misfit(None));
+}
+
+#[test]
+fn the_pulls_of_a_fit_are_the_slopes_of_its_misfit() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, None);
+    let whitened: Vec<f64> = (0..8).map(|i| f64::from(i % 3) * 4.0).collect();
+    let unknowns = [4.0, 0.1013, 3.0, 0.3021, 2.0];
+    let fit = |[mode_n, x_m, force_n, other_m, other_n]: [f64; 5]| {
+        let contacts = [(x_m, force_n), (other_m, other_n)]
+            .map(|(x_m, force_n)| Contact { position: Position::along(x_m), force_n });
+        likelihood.fit_two(&whitened, contacts, Some(mode_n))
+    };
+    for (k, step) in [1e-4, 1e-7, 1e-4, 1e-7, 1e-4].into_iter().enumerate() {
+        let moved = |by: f64| {
+            let mut unknowns = unknowns;
+            unknowns[k] += by;
+            fit(unknowns).misfit
+        };
+        let slope = (moved(step) - moved(-step)) / (2.0 * step);
+        let pull = fit(unknowns).pull[k];
+        assert!((slope + 2.0 * pull).abs() < 1e-4 * pull.abs(), "{k}: {slope} {pull}");
+    }
+}
+
+/// Readings in balance under two contacts, each with its force.
+fn two_readings(rig: &Example, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contact; 2], Vec<f64>)> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let errors = ChannelErrors::none(&rig.bench.layout);
+    let surface = rig.bench.surface.model().unwrap();
+    let duration_s = motions[0].duration_s().max(motions[1].duration_s());
+    let at = |i: usize| {
+        let time_s = i as f64 / RATE_HZ;
+        let contacts = [motions[0].contact_at(time_s, 3.0), motions[1].contact_at(time_s, 2.0)];
+        let [first, second] = contacts.map(|contact| clean_reading(surface, &rig.bench.layout, contact));
+        let clean: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
+        (time_s, contacts, measure(&rig.bench.layout, &clean, &errors, &mut rng))
+    };
+    (0..(duration_s * RATE_HZ) as usize).map(at).collect()
+}
+
+#[test]
+fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
+    let (rig, motions) = two_moving_loads();
+    let recording = rig.simulate(1);
+    let task = FitTask { bench: &rig.bench, recording: &recording, seed: 0 };
+    let config = InfluenceConfig { contacts: 2, ..InfluenceConfig::default() };
+    let likelihood = BeamLikelihood::new(&config.fit_beam(task, &mut || true).unwrap().unwrap());
+    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
+    let (mut wrong, mut all) = (0, 0);
+    let (mut tracked, mut alone) = (Vec::new(), Vec::new());
+    for (time_s, truths, reading) in two_readings(&rig, motions, 3) {
+        let track = tracker.follow(time_s, &reading).unwrap();
+        let touching: Vec<f64> =
+            truths.iter().filter(|truth| truth.force_n > 0.0).map(|truth| truth.position.x_m).collect();
+        all += 1;
+        wrong += usize::from(touching.len() != track.contacts.len());
+        tracked.extend(off_m(&touching, track.contacts.iter().map(|tracked| tracked.x_m).collect()));
+        let single = std::iter::once(&track.alone.contact).chain(track.alone.further.as_slice());
+        alone.extend(off_m(&touching, single.map(|contact| contact.position.x_m).collect()));
+    }
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    let (tracked_m, alone_m) = (mean(&tracked), mean(&alone));
+    eprintln!("{wrong} of {all} wrong; off by {tracked_m} m, readings alone {alone_m} m");
+    assert!(wrong * 20 < all, "{wrong} of {all}");
+    assert!(2.0 * tracked_m < alone_m, "{tracked_m} {alone_m}");
+}
+
+/// How far each of `touching` is from its place among as many `found`; empty where they are not as many.
+fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
+    found.sort_by(f64::total_cmp);
+    let pairs = touching.iter().zip(&found);
+    if touching.len() == found.len() { pairs.map(|(a, b)| (a - b).abs()).collect() } else { Vec::new() }
+}
+
+#[test]
+fn readings_out_of_order_are_refused_and_change_nothing() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, Some(3.0));
+    let surface = rig.bench.surface.model().unwrap();
+    let contact = Contact { position: Position::along(0.1), force_n: 3.0 };
+    let reading = clean_reading(surface, &rig.bench.layout, contact);
+    let (mut one, mut other) = (
+        Tracker::new(&likelihood, TrackerConfig::default()),
+        Tracker::new(&likelihood, TrackerConfig::default()),
+    );
+    for tracker in [&mut one, &mut other] {
+        tracker.follow(1.0, &reading).unwrap();
+    }
+    for time_s in [1.0, 0.5, f64::NAN] {
+        assert!(one.follow(time_s, &reading).is_err());
+    }
+    let told = one.follow(0.5, &reading).unwrap_err().to_string();
+    assert_eq!(told, "the reading is of 0.5 s; it must be later than the one before, of 1 s");
+    assert_eq!(one.follow(2.0, &reading), other.follow(2.0, &reading));
+}
+
+#[test]
+fn absurd_readings_and_gaps_leave_numbers_behind() {
+    let rig = rig();
+    let likelihood = likelihood(&rig, None);
+    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
+    let absurd = [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]];
+    for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
+        let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
+        assert!(track.touching().is_finite());
+        for tracked in track.contacts {
+            assert!(tracked.x_m.is_finite() && (0.0..=0.4).contains(&tracked.x_m), "{tracked:?}");
+        }
+    }
+}

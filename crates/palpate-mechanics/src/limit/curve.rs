@@ -1,0 +1,117 @@
+//! The limit over a whole surface.
+
+use super::grid::Grid;
+use super::{Bound, Force, Limit, LimitError};
+use crate::contact::{Contact, Position};
+use crate::surface::Extent;
+
+/// The limit at one position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitPoint {
+    /// Where.
+    pub position: Position,
+    /// The bound there; `None` where the readings do not tell the position.
+    pub bound: Option<Bound>,
+}
+
+/// The limit at many positions, for one force.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitCurve {
+    /// The surface.
+    pub extent: Extent,
+    /// The contact force, in newtons.
+    pub force_n: f64,
+    /// What is known of the force.
+    pub force: Force,
+    /// Positions and bounds; on a line from left to right.
+    pub points: Vec<LimitPoint>,
+}
+
+/// A curve in short, over the positions where there is a bound. Limits are standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitSummary {
+    /// Mean limit, in metres.
+    pub mean_m: f64,
+    /// Median limit, in metres.
+    pub median_m: f64,
+    /// Mean over the positions of the mean error of an estimator at the limit (σ·√(2/π) on a line), in metres.
+    pub mean_error_m: f64,
+    /// Smallest limit, in metres, and where it is.
+    pub best: (Position, f64),
+    /// Largest limit, in metres, and where it is.
+    pub worst: (Position, f64),
+    /// Positions without a bound.
+    pub without: usize,
+}
+
+impl LimitCurve {
+    /// The limit all over the surface: on a line at 399 positions, 1/400 of the length apart.
+    ///
+    /// # Errors
+    /// [`LimitError::Force`] for a force that is not positive and finite.
+    pub fn over(limit: &Limit, force_n: f64, force: Force) -> Result<Self, LimitError> {
+        Self::at(limit, force_n, force, &Grid::over(limit.surface.extent()).positions)
+    }
+
+    /// The limit at positions `every_m` (metres) apart, the first of them `every_m` from the edge.
+    ///
+    /// # Errors
+    /// [`LimitError::Positions`] where those are none or more than 100,000, and [`LimitError::Force`].
+    pub fn every(limit: &Limit, force_n: f64, force: Force, every_m: f64) -> Result<Self, LimitError> {
+        Self::at(limit, force_n, force, &Grid::every(limit.surface.extent(), every_m)?.positions)
+    }
+
+    /// The limit at the given positions, which must be on the surface.
+    ///
+    /// # Errors
+    /// [`LimitError::Force`] for a force that is not positive and finite.
+    pub fn at(limit: &Limit, force_n: f64, force: Force, positions: &[Position]) -> Result<Self, LimitError> {
+        check_force(force_n)?;
+        let point =
+            |&position| LimitPoint { position, bound: limit.at(Contact { position, force_n }, force) };
+        Ok(Self {
+            extent: limit.surface.extent(),
+            force_n,
+            force,
+            points: positions.iter().map(point).collect(),
+        })
+    }
+
+    /// A figure of the bound by x in metres, from left to right; on a plane its mean across the width. NaN where there is no bound.
+    pub fn by_x(&self, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
+        let mut points: Vec<&LimitPoint> = self.points.iter().collect();
+        points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
+        let columns = points.chunk_by(|a, b| a.position.x_m == b.position.x_m);
+        let mean = |column: &[&LimitPoint]| {
+            let figures = column.iter().map(|point| point.bound.as_ref().map_or(f64::NAN, &figure));
+            figures.sum::<f64>() / column.len() as f64
+        };
+        columns.map(|column| (column[0].position.x_m, mean(column))).collect()
+    }
+
+    /// The curve in short; `None` where no position has a bound.
+    pub fn summary(&self) -> Option<LimitSummary> {
+        let mut bounds: Vec<(Position, Bound)> =
+            self.points.iter().filter_map(|point| Some((point.position, point.bound?))).collect();
+        bounds.sort_by(|(_, a), (_, b)| a.sd_position_m.total_cmp(&b.sd_position_m));
+        let limit = |&(position, bound): &(Position, Bound)| (position, bound.sd_position_m);
+        let count = bounds.len() as f64;
+        let mean = |of: fn(&Bound) -> f64| bounds.iter().map(|(_, bound)| of(bound)).sum::<f64>() / count;
+        let middle = bounds.len() / 2;
+        let (_, below) = bounds.get(middle.saturating_sub(1 - bounds.len() % 2)).map(limit)?;
+        let (_, above) = bounds.get(middle).map(limit)?;
+        Some(LimitSummary {
+            mean_m: mean(|bound| bound.sd_position_m),
+            median_m: below.midpoint(above),
+            mean_error_m: mean(Bound::mean_error_m),
+            best: bounds.first().map(limit)?,
+            worst: bounds.last().map(limit)?,
+            without: self.points.len() - bounds.len(),
+        })
+    }
+}
+
+/// Refuses a force for which there is no limit.
+pub(super) fn check_force(force_n: f64) -> Result<(), LimitError> {
+    if force_n > 0.0 && force_n.is_finite() { Ok(()) } else { Err(LimitError::Force { force_n }) }
+}

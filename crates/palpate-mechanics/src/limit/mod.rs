@@ -1,0 +1,161 @@
+//! The limit: the Cramér–Rao bound of contact position and force for a surface, its layout and its noise.
+//!
+//! Sensor i reads y_i(a, W) plus independent Gaussian noise of variance σ_i² + q_i²/12, where a is the contact
+//! position, W its force, y_i the sensor's response function (W·f_i(a), with f_i its influence function, on a surface that
+//! bends little), σ_i its noise and q_i its resolution (quantisation as noise
+//! of variance q²/12: Widrow and Kollár, *Quantization Noise*, 2008). For a known force on a line the bound is
+//! 1/√(Σ_i (∂y_i/∂a/σ_i)²); an unknown force is estimated along and costs part of that information.
+//!
+//! Left out: dead channels, and those that are saturated at the contact. Not counted: gain and offset errors, which
+//! calibration removes. The bound is one of unbiased estimators and small errors; where it nears the size of the surface it
+//! says "blind" and no more, and that two contacts far apart may read alike is for [`LimitWarning`] to say.
+
+mod bound;
+mod curve;
+mod error;
+mod grid;
+mod information;
+mod twins;
+mod warning;
+mod zone;
+
+pub use bound::Bound;
+pub use curve::{LimitCurve, LimitPoint, LimitSummary};
+pub use error::LimitError;
+pub use warning::{AMBIGUOUS_DISTANCE, BLIND_SHARE, FAINT_SIGNAL, LimitWarning, limit_warnings};
+pub use zone::Zone;
+
+use std::sync::Arc;
+
+use crate::contact::Contact;
+use crate::sensing::{Layout, Sensor, SensorKind};
+use crate::surface::{ResponseFunction, ResponseGradient, Surface};
+
+/// What is known of the contact force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Force {
+    /// Its value.
+    Known,
+    /// Nothing: it is estimated together with the position.
+    Unknown,
+}
+
+impl Force {
+    /// "known" or "unknown".
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Known => "known",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// A surface with the sensors that are alive and the noise of each.
+#[derive(Clone)]
+pub struct Limit<'a> {
+    surface: &'a dyn Surface,
+    channels: Vec<Channel<'a>>,
+}
+
+/// A live sensor.
+#[derive(Clone)]
+struct Channel<'a> {
+    kind: SensorKind,
+    response: Arc<dyn ResponseFunction + 'a>,
+    /// √(σ² + q²/12).
+    sd: f64,
+    range: Option<(f64, f64)>,
+}
+
+impl<'a> Limit<'a> {
+    /// The limit of a surface read by `layout`; dead channels are left out.
+    ///
+    /// # Errors
+    /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive.
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
+        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
+            let sd = sd?;
+            let response = surface.response_function(sensor.kind, sensor.position);
+            Some(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
+        };
+        let channels = layout.sensors.iter().zip(layout.reading_sds()?).filter_map(channel).collect();
+        Ok(Self { surface, channels })
+    }
+
+    /// The surface.
+    pub fn surface(&self) -> &'a dyn Surface {
+        self.surface
+    }
+
+    /// How many sensors are alive.
+    pub fn alive(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// The bound at a contact; `None` where the readings do not tell the position at all, which is where the Fisher
+    /// information is singular: no force, no sensor that notices, or a change of position that a change of force undoes.
+    pub fn at(&self, contact: Contact, force: Force) -> Option<Bound> {
+        let Columns { force: by_force, along, across } = self.derivatives(contact);
+        match (force, across) {
+            (Force::Known, None) => {
+                let [[xx]] = information::inverse_information([along])?;
+                Some(Bound::new([[xx, 0.0], [0.0, 0.0]], None))
+            }
+            (Force::Known, Some(across)) => Bound::of_columns([along, across]),
+            (Force::Unknown, None) => {
+                let [[ff, _], [_, xx]] = information::inverse_information([by_force, along])?;
+                Some(Bound::new([[xx, 0.0], [0.0, 0.0]], Some(ff)))
+            }
+            (Force::Unknown, Some(across)) => {
+                let covariance = information::inverse_information([by_force, along, across])?;
+                let [[ff, ..], [_, xx, xy], [_, _, yy]] = covariance;
+                Some(Bound::new([[xx, xy], [xy, yy]], Some(ff)))
+            }
+        }
+    }
+
+    /// Each live sensor's reading at a contact, without noise, over the standard deviation of its noise.
+    pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
+        self.channels.iter().map(|channel| Self::clean(channel, contact) / channel.sd).collect()
+    }
+
+    /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
+    pub fn signal_to_noise(&self, contact: Contact) -> f64 {
+        information::norm(&self.whitened_reading(contact))
+    }
+
+    /// What a sensor reads without noise, held at the ends of its range.
+    fn clean(channel: &Channel, contact: Contact) -> f64 {
+        let value = channel.response.at(contact);
+        channel.range.map_or(value, |(low, high)| value.max(low).min(high))
+    }
+
+    /// Derivatives of the whitened readings; those of saturated channels are 0.
+    fn derivatives(&self, contact: Contact) -> Columns {
+        let mut columns = Columns::default();
+        let mut across = Vec::new();
+        for Channel { response, sd, range, .. } in &self.channels {
+            let reading = response.at(contact);
+            let ResponseGradient { position: [along_x, along_y], force } = response.gradient(contact);
+            let free = range.is_none_or(|(low, high)| low < reading && reading < high);
+            let weight = if free { 1.0 / sd } else { 0.0 };
+            columns.force.push(weight * force);
+            columns.along.push(weight * along_x);
+            across.push(weight * along_y);
+        }
+        columns.across = self.surface.extent().width_m.is_some().then_some(across);
+        columns
+    }
+}
+
+/// Derivatives of the whitened readings with respect to force, x and, on a plane, y.
+#[derive(Default)]
+struct Columns {
+    force: Vec<f64>,
+    along: Vec<f64>,
+    across: Option<Vec<f64>>,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,354 @@
+//! The limit against the paper's figures, closed forms, simulation, and its own symmetries.
+
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::*;
+use crate::contact::Position;
+use crate::surface::{Beam, Extent, InfluenceFunction};
+
+/// The founding paper's beam.
+const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+
+fn with_noise(mut layout: Layout, noise_sd: f64) -> Layout {
+    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
+    layout
+}
+
+fn deflections(count: usize) -> Layout {
+    with_noise(Layout::even(SensorKind::Deflection, count, BEAM.length_m), 5e-6)
+}
+
+fn sd_mm(limit: &Limit, a_mm: f64, force: Force) -> f64 {
+    let contact = Contact { position: Position::along(a_mm * 1e-3), force_n: 3.0 };
+    limit.at(contact, force).unwrap().sd_x_m * 1e3
+}
+
+fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
+    limit_warnings(&Limit::new(&BEAM, layout).unwrap(), 3.0, force).unwrap()
+}
+
+/// The words of some warnings.
+fn words(warnings: &[LimitWarning]) -> String {
+    warnings.iter().map(|warning| format!("{warning}\n  would help: {}\n", warning.help())).collect()
+}
+
+#[test]
+fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
+    let layout = deflections(8);
+    let limit = Limit::new(&BEAM, &layout).unwrap();
+    // What physics allows at 5 µm and 3 N, from a calculation of its own.
+    let known = [(1.0, 0.087), (50.0, 0.095), (100.0, 0.12), (200.0, 0.69)];
+    let unknown = [(1.0, 8300.0), (20.0, 21.0), (50.0, 3.3), (200.0, 0.69)];
+    for (force, figures) in [(Force::Known, known), (Force::Unknown, unknown)] {
+        for (a_mm, limit_mm) in figures {
+            let seen = sd_mm(&limit, a_mm, force);
+            // They are given with two digits.
+            assert!((seen / limit_mm - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {seen}, not {limit_mm}");
+        }
+    }
+    let summary = LimitCurve::over(&limit, 3.0, Force::Known).unwrap().summary().unwrap();
+    assert_eq!(format!("{:.3}", summary.mean_m * 1e3), "0.195");
+    let ratio = summary.mean_error_m / summary.mean_m;
+    assert!((ratio - std::f64::consts::FRAC_2_PI.sqrt()).abs() < 1e-9);
+    assert_eq!(format!("{:.0} mm", summary.worst.0.x_m * 1e3), "200 mm");
+    assert!(summary.best.1 <= summary.median_m && summary.median_m <= summary.mean_m);
+    assert_eq!(summary.without, 0);
+}
+
+#[test]
+fn two_reactions_give_the_closed_form() {
+    // R₁ = W·(l − a)/l and R₂ = W·a/l with noise σ: known force, σ·l/(W·√2); unknown force, position a = l·R₂/(R₁ + R₂)
+    // and force R₁ + R₂ with σ·√((l − a)² + a²)/W and σ·√2.
+    let mut layout = with_noise(Layout::even(SensorKind::Reaction, 2, BEAM.length_m), 0.01);
+    layout.sensors[0].position = Position::along(0.0);
+    layout.sensors[1].position = Position::along(0.4);
+    let limit = Limit::new(&BEAM, &layout).unwrap();
+    for a_m in [0.0, 0.05, 0.2, 0.4] {
+        let contact = Contact { position: Position::along(a_m), force_n: 3.0 };
+        let known = limit.at(contact, Force::Known).unwrap();
+        assert!((known.sd_x_m - 0.01 * 0.4 / (3.0 * 2f64.sqrt())).abs() < 1e-12);
+        assert_eq!((known.sd_force_n, known.sd_y_m), (None, 0.0));
+        let unknown = limit.at(contact, Force::Unknown).unwrap();
+        assert!((unknown.sd_x_m - 0.01 * (0.4 - a_m).hypot(a_m) / 3.0).abs() < 1e-12);
+        assert!((unknown.sd_force_n.unwrap() - 0.01 * 2f64.sqrt()).abs() < 1e-12);
+    }
+}
+
+/// A plane on a bump of the influence for every sensor: exp(−d²/2w²) of the distance d of sensor and contact.
+struct Pad;
+
+const PAD_WIDTH_M: f64 = 0.02;
+
+/// The influence of a sensor of the [`Pad`] at a position.
+struct Bump(Position);
+
+impl InfluenceFunction for Bump {
+    fn at(&self, contact: Position) -> f64 {
+        1e-4 * (-0.5 * (self.0.distance_m(contact) / PAD_WIDTH_M).powi(2)).exp()
+    }
+
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        let by_distance = -self.at(contact) / PAD_WIDTH_M.powi(2);
+        [by_distance * (contact.x_m - self.0.x_m), by_distance * (contact.y_m - self.0.y_m)]
+    }
+}
+
+impl Surface for Pad {
+    fn influence_function(&self, _: SensorKind, sensor: Position) -> Arc<dyn InfluenceFunction + '_> {
+        Arc::new(Bump(sensor))
+    }
+
+    fn is_supported_at(&self, _: Position) -> bool {
+        false
+    }
+
+    fn full_scale(&self, kind: SensorKind) -> f64 {
+        if kind == SensorKind::Deflection { 1e-4 } else { 0.0 }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent { length_m: 0.06, width_m: Some(0.04) }
+    }
+}
+
+fn pad_layout(positions: &[(f64, f64)]) -> Layout {
+    let mut layout = with_noise(Layout::even(SensorKind::Deflection, positions.len(), 0.06), 1e-6);
+    for (sensor, &(x_m, y_m)) in layout.sensors.iter_mut().zip(positions) {
+        sensor.position = Position { x_m, y_m };
+    }
+    layout
+}
+
+#[test]
+fn a_plane_has_a_bound_in_both_directions() {
+    let corners = [(0.01, 0.01), (0.05, 0.01), (0.01, 0.03), (0.05, 0.03)];
+    let four = pad_layout(&corners);
+    let limit = Limit::new(&Pad, &four).unwrap();
+    let at = |x_m, y_m, force| limit.at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
+    // In the centre of a symmetric layout x, y and force do not disturb each other: 1/√(Σ (∂y_i/∂x)²) each.
+    let centre = at(0.03, 0.02, Force::Unknown).unwrap();
+    let reading = 2.0 * 1e-4 * (-0.5 * (4e-4 + 1e-4) / 4e-4_f64).exp() / 1e-6;
+    let by_x = reading * 0.02 / 4e-4;
+    assert!((centre.sd_x_m * 2.0 * by_x - 1.0).abs() < 1e-6, "{centre:?}");
+    assert!((centre.sd_y_m / centre.sd_x_m - 2.0).abs() < 1e-6);
+    assert!(centre.covariance_xy_m2.abs() < 1e-6 * centre.sd_x_m * centre.sd_y_m);
+    assert!((centre.sd_position_m - centre.sd_x_m.hypot(centre.sd_y_m)).abs() < 1e-15);
+    let known = at(0.035, 0.022, Force::Known).unwrap();
+    let unknown = at(0.035, 0.022, Force::Unknown).unwrap();
+    assert!(known.sd_x_m < unknown.sd_x_m && known.sd_position_m < unknown.sd_position_m);
+    // Sensors on a line through the contact do not see it move across.
+    let line = pad_layout(&corners.map(|(x_m, _)| (x_m, 0.02)));
+    let limit = Limit::new(&Pad, &line).unwrap();
+    let contact = Contact { position: Position { x_m: 0.03, y_m: 0.02 }, force_n: 2.0 };
+    assert_eq!(limit.at(contact, Force::Known), None);
+    let found = limit_warnings(&limit, 2.0, Force::Known).unwrap();
+    // They cannot tell one side of the line from the other either.
+    assert_eq!(found.iter().map(LimitWarning::kind).collect::<Vec<_>>(), ["mirror"], "{}", words(&found));
+    let curve = LimitCurve::every(&limit, 2.0, Force::Known, 5e-3).unwrap();
+    assert_eq!(curve.points.len(), 11 * 7);
+    assert_eq!(curve.summary().unwrap().without, 11);
+}
+
+/// The position whose readings are nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around
+/// `near_m`: maximum likelihood, where the model is known. An unknown force is fitted along.
+fn most_likely(limit: &Limit, reading: &[f64], near_m: f64, step_m: f64, force: Force) -> f64 {
+    let cost = |a_m: f64| {
+        let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
+        let scale = match force {
+            Force::Known => 1.0,
+            Force::Unknown => information::dot(&shape, reading) / information::dot(&shape, &shape),
+        };
+        shape.iter().zip(reading).map(|(s, r)| (r - scale * s).powi(2)).sum::<f64>()
+    };
+    // Golden section: the cost has one minimum within the few standard deviations that are searched.
+    let (mut low, mut high) = (near_m - step_m, near_m + step_m);
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    while high - low > 1e-4 * step_m {
+        let (left, right) = (high - ratio * (high - low), low + ratio * (high - low));
+        if cost(left) < cost(right) { high = right } else { low = left }
+    }
+    low.midpoint(high)
+}
+
+#[test]
+fn maximum_likelihood_spreads_as_the_limit_says() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(20);
+    let layout = deflections(8);
+    let limit = Limit::new(&BEAM, &layout).unwrap();
+    const DRAWS: usize = 4000;
+    for (a_mm, force) in [
+        (5.0, Force::Known),
+        (50.0, Force::Known),
+        (130.0, Force::Known),
+        (130.0, Force::Unknown),
+        (200.0, Force::Unknown),
+    ] {
+        let contact = Contact { position: Position::along(a_mm * 1e-3), force_n: 3.0 };
+        let bound = limit.at(contact, force).unwrap();
+        let clean = limit.whitened_reading(contact);
+        let errors: Vec<f64> = (0..DRAWS)
+            .map(|_| {
+                let noisy: Vec<f64> =
+                    clean.iter().map(|value| value + rng.sample::<f64, _>(StandardNormal)).collect();
+                most_likely(&limit, &noisy, contact.position.x_m, 8.0 * bound.sd_x_m, force)
+                    - contact.position.x_m
+            })
+            .collect();
+        let sd_m = (errors.iter().map(|e| e * e).sum::<f64>() / DRAWS as f64).sqrt();
+        let mean_m = errors.iter().map(|e| e.abs()).sum::<f64>() / DRAWS as f64;
+        // The standard deviation of 4000 draws is known to 1/√8000 = 1.1 %; the mean error to 1.2 %.
+        assert!((sd_m / bound.sd_x_m - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {}", sd_m / bound.sd_x_m);
+        assert!((mean_m / bound.mean_error_m() - 1.0).abs() < 0.045, "{a_mm} mm, {force:?}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn less_noise_more_force_and_more_sensors_lower_the_limit(a in 0.002..0.398_f64, factor in 1.5..10.0_f64) {
+        let at = |layout: &Layout, force_n, force| {
+            let contact = Contact { position: Position::along(a), force_n };
+            Limit::new(&BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
+        };
+        let layout = deflections(8);
+        for force in [Force::Known, Force::Unknown] {
+            let limit = at(&layout, 3.0, force);
+            prop_assert!((at(&with_noise(layout.clone(), factor * 5e-6), 3.0, force) / limit / factor - 1.0).abs() < 1e-6);
+            prop_assert!((at(&layout, factor * 3.0, force) * factor / limit - 1.0).abs() < 1e-6);
+            let mut more = layout.clone();
+            more.sensors.extend(deflections(3).sensors);
+            prop_assert!(at(&more, 3.0, force) < limit);
+            let mirrored = Limit::new(&BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
+            prop_assert!((mirrored.unwrap().sd_x_m / limit - 1.0).abs() < 1e-4);
+        }
+        prop_assert!(at(&layout, 3.0, Force::Known) <= at(&layout, 3.0, Force::Unknown) * (1.0 + 1e-9));
+    }
+}
+
+#[test]
+fn a_dead_channel_counts_as_if_it_were_not_there() {
+    let mut dead = deflections(8);
+    dead.sensors[2].channel.dead = true;
+    // A dead channel needs no noise.
+    dead.sensors[2].channel.noise_sd = 0.0;
+    let mut without = deflections(8);
+    without.sensors.remove(2);
+    let (dead, without) = (Limit::new(&BEAM, &dead).unwrap(), Limit::new(&BEAM, &without).unwrap());
+    assert_eq!(dead.alive(), 7);
+    for force in [Force::Known, Force::Unknown] {
+        assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));
+    }
+    let whole = deflections(8);
+    let whole = Limit::new(&BEAM, &whole).unwrap();
+    assert!(sd_mm(&dead, 130.0, Force::Known) > sd_mm(&whole, 130.0, Force::Known));
+}
+
+#[test]
+fn quantisation_is_noise_of_a_twelfth_of_its_square() {
+    let mut coarse = with_noise(deflections(8), 3e-6);
+    coarse.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 4e-6 * 12f64.sqrt());
+    let (coarse, plain) = (Limit::new(&BEAM, &coarse).unwrap(), deflections(8));
+    let plain = Limit::new(&BEAM, &plain).unwrap();
+    let ratio = sd_mm(&coarse, 70.0, Force::Known) / sd_mm(&plain, 70.0, Force::Known);
+    assert!((ratio - 1.0).abs() < 1e-12);
+    let mut silent = with_noise(deflections(8), 0.0);
+    silent.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 1e-6);
+    assert!(Limit::new(&BEAM, &silent).is_ok());
+}
+
+#[test]
+fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
+    let mut saturating = deflections(8);
+    saturating.sensors[3].channel.range = Some((-1e-3, 1e-3));
+    let mut without = deflections(8);
+    without.sensors.remove(3);
+    let whole = deflections(8);
+    let [saturating, without, whole] = [saturating, without, whole].map(|layout| {
+        let limit = Limit::new(&BEAM, &layout).unwrap();
+        [10.0, 200.0].map(|a_mm| sd_mm(&limit, a_mm, Force::Known))
+    });
+    assert_eq!(saturating[1], without[1], "3 N at mid-span lower sensor 4 by more than 1 mm");
+    assert_eq!(saturating[0], whole[0], "next to the support they lower it by less");
+}
+
+#[test]
+fn what_has_no_limit_says_why() {
+    let clean = deflections(8);
+    let clean = with_noise(clean, 0.0);
+    let mut one_clean = deflections(8);
+    one_clean.sensors[4].channel.noise_sd = 0.0;
+    let mut dead = deflections(2);
+    dead.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
+    let said = |layout: &Layout| Limit::new(&BEAM, layout).err().unwrap().to_string();
+    let no_model = LimitError::NoModel.to_string();
+    let layout = deflections(8);
+    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let force = |force_n| LimitCurve::over(&limit, force_n, Force::Known).unwrap_err().to_string();
+    let every = |every_m| LimitCurve::every(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
+    insta::assert_snapshot!(
+        [
+            said(&clean),
+            said(&one_clean),
+            said(&dead),
+            no_model,
+            force(0.0),
+            force(f64::NAN),
+            every(0.5),
+            every(1e-9)
+        ]
+        .join("\n")
+    );
+}
+
+#[test]
+fn no_information_is_none_and_never_infinite() {
+    let layout = deflections(8);
+    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let at = |x_m, force_n, force| limit.at(Contact { position: Position::along(x_m), force_n }, force);
+    assert_eq!(at(0.0, 3.0, Force::Unknown), None);
+    assert_eq!(at(0.4, 3.0, Force::Unknown), None);
+    assert_eq!(at(0.2, 0.0, Force::Known), None);
+    assert_eq!(at(0.2, f64::NAN, Force::Known), None);
+    assert!(at(0.0, 3.0, Force::Known).is_some(), "the beam tilts when a known force leaves its support");
+    // One sensor cannot tell two numbers; nor can it see a small move of a force right above it.
+    let one = deflections(1);
+    let one = Limit::new(&BEAM, &one).unwrap();
+    let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
+    assert_eq!(one.at(contact(0.1), Force::Unknown), None);
+    assert_eq!(one.at(contact(0.2), Force::Known), None);
+    assert!(one.at(contact(0.1), Force::Known).is_some());
+}
+
+#[test]
+fn the_papers_beam_is_ambiguous_next_to_its_supports_and_nowhere_else() {
+    let found = warnings(&deflections(8), Force::Known);
+    insta::assert_snapshot!(words(&found));
+}
+
+#[test]
+fn with_an_unknown_force_the_papers_beam_is_blind_next_to_its_supports() {
+    insta::assert_snapshot!(words(&warnings(&deflections(8), Force::Unknown)));
+}
+
+#[test]
+fn one_sensor_at_mid_span_cannot_tell_left_from_right() {
+    insta::assert_snapshot!(words(&warnings(&deflections(1), Force::Known)));
+}
+
+#[test]
+fn loud_sensors_miss_contacts_next_to_the_supports() {
+    insta::assert_snapshot!(words(&warnings(&with_noise(deflections(8), 5e-5), Force::Known)));
+}
+
+#[test]
+fn reactions_see_what_deflections_do_not() {
+    let mut layout = deflections(8);
+    let mut supports = with_noise(Layout::even(SensorKind::Reaction, 2, 0.4), 0.01);
+    supports.sensors[0].position = Position::along(0.0);
+    supports.sensors[1].position = Position::along(0.4);
+    layout.sensors.extend(supports.sensors);
+    assert_eq!(warnings(&layout, Force::Unknown), vec![]);
+    assert_eq!(warnings(&layout, Force::Known), vec![]);
+}

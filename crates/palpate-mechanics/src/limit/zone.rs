@@ -1,0 +1,151 @@
+//! Stretches of a surface where something holds.
+
+use serde::Serialize;
+
+use super::grid::Grid;
+use crate::contact::Position;
+use crate::surface::Extent;
+use crate::units::format_length_mm;
+
+/// Halvings by which the end of a stretch is found between two positions of the grid.
+const HALVINGS: u32 = 12;
+
+/// A zone of a plane is called filled from this share on.
+const FILLED: f64 = 0.9;
+
+/// A stretch of a line, or a rectangle of a plane around all its positions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Zone {
+    /// Its left or lower left end.
+    pub from: Position,
+    /// Its right or upper right end.
+    pub to: Position,
+    /// Share of it where what is said holds; 1 of a stretch of a line.
+    pub filled: f64,
+}
+
+impl Zone {
+    /// The smallest zone that holds all `positions`; `None` of none.
+    pub(super) fn around(positions: impl IntoIterator<Item = Position>) -> Option<Self> {
+        positions.into_iter().fold(None, |zone: Option<Self>, position| {
+            let Self { from, to, .. } = zone.unwrap_or(Self::at(position));
+            Some(Self {
+                from: Position { x_m: from.x_m.min(position.x_m), y_m: from.y_m.min(position.y_m) },
+                to: Position { x_m: to.x_m.max(position.x_m), y_m: to.y_m.max(position.y_m) },
+                filled: 1.0,
+            })
+        })
+    }
+
+    /// One position.
+    pub(super) const fn at(position: Position) -> Self {
+        Self { from: position, to: position, filled: 1.0 }
+    }
+
+    /// Whether it holds a position.
+    pub fn contains(&self, position: Position) -> bool {
+        let Self { from, to, .. } = self;
+        (from.x_m..=to.x_m).contains(&position.x_m) && (from.y_m..=to.y_m).contains(&position.y_m)
+    }
+}
+
+impl std::fmt::Display for Zone {
+    /// "0–1.6 mm", or "0–40 × 10–20 mm" on a plane, "18 % of 0–40 × 10–20 mm" where it is not filled; one position is
+    /// "200 mm".
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { from, to, filled } = self;
+        if *filled < FILLED {
+            write!(f, "{:.0} % of ", 100.0 * filled)?;
+        }
+        let range = |from_m: f64, to_m: f64| {
+            let [from, to] = [from_m, to_m].map(|value_m| format_length_mm(tenths_mm(value_m)));
+            if from == to { to } else { format!("{}–{to}", from.trim_end_matches(" mm")) }
+        };
+        if from.y_m == 0.0 && to.y_m == 0.0 {
+            f.write_str(&range(from.x_m, to.x_m))
+        } else {
+            let along = range(from.x_m, to.x_m);
+            write!(f, "{} × {}", along.trim_end_matches(" mm"), range(from.y_m, to.y_m))
+        }
+    }
+}
+
+/// A length rounded to tenths of a millimetre.
+fn tenths_mm(value_m: f64) -> f64 {
+    (value_m * 1e4).round() / 1e4
+}
+
+/// The zones of a grid where `holds`, each with its positions of the grid. On a line there is one for each stretch, its
+/// ends found between the positions of the grid and carried to the end of the surface from the outermost; on a plane there is
+/// one for each set of neighbours, half a pitch wider than they are.
+pub(super) fn zones(
+    extent: Extent,
+    grid: &Grid,
+    holds: impl Fn(Position) -> bool,
+) -> Vec<(Zone, Vec<Position>)> {
+    let flags: Vec<bool> = grid.positions.iter().map(|&position| holds(position)).collect();
+    if let Some(width_m) = extent.width_m {
+        return patches(extent.length_m, width_m, grid, flags);
+    }
+    let mut found = Vec::new();
+    let mut start = 0;
+    for run in flags.chunk_by(|a, b| a == b) {
+        let end = start + run.len();
+        if run[0] {
+            let inside = &grid.positions[start..end];
+            let before = start.checked_sub(1).map(|i| grid.positions[i].x_m);
+            let after = grid.positions.get(end).map(|position| position.x_m);
+            let from_m = before.map_or(0.0, |out_m| edge(inside[0].x_m, out_m, &holds));
+            let to_m = after.map_or(extent.length_m, |out_m| edge(inside[run.len() - 1].x_m, out_m, &holds));
+            let zone = Zone { from: Position::along(from_m), to: Position::along(to_m), filled: 1.0 };
+            found.push((zone, inside.to_vec()));
+        }
+        start = end;
+    }
+    found
+}
+
+/// The connected sets of a plane's positions where `flags` are set.
+fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Vec<(Zone, Vec<Position>)> {
+    let rows = grid.positions.len() / grid.columns;
+    let (along_m, across_m) = (length_m / (grid.columns + 1) as f64, width_m / (rows + 1) as f64);
+    let mut found = Vec::new();
+    while let Some(first) = flags.iter().position(|flag| *flag) {
+        flags[first] = false;
+        let (mut patch, mut next) = (vec![first], 0);
+        while let Some(&here) = patch.get(next) {
+            for near in grid.neighbours(here) {
+                if std::mem::take(&mut flags[near]) {
+                    patch.push(near);
+                }
+            }
+            next += 1;
+        }
+        let inside: Vec<Position> = patch.iter().map(|i| grid.positions[*i]).collect();
+        let Some(around) = Zone::around(inside.iter().copied()) else { continue };
+        // From the outermost positions a zone is carried to the edge.
+        let lower = |at_m: f64, pitch_m: f64| if at_m < 1.5 * pitch_m { 0.0 } else { at_m - 0.5 * pitch_m };
+        let upper = |at_m: f64, pitch_m: f64, size_m: f64| {
+            if at_m > size_m - 1.5 * pitch_m { size_m } else { at_m + 0.5 * pitch_m }
+        };
+        let from = Position { x_m: lower(around.from.x_m, along_m), y_m: lower(around.from.y_m, across_m) };
+        let to = Position {
+            x_m: upper(around.to.x_m, along_m, length_m),
+            y_m: upper(around.to.y_m, across_m, width_m),
+        };
+        let side = |from_m: f64, to_m: f64, pitch_m: f64| ((to_m - from_m) / pitch_m).round() + 1.0;
+        let all =
+            side(around.from.x_m, around.to.x_m, along_m) * side(around.from.y_m, around.to.y_m, across_m);
+        found.push((Zone { from, to, filled: inside.len() as f64 / all }, inside));
+    }
+    found
+}
+
+/// Where `holds` ends between a place where it does and one where it does not.
+fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle_m = inside_m.midpoint(outside_m);
+        if holds(Position::along(middle_m)) { inside_m = middle_m } else { outside_m = middle_m }
+    }
+    inside_m
+}

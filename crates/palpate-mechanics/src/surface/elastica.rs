@@ -1,0 +1,233 @@
+//! The exact shape of a thin finger that one force bends: Euler's elastica.
+//!
+//! The finger is clamped at σ = 0, does not stretch, and is straight beyond the contact at σ = s. Before it, with ψ the angle by
+//! which the finger is turned downward,
+//!
+//! ψ″(σ) = −q·cos(ψ − α), ψ(0) = 0, ψ′(s) = 0, q = F/(E·I),
+//!
+//! where α is the angle of the force from the downward normal of the clamp: 0 for a force that stays vertical, ψ(s) for
+//! one that stays normal to the finger. Seen from the contact this is a pendulum of angle ω = π/2 + ψ − α that is let go
+//! at rest: with u = √q·(s − σ)
+//!
+//! sin(ω/2) = √m·cd(u | m), ψ′ = 2·√q·√(m·m′)·sd(u | m), m = sin²(ω(s)/2), m′ = 1 − m
+//!
+//! (Love, *A Treatise on the Mathematical Theory of Elasticity*, §§ 262–263; Jacobi's functions). A normal force starts the
+//! pendulum at ω = π/2, so that m = ½ whatever the load. A vertical one has to bring it to ω = π/2 at the clamp; with the
+//! Gudermannian w of the turn there, sin ψ(s) = tanh w and m = 1/(1 + e⁻²ʷ), the load is
+//!
+//! F·s²/(E·I) = (1 − e⁻²ʷ)·R_F(e⁻²ʷ, 2/(1 + e²ʷ), 1)²
+//!
+//! in Carlson's form of Bisshopp and Drucker's equation (*Large deflection of cantilever beams*, 1945), a convex function
+//! of w that Newton's method inverts.
+
+use std::f64::consts::FRAC_PI_2;
+
+use serde::{Deserialize, Serialize};
+
+use palpate_numerics::{Jacobi, carlson_rd, carlson_rf};
+
+/// Where a contact's force on a finger points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ForceDirection {
+    /// Always across the finger where it is touched: a contact without friction.
+    Normal,
+    /// Always across the finger as it is when straight: a weight on a horizontal finger.
+    Vertical,
+}
+
+impl ForceDirection {
+    /// Its name in a rig.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Vertical => "vertical",
+        }
+    }
+}
+
+/// Beyond this w, where a vertical load passes 10⁵, the contact hangs straight down to all digits.
+const MOST_TURN: f64 = 300.0;
+/// Newton steps; from above the root of a convex function about six reach the last bit.
+const MOST_STEPS: usize = 60;
+
+/// A finger in its exact shape under one force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elastica {
+    direction: ForceDirection,
+    /// s, in metres.
+    contact_m: f64,
+    /// E·I, in N·m².
+    stiffness_n_m2: f64,
+    /// 1, or −1 for a force that pulls upward.
+    sign: f64,
+    /// q, in 1/m².
+    q: f64,
+    /// m′ = 1 − m.
+    complement: f64,
+    /// √(m·m′), half of the cosine of the force against the finger's normal at the contact.
+    half_cosine: f64,
+    /// dm/d(q·s²).
+    modulus_by_load: f64,
+    /// α, in radians.
+    force_angle: f64,
+}
+
+impl Elastica {
+    /// The shape of a finger of bending stiffness E·I (N·m², greater than 0) under a force (N, positive downward) at
+    /// `contact_m` metres along it, which is at least 0.
+    ///
+    /// Valid for loads F·s²/(E·I) up to 10⁵ vertically; a normal load above 13.75 = (2·K(½))² turns the contact by more
+    /// than half a turn, which no frictionless finger bears without touching itself.
+    pub fn new(direction: ForceDirection, stiffness_n_m2: f64, contact_m: f64, force_n: f64) -> Self {
+        let q = force_n.abs() / stiffness_n_m2;
+        let mut shape = Self {
+            direction,
+            contact_m,
+            stiffness_n_m2,
+            sign: if force_n < 0.0 { -1.0 } else { 1.0 },
+            q,
+            complement: 0.5,
+            half_cosine: 0.5,
+            modulus_by_load: 0.0,
+            force_angle: 0.0,
+        };
+        match direction {
+            ForceDirection::Normal => shape.force_angle = FRAC_PI_2 - shape.pendulum_angle(0.0),
+            ForceDirection::Vertical => {
+                let Turn { w, by_load } = Turn::of_load(q * contact_m * contact_m);
+                let m = 1.0 / (1.0 + (-2.0 * w).exp());
+                shape.complement = 1.0 / (1.0 + (2.0 * w).exp());
+                shape.half_cosine = (m * shape.complement).sqrt();
+                shape.modulus_by_load = 2.0 * m * shape.complement * by_load;
+            }
+        }
+        shape
+    }
+
+    /// How far the finger is turned downward at σ = `at_m` metres from the clamp, in radians.
+    pub fn angle(&self, at_m: f64) -> f64 {
+        self.sign * (self.pendulum_angle(at_m) - FRAC_PI_2 + self.force_angle)
+    }
+
+    /// The curvature ψ′ at `at_m`, positive where the finger bends downward, in 1/m; 0 beyond the contact.
+    pub fn curvature(&self, at_m: f64) -> f64 {
+        if at_m >= self.contact_m {
+            return 0.0;
+        }
+        let Jacobi { sn, dn, .. } = self.jacobi(at_m);
+        self.sign * 2.0 * self.q.sqrt() * self.half_cosine * sn / dn
+    }
+
+    /// How the curvature at `at_m` changes as the contact moves along the finger, in 1/m², and as the force grows, in
+    /// 1/(m·N); 0 beyond the contact, and at the contact what holds just before it.
+    pub fn curvature_gradient(&self, at_m: f64) -> [f64; 2] {
+        if at_m > self.contact_m {
+            return [0.0; 2];
+        }
+        let (q, s, d) = (self.q, self.contact_m, self.contact_m - at_m);
+        let root = q.sqrt();
+        let Jacobi { sn, cn, dn, epsilon } = self.jacobi(at_m);
+        let (sd, sd_by_u) = (sn / dn, cn / (dn * dn));
+        let by_distance = 2.0 * q * self.half_cosine * sd_by_u;
+        let by_q = self.half_cosine * (if root > 0.0 { sd / root } else { d } + d * sd_by_u);
+        // ∂am(u)/∂m follows from ∂F(φ, m)/∂m (Byrd and Friedman, 710.07), and sd from am.
+        let (m, complement) = (1.0 - self.complement, self.complement);
+        let amplitude_by_m =
+            dn * (root * d / (2.0 * m) - epsilon / (2.0 * m * complement)) + sn * cn / (2.0 * complement);
+        let sd_by_m = amplitude_by_m * cn / dn
+            + sn * (sn * sn + 2.0 * m * sn * cn * amplitude_by_m) / (2.0 * dn.powi(3));
+        let by_m =
+            2.0 * root * ((1.0 - 2.0 * m) / (2.0 * self.half_cosine) * sd + self.half_cosine * sd_by_m);
+        let by_load = by_m * self.modulus_by_load;
+        [self.sign * (by_distance + by_load * 2.0 * q * s), (by_q + by_load * s * s) / self.stiffness_n_m2]
+    }
+
+    /// Where the point at σ = `at_m` has gone: along the straight finger, and across it (positive upward), in metres from
+    /// the clamp.
+    pub fn point(&self, at_m: f64) -> [f64; 2] {
+        let bent_m = at_m.min(self.contact_m);
+        let ([x0, y0], [x1, y1]) = (self.way_to_contact(0.0), self.way_to_contact(bent_m));
+        let (sine, cosine) = self.angle(self.contact_m).sin_cos();
+        let straight_m = at_m - bent_m;
+        [x0 - x1 + straight_m * cosine, -self.sign * (y0 - y1) - straight_m * sine]
+    }
+
+    /// The vector from σ to the contact, along the straight finger and downward: with S = ∫ sin ω = ψ′/q and
+    /// C = ∫ cos ω = (2·(ℰ − m·sn·cd) − u)/√q over the way between them, (S·cos α + C·sin α, S·sin α − C·cos α).
+    fn way_to_contact(&self, at_m: f64) -> [f64; 2] {
+        if self.q == 0.0 {
+            return [self.contact_m - at_m, 0.0];
+        }
+        let root = self.q.sqrt();
+        let Jacobi { sn, cn, dn, epsilon } = self.jacobi(at_m);
+        let m = 1.0 - self.complement;
+        let sines = 2.0 * self.half_cosine * sn / dn / root;
+        let cosines = (2.0 * (epsilon - m * sn * cn / dn) - root * (self.contact_m - at_m)) / root;
+        let (sin_a, cos_a) = self.force_angle.sin_cos();
+        [sines * cos_a + cosines * sin_a, sines * sin_a - cosines * cos_a]
+    }
+
+    /// ω at σ = `at_m`, and at the contact for any point beyond it.
+    fn pendulum_angle(&self, at_m: f64) -> f64 {
+        let Jacobi { cn, .. } = self.jacobi(at_m.min(self.contact_m));
+        let m = 1.0 - self.complement;
+        2.0 * (m.sqrt() * cn).atan2(self.complement.sqrt())
+    }
+
+    fn jacobi(&self, at_m: f64) -> Jacobi {
+        Jacobi::new(self.q.sqrt() * (self.contact_m - at_m), self.complement)
+    }
+}
+
+/// How far a vertical force turns the finger where it acts.
+#[derive(Clone, Copy)]
+struct Turn {
+    /// The Gudermannian argument: sin ψ(s) = tanh w.
+    w: f64,
+    /// dw/d(F·s²/(E·I)).
+    by_load: f64,
+}
+
+impl Turn {
+    /// Inverts the load by Newton's method. The load is convex in w, at least 2·w and at least (w − 1)², so the first guess
+    /// lies above the root, and so do all that follow.
+    fn of_load(load: f64) -> Self {
+        let mut turn = Self { w: (0.5 * load).min(load.sqrt() + 1.0).min(MOST_TURN), by_load: 0.5 };
+        for _ in 0..MOST_STEPS {
+            if turn.w <= 0.0 {
+                break;
+            }
+            let (at_w, slope) = load_of_turn(turn.w);
+            turn.by_load = 1.0 / slope;
+            let next = (turn.w - (at_w - load) / slope).clamp(0.0, MOST_TURN);
+            let moved = (next - turn.w).abs();
+            turn.w = next;
+            if moved <= 4.0 * f64::EPSILON * next {
+                break;
+            }
+        }
+        turn
+    }
+}
+
+/// The load F·s²/(E·I) that turns the contact by w > 0, and its derivative.
+///
+/// The root of the load is F(φ, m) with cos φ = e⁻ʷ; dF = dφ/Δ + (E − m′·F − m·sin φ·cos φ/Δ)·dw, as dm = 2·m·m′·dw, and
+/// Δ² = 1 − m·sin² φ = 1 − tanh w.
+fn load_of_turn(w: f64) -> (f64, f64) {
+    let squared_cosine = (-2.0 * w).exp();
+    let squared_sine = -(-2.0 * w).exp_m1();
+    let complement = 1.0 / (1.0 + (2.0 * w).exp());
+    let m = 1.0 - complement;
+    let squared_delta = 2.0 * complement;
+    let (sine, cosine, delta) = (squared_sine.sqrt(), squared_cosine.sqrt(), squared_delta.sqrt());
+    let first = sine * carlson_rf(squared_cosine, squared_delta, 1.0);
+    let second = first - m * sine * squared_sine / 3.0 * carlson_rd(squared_cosine, squared_delta, 1.0);
+    let by_angle = cosine / (sine * delta);
+    let slope = by_angle + second - complement * first - m * sine * cosine / delta;
+    (first * first, 2.0 * first * slope)
+}
+
+#[cfg(test)]
+mod tests;

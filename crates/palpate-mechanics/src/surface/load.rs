@@ -1,0 +1,100 @@
+//! A force that is spread over part of a surface.
+
+use serde::{Deserialize, Serialize};
+
+use super::InfluenceFunction;
+use crate::contact::Position;
+
+/// Points along each side at which a spread force is summed: by the midpoint rule the kinks of strain and reaction sensors
+/// cost less than 10⁻⁴ of their full scale.
+const POINTS_ALONG: usize = 100;
+/// The same across, on a plane.
+const POINTS_ACROSS: usize = 20;
+
+/// A force spread evenly over a stretch of a line, or over a rectangle of a plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UniformLoad {
+    /// Its left end, or lower left corner.
+    pub from: Position,
+    /// Its right end, or upper right corner; not left of or below `from`.
+    pub to: Position,
+    /// The whole force in newtons, positive downward.
+    pub force_n: f64,
+}
+
+impl UniformLoad {
+    /// The middle of it, where its force acts as a whole.
+    pub fn centre(&self) -> Position {
+        Position { x_m: self.from.x_m.midpoint(self.to.x_m), y_m: self.from.y_m.midpoint(self.to.y_m) }
+    }
+
+    /// What a sensor reads per newton of it: the mean of the influence function over the stretch, in its unit.
+    pub fn mean(&self, influence: &dyn InfluenceFunction) -> f64 {
+        let points = self.points();
+        points.iter().map(|point| influence.at(*point)).sum::<f64>() / points.len() as f64
+    }
+
+    /// How fast that changes as the whole load moves along x and along y, per metre.
+    pub fn mean_gradient(&self, influence: &dyn InfluenceFunction) -> [f64; 2] {
+        let points = self.points();
+        let sum = points.iter().fold([0.0, 0.0], |[sum_x, sum_y], point| {
+            let [x, y] = influence.gradient(*point);
+            [sum_x + x, sum_y + y]
+        });
+        sum.map(|sum| sum / points.len() as f64)
+    }
+
+    fn points(&self) -> Vec<Position> {
+        let across = if self.to.y_m > self.from.y_m { POINTS_ACROSS } else { 1 };
+        midpoints(self.from, self.to, [POINTS_ALONG, across])
+    }
+}
+
+/// The middles of `counts` equal parts along x and along y of the rectangle between two corners, row by row.
+pub fn midpoints(from: Position, to: Position, counts: [usize; 2]) -> Vec<Position> {
+    let at =
+        |low: f64, high: f64, i: usize, count: usize| low + (high - low) * (i as f64 + 0.5) / count as f64;
+    let [along, across] = counts;
+    let point = |j, i| Position { x_m: at(from.x_m, to.x_m, i, along), y_m: at(from.y_m, to.y_m, j, across) };
+    (0..across).flat_map(|j| (0..along).map(move |i| point(j, i))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensing::SensorKind;
+    use crate::surface::{Beam, Surface};
+
+    fn beam() -> Beam {
+        Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 }
+    }
+
+    /// 5·q·l⁴/(384·E·I) at mid-span, t·q·l²/(16·E·I) there, and half of the load at either support.
+    #[test]
+    fn a_load_all_over_a_beam_bends_it_as_tables_say() {
+        let (beam, l) = (beam(), 0.4);
+        let load = UniformLoad { from: Position::along(0.0), to: Position::along(l), force_n: 1.0 };
+        let read = |kind, at| load.mean(&*beam.influence_function(kind, Position::along(at)));
+        let stiffness = beam.bending_stiffness();
+        let deflection = -5.0 * l.powi(3) / (384.0 * stiffness);
+        assert!((read(SensorKind::Deflection, l / 2.0) / deflection - 1.0).abs() < 1e-4);
+        let strain = 1.2e-3 * l / (16.0 * stiffness);
+        assert!((read(SensorKind::Strain, l / 2.0) / strain - 1.0).abs() < 1e-4);
+        assert!((read(SensorKind::Reaction, 0.0) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn moving_a_load_changes_what_is_read_as_its_gradient_says() {
+        let beam = beam();
+        let load = |x_m: f64| UniformLoad {
+            from: Position::along(x_m - 0.01),
+            to: Position::along(x_m + 0.01),
+            force_n: 1.0,
+        };
+        let influence = beam.influence_function(SensorKind::Deflection, Position::along(0.13));
+        let step = 1e-4;
+        let slope = (load(0.2 + step).mean(&*influence) - load(0.2 - step).mean(&*influence)) / (2.0 * step);
+        assert!((load(0.2).mean_gradient(&*influence)[0] / slope - 1.0).abs() < 1e-6);
+        assert_eq!(load(0.2).centre(), Position::along(0.2));
+    }
+}

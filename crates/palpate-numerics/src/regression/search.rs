@@ -1,0 +1,179 @@
+//! Finding the hyperparameters: the evidence, with a weak prior, at its greatest.
+
+use ndarray::Axis;
+
+use super::evidence::Evidence;
+use super::groups::Groups;
+use super::lbfgs::{Stop, minimise};
+use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, Trend};
+use crate::random_order;
+
+/// How a Gaussian process is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Regression {
+    /// The correlation of two points.
+    pub kernel: Kernel,
+    /// What lies beneath.
+    pub trend: Trend,
+    /// The hyperparameters are found from at most this many distinct points, drawn at random; at least 2. Whatever
+    /// their number, the posterior is that of all rows.
+    pub search_points: usize,
+    /// Fixes the draw.
+    pub seed: u64,
+}
+
+impl Default for Regression {
+    fn default() -> Self {
+        Self { kernel: Kernel::Matern52, trend: Trend::Constant, search_points: 500, seed: 0 }
+    }
+}
+
+/// Points on which the starts are tried.
+const TRIAL_POINTS: usize = 160;
+/// How long a start is tried, and how long the best is then followed.
+const TRIAL: Stop = Stop { evaluations: 30, decrease: 0.05 };
+const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
+/// Starts: length scales over the coordinates' spread, and the noise ratio.
+const STARTS: [(f64, f64); 3] = [(1.0, 1e-2), (0.3, 1e-3), (3.0, 1e-5)];
+
+impl Regression {
+    /// Finds the hyperparameters and the posterior; `None` when `keep_going`, asked often, says no.
+    ///
+    /// All outputs share length scales and noise ratio; each has its own signal variance. The logarithms of the
+    /// hyperparameters have normal priors so wide (a factor of e² for length scales, e⁵ for a fitted noise ratio, one
+    /// standard deviation each way) that they matter only where a handful of rows say nothing.
+    ///
+    /// # Errors
+    /// [`RegressionError`], with the row or value that no regression can use.
+    pub fn fit(
+        &self,
+        samples: Samples,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<GaussianProcess>, RegressionError> {
+        let groups = Groups::of(samples)?;
+        let Some(found) = self.search(&groups, keep_going) else { return Ok(None) };
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found).map(Some)
+    }
+
+    /// As [`Self::fit`], every output with hyperparameters of its own: one process an output.
+    ///
+    /// # Errors
+    /// [`RegressionError`], with the row or value that no regression can use.
+    pub fn fit_each(
+        &self,
+        samples: Samples,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<GaussianProcess>>, RegressionError> {
+        let mut processes = Vec::with_capacity(samples.outputs.ncols());
+        for column in samples.outputs.axis_chunks_iter(Axis(1), 1) {
+            let Some(process) = self.fit(Samples { outputs: column, ..samples }, keep_going)? else {
+                return Ok(None);
+            };
+            processes.push(process);
+        }
+        Ok(Some(processes))
+    }
+
+    /// The posterior with hyperparameters that are known.
+    ///
+    /// # Errors
+    /// [`RegressionError`], with the row or value that no regression can use.
+    pub fn condition(
+        &self,
+        samples: Samples,
+        hyperparameters: &Hyperparameters,
+    ) -> Result<GaussianProcess, RegressionError> {
+        let groups = Groups::of(samples)?;
+        hyperparameters.check(groups.coordinates.nrows())?;
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters)
+    }
+
+    fn search(&self, groups: &Groups, keep_going: &mut dyn FnMut() -> bool) -> Option<Hyperparameters> {
+        let prior = Prior::of(groups);
+        let order = random_order(groups.len(), self.seed);
+        let first = |count: usize| {
+            let mut chosen = order[..count.min(order.len())].to_vec();
+            chosen.sort_unstable();
+            groups.subset(&chosen)
+        };
+        let search = groups.len().min(self.search_points.max(2));
+        let trial = first(search.min(TRIAL_POINTS));
+        let mut best = self.follow(&trial, &prior, &prior.start(STARTS[0]), TRIAL, keep_going)?;
+        for start in &STARTS[1..] {
+            let found = self.follow(&trial, &prior, &prior.start(*start), TRIAL, keep_going)?;
+            if found.1 < best.1 {
+                best = found;
+            }
+        }
+        let best = self.follow(&first(search), &prior, &best.0, FINAL, keep_going)?;
+        Some(Hyperparameters::from_logarithms(&best.0))
+    }
+
+    /// Logarithms of the hyperparameters that maximise posterior density from `start`, and minus its logarithm.
+    fn follow(
+        &self,
+        groups: &Groups,
+        prior: &Prior,
+        start: &[f64],
+        stop: Stop,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Option<(Vec<f64>, f64)> {
+        let evidence = Evidence { groups, kernel: self.kernel, trend: self.trend };
+        let minimum = minimise(start, stop, |logarithms, gradient| {
+            if !keep_going() {
+                return None;
+            }
+            let hyperparameters = Hyperparameters::from_logarithms(logarithms);
+            let log_evidence = evidence.with_gradient(&hyperparameters, gradient);
+            // No factor: a cliff for the search to back away from.
+            let Some(log_evidence) = log_evidence.ok().filter(|value| value.is_finite()) else {
+                return Some(f64::INFINITY);
+            };
+            gradient.iter_mut().for_each(|slope| *slope = -*slope);
+            Some(prior.minus_log_density(logarithms, gradient) - log_evidence)
+        })?;
+        Some((minimum.point, minimum.value))
+    }
+}
+
+/// Normal priors of the logarithms.
+struct Prior {
+    centre: Vec<f64>,
+    deviation: Vec<f64>,
+    /// Where the noise is given, ln η of a signal as large as the outputs are: every search starts there.
+    known_start: Option<f64>,
+}
+
+impl Prior {
+    fn of(groups: &Groups) -> Self {
+        let d = groups.spread.len();
+        // Points in d dimensions are about √d spreads apart.
+        let apart = (d as f64).sqrt();
+        let scales = groups.spread.iter().map(|spread| (spread * apart).ln());
+        let known_start = groups.noise_given.then(|| -groups.mean_square().max(f64::MIN_POSITIVE).ln());
+        let (noise, deviation) = known_start.map_or((1e-3_f64.ln(), 5.0), |start| (start, 3.0));
+        let centre = scales.chain([noise]).collect();
+        Self { centre, deviation: [vec![2.0; d], vec![deviation]].concat(), known_start }
+    }
+
+    /// Where a search starts, from length scales over their centre and a noise ratio.
+    fn start(&self, (scale, noise): (f64, f64)) -> Vec<f64> {
+        let mut start: Vec<f64> = self.centre.iter().map(|centre| centre + f64::ln(scale)).collect();
+        if let Some(last) = start.last_mut() {
+            *last = self.known_start.unwrap_or(noise.ln());
+        }
+        start
+    }
+
+    /// ½·Σ ((θ − centre)/deviation)², and its gradient added.
+    fn minus_log_density(&self, logarithms: &[f64], gradient: &mut [f64]) -> f64 {
+        let mut sum = 0.0;
+        for (i, theta) in logarithms.iter().enumerate() {
+            let off = (theta - self.centre[i]) / self.deviation[i];
+            gradient[i] += off / self.deviation[i];
+            sum += 0.5 * off * off;
+        }
+        sum
+    }
+}

@@ -1,0 +1,181 @@
+//! The report of a comparison: every estimator's errors beside each other, and the limit.
+
+use maud::{Markup, html};
+
+use super::error_lines::{in_thousandths, limit_in_words, limit_line};
+use super::maps::error_map;
+use super::numbers::{counted, number};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::{Axis, Chart, Series};
+use palpate_estimators::evaluation::{Comparison, Evaluation, limit_ratio, percentage_error};
+use palpate_estimators::setup::Bench;
+
+/// Stretches of the surface over which errors are summed up.
+const STRETCHES: usize = 40;
+/// Maps that fit beside each other; estimators beyond them are in the table alone.
+const MOST_MAPS: usize = 9;
+
+/// What a comparison's report is made from.
+#[derive(Clone, Copy)]
+pub struct ComparisonReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// The surface and its sensors.
+    pub bench: &'a Bench,
+    /// What the estimators were tried on, in words.
+    pub trials: &'a str,
+    /// The estimators, best first.
+    pub comparisons: &'a [Comparison],
+    /// Kinds that do not suit the rig or the recording, and why.
+    pub left_out: &'a [(&'static str, String)],
+    /// Errors up to this are good enough for the effective length, in metres.
+    pub tolerance_m: f64,
+    /// Seed of simulation and fits.
+    pub seed: u64,
+}
+
+/// Reports a comparison: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
+    let (heading, errors) = if report.is_plane() {
+        ("Errors over the surface", report.errors_map())
+    } else {
+        ("Errors along the surface", report.along_figure())
+    };
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections: vec![
+            Section::new("table", "The estimators").table(report.table()).text(report.left_out_in_words()),
+            Section::new("along", heading).figure(errors),
+            Section::new("share", "How many readings are how good").figure(report.share_figure()),
+        ],
+        made: html! { " from " (report.trials) "; seed " (report.seed) ". Times are of this machine and this run" },
+    }
+    .files()
+}
+
+impl ComparisonReport<'_> {
+    fn is_plane(&self) -> bool {
+        self.bench.surface.extent().is_plane()
+    }
+
+    fn summary(&self) -> Markup {
+        let best = self.comparisons.first();
+        let mean = best.and_then(|best| best.evaluation.summary(None));
+        html! {
+            li { (counted(self.comparisons.len(), "estimator", "estimators")) " on " (self.trials) "." }
+            @if let (Some(best), Some(mean)) = (best, mean) {
+                li {
+                    "The least mean error is that of " b { (best.estimator.kind()) } ": "
+                    (number(mean.average_m * 1e3)) " mm, median " (number(mean.median_m * 1e3)) " mm."
+                }
+                @if let Some(ratio) = limit_ratio(self.bench, &best.evaluation) {
+                    li { "That is " (number(ratio)) " times what physics allows where the limit is small." }
+                }
+            }
+        }
+    }
+
+    fn table(&self) -> Table {
+        let rows = self.comparisons.iter().filter_map(|comparison| {
+            let evaluation = &comparison.evaluation;
+            let summary = evaluation.summary(None)?;
+            Some(vec![
+                text(comparison.estimator.kind()),
+                value_mm(summary.average_m),
+                value(percentage_error(summary.average_m, evaluation.length_m)),
+                value_mm(summary.median_m),
+                value_mm(summary.p95_m),
+                value_mm(summary.rmse_m),
+                value(evaluation.effective_percent(self.tolerance_m)),
+                value(evaluation.coverage_percent()),
+                value(limit_ratio(self.bench, evaluation)),
+                value(comparison.fit_seconds * 1e3),
+                value(comparison.locate_ns * 1e-3),
+            ])
+        });
+        let columns = [
+            short("estimator"),
+            numeric("mean"),
+            numeric("% of length"),
+            numeric("median"),
+            numeric("95th"),
+            numeric("RMS"),
+            numeric("effective, %"),
+            numeric("covered, %"),
+            numeric("× limit"),
+            numeric("fit, ms"),
+            numeric("a reading, µs"),
+        ];
+        let caption = html! {
+            "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
+            (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. × limit: mean \
+             error over what physics allows, where the limit is at most " (if self.is_plane() { "1/20" } else { "1/200" })
+            " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
+        };
+        Table::new(columns, rows, caption)
+    }
+
+    fn left_out_in_words(&self) -> Markup {
+        html! {
+            @if !self.left_out.is_empty() {
+                p { "Left out:" }
+                ul {
+                    @for (kind, why) in self.left_out {
+                        li { b { (*kind) } ": " (why) "." }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A line an estimator.
+    fn series(&self, points: impl Fn(&Evaluation) -> Vec<(f64, f64)>) -> Vec<Series> {
+        // The last colour is black, which the limit has.
+        const COLOURS: usize = 6;
+        let series = |(i, comparison): (usize, &Comparison)| {
+            let (label, points) = (comparison.estimator.kind(), points(&comparison.evaluation));
+            let drawn = if i < COLOURS { Series::line } else { Series::dashes };
+            drawn(label, i % COLOURS, points)
+        };
+        self.comparisons.iter().enumerate().map(series).collect()
+    }
+
+    fn errors_map(&self) -> Figure {
+        let shown = self.comparisons.iter().take(MOST_MAPS);
+        let evaluations: Vec<(&str, &Evaluation)> =
+            shown.map(|comparison| (comparison.estimator.kind(), &comparison.evaluation)).collect();
+        let what = "Median error of each estimator, from the best mean to the worst and all on one scale";
+        error_map(self.bench, "Median error over the surface", what, &evaluations)
+    }
+
+    fn along_figure(&self) -> Figure {
+        let length_mm = self.bench.surface.extent().length_m * 1e3;
+        let mut series = self.series(|evaluation| in_thousandths(evaluation.median_by_stretch_m(STRETCHES)));
+        series.extend(limit_line(self.bench));
+        let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);
+        let y = Axis::log10("location error, mm");
+        let chart = Chart::new("Median error along the surface", x, y, series).with_height(480);
+        let limit = limit_in_words(&chart);
+        let caption = html! {
+            "Median error of each estimator over stretches of " (number(length_mm / STRETCHES as f64)) " mm."
+            (limit)
+            @if !limit.is_empty() { " The median of normal errors is 0.85 times their mean: the best estimators lie that far below." }
+        };
+        Figure::chart(&chart, caption)
+    }
+
+    fn share_figure(&self) -> Figure {
+        let shares = |evaluation: &Evaluation| {
+            let points = evaluation.percentiles_m().into_iter();
+            let points = points.map(|(percent, error_m)| (error_m * 1e3, f64::from(percent)));
+            points.filter(|(error_mm, _)| *error_mm > 0.0).collect()
+        };
+        let x = Axis::log10("location error, mm");
+        let y = Axis::linear("share of the readings, %").from_to(0.0, 100.0);
+        let chart = Chart::new("Share of the readings within an error", x, y, self.series(shares));
+        let caption = html! { "How many of an estimator's readings are located within an error: the further left, the better." };
+        Figure::chart(&chart.with_height(480), caption)
+    }
+}

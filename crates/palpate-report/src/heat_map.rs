@@ -1,0 +1,260 @@
+//! A quantity over a plane as colours: one map, or several of the same plane and scale beside each other.
+
+use super::chart::{Axis, Ticks};
+use super::extremes::Extremes;
+use super::geometry::{Point, Rect};
+use super::scale::AxisScale;
+use super::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, Svg, WHITE};
+use super::text;
+use super::ticks::{self, TICK_SIZE, Tick, columns_fit, rows_fit, tick_labels};
+use palpate_estimators::estimator::Cells;
+
+const MARGIN: f64 = 12.0;
+const TITLE_SIZE: f64 = 15.0;
+const TITLE_LINE: f64 = 26.0;
+const NAME_SIZE: f64 = 12.5;
+const NAME_LINE: f64 = 22.0;
+/// Room left of a map for the labels of its ticks, and beneath it.
+const GUTTER: f64 = 40.0;
+const FOOT: f64 = 26.0;
+/// From one map to the next.
+const GAP: f64 = 18.0;
+const BAR_WIDTH: f64 = 16.0;
+/// Room for the labels of the colour bar.
+const BAR_LABELS: f64 = 54.0;
+/// Most height of one map.
+const MOST_HEIGHT: f64 = 420.0;
+/// Cells overlap by this much, or a line of background would show between them.
+const OVERLAP: f64 = 0.5;
+
+/// A quantity over a plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatMap {
+    /// Heading, in one line.
+    pub title: String,
+    /// The plane, parted into cells of one value each.
+    pub cells: Cells,
+    /// The maps.
+    pub panels: Vec<HeatPanel>,
+    /// Where the dots are, such as sensors, in millimetres.
+    pub dots_mm: Vec<(f64, f64)>,
+    /// What the colours mean, with its unit: "limit, mm".
+    pub label: String,
+    /// Larger values have the colour of this one.
+    pub most: f64,
+    /// Width of the image in pixels at scale 1; drawn within 320 to 4,000. The height follows from the plane.
+    pub width_px: u32,
+}
+
+/// One map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatPanel {
+    /// Its name; empty for none.
+    pub name: String,
+    /// A value a cell; one that is not finite leaves its cell grey.
+    pub values: Vec<f64>,
+}
+
+impl HeatPanel {
+    /// A map with its name; the name may be empty.
+    pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), values }
+    }
+}
+
+/// Draws the maps as one self-contained SVG document: x to the right, y upward, a millimetre as long both ways, with one
+/// colour bar for all. The scale is logarithmic where the largest value is ten times the smallest, and all are positive.
+pub fn heat_map_to_svg(map: &HeatMap) -> String {
+    let width_px = map.width_px.clamp(320, 4000);
+    let layout = Layout::new(map, f64::from(width_px));
+    let mut svg = Svg::new(width_px, layout.height.ceil() as u32);
+    svg.text(&layout.title(map));
+    for (panel, plot) in map.panels.iter().zip(&layout.plots) {
+        draw_cells(&mut svg, map, panel, *plot, &layout.colours);
+        draw_dots(&mut svg, map, *plot);
+        layout.labels_of(panel, *plot).iter().for_each(|label| svg.text(label));
+    }
+    layout.draw_bar(&mut svg, map);
+    svg.finish()
+}
+
+/// Length and width of the plane in millimetres.
+fn sides_mm(map: &HeatMap) -> [f64; 2] {
+    let extent = map.cells.extent;
+    [extent.length_m * 1e3, extent.width_m.unwrap_or(extent.length_m) * 1e3]
+}
+
+/// Where everything goes.
+struct Layout {
+    height: f64,
+    plots: Vec<Rect>,
+    bar: Rect,
+    colours: AxisScale,
+    x: (AxisScale, Vec<Tick>),
+    y: (AxisScale, Vec<Tick>),
+}
+
+impl Layout {
+    fn new(map: &HeatMap, width: f64) -> Self {
+        let count = map.panels.len().max(1);
+        let columns = match count {
+            1..=3 => count,
+            4 => 2,
+            _ => 3,
+        };
+        let room = width - 2.0 * MARGIN - BAR_LABELS - BAR_WIDTH - GAP;
+        let each = room / columns as f64 - GUTTER - GAP;
+        let [length_mm, width_mm] = sides_mm(map);
+        let aspect = width_mm / length_mm;
+        let map_width = each.min(MOST_HEIGHT / aspect).max(20.0);
+        let map_height = map_width * aspect;
+        let top = MARGIN + TITLE_LINE;
+        let row_height = NAME_LINE + map_height + FOOT;
+        let plot = |i: usize| {
+            let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+            let left = MARGIN + GUTTER + column * (map_width + GUTTER + GAP);
+            let top = top + row * row_height + NAME_LINE;
+            Rect { left, top, right: left + map_width, bottom: top + map_height }
+        };
+        let plots: Vec<Rect> = (0..count).map(plot).collect();
+        let left = plots.iter().map(|plot| plot.right).fold(0.0, f64::max) + GAP;
+        let top_of_bar = plots[0].top;
+        let bottom = top_of_bar + map_height.max(120.0);
+        let bar = Rect { left, right: left + BAR_WIDTH, top: top_of_bar, bottom };
+        let rows = count.div_ceil(columns) as f64;
+        let height = (top + rows * row_height).max(bar.bottom + FOOT) + NAME_LINE + MARGIN;
+        let axis = |size_mm: f64| AxisScale::new(&Axis::linear("").from_to(0.0, size_mm), &[]);
+        let (x, y) = (axis(length_mm), axis(width_mm));
+        let x_ticks = ticks::choose(&x, &Ticks::Automatic, &|ticks| columns_fit(&x, ticks, map_width));
+        let y_ticks = ticks::choose(&y, &Ticks::Automatic, &|ticks| rows_fit(&y, ticks, map_height));
+        Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
+    }
+
+    fn title(&self, map: &HeatMap) -> Label {
+        let at = (MARGIN, MARGIN + 0.5 * TITLE_LINE);
+        let text = text::fit(&map.title, TITLE_SIZE, self.bar.right + BAR_LABELS - MARGIN);
+        Label { text, at, anchor: Anchor::Start, size: TITLE_SIZE, colour: INK }
+    }
+
+    /// Name and ticks of one map.
+    fn labels_of(&self, panel: &HeatPanel, plot: Rect) -> Vec<Label> {
+        let label = |text: &str, at: Point, anchor| Label {
+            text: text.to_owned(),
+            at,
+            anchor,
+            size: TICK_SIZE,
+            colour: QUIET_INK,
+        };
+        let mut labels = tick_labels(&plot, (&self.x.0, &self.x.1), (&self.y.0, &self.y.1));
+        let name = text::fit(&panel.name, NAME_SIZE, plot.width() + GUTTER);
+        let above = plot.top - 11.0;
+        labels.push(Label {
+            size: NAME_SIZE,
+            colour: INK,
+            ..label(&name, (plot.left, above), Anchor::Start)
+        });
+        // The lowest map of a column names the axis beneath it.
+        if !self.plots.iter().any(|other| other.left == plot.left && other.top > plot.top) {
+            let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 1.0);
+            labels.push(label("x, mm", at, Anchor::Middle));
+        }
+        labels.push(label("y, mm", (plot.left - 7.0, above), Anchor::End));
+        labels
+    }
+
+    fn draw_bar(&self, svg: &mut Svg, map: &HeatMap) {
+        const STEPS: usize = 120;
+        let Rect { left, right, top, bottom } = self.bar;
+        let step = (bottom - top) / STEPS as f64;
+        for i in 0..STEPS {
+            let low = bottom - i as f64 * step;
+            let area = Rect { left, right, top: (low - step - OVERLAP).max(top), bottom: low };
+            svg.rectangle(area, colour_of((i as f64 + 0.5) / STEPS as f64));
+        }
+        let fits = |ticks: &[Tick]| rows_fit(&self.colours, ticks, bottom - top);
+        for Tick { value, label } in ticks::choose(&self.colours, &Ticks::Automatic, &fits) {
+            let y = bottom - self.colours.tick_share(value) * (bottom - top);
+            svg.line(&[(right, y), (right + 4.0, y)], 1.0, QUIET_INK);
+            let at = (right + 8.0, y);
+            svg.text(&Label { text: label, at, anchor: Anchor::Start, size: TICK_SIZE, colour: QUIET_INK });
+        }
+        let at = (left, top - 11.0);
+        let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + MARGIN);
+        svg.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
+    }
+}
+
+/// The scale of the colours.
+fn colours(map: &HeatMap) -> AxisScale {
+    let all = map.panels.iter().flat_map(|panel| panel.values.iter().copied());
+    let finite = all.filter(|value| value.is_finite());
+    let extremes = Extremes::of(finite.map(|value| value.min(map.most)));
+    let Extremes { least, greatest } = extremes;
+    let from = if extremes.are_far_apart() { least } else { least.min(0.0) };
+    AxisScale::new(&extremes.axis("").from_to(from, greatest), &[least, greatest])
+}
+
+fn draw_cells(svg: &mut Svg, map: &HeatMap, panel: &HeatPanel, plot: Rect, colours: &AxisScale) {
+    svg.rectangle(plot, GRID);
+    let (width, height) = (plot.width() / map.cells.columns as f64, plot.height() / map.cells.rows as f64);
+    for (i, value) in panel.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        let Some(share) = colours.share_or_low_end(value.min(map.most)) else { continue };
+        let (column, row) = ((i % map.cells.columns) as f64, (i / map.cells.columns) as f64);
+        let (left, bottom) = (plot.left + column * width, plot.bottom - row * height);
+        let right = (left + width + OVERLAP).min(plot.right);
+        let top = (bottom - height - OVERLAP).max(plot.top);
+        svg.rectangle(Rect { left, right, top, bottom }, colour_of(share));
+    }
+}
+
+/// White rings with a dark middle, which are seen on any colour.
+fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
+    let (rim, middle) = if plot.width() < 200.0 { (3.2, 1.9) } else { (4.8, 3.0) };
+    let [length_mm, width_mm] = sides_mm(map);
+    for &(x_mm, y_mm) in &map.dots_mm {
+        let at = (plot.left + x_mm / length_mm * plot.width(), plot.bottom - y_mm / width_mm * plot.height());
+        svg.disc(at, rim, WHITE);
+        svg.disc(at, middle, INK);
+    }
+}
+
+/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain): colours that rise in lightness with a value, so that
+/// readers who see few colours can tell them, and print without any.
+const VIRIDIS: [Colour; 10] = [
+    Colour::opaque(68, 1, 84),
+    Colour::opaque(72, 40, 120),
+    Colour::opaque(62, 74, 137),
+    Colour::opaque(49, 104, 142),
+    Colour::opaque(38, 130, 142),
+    Colour::opaque(31, 158, 137),
+    Colour::opaque(53, 183, 121),
+    Colour::opaque(109, 205, 89),
+    Colour::opaque(180, 222, 44),
+    Colour::opaque(253, 231, 37),
+];
+
+/// The colour of a share of the scale, 0 to 1; beyond it the colour of its end.
+fn colour_of(share: f64) -> Colour {
+    let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
+    let below = (place as usize).min(VIRIDIS.len() - 2);
+    let part = place - below as f64;
+    let (low, high) = (VIRIDIS[below].rgb, VIRIDIS[below + 1].rgb);
+    let mix = |i: usize| (f64::from(low[i]) * (1.0 - part) + f64::from(high[i]) * part).round() as u8;
+    Colour::opaque(mix(0), mix(1), mix(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_grow_lighter_and_hold_at_the_ends() {
+        let light = |share: f64| {
+            let [r, g, b] = colour_of(share).rgb.map(f64::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let steps: Vec<f64> = (0..=50).map(|i| light(f64::from(i) / 50.0)).collect();
+        assert!(steps.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!((colour_of(-3.0), colour_of(9.0)), (VIRIDIS[0], VIRIDIS[9]));
+    }
+}

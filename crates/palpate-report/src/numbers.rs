@@ -1,0 +1,140 @@
+//! Numbers as people read them.
+
+use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{Dimension, Quantity, format_count};
+
+/// What stands where there is no number.
+pub(crate) const NOTHING: &str = "–";
+
+/// About three significant digits: "63.5", "2.46", "0.044", "1,250". "–" for what is not finite.
+pub(crate) fn number(value: f64) -> String {
+    let size = value.abs();
+    if !value.is_finite() {
+        NOTHING.to_owned()
+    } else if size >= 99.95 {
+        whole(value)
+    } else if size >= 9.995 {
+        format!("{value:.1}")
+    } else if size >= 0.0995 || size == 0.0 {
+        format!("{value:.2}")
+    } else if size >= 1e-5 {
+        let decimals = (1.0 - size.log10().floor()) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+/// An SI value with its unit, in print: "5 µm" where files and the terminal have "5 um".
+pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
+    let told = Quantity { value, dimension }.to_string();
+    match told.split_once(" u") {
+        Some((number, "e")) => format!("{number} µε"),
+        Some((number, unit)) => format!("{number} µ{unit}"),
+        None => told,
+    }
+}
+
+/// Rounded to a whole number, with separators of thousands: "26,850".
+pub(crate) fn whole(value: f64) -> String {
+    if !value.is_finite() {
+        return NOTHING.to_owned();
+    }
+    let text = format_count(value.abs().round() as u64);
+    if value < 0.0 && text != "0" { format!("−{text}") } else { text }
+}
+
+/// As it was written, with separators of thousands from 1,000 on: "3.6", "26,850".
+pub(crate) fn as_written(value: f64) -> String {
+    if value.abs() >= 1e3 { whole(value) } else { format!("{value}") }
+}
+
+/// A length in millimetres without its unit, no more decimals than it has, and two at most: "33.33", "20".
+pub(crate) fn mm(length_m: f64) -> String {
+    let text = format!("{:.2}", length_m * 1e3);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A position in millimetres: "50", or "50, 20" on a plane.
+pub(crate) fn place(position: Position, extent: Extent) -> String {
+    match extent.width_m {
+        Some(_) => format!("{}, {}", mm(position.x_m), mm(position.y_m)),
+        None => mm(position.x_m),
+    }
+}
+
+/// A portion of the surface: "20–380 mm".
+pub(crate) fn stretch(portion: Portion) -> String {
+    format!("{}–{} mm", mm(portion.from_m), mm(portion.to_m))
+}
+
+/// A number as a rig states it, freed of rounding errors: "3", "200", "0.25".
+pub(crate) fn stated(value: f64) -> String {
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// Median with the range from the 5th to the 95th percentile: "2.38 (2.26–2.73)"; the median alone where they all read
+/// the same.
+pub(crate) fn spread(spread: Spread, shown: fn(f64) -> String) -> String {
+    let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
+    if low == median && high == median { median } else { format!("{median} ({low}–{high})") }
+}
+
+/// A count with its noun: "1 seed", "1,200 networks".
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{} {}", whole(count as f64), if count == 1 { one } else { many })
+}
+
+/// A list in words: "C1, C2 and C5".
+pub(crate) fn listed<T: AsRef<str>>(items: &[T]) -> String {
+    match items {
+        [] => String::new(),
+        [only] => only.as_ref().to_owned(),
+        [first @ .., last] => {
+            let first: Vec<&str> = first.iter().map(AsRef::as_ref).collect();
+            format!("{} and {}", first.join(", "), last.as_ref())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_about_three_digits() {
+        let shown = [26_850.4, 100.0, 63.46, 2.4649, 0.5712, 0.0, 0.04449, 1.2e-7, f64::NAN].map(number);
+        assert_eq!(shown, ["26,850", "100", "63.5", "2.46", "0.57", "0.00", "0.044", "1.2e-7", "–"]);
+    }
+
+    #[test]
+    fn thousands_are_set_apart() {
+        let shown = [0.0, 999.0, 1000.0, -1_234_567.0, f64::INFINITY].map(whole);
+        assert_eq!(shown, ["0", "999", "1,000", "−1,234,567", "–"]);
+        assert_eq!([26_850.0, 3.6].map(as_written), ["26,850", "3.6"]);
+    }
+
+    #[test]
+    fn micro_is_a_letter_of_its_own_in_print() {
+        let shown = [quantity(5e-6, Dimension::Length), quantity(1e-6, Dimension::Strain)];
+        assert_eq!(shown, ["5 µm", "1 µε"]);
+        assert_eq!(quantity(5e-3, Dimension::Force), "5 mN");
+    }
+
+    #[test]
+    fn a_spread_of_one_value_is_that_value() {
+        assert_eq!(spread(Spread { median: 2.0, p05: 2.0, p95: 2.0 }, number), "2.00");
+        assert_eq!(spread(Spread { median: 2.0, p05: 1.0, p95: 30.0 }, number), "2.00 (1.00–30.0)");
+    }
+
+    #[test]
+    fn lists_and_counts_read_as_sentences_do() {
+        assert_eq!(listed::<&str>(&[]), "");
+        assert_eq!(listed(&["C1", "C2", "C5"]), "C1, C2 and C5");
+        assert_eq!(counted(1, "seed", "seeds"), "1 seed");
+        assert_eq!(counted(1200, "seed", "seeds"), "1,200 seeds");
+    }
+}

@@ -1,0 +1,197 @@
+//! The report of a design of training positions: arrangements by several rules and searches, judged alike.
+
+use maud::{Markup, html};
+
+use super::bench_figures::{row_axis, row_height};
+use super::extremes::Extremes;
+use super::maps::{Designed, compared_maps, in_mm};
+use super::numbers::{counted, mm, number};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
+use super::{Axis, Chart, Marker, Series};
+use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
+use palpate_estimators::estimator::Cells;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::in_words;
+
+/// What a report of training positions is made from.
+#[derive(Clone, Copy)]
+pub struct PositionDesignReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// The surface with its sensors.
+    pub bench: &'a Bench,
+    /// The estimator's kind.
+    pub estimator: &'a str,
+    /// What was designed.
+    pub problem: &'a PositionProblem<'a>,
+    /// The arrangements.
+    pub placed: &'a [Placed],
+}
+
+/// Reports training positions: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> {
+    let positions = Section::new("positions", "The arrangements").table(report.table());
+    let errors = Section::new("errors", "Where the locator is off");
+    let (positions, errors) = if report.problem.is_plane() {
+        (positions, errors.figures(report.maps()))
+    } else {
+        (positions.figure(report.rows_figure()), errors.figure(report.errors_figure()))
+    };
+    let meaning = Section::new("meaning", "How positions are found and judged").text(report.meaning());
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections: vec![positions.table(report.places()), errors, meaning],
+        made: html! { ", seed " (report.problem.budget().seed) },
+    }
+    .files()
+}
+
+impl<'a> PositionDesignReport<'a> {
+    fn even(&self) -> Option<&'a Placed> {
+        self.placed.iter().find(|placed| placed.placement == Placement::Even)
+    }
+
+    fn best(&self) -> Option<&'a Placed> {
+        best_placed(self.placed)
+    }
+
+    /// The even arrangement and the best, where that is another.
+    fn compared(&self) -> Vec<&'a Placed> {
+        let best = self.best().filter(|best| best.placement != Placement::Even);
+        self.even().into_iter().chain(best).collect()
+    }
+
+    fn summary(&self) -> Markup {
+        let Some(best) = self.best() else { return html! {} };
+        let budget = self.problem.budget();
+        let median = |placed: &Placed| placed.verification.median_error_m * 1e3;
+        html! {
+            li {
+                "Best of " (counted(self.placed.len(), "arrangement", "arrangements")) " of "
+                (counted(budget.count, "training position", "training positions")) ", "
+                (counted(budget.repeats, "press", "presses")) " each: " b { (best.placement.name()) } "."
+            }
+            li {
+                "Calibrated so, the locator (" (self.estimator) ") is off by " b { (number(median(best))) " mm" }
+                @if let Some(even) = self.even().filter(|even| even.placement != best.placement) {
+                    ", " (number(100.0 * (1.0 - median(best) / median(even)))) " % below the even arrangement's "
+                    (number(median(even))) " mm"
+                }
+                "; medians of " (counted(budget.verifications, "calibration", "calibrations")) ", force "
+                (self.problem.force().name()) "."
+            }
+        }
+    }
+
+    fn table(&self) -> Table {
+        let rows = self.placed.iter().map(|placed| {
+            let told = &placed.verification;
+            vec![
+                text(placed.placement.name()),
+                value_mm(told.median_error_m),
+                value_mm(told.mean_error_m),
+                value_mm(told.standard_error_m),
+                value(told.within_tolerance_percent),
+            ]
+        });
+        let columns = [
+            short("positions"),
+            numeric("median error, mm"),
+            numeric("mean error, mm"),
+            numeric("±, mm"),
+            numeric(format!("within {} mm, %", mm(self.problem.tolerance_m()))),
+        ];
+        let caption = html! {
+            "Errors after calibrating, averaged over " (counted(self.problem.contacts().len(), "contact", "contacts"))
+            ": the median and the mean of the calibrations, and the standard error of the mean."
+        };
+        Table::new(columns, rows, caption)
+    }
+
+    fn places(&self) -> Table {
+        let plane = self.problem.is_plane();
+        let rows = self
+            .placed
+            .iter()
+            .map(|placed| vec![text(placed.placement.name()), text(in_words(&placed.positions, plane))]);
+        Table::new([short("positions"), wide("where")], rows, html! { "Where to press." })
+    }
+
+    /// Every arrangement a row, the first uppermost.
+    fn rows_figure(&self) -> Figure {
+        let rows = self.placed.len();
+        let series = self.placed.iter().enumerate().map(|(row, placed)| {
+            let points = placed.positions.iter().map(|at| (at.x_m * 1e3, row_height(rows, row)));
+            Series::markers("", row, points.collect(), Marker::Circle)
+        });
+        let names: Vec<&str> = self.placed.iter().map(|placed| placed.placement.name()).collect();
+        let x = self.axis("training position, mm");
+        let chart = Chart::new("Where to press", x, row_axis(&names), series.collect())
+            .with_height((150 + 34 * rows) as u32);
+        Figure::chart(&chart, html! { "The training positions of every arrangement, a row each." })
+    }
+
+    /// The mean error at each contact, of the even arrangement and the best.
+    fn errors_figure(&self) -> Figure {
+        let contacts = &self.problem.contacts().positions;
+        let points = |placed: &Placed| {
+            let errors = contacts.iter().zip(&placed.errors_m);
+            errors.map(|(at, error_m)| (at.x_m * 1e3, error_m * 1e3)).collect()
+        };
+        let line = |(i, placed): (usize, &Placed)| {
+            let name = placed.placement.name();
+            if i == 0 {
+                Series::dashes(name, 6, points(placed))
+            } else {
+                Series::line(name, 0, points(placed))
+            }
+        };
+        let series: Vec<Series> = self.compared().into_iter().enumerate().map(line).collect();
+        let y = Extremes::of_lines(&series).axis("mean error, mm");
+        let chart = Chart::new("Error by contact position", self.axis("contact position, mm"), y, series);
+        Figure::chart(&chart, html! { "The mean error at each contact over all verifying calibrations." })
+    }
+
+    /// On a plane, the error with the even arrangement and with the best, side by side in one scale, with the positions.
+    fn maps(&self) -> Vec<Figure> {
+        let contacts = &self.problem.contacts().positions;
+        let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);
+        let cells = Cells { extent: self.bench.surface.extent(), columns, rows: contacts.len() / columns };
+        let designed = |placed: &'a Placed| Designed {
+            name: placed.placement.name(),
+            values: placed.errors_m.iter().map(|error_m| error_m * 1e3).collect(),
+            dots_mm: placed.positions.iter().copied().map(in_mm).collect(),
+        };
+        let designs = self.compared().into_iter().map(designed).collect();
+        let title = |name: &str| format!("Mean error, {name} positions");
+        let caption = |name: &str, most: &str| {
+            html! {
+                "The mean error at each contact after pressing at the " (name) " positions, which are the dots. Errors above "
+                (most) " mm have its colour."
+            }
+        };
+        compared_maps(cells, "error, mm", designs, title, caption)
+    }
+
+    fn axis(&self, label: &str) -> Axis {
+        Axis::linear(label).from_to(0.0, self.bench.surface.extent().length_m * 1e3)
+    }
+
+    fn meaning(&self) -> Markup {
+        let budget = self.problem.budget();
+        html! {
+            p {
+                "Every arrangement is judged by the same calibrations: presses are simulated with noise, the estimator is fitted, and \
+                 readings of the contacts are located. The search judged by " (counted(budget.calibrations, "calibration", "calibrations"))
+                "; the figures here are of " (counted(budget.verifications, "other one", "other ones")) ", with noise that no search has seen."
+            }
+            p {
+                b { "even" } " and " b { "edge-dense" } " are the founding paper's, " b { "chebyshev" } " are the nodes that polynomials are best \
+                 interpolated from, " b { "variance-optimal" } " leaves influence functions, learnt from the presses alone, the least variance, and "
+                b { "optimal" } " is the best of these and of some between, with its positions moved about while simulated calibrations get better."
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The rig file: one TOML document that says what is on the bench.
+
+mod error;
+mod sections;
+mod validate;
+mod value;
+
+pub use error::{RigError, RigProblem};
+pub use sections::{
+    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection,
+    TrainingSection,
+};
+pub use validate::validate;
+pub use value::{RawQuantity, choice, count, positive};
+
+use palpate_design::sensors::SensorDesign;
+use palpate_estimators::arrangement::Training;
+use palpate_estimators::estimator::EstimatorConfig;
+use palpate_estimators::evaluation::Trial;
+use palpate_estimators::recording::{Recording, TimedRecording};
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
+use palpate_mechanics::surface::UniformLoad;
+
+/// A bench, where to press it, and the method that then locates: all checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// Surface, sensors and contact.
+    pub bench: Bench,
+    /// Where to press to calibrate.
+    pub training: Option<Training>,
+    /// The method that locates.
+    pub estimator: EstimatorConfig,
+    /// Loads for a load profile to be simulated from.
+    pub loads: Vec<UniformLoad>,
+    /// How a contact moves, and what moves with it, where the rig says.
+    pub motion: Option<MovingContacts>,
+    /// What a sensor design may choose from, where the rig says.
+    pub design: Option<SensorDesign>,
+}
+
+impl Rig {
+    /// The bench as it is when pressed to calibrate: with the force of the training presses.
+    pub fn pressed_bench(&self) -> Bench {
+        self.training.as_ref().map_or_else(|| self.bench.clone(), |training| self.bench.pressed_by(training))
+    }
+
+    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Bench::simulate`].
+    ///
+    /// # Errors
+    /// [`RigSimulationError`] when the rig has no training positions, no model or no force.
+    pub fn simulate(&self, seed: u64) -> Result<Recording, RigSimulationError> {
+        Ok(self.bench.simulate(self.training()?, seed)?)
+    }
+
+    /// Simulated calibrations at the training positions; see [`Trial::by_simulation`].
+    ///
+    /// # Errors
+    /// [`RigSimulationError`] as for [`Rig::simulate`].
+    pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Trial>, RigSimulationError> {
+        Ok(Trial::by_simulation(&self.bench, self.training()?, count, seed)?)
+    }
+
+    /// The training positions.
+    ///
+    /// # Errors
+    /// [`RigSimulationError::NoTraining`] where the rig has none.
+    pub fn training(&self) -> Result<&Training, RigSimulationError> {
+        self.training.as_ref().ok_or(RigSimulationError::NoTraining)
+    }
+
+    /// Moves the contacts as `[motion]` says; see [`simulate_moving`].
+    ///
+    /// # Errors
+    /// [`RigSimulationError`] when the rig has no motion, no model or no force.
+    pub fn simulate_moving(&self, seed: u64) -> Result<TimedRecording, RigSimulationError> {
+        let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
+        Ok(simulate_moving(&self.pressed_bench(), moving, seed)?)
+    }
+
+    /// Reads a rig file.
+    ///
+    /// # Errors
+    /// [`RigError`], with the place in `text`, the value and its bound.
+    pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        validate(&toml::from_str(text).map_err(RigError::from_toml)?)
+    }
+}
+
+/// A rig that cannot be simulated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RigSimulationError {
+    /// The rig does not say where to press.
+    #[error("a simulation needs training positions; the rig has no [training]")]
+    NoTraining,
+    /// The rig does not say how a contact moves.
+    #[error("a moving contact needs to be told of; the rig has no [motion]")]
+    NoMotion,
+    /// What it describes cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,369 @@
+mod digits;
+mod loads;
+mod planes;
+mod plates;
+
+use super::*;
+use palpate_estimators::arrangement::Arrangement;
+use palpate_estimators::network::{InputScale, NetworkConfig, OutputCoding};
+use palpate_estimators::recording::{Column, PositionColumns};
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
+use palpate_testing::data::recording;
+
+mod supports;
+
+const PAPER: &str = include_str!("../../../examples/paper.toml");
+const FSI_WATER: &str = include_str!("../../../examples/fsi-water.toml");
+
+#[test]
+fn the_papers_bench_is_what_the_paper_says() {
+    let rig = Rig::from_toml(PAPER).unwrap();
+    let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+    assert_eq!(rig.bench.surface, SurfaceSpec::Beam(beam));
+    let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
+    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6);
+    assert_eq!(rig.bench.layout, layout);
+    assert_eq!(rig.bench.force_n, Some(3.0));
+    assert_eq!(
+        rig.training,
+        Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
+    );
+    assert_eq!(rig.estimator, EstimatorConfig::Network(NetworkConfig::default()));
+    assert_eq!(rig.bench.columns, None);
+}
+
+#[test]
+fn the_water_strip_maps_foreign_columns() {
+    let rig = Rig::from_toml(FSI_WATER).unwrap();
+    assert_eq!(rig.bench.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
+    assert_eq!(rig.bench.layout.names(), ["Pl", "Pr"]);
+    let EstimatorConfig::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
+    assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));
+    let columns = rig.bench.columns.unwrap();
+    assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
+    assert_eq!(columns.position_unit.symbol(), "mm");
+}
+
+#[test]
+fn the_water_strips_recording_is_read() {
+    let Some(path) = recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
+    let rig = Rig::from_toml(FSI_WATER).unwrap();
+    let recording = rig.bench.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
+    assert_eq!(recording.rows.len(), 779);
+    assert_eq!(recording.distinct_positions().len(), 41);
+    assert_eq!(recording.rows[0].reading, [2.04354199724436, 1.42585650614297]);
+    assert_eq!(recording.rows[0].force_n, Some(2.21296444140415));
+    let folds = recording.folds(5).unwrap();
+    assert_eq!(recording.warnings(), []);
+    let held_out: Vec<usize> = folds.iter().map(|fold| fold.held_out.len()).collect();
+    assert_eq!(held_out, [9 * 19, 8 * 19, 8 * 19, 8 * 19, 8 * 19]);
+}
+
+/// The message, then the first line that is meant with a mark under it, then the help.
+fn pointed(text: &str) -> String {
+    let error = Rig::from_toml(text).unwrap_err();
+    let mut shown = error.to_string();
+    if let Some(span) = error.span.clone() {
+        let start = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+        let line = text[start..].lines().next().unwrap_or("");
+        let end = span.end.min(start + line.len()).max(span.start);
+        let before = text[start..span.start].chars().count();
+        let marked = text[span.start..end].chars().count().max(1);
+        shown += &format!("\n  | {line}\n  | {}{}", " ".repeat(before), "^".repeat(marked));
+    }
+    if let Some(help) = error.help() {
+        shown += &format!("\n  help: {help}");
+    }
+    shown
+}
+
+/// A bench on which everything can be changed.
+const BENCH: &str = r#"[surface]
+kind = "beam"
+length = "400 mm"
+width = "40 mm"
+thickness = "1.2 mm"
+youngs_modulus = "200 GPa"
+[sensors]
+measure = "deflection"
+count = 8
+[contact]
+force = "3 N"
+[training]
+count = 10
+[estimator]
+kind = "network"
+"#;
+
+/// Each change replaces one piece of the bench by another.
+fn refused(base: &str, changes: &[(&str, &str)]) -> String {
+    let shown = changes.iter().map(|(from, to)| {
+        assert!(base.contains(from), "{from}");
+        pointed(&base.replace(from, to))
+    });
+    shown.collect::<Vec<_>>().join("\n\n")
+}
+
+#[test]
+fn a_bad_surface_is_refused_with_a_caret() {
+    let shown = refused(
+        BENCH,
+        &[
+            ("length", "lenght"),
+            ("length =", "colour ="),
+            ("[surface]", "[surfaces]"),
+            ("\"400 mm\"", "\"400 m m\""),
+            ("\"400 mm\"", "\"400 N\""),
+            ("\"400 mm\"", "400"),
+            ("\"400 mm\"", "\"-400 mm\""),
+            ("\"400 mm\"", "[400]"),
+            ("\"400 mm\"", "\"400 mm"),
+            ("\"1.2 mm\"", "\"0 mm\""),
+            ("\"1.2 mm\"", "\"1e-300 nm\""),
+            ("\"beam\"", "\"baem\""),
+            ("\"beam\"", "\"measured\""),
+            ("kind = \"beam\"\n", ""),
+            ("width = \"40 mm\"\n", ""),
+            ("thickness", "supports = \"clamped\"\nthickness"),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+    insta::assert_snapshot!(pointed(""));
+}
+
+#[test]
+fn bad_sensors_are_refused_with_a_caret() {
+    let shown = refused(
+        BENCH,
+        &[
+            ("count = 8", "count = 0"),
+            ("count = 8", "count = -1"),
+            ("count = 8", ""),
+            ("count = 8", "positions = []"),
+            ("count = 8", "positions = [\"44 mm\", \"401 mm\"]"),
+            ("count = 8", "positions = [\"44 mm\"]\ncount = 1"),
+            ("count = 8", "count = 8\nnoise = \"5 N\""),
+            ("count = 8", "count = 8\nnoise = \"-5 um\""),
+            ("count = 8", "count = 8\ngain_error = \"100 %\""),
+            ("count = 8", "count = 8\nposition_error = \"5 N\""),
+            ("\"deflection\"\ncount = 8", "\"reaction\"\npositions = [\"0 mm\"]\nposition_error = \"1 mm\""),
+            ("count = 8", "count = 8\nrange = [\"5 mm\", \"-5 mm\"]"),
+            ("count = 8", "count = 8\nrange = [\"5 mm\"]"),
+            ("count = 8", "count = 8\ndead = [3, 9]"),
+            ("\"deflection\"", "\"deflexion\""),
+            ("\"deflection\"", "\"raw\""),
+            ("\"deflection\"", "\"reaction\""),
+            ("\"deflection\"\ncount = 8", "\"reaction\"\npositions = [\"0 mm\", \"200 mm\"]"),
+            ("measure = \"deflection\"\n", ""),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+}
+
+#[test]
+fn bad_contacts_and_training_positions_are_refused_with_a_caret() {
+    let shown = refused(
+        BENCH,
+        &[
+            ("\"3 N\"", "\"0 N\""),
+            ("\"3 N\"", "\"3 mm\""),
+            ("force = \"3 N\"\n", ""),
+            ("count = 10", "count = 0"),
+            ("count = 10", "count = 10\nrepeats = 0"),
+            ("count = 10", "count = 100000\nrepeats = 100000"),
+            ("count = 10", "count = 10\nmiddle = 4"),
+            ("count = 10", "arrangement = \"edge-dense\"\ncount = 10"),
+            ("count = 10", "arrangement = \"edge-dense\"\ncount = 10\nmiddle = 5"),
+            ("count = 10", "arrangement = \"edge-dense\"\ncount = 10\nmiddle = 4\nportion = [0.25]"),
+            ("count = 10", "arrangement = \"explicit\""),
+            ("count = 10", "positions = []"),
+            ("count = 10", "positions = [\"20 mm\", \"401 mm\"]"),
+            ("count = 10", "count = 10\nportion = [\"90 %\", \"10 %\"]"),
+            ("count = 10", "positions = [\"20 mm\"]\nportion = [0.1, 0.9]"),
+            ("count = 10", "arrangement = \"edgedense\"\ncount = 10"),
+            ("count = 10", ""),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+}
+
+#[test]
+fn a_bad_estimator_is_refused_with_a_caret() {
+    let network = "kind = \"network\"";
+    let with = |line: &str| pointed(&BENCH.replace(network, &format!("{network}\n{line}")));
+    let shown = [
+        pointed(&BENCH.replace("\"network\"", "\"netwrok\"")),
+        with("hidden = [10, 0]"),
+        with("hidden = 10"),
+        with("momentum = 1"),
+        with("momentum = -0.1"),
+        with("learning_rate = 0"),
+        with("learning_rate = nan"),
+        with("aggregate_error = 0.0"),
+        with("max_epochs = 0"),
+        with("initial_weights = -0.5"),
+        with("output = \"normalised\""),
+        with("hidden_activation = \"sigmoid\""),
+        with("order = \"random\""),
+        with("input_scale = \"5 N\""),
+        with("input_scale = \"fullscale\""),
+        with("learning_rat = 0.7"),
+    ];
+    insta::assert_snapshot!(shown.join("\n\n"));
+}
+
+#[test]
+fn a_bad_recording_section_is_refused_with_a_caret() {
+    let shown = refused(
+        FSI_WATER,
+        &[
+            ("\"mm\"", "\"N\""),
+            ("[\"Pl\", \"Pr\"]", "[\"Pl\"]"),
+            ("[\"Pl\", \"Pr\"]", "[\"Pl\", \"Pl\"]"),
+            ("[\"Pl\", \"Pr\"]", "[0, 1]"),
+            ("position = \"X\"", "position = \"X\"\ny = \"Y\""),
+            ("position = \"X\"", "x = \"X\""),
+            ("position = \"X\"", "x = \"X\"\ny = \"Y\""),
+            ("position = \"X\"", "position = \"X\"\nheader = false"),
+            ("position = \"X\"", "position = \"X\"\nchannel_unit = \"mm\""),
+            ("force = \"F\"\n", ""),
+        ],
+    );
+    insta::assert_snapshot!(shown);
+}
+
+#[test]
+fn every_key_can_be_said() {
+    let text = r#"
+        [surface]
+        kind = "beam"
+        length = "40 cm"
+        width = "40mm"
+        thickness = "1200 um"
+        youngs_modulus = "200 GPa"
+        supports = "simple"
+        [[sensors]]
+        measure = "deflection"
+        positions = ["100 mm", "200 mm", "300 mm"]
+        noise = "5 um"
+        resolution = "1 um"
+        gain_error = "5 %"
+        offset_error = "2 um"
+        position_error = "0.5 mm"
+        range = ["-5 mm", "5 mm"]
+        dead = [3]
+        [[sensors]]
+        measure = "reaction"
+        positions = ["0 mm", "400 mm"]
+        [training]
+        arrangement = "edge-dense"
+        count = 10
+        middle = 4
+        portion = ["25 %", 0.75]
+        repeats = 5
+        [estimator]
+        kind = "network"
+        hidden = [12, 6]
+        hidden_activation = "tanh"
+        output_activation = "linear"
+        biases = false
+        output = "position"
+        input_scale = "standardized"
+        learning_rate = 1
+        momentum = 0
+        aggregate_error = 1e-4
+        max_epochs = 1000
+        order = "fixed"
+        initial_weights = 0.1
+        [recording]
+        header = false
+        position = 1
+        position_unit = "m"
+        channels = [2, 3, 4, 5, 6]
+        channel_unit = ["um", "um", "um", "N", "N"]
+        force = 7
+        force_unit = "mN"
+        [[load]]
+        from = "130 mm"
+        to = "15 cm"
+        force = "2 N"
+    "#;
+    insta::assert_debug_snapshot!(Rig::from_toml(text).unwrap());
+}
+
+/// A document that holds a rig's sections among others.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    name: String,
+    surface: Option<toml::Spanned<SurfaceSection>>,
+    sensors: Option<toml::Spanned<SensorsSections>>,
+    contact: Option<toml::Spanned<ContactSection>>,
+    arm: Vec<Arm>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Arm {
+    training: Option<toml::Spanned<TrainingSection>>,
+    estimator: Option<toml::Spanned<EstimatorSection>>,
+}
+
+#[test]
+fn a_larger_document_can_embed_sections_and_keep_their_places() {
+    let base = BENCH.split("[training]").next().unwrap();
+    let arms = "[[arm]]\ntraining = { count = 10 }\n[[arm]]\nestimator = { momentum = 2 }\ntraining = { count = 20 }\n";
+    let text = format!("name = \"two arms\"\n{base}{arms}");
+    let document: Document = toml::from_str(&text).unwrap();
+    let rigs = document.arm.iter().map(|arm| {
+        validate(&RigSections {
+            surface: document.surface.clone(),
+            sensors: document.sensors.clone(),
+            contact: document.contact.clone(),
+            training: arm.training.clone(),
+            estimator: arm.estimator.clone(),
+            recording: None,
+            motion: None,
+            load: None,
+            design: None,
+        })
+    });
+    let rigs: Vec<Result<Rig, RigError>> = rigs.collect();
+    assert_eq!(document.name, "two arms");
+    assert_eq!(rigs[0].as_ref().unwrap().training.as_ref().unwrap().count, 10);
+    let error = rigs[1].as_ref().unwrap_err();
+    assert_eq!(&text[error.span.clone().unwrap()], "2");
+    assert_eq!(error.to_string(), "`momentum` is 2; it must be at least 0 and below 1");
+}
+
+#[test]
+fn an_input_scale_is_a_reading_of_the_sensors() {
+    let text = BENCH.replace("kind = \"network\"", "kind = \"network\"\ninput_scale = \"5 mm\"");
+    let EstimatorConfig::Network(network) = Rig::from_toml(&text).unwrap().estimator else {
+        panic!("not a network")
+    };
+    assert_eq!(network.input_scale, InputScale::DivideBy(0.005));
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_bytes_panic(bytes in proptest::collection::vec(proptest::arbitrary::any::<u8>(), 0..200)) {
+        let _ = Rig::from_toml(&String::from_utf8_lossy(&bytes));
+    }
+
+    /// Cuts and swaps within real rigs get further than random bytes.
+    #[test]
+    fn no_damaged_rig_panics(from in 0..BENCH.len(), length in 0..30usize, patch in "[-\"0-9a-zN%\\[\\]=. \n]{0,12}") {
+        for rig in [BENCH, PAPER, FSI_WATER] {
+            let mut text: Vec<char> = rig.chars().collect();
+            let start = from.min(text.len());
+            let end = (start + length).min(text.len());
+            text.splice(start..end, patch.chars());
+            if let Err(error) = Rig::from_toml(&text.into_iter().collect::<String>()) {
+                let _ = (error.to_string(), error.help());
+            }
+        }
+    }
+}

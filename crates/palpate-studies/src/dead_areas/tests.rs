@@ -1,0 +1,73 @@
+//! Dead areas are there for an array's centroid where its sensors see too little, and not for the influence estimator.
+
+use super::*;
+use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+
+fn study(counts: &[usize]) -> DeadAreaFindings {
+    let study = DeadAreas {
+        rig: Rig::from_toml(RIG_TOML).unwrap(),
+        counts: counts.to_vec(),
+        calibrations: 1,
+        tolerance_m: 2e-3,
+        without: vec!["network", "network-lm", "gaussian-process", "neighbours"],
+        seed: 0,
+    };
+    study.run(&mut || true).unwrap().unwrap()
+}
+
+#[test]
+fn dead_areas_are_the_interpretations_and_not_the_counts() {
+    let found = study(&[4, 16]);
+    let row = |sensing: &str, estimator: &str, sensors: usize| {
+        let mut rows = found.rows.iter();
+        rows.find(|row| {
+            row.sensing.starts_with(sensing) && row.estimator == estimator && row.sensors == sensors
+        })
+        .unwrap()
+    };
+    // Few sensors under one surface, interpreted well: no dead area; more of them change nothing.
+    for sensors in [4, 16] {
+        let row = row("distributive", "influence", sensors);
+        assert!(row.effective_percent > 97.0 && row.folded.dead_percent < 3.0, "{row:?}");
+        assert!(row.folded.between_m < 2.0 * row.folded.at_sensors_m, "{row:?}");
+    }
+    // The same sensors, interpreted as an array's are: dead.
+    assert!(row("distributive", "centroid", 16).effective_percent < 60.0);
+    // An array whose sensors see 10 mm: dead between four, alive between sixteen.
+    let sparse = row("array, spread 10 mm", "centroid", 4);
+    assert!(sparse.folded.dead_percent > 60.0, "{sparse:?}");
+    let dense = row("array, spread 10 mm", "centroid", 16);
+    assert!(dense.folded.dead_percent < 0.5 * sparse.folded.dead_percent, "{dense:?}");
+}
+
+#[test]
+fn errors_are_folded_over_the_gaps() {
+    let layout = Layout::even(SensorKind::Deflection, 3, 0.4);
+    let off = |x_m: f64, error_m: f64| Located {
+        truth: Position::along(x_m),
+        force_n: None,
+        estimate: Position::along(x_m + error_m),
+        covered: None,
+    };
+    // Over a sensor, in the middle of a gap, and beyond the outermost sensor.
+    let located = vec![off(0.1, 1e-3), off(0.2, 3e-3), off(0.25, 8e-3), off(0.05, 1.0)];
+    let folded = FoldedErrors::of(&Evaluation { length_m: 0.4, located }, &layout, 2e-3);
+    assert!((folded.at_sensors_m - 2e-3).abs() < 1e-12 && (folded.between_m - 8e-3).abs() < 1e-12);
+    assert!((folded.dead_percent - 200.0 / 3.0).abs() < 1e-9);
+    assert_eq!(folded.folds.iter().map(|fold| fold.contacts).collect::<Vec<_>>(), [2, 1]);
+}
+
+#[test]
+fn a_stopped_study_finds_nothing() {
+    let study = DeadAreas {
+        rig: Rig::from_toml(RIG_TOML).unwrap(),
+        counts: vec![2],
+        calibrations: 1,
+        tolerance_m: 2e-3,
+        without: vec!["influence", "gaussian-process", "closed-form", "neighbours", "network", "network-lm"],
+        seed: 0,
+    };
+    assert_eq!(study.run(&mut || false).unwrap(), None);
+}

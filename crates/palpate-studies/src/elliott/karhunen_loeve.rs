@@ -1,0 +1,92 @@
+//! Karhunen–Loève reduction of readings: their principal components.
+
+use ndarray::{Array1, Array2};
+
+use palpate_estimators::recording::{Recording, Row};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Bound;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{ResponseGradient, SurfaceSpec};
+use palpate_numerics::symmetric_eigen;
+
+/// The components of a recording's readings: with d a reading less the mean m, each channel over its noise, and
+/// Σ d·dᵀ = V·Λ·Vᵀ over the rows, the components of a reading are Vᵀ·d, those of the largest variance first. Whitened so,
+/// every component carries noise of variance 1, independent of the others'.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KarhunenLoeve {
+    /// m, in the unit of each channel.
+    mean: Array1<f64>,
+    /// One over the standard deviation of each channel's noise.
+    inverse_sd: Array1<f64>,
+    /// V, a component a column.
+    components: Array2<f64>,
+    /// Λ over the rows: the variance of each component, in noise variances.
+    variances: Vec<f64>,
+}
+
+impl KarhunenLoeve {
+    /// Of a recording with at least one row, whose channels have noise of these standard deviations.
+    pub fn of(recording: &Recording, noise_sd: &[f64]) -> Self {
+        let (rows, channels) = (recording.rows.len(), recording.channels.len());
+        let at = |(row, channel): (usize, usize)| recording.rows[row].reading[channel];
+        let readings = Array2::from_shape_fn((rows, channels), at);
+        let mean = readings.sum_axis(ndarray::Axis(0)) / rows as f64;
+        let inverse_sd: Array1<f64> = noise_sd.iter().map(|sd| 1.0 / sd).collect();
+        let whitened = (readings - &mean) * &inverse_sd;
+        let (squares, components) = symmetric_eigen(&whitened.t().dot(&whitened));
+        let variances = squares.iter().map(|square| square.max(0.0) / rows as f64).collect();
+        Self { mean, inverse_sd, components, variances }
+    }
+
+    /// The share of all variance that each component carries, in %.
+    pub fn variance_percent(&self) -> Vec<f64> {
+        let all: f64 = self.variances.iter().sum();
+        self.variances.iter().map(|variance| 100.0 * variance / all).collect()
+    }
+
+    /// The first `count` components of every reading, as raw channels.
+    pub fn reduced(&self, recording: &Recording, count: usize) -> Recording {
+        let row = |row: &Row| {
+            let reading: Array1<f64> = row.reading.iter().copied().collect();
+            Row { reading: self.along(&((reading - &self.mean) * &self.inverse_sd), count), ..row.clone() }
+        };
+        let layout = raw_layout(count);
+        Recording {
+            channels: layout.names(),
+            kinds: layout.kinds(),
+            rows: recording.rows.iter().map(row).collect(),
+            provenance: recording.provenance.clone(),
+        }
+    }
+
+    /// What no unbiased estimator that sees the first `count` components can beat, at a contact whose readings have these
+    /// derivatives; `None` where they do not tell the place. The force is known.
+    pub fn bound(&self, gradients: &[ResponseGradient], count: usize) -> Option<Bound> {
+        let by = |k: usize| -> Array1<f64> {
+            let slopes: Array1<f64> = gradients.iter().map(|gradient| gradient.position[k]).collect();
+            slopes * &self.inverse_sd
+        };
+        Bound::of_columns([self.along(&by(0), count), self.along(&by(1), count)])
+    }
+
+    fn along(&self, whitened: &Array1<f64>, count: usize) -> Vec<f64> {
+        let all = self.components.t().dot(whitened);
+        all.iter().take(count).copied().collect()
+    }
+}
+
+/// Channels without a model, a component each.
+pub(super) fn raw_layout(count: usize) -> Layout {
+    let sensor = |i: usize| Sensor {
+        kind: SensorKind::Raw,
+        position: Position::along(0.0),
+        name: format!("component_{}", i + 1),
+        channel: ChannelModel::default(),
+    };
+    Layout { sensors: (0..count).map(sensor).collect() }
+}
+
+/// A surface as one knows it who sees components of readings only: where it ends.
+pub(super) fn without_model(surface: &SurfaceSpec) -> SurfaceSpec {
+    SurfaceSpec::Measured(surface.extent())
+}

@@ -1,0 +1,347 @@
+//! The chain of Elliott and others for a load that moves over a plate: readings of a grid of sensors, their Karhunen–Loève
+//! reduction, and a back-propagation network on the components; beside the influence locator and its tracker on the same
+//! readings, and beside the limit.
+//!
+//! The chain is calibrated by the presses of a rig and judged in two ways: by one press at each of some 400 places all over
+//! the plate, of which those within its inner 90 % count, and by the readings of a load that moves as the rig's `[motion]` says.
+
+mod karhunen_loeve;
+
+pub use karhunen_loeve::KarhunenLoeve;
+
+use karhunen_loeve::{raw_layout, without_model};
+use serde::Serialize;
+
+use palpate_estimators::estimator::{
+    EstimatorConfig, FitError, Fitting, Locator, ReadingError, Track, TrackerConfig,
+};
+use palpate_estimators::evaluation::{Evaluation, FollowError, Spread, TrackErrors, Trial, follow};
+use palpate_estimators::network::{InputScale, NetworkConfig};
+use palpate_estimators::recording::TimedRecording;
+use palpate_estimators::setup::Bench;
+use palpate_estimators::simulate::SimulateError;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Bound;
+use palpate_mechanics::sensing::NoiseError;
+use palpate_mechanics::surface::{Extent, ResponseGradient};
+use palpate_rig::{Rig, RigSimulationError};
+
+/// The bench of the study, as a rig.
+pub const RIG_TOML: &str = include_str!("../../../../examples/elliott.toml");
+/// Numbers of components of the study.
+pub const COMPONENTS: [usize; 9] = [2, 3, 4, 5, 6, 8, 10, 15, 25];
+/// Presentations after which a network of the study stops: its readings are noisy, and no network's error becomes 0.
+pub const PRESENTATIONS: u32 = 3_000_000;
+/// Nodes of the network's hidden layer.
+const HIDDEN: usize = 12;
+/// Step along the gradient: noisy readings want a smaller one than the founding paper's.
+const LEARNING_RATE: f64 = 0.1;
+/// What the moving load's seed is more than that of its calibration, so that it moves under noise of its own.
+const OTHER_NOISE: u64 = 1 << 32;
+/// Share of length and width, about the middle, within which contacts are judged.
+pub const INNER: f64 = 0.9;
+
+/// What the study is to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Elliott {
+    /// Plate, sensors, known force, training positions and motion; the sensors have noise and no other errors.
+    pub rig: Rig,
+    /// How many components a network sees, one after the other; at most as many as there are sensors.
+    pub components: Vec<usize>,
+    /// Presentations after which a network stops.
+    pub presentations: u32,
+    /// Calibrations, each with noise and networks of its own; at least 1.
+    pub calibrations: u64,
+    /// An error up to this, in metres, is good enough for the effective area.
+    pub tolerance_m: f64,
+    /// Seed of noise and networks.
+    pub seed: u64,
+}
+
+/// A way from readings to places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chain {
+    /// A network on so many components.
+    Components(usize),
+    /// A network on the readings themselves.
+    Readings,
+    /// The influence locator, reading by reading.
+    Influence,
+    /// The influence locator's tracker, as readings come.
+    Filter,
+    /// The same, with all readings.
+    Smoother,
+}
+
+impl std::fmt::Display for Chain {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Chain::Components(count) => return write!(out, "network on {count} components"),
+            Chain::Readings => "network on all readings",
+            Chain::Influence => "influence locator",
+            Chain::Filter => "influence locator, filter",
+            Chain::Smoother => "influence locator, smoother",
+        })
+    }
+}
+
+/// How one chain did, over the calibrations.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChainRow {
+    /// The chain.
+    pub chain: Chain,
+    /// Mean error of presses within the inner plate, in metres; nothing of a tracker, which wants readings in time.
+    pub error_m: Option<Spread>,
+    /// Share of these presses whose error is within the tolerance, in %.
+    pub effective_percent: Option<Spread>,
+    /// Mean error of readings of the moving load, in metres.
+    pub moving_error_m: Spread,
+    /// Mean of the Cramér–Rao bound over the same presses, of what the chain sees, in metres; nothing where it does not tell
+    /// the place everywhere.
+    pub limit_m: Option<f64>,
+}
+
+/// What the study found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ElliottFindings {
+    /// The share of the readings' variance that each component carries, in %, of the first calibration.
+    pub variance_percent: Vec<f64>,
+    /// A row a chain.
+    pub rows: Vec<ChainRow>,
+}
+
+/// Why the study cannot be run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ElliottError {
+    /// The rig cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] RigSimulationError),
+    /// A chain cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// A locator does not suit the readings.
+    #[error(transparent)]
+    Reading(#[from] ReadingError),
+    /// The influence locator cannot follow.
+    #[error(transparent)]
+    Follow(#[from] FollowError),
+    /// The noise is singular.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
+    /// Components that are not there.
+    #[error(
+        "{components} components are asked of {sensors} sensors; there are as many as sensors, and at least 1"
+    )]
+    Components {
+        /// Asked for.
+        components: usize,
+        /// Sensors.
+        sensors: usize,
+    },
+    /// Nothing is left to be judged.
+    #[error("no calibration is asked for; there must be at least 1")]
+    NoCalibration,
+    /// Nothing was tracked.
+    #[error("the tracker never found the moving load")]
+    NothingTracked,
+}
+
+/// The errors of one chain in one calibration.
+#[derive(Clone, Copy, Debug)]
+struct Judged {
+    /// Mean error in metres and effective percentage.
+    pressed: Option<(f64, f64)>,
+    moving_error_m: f64,
+}
+
+impl Elliott {
+    /// Runs the study; `None` when `keep_going`, asked often, says no.
+    ///
+    /// # Errors
+    /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
+    /// are not there.
+    pub fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<ElliottFindings>, ElliottError> {
+        let sensors = self.rig.bench.layout.len();
+        if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
+            return Err(ElliottError::Components { components, sensors });
+        }
+        let noise_sd: Vec<f64> = self.rig.bench.layout.reading_sds()?.into_iter().flatten().collect();
+        let trials = self.rig.trials(self.calibrations, self.seed)?;
+        let mut judged = vec![Vec::new(); self.chains().len()];
+        let mut reductions = Vec::new();
+        for (seed, trial) in (self.seed..).zip(&trials) {
+            let moving = self.rig.simulate_moving(seed.wrapping_add(OTHER_NOISE))?;
+            let reduction = KarhunenLoeve::of(&trial.training, &noise_sd);
+            let bench = TrialBench { trial, moving: &moving, reduction: &reduction, seed };
+            let Some(every) = self.judge(&bench, keep_going)? else { return Ok(None) };
+            for (judged, one) in judged.iter_mut().zip(every) {
+                judged.push(one);
+            }
+            reductions.push(reduction);
+        }
+        let first = reductions.first().ok_or(ElliottError::NoCalibration)?;
+        let contacts: Vec<Vec<ResponseGradient>> = self.gradients(&trials)?;
+        let row = |(chain, judged): (Chain, Vec<Judged>)| self.row(chain, &judged, first, &contacts);
+        let rows = self.chains().into_iter().zip(judged).map(row).collect::<Option<_>>();
+        let rows = rows.ok_or(ElliottError::NoCalibration)?;
+        Ok(Some(ElliottFindings { variance_percent: first.variance_percent(), rows }))
+    }
+
+    /// The most often that [`Elliott::run`] asks whether to go on while it fits.
+    pub fn most_rounds(&self) -> u64 {
+        let networks = self.components.len() as u64 + 1;
+        self.calibrations * networks * u64::from(self.network().training.max_epochs)
+    }
+
+    /// Every chain, as the findings list them.
+    fn chains(&self) -> Vec<Chain> {
+        let components = self.components.iter().map(|count| Chain::Components(*count));
+        let others = [Chain::Readings, Chain::Influence, Chain::Filter, Chain::Smoother];
+        components.chain(others).collect()
+    }
+
+    fn network(&self) -> NetworkConfig {
+        let rows = self.rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
+        let mut network = NetworkConfig {
+            hidden: vec![HIDDEN],
+            input_scale: InputScale::Standardized,
+            ..NetworkConfig::default()
+        };
+        network.training.learning_rate = LEARNING_RATE;
+        network.training.max_epochs =
+            (self.presentations / u32::try_from(rows.max(1)).unwrap_or(u32::MAX)).max(1);
+        network
+    }
+
+    /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
+    fn judge(
+        &self,
+        bench: &TrialBench,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<Judged>>, ElliottError> {
+        let whole = &self.rig.bench;
+        let network = EstimatorConfig::Network(self.network());
+        let mut judged = Vec::new();
+        for &count in &self.components {
+            let reduce = |recording| bench.reduction.reduced(recording, count);
+            let trial =
+                Trial { training: reduce(&bench.trial.training), judged: reduce(&bench.trial.judged) };
+            let recording = reduce(&bench.moving.recording);
+            let moving = TimedRecording { recording, ..bench.moving.clone() };
+            let reduced = Bench {
+                surface: without_model(&whole.surface),
+                layout: raw_layout(count),
+                force_n: whole.force_n,
+                columns: None,
+            };
+            let bench = TrialBench { trial: &trial, moving: &moving, ..*bench };
+            let Some(locator) = bench.fit(&reduced, &network, keep_going)? else { return Ok(None) };
+            judged.push(self.judge_readings(&locator, &bench)?);
+        }
+        let Some(locator) = bench.fit(whole, &network, keep_going)? else { return Ok(None) };
+        judged.push(self.judge_readings(&locator, bench)?);
+        let Some(locator) = bench.fit(whole, &self.rig.estimator, keep_going)? else { return Ok(None) };
+        judged.push(self.judge_readings(&locator, bench)?);
+        judged.extend(self.judge_tracks(&locator, bench)?);
+        Ok(Some(judged))
+    }
+
+    /// A locator's errors, reading by reading.
+    fn judge_readings(&self, locator: &Locator, bench: &TrialBench) -> Result<Judged, ElliottError> {
+        let mut pressed = Evaluation::of(locator, &bench.trial.judged)?;
+        let extent = self.rig.bench.surface.extent();
+        pressed.located.retain(|located| is_inner(located.truth, extent));
+        let moving = Evaluation::of(locator, &bench.moving.recording)?;
+        let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
+        Ok(Judged {
+            pressed: Some((mean_m(&pressed), pressed.effective_percent(self.tolerance_m))),
+            moving_error_m: mean_m(&moving),
+        })
+    }
+
+    /// The errors of a locator's tracker, as readings come and with all of them.
+    fn judge_tracks(&self, locator: &Locator, bench: &TrialBench) -> Result<[Judged; 2], ElliottError> {
+        let followed = follow(locator, TrackerConfig::default(), bench.moving)?;
+        let (truths, extent) = (bench.moving.truths(), self.rig.bench.surface.extent());
+        let judge = |tracks: &[Track]| -> Result<Judged, ElliottError> {
+            let errors = TrackErrors::of(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
+            Ok(Judged { pressed: None, moving_error_m: errors.track_m })
+        };
+        Ok([judge(&followed.filtered)?, judge(&followed.smoothed)?])
+    }
+
+    /// The derivatives of all readings at each judged contact.
+    fn gradients(&self, trials: &[Trial]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
+        let Bench { surface, layout, force_n, .. } = &self.rig.bench;
+        let model = surface.model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
+        let force_n = force_n.ok_or(RigSimulationError::from(SimulateError::NoForce))?;
+        let functions: Vec<_> = layout
+            .sensors
+            .iter()
+            .map(|sensor| model.response_function(sensor.kind, sensor.position))
+            .collect();
+        let judged = trials.first().map_or(&[][..], |trial| &trial.judged.rows);
+        let inner = judged.iter().filter(|row| is_inner(row.position, surface.extent()));
+        let at = |position| functions.iter().map(|f| f.gradient(Contact { position, force_n })).collect();
+        Ok(inner.map(|row| at(row.position)).collect())
+    }
+
+    fn row(
+        &self,
+        chain: Chain,
+        judged: &[Judged],
+        reduction: &KarhunenLoeve,
+        contacts: &[Vec<ResponseGradient>],
+    ) -> Option<ChainRow> {
+        let pressed = |pick: fn((f64, f64)) -> f64| {
+            Spread::of(judged.iter().filter_map(|one| one.pressed.map(pick)).collect())
+        };
+        let seen = match chain {
+            Chain::Components(count) => count,
+            _ => self.rig.bench.layout.len(),
+        };
+        let bounds: Option<Vec<Bound>> =
+            contacts.iter().map(|gradients| reduction.bound(gradients, seen)).collect();
+        let mean_m = |bounds: Vec<Bound>| {
+            bounds.iter().map(Bound::mean_error_m).sum::<f64>() / bounds.len().max(1) as f64
+        };
+        let is_single = !matches!(chain, Chain::Filter | Chain::Smoother);
+        Some(ChainRow {
+            chain,
+            error_m: pressed(|(error_m, _)| error_m),
+            effective_percent: pressed(|(_, percent)| percent),
+            moving_error_m: Spread::of(judged.iter().map(|one| one.moving_error_m).collect())?,
+            limit_m: bounds.filter(|_| is_single).map(mean_m),
+        })
+    }
+}
+
+/// What the chains of one calibration share.
+#[derive(Clone, Copy)]
+struct TrialBench<'a> {
+    trial: &'a Trial,
+    moving: &'a TimedRecording,
+    reduction: &'a KarhunenLoeve,
+    seed: u64,
+}
+
+impl TrialBench<'_> {
+    fn fit(
+        &self,
+        of: &Bench,
+        estimator: &EstimatorConfig,
+        keep_going: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Locator>, FitError> {
+        Fitting::prepare(of, estimator, &self.trial.training)?.fit(self.seed, keep_going)
+    }
+}
+
+/// Whether a contact lies within the inner part of a plate.
+fn is_inner(position: Position, Extent { length_m, width_m }: Extent) -> bool {
+    let inner = |at_m: f64, size_m: f64| (at_m / size_m - 0.5).abs() <= 0.5 * INNER;
+    inner(position.x_m, length_m) && width_m.is_none_or(|width_m| inner(position.y_m, width_m))
+}
+
+#[cfg(test)]
+mod tests;

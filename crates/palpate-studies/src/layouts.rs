@@ -1,0 +1,61 @@
+//! The layouts that arms ask for by method.
+
+use super::{Arm, AskedLayout, Study, StudyRunError};
+use palpate_design::sensors::SensorDesign;
+use palpate_design::sensors::{DesignError, KeepGoing, Method, SensorProblem};
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::sensing::Layout;
+
+/// Seed of the searches, the same whatever the study's seeds are: a layout is part of what an arm is.
+const SEED: u64 = 0;
+
+/// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same. `None`
+/// when `keep_going` says no.
+pub(super) fn lay_out(mut study: Study, keep_going: &mut KeepGoing) -> Result<Option<Study>, StudyRunError> {
+    let mut found: Vec<(Wish, Layout)> = Vec::new();
+    for arm in &mut study.arms {
+        let Some((asked, wish)) = wish(arm) else { continue };
+        let layout = match found.iter().find(|(other, _)| *other == wish) {
+            Some((_, layout)) => layout.clone(),
+            None => {
+                let designed = wish.layout(keep_going).map_err(|error| StudyRunError::Design {
+                    arm: arm.name.clone(),
+                    place: asked.place,
+                    error,
+                })?;
+                let Some(layout) = designed else { return Ok(None) };
+                found.push((wish, layout.clone()));
+                layout
+            }
+        };
+        arm.rig.bench.layout = layout;
+    }
+    Ok(Some(study))
+}
+
+/// What a layout follows from.
+#[derive(PartialEq)]
+struct Wish {
+    method: Method,
+    bench: Bench,
+    design: SensorDesign,
+}
+
+impl Wish {
+    fn layout(&self, keep_going: &mut KeepGoing) -> Result<Option<Layout>, DesignError> {
+        let problem = SensorProblem::new(&self.bench, &self.design, keep_going)?;
+        let Some(problem) = problem else { return Ok(None) };
+        let designed = problem.by_method(self.method, SEED, keep_going)?;
+        Ok(designed.map(|designed| designed.layout))
+    }
+}
+
+fn wish(arm: &Arm) -> Option<(AskedLayout, Wish)> {
+    let asked = arm.layout.clone()?;
+    let bench = arm.rig.pressed_bench();
+    let own = || SensorDesign::of(&bench.layout, bench.surface.extent());
+    let mut design = arm.rig.design.clone().or_else(own)?;
+    design.force_is_known.get_or_insert(arm.rig.bench.force_n.is_some());
+    let method = asked.method;
+    Some((asked, Wish { method, bench, design }))
+}

@@ -1,0 +1,290 @@
+//! What the paper claims in words, and whether the seeds bear it out.
+//!
+//! A claim is split into parts that a program can check. Each part is asked twice: of the medians over all seeds, and
+//! of every seed by itself (seed k of one arm beside seed k of another: they start from the same random stream).
+
+use serde::Serialize;
+
+use super::COUNTS;
+use crate::{ArmOutcome, Judging, TrainedSeed};
+use palpate_estimators::evaluation::{Portion, percentile};
+
+/// A claim and its verdict.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Claim {
+    /// "C1" to "C8".
+    pub id: &'static str,
+    /// The claim in words.
+    pub claim: &'static str,
+    /// Whether every part holds in the medians.
+    pub holds: bool,
+    /// Share of the seeds for which every part holds, 0 to 1.
+    pub share_of_seeds: f64,
+    /// What was checked.
+    pub parts: Vec<ClaimPart>,
+}
+
+/// One checkable part of a claim.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClaimPart {
+    /// What was checked, in words.
+    pub what: String,
+    /// Whether it holds in the medians.
+    pub holds: bool,
+    /// Share of the seeds for which it holds, 0 to 1.
+    pub share_of_seeds: f64,
+}
+
+/// The paper's sensor pitch, l/9, as a share of the length.
+const PITCH_PERCENT: f64 = 100.0 / 9.0;
+/// "About 1 %" is taken as between a half and one and a half.
+const ABOUT_ONE: std::ops::RangeInclusive<f64> = 0.5..=1.5;
+/// "Linear" is taken as: the two increments differ by no more than this factor.
+const LINEAR_FACTOR: f64 = 2.0;
+/// The portion that the paper finds good, in metres.
+const GOOD: Portion = Portion { from_m: 0.060, to_m: 0.300 };
+
+/// Every claim, C1 to C8, checked on the outcomes of the paper's study. Claims whose arms were not all run are left out.
+pub fn claims(outcomes: &[ArmOutcome], judging: &Judging) -> Vec<Claim> {
+    let table = Table { outcomes, judging };
+    let claims = [
+        (
+            "C1",
+            "errors grow towards the edges, and the position output overshoots 400 mm near the right edge",
+            c1(),
+        ),
+        (
+            "C2",
+            "the average error falls as the number of training positions grows, sharply from 10 to 20 and less from 20 to 30",
+            c2(),
+        ),
+        (
+            "C3",
+            "the normalized output lowers the average error by about 1 % of the length at each number of training positions",
+            c3(),
+        ),
+        ("C4", "the normalized output needs fewer iterations at each number of training positions", c4()),
+        (
+            "C5",
+            "iterations grow with the number of training positions, linearly for the position output",
+            c5(),
+        ),
+        (
+            "C6",
+            "at equal number, more training positions near the edges lower the average error, but for 6 in the middle at 10",
+            c6(),
+        ),
+        (
+            "C7",
+            "at equal number, 4 in the middle gives the largest effective length, and the difference shrinks as the number grows",
+            c7(),
+        ),
+        ("C8", "the location error is far below the sensor pitch of 44.4 mm", c8()),
+    ];
+    claims.into_iter().filter_map(|(id, claim, parts)| table.judge(id, claim, &parts)).collect()
+}
+
+/// A figure of one seed of an arm.
+#[derive(Clone, Copy)]
+enum Figure {
+    Error,
+    /// Average error outside the good portion.
+    EdgeError,
+    /// Average error inside it.
+    GoodError,
+    /// The largest position that the locator answers, in % of the length.
+    LargestPosition,
+    Epochs,
+    Effective,
+}
+
+/// Looks a figure up: by arm.
+type Look<'a> = dyn Fn(&str, Figure) -> f64 + 'a;
+
+struct Part {
+    what: String,
+    test: Box<dyn Fn(&Look) -> bool>,
+}
+
+fn part(what: impl Into<String>, test: impl Fn(&Look) -> bool + 'static) -> Part {
+    Part { what: what.into(), test: Box::new(test) }
+}
+
+fn arm(family: &str, count: u32) -> String {
+    format!("{family}-{count}")
+}
+
+fn c1() -> Vec<Part> {
+    let edges = part("position-10: larger average error outside 60–300 mm than inside", |look| {
+        look("position-10", Figure::EdgeError) > look("position-10", Figure::GoodError)
+    });
+    let overshoot = part("position-10: some estimates lie beyond 400 mm", |look| {
+        look("position-10", Figure::LargestPosition) > 100.0
+    });
+    vec![edges, overshoot]
+}
+
+fn c2() -> Vec<Part> {
+    let family = |family: &'static str| {
+        let error = move |look: &Look| COUNTS.map(|n| look(&arm(family, n), Figure::Error));
+        let falls = part(format!("{family}: the error falls from 10 to 20 to 30"), move |look| {
+            let [ten, twenty, thirty] = error(look);
+            ten > twenty && twenty > thirty
+        });
+        let levels = part(format!("{family}: it falls more from 10 to 20 than from 20 to 30"), move |look| {
+            let [ten, twenty, thirty] = error(look);
+            ten - twenty > twenty - thirty
+        });
+        [falls, levels]
+    };
+    ["position", "normalized"].into_iter().flat_map(family).collect()
+}
+
+fn c3() -> Vec<Part> {
+    let at = |n: u32| {
+        part(format!("n = {n}: the error falls by 0.5 to 1.5 % of the length"), move |look| {
+            let fall = look(&arm("position", n), Figure::Error) - look(&arm("normalized", n), Figure::Error);
+            ABOUT_ONE.contains(&fall)
+        })
+    };
+    COUNTS.map(at).into()
+}
+
+fn c4() -> Vec<Part> {
+    let at = |n: u32| {
+        part(format!("n = {n}: normalized takes fewer iterations than position"), move |look| {
+            look(&arm("normalized", n), Figure::Epochs) < look(&arm("position", n), Figure::Epochs)
+        })
+    };
+    COUNTS.map(at).into()
+}
+
+fn c5() -> Vec<Part> {
+    let epochs = |look: &Look, family: &str| COUNTS.map(|n| look(&arm(family, n), Figure::Epochs));
+    let grow = |family: &'static str| {
+        part(format!("{family}: iterations grow from 10 to 20 to 30"), move |look| {
+            let [ten, twenty, thirty] = epochs(look, family);
+            ten < twenty && twenty < thirty
+        })
+    };
+    let linear = part(
+        "position: the increments from 10 to 20 and from 20 to 30 are within a factor of 2",
+        move |look| {
+            let [ten, twenty, thirty] = epochs(look, "position");
+            let ratio = (thirty - twenty) / (twenty - ten);
+            (1.0 / LINEAR_FACTOR..=LINEAR_FACTOR).contains(&ratio)
+        },
+    );
+    vec![grow("position"), grow("normalized"), linear]
+}
+
+fn c6() -> Vec<Part> {
+    let lower = |family: &'static str, n: u32| {
+        part(format!("n = {n}: {family} has a lower error than the even arrangement"), move |look| {
+            look(&arm(family, n), Figure::Error) < look(&arm("normalized", n), Figure::Error)
+        })
+    };
+    let exception = part("n = 10: 6 in the middle has the highest error of the normalized sets", |look| {
+        let error = look("middle6-10", Figure::Error);
+        error > look("normalized-10", Figure::Error) && error > look("middle4-10", Figure::Error)
+    });
+    let mut parts = vec![exception, lower("middle4", 10)];
+    for n in [20, 30] {
+        parts.push(lower("middle6", n));
+        parts.push(lower("middle4", n));
+    }
+    parts
+}
+
+fn c7() -> Vec<Part> {
+    let effective = |look: &Look, family: &str, n: u32| look(&arm(family, n), Figure::Effective);
+    let largest = |n: u32| {
+        part(format!("n = {n}: 4 in the middle has the largest effective length"), move |look| {
+            let four = effective(look, "middle4", n);
+            four > effective(look, "middle6", n) && four > effective(look, "normalized", n)
+        })
+    };
+    let shrinks = part("its lead over the even arrangement is smaller at 30 than at 10", move |look| {
+        let lead = |n| effective(look, "middle4", n) - effective(look, "normalized", n);
+        lead(30) < lead(10)
+    });
+    COUNTS.map(largest).into_iter().chain([shrinks]).collect()
+}
+
+fn c8() -> Vec<Part> {
+    let below = |family: &'static str, n: u32| {
+        part(format!("{family}-{n}: the average error is less than half the pitch"), move |look| {
+            look(&arm(family, n), Figure::Error) < PITCH_PERCENT / 2.0
+        })
+    };
+    let families = ["position", "normalized", "middle6", "middle4"];
+    families.into_iter().flat_map(|family| COUNTS.map(|n| below(family, n))).collect()
+}
+
+struct Table<'a> {
+    outcomes: &'a [ArmOutcome],
+    judging: &'a Judging,
+}
+
+impl Table<'_> {
+    /// `None` when an arm that the claim needs has no fits.
+    fn judge(&self, id: &'static str, claim: &'static str, parts: &[Part]) -> Option<Claim> {
+        let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
+        let asked = std::cell::Cell::new(true);
+        let median = |name: &str, figure: Figure| {
+            let mut values: Vec<f64> = self.fits(name).iter().map(|fit| self.figure(fit, figure)).collect();
+            values.sort_by(f64::total_cmp);
+            percentile(&values, 50.0).unwrap_or_else(|| {
+                asked.set(false);
+                f64::NAN
+            })
+        };
+        let of_seed = |seed: u64| {
+            move |name: &str, figure: Figure| {
+                let fit = self.fits(name).iter().find(|fit| fit.seed == seed);
+                fit.map_or(f64::NAN, |fit| self.figure(fit, figure))
+            }
+        };
+        let share = |test: &dyn Fn(u64) -> bool| {
+            (0..seeds as u64).filter(|seed| test(*seed)).count() as f64 / seeds.max(1) as f64
+        };
+        let judged: Vec<ClaimPart> = parts
+            .iter()
+            .map(|part| ClaimPart {
+                what: part.what.clone(),
+                holds: (part.test)(&median),
+                share_of_seeds: share(&|seed| (part.test)(&of_seed(seed))),
+            })
+            .collect();
+        let all = share(&|seed| parts.iter().all(|part| (part.test)(&of_seed(seed))));
+        let holds = judged.iter().all(|part| part.holds);
+        asked.get().then_some(Claim { id, claim, holds, share_of_seeds: all, parts: judged })
+    }
+
+    fn fits(&self, name: &str) -> &[TrainedSeed] {
+        self.outcomes.iter().find(|outcome| outcome.name == name).map_or(&[], |outcome| &outcome.fits)
+    }
+
+    fn figure(&self, fit: &TrainedSeed, figure: Figure) -> f64 {
+        let evaluation = &fit.evaluation;
+        let error = |keep: &dyn Fn(bool) -> bool| {
+            let mut part = evaluation.clone();
+            part.located.retain(|located| keep(GOOD.contains(located.truth)));
+            part.summary(None).map_or(f64::NAN, |s| s.average_m / part.length_m * 100.0)
+        };
+        match figure {
+            Figure::Error => error(&|_| true),
+            Figure::GoodError => error(&|good| good),
+            Figure::EdgeError => error(&|good| !good),
+            Figure::LargestPosition => {
+                let positions = evaluation.located.iter().map(|located| located.estimate.x_m);
+                positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.length_m * 100.0
+            }
+            Figure::Epochs => f64::from(fit.outcome().epochs),
+            Figure::Effective => evaluation.effective_percent(self.judging.tolerance_m),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,162 @@
+//! The figures that the paper prints, each from one training run of the author's, beside ours.
+
+use serde::Serialize;
+
+use crate::{ArmResults, StudyResults};
+use palpate_estimators::evaluation::Spread;
+
+/// How near our median must come to a published figure to agree with it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Yardstick {
+    /// The difference is at most this, in the figure's own unit.
+    Within(f64),
+    /// The ratio, the larger to the smaller, is at most this.
+    Factor(f64),
+    /// The paper gives a bound, and our median keeps it.
+    Below,
+}
+
+impl Yardstick {
+    fn accepts(self, published: f64, median: f64) -> bool {
+        match self {
+            Self::Within(difference) => (published - median).abs() <= difference,
+            Self::Factor(factor) => median <= published * factor && published <= median * factor,
+            Self::Below => median < published,
+        }
+    }
+}
+
+/// What a published figure measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Figure {
+    Epochs,
+    Error,
+    /// Average error within a portion of the study, by its index.
+    PortionError(usize),
+    /// Largest error within a portion of the study, by its index.
+    PortionMaxError(usize),
+    EffectiveLength,
+}
+
+impl Figure {
+    fn of(self, arm: &ArmResults) -> Option<Spread> {
+        Some(match self {
+            Self::Epochs => arm.epochs?,
+            Self::Error => arm.error_percent,
+            Self::PortionError(index) => arm.portions.get(index)?.error_percent,
+            Self::PortionMaxError(index) => arm.portions.get(index)?.max_error_percent,
+            Self::EffectiveLength => arm.effective_length_percent,
+        })
+    }
+
+    const fn name(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Epochs => ("epochs", "iterations"),
+            Self::Error => ("error_percent", "average error, 1–399 mm, %"),
+            Self::PortionError(0) => ("error_percent_20_380", "average error, 20–380 mm, %"),
+            Self::PortionError(_) => ("error_percent_60_300", "average error, 60–300 mm, %"),
+            Self::PortionMaxError(_) => ("max_error_percent_60_300", "largest error, 60–300 mm, %"),
+            Self::EffectiveLength => ("effective_length_percent", "effective length, %"),
+        }
+    }
+
+    /// The agreed distances: errors within 0.6 points of the length (0.25 below 1 %), effective lengths within 6 points,
+    /// iterations within a factor of 3.
+    fn yardstick(self, published: f64) -> Yardstick {
+        match self {
+            Self::Epochs => Yardstick::Factor(3.0),
+            Self::PortionMaxError(_) => Yardstick::Below,
+            Self::EffectiveLength => Yardstick::Within(6.0),
+            Self::Error | Self::PortionError(_) if published < 1.0 => Yardstick::Within(0.25),
+            Self::Error | Self::PortionError(_) => Yardstick::Within(0.6),
+        }
+    }
+}
+
+/// The paper's sections 3.1 to 3.3, arm by arm.
+const PUBLISHED: [(&str, Figure, f64); 16] = [
+    ("position-10", Figure::Epochs, 26_850.0),
+    ("position-10", Figure::Error, 3.6),
+    ("position-10", Figure::PortionError(0), 1.4),
+    ("position-10", Figure::PortionError(1), 0.2),
+    ("position-10", Figure::PortionMaxError(1), 0.5),
+    ("position-30", Figure::Error, 1.6),
+    ("normalized-10", Figure::Error, 2.46),
+    ("normalized-30", Figure::Error, 0.57),
+    ("middle4-10", Figure::Error, 2.18),
+    ("middle4-30", Figure::Error, 0.44),
+    ("normalized-10", Figure::EffectiveLength, 63.5),
+    ("normalized-30", Figure::EffectiveLength, 87.5),
+    ("middle6-10", Figure::EffectiveLength, 70.3),
+    ("middle6-30", Figure::EffectiveLength, 94.5),
+    ("middle4-10", Figure::EffectiveLength, 78.0),
+    ("middle4-30", Figure::EffectiveLength, 94.8),
+];
+
+/// A figure that the paper prints, beside ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PublishedFigure {
+    /// Arm and figure: "position-10.error_percent".
+    pub id: String,
+    /// The arm.
+    pub arm: &'static str,
+    /// The figure in words, with its unit.
+    pub what: &'static str,
+    /// What the paper prints.
+    pub published: f64,
+    /// Half of our seeds lie below.
+    pub median: f64,
+    /// One in twenty of our seeds lies below.
+    pub p05: f64,
+    /// One in twenty of our seeds lies above.
+    pub p95: f64,
+    /// What counts as agreement.
+    pub yardstick: Yardstick,
+    /// Whether our median agrees.
+    pub agrees: bool,
+}
+
+/// Published figures that agree, of how many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Agreement {
+    /// Those that agree.
+    pub agreeing: usize,
+    /// All.
+    pub of: usize,
+}
+
+impl Agreement {
+    /// Counts.
+    pub fn among(figures: &[PublishedFigure]) -> Self {
+        Self { agreeing: figures.iter().filter(|figure| figure.agrees).count(), of: figures.len() }
+    }
+}
+
+/// Every published figure whose arm is among the results, beside ours.
+pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
+    let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
+        let Spread { median, p05, p95 } = figure.of(results.arm(arm)?)?;
+        let (key, what) = figure.name();
+        let yardstick = figure.yardstick(published);
+        let agrees = yardstick.accepts(published, median);
+        let id = format!("{arm}.{key}");
+        Some(PublishedFigure { id, arm, what, published, median, p05, p95, yardstick, agrees })
+    };
+    PUBLISHED.iter().filter_map(beside).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yardsticks_measure_both_ways() {
+        assert!(Yardstick::Within(0.6).accepts(3.6, 3.01));
+        assert!(!Yardstick::Within(0.6).accepts(3.6, 4.21));
+        assert!(Yardstick::Factor(3.0).accepts(26_850.0, 9_000.0));
+        assert!(!Yardstick::Factor(3.0).accepts(26_850.0, 8_900.0));
+        assert!(!Yardstick::Factor(3.0).accepts(26_850.0, 81_000.0));
+        assert!(!Yardstick::Below.accepts(0.5, 0.5));
+    }
+}

@@ -1,0 +1,287 @@
+//! What a study found: each arm's figures, with their spread over the seeds.
+
+use serde::Serialize;
+
+use super::limits::expected_errors_m;
+use super::seed_by_seed::touched_bench;
+use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
+use palpate_estimators::evaluation::{
+    ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error,
+};
+use palpate_estimators::network::{Precision, TrainingStatus};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::SensorKind;
+
+/// What a study found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StudyResults {
+    /// Every arm that has at least one fit.
+    pub arms: Vec<ArmResults>,
+}
+
+/// How a study was run, as every file that it writes says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunFacts {
+    /// Version of palpate.
+    pub palpate: &'static str,
+    /// The study's name.
+    pub study: String,
+    /// SHA-256 of the study file, in hexadecimal.
+    pub study_sha256: String,
+    /// Seeds 0 to this less 1, of every arm.
+    pub seeds: u64,
+    /// Threads that fitted.
+    pub threads: usize,
+    /// Width of the numbers in training.
+    pub precision: Precision,
+    /// The arithmetic of the lanes, in words.
+    pub arithmetic: String,
+    /// Patterns presented to networks in this run; what an earlier run left is not counted.
+    pub presentations: u64,
+    /// Wall-clock time of the fits, in seconds.
+    pub seconds: f64,
+    /// Their ratio.
+    pub presentations_per_second: f64,
+}
+
+/// An arm's figures over its seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArmResults {
+    /// The arm.
+    pub name: String,
+    /// What is fitted, in a study whose arms differ in it.
+    #[serde(flatten)]
+    pub set_up: Option<SetUp>,
+    /// Seeds that were fitted.
+    pub seeds: usize,
+    /// Seeds whose training converged; `None` for an estimator that is not trained by epochs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converged: Option<usize>,
+    /// Epochs of training, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub epochs: Option<Spread>,
+    /// Average percentage error over all positions.
+    pub error_percent: Spread,
+    /// Largest percentage error over all positions.
+    pub max_error_percent: Spread,
+    /// Share of the positions located within the tolerance, in %.
+    pub effective_length_percent: Spread,
+    /// The same errors by portion; in JSON as `error_percent_20_380` and so on.
+    #[serde(flatten, serialize_with = "portions_as_keys")]
+    pub portions: Vec<PortionResults>,
+    /// Errors between the outermost training positions and beyond them, where the study asks for them.
+    #[serde(flatten)]
+    pub training_span: Option<TrainingSpanResults>,
+    /// What physics allows, where sensors have noise.
+    #[serde(flatten)]
+    pub limit: Option<LimitResults>,
+    /// Share of the estimator's 95 % intervals that hold their contact, in %, where it has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage_percent: Option<Spread>,
+}
+
+/// What an arm fits.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SetUp {
+    /// The kind of its estimator.
+    pub estimator: &'static str,
+    /// What the estimator knows of the force.
+    pub force: Force,
+    /// The method that its layout was asked for by.
+    pub layout: Option<&'static str>,
+    /// Its sensors.
+    pub sensors: Vec<SensorPlace>,
+}
+
+/// A sensor in short.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SensorPlace {
+    /// What it measures.
+    pub measure: SensorKind,
+    /// Where it sits along the surface, in millimetres.
+    pub position_mm: f64,
+}
+
+/// Errors within a portion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PortionResults {
+    /// The portion.
+    pub portion: Portion,
+    /// Average percentage error.
+    pub error_percent: Spread,
+    /// Largest percentage error.
+    pub max_error_percent: Spread,
+    /// Average percentage error of an estimator at the limit, where there is a limit.
+    pub limit_error_percent: Option<f64>,
+}
+
+/// Errors between the outermost training positions, and beyond them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrainingSpanResults {
+    /// Where the outermost training positions are.
+    pub training_span: Portion,
+    /// Average percentage error between them; `None` where nothing is judged there.
+    pub error_percent_within_training: Option<Spread>,
+    /// Average percentage error beyond them, likewise.
+    pub error_percent_beyond_training: Option<Spread>,
+}
+
+/// What physics allows an arm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LimitResults {
+    /// Average percentage error of an estimator at the limit, over all positions. Where readings hardly tell the position, it is
+    /// still known that the contact lies on the surface: the limit s counts as 1/√(1/s² + 12/l²), with l the surface's length.
+    pub limit_error_percent: f64,
+    /// Average error over the limit's, at contacts at least 1/80 of the length from the ends whose limit is at most 1/200 of it;
+    /// `None` where there are none.
+    pub error_over_limit: Option<Spread>,
+}
+
+fn portions_as_keys<S: serde::Serializer>(
+    portions: &[PortionResults],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    use serde::ser::SerializeMap;
+    let mut map = serializer.serialize_map(None)?;
+    for results in portions {
+        let key = results.portion.key();
+        map.serialize_entry(&format!("error_percent_{key}"), &results.error_percent)?;
+        map.serialize_entry(&format!("max_error_percent_{key}"), &results.max_error_percent)?;
+        if let Some(limit) = results.limit_error_percent {
+            map.serialize_entry(&format!("limit_error_percent_{key}"), &limit)?;
+        }
+    }
+    map.end()
+}
+
+impl StudyResults {
+    /// Sums up the outcomes of a run of `study`, an outcome an arm.
+    pub fn of(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
+        let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::of).collect();
+        // What is the same for all arms, the study file says once.
+        let same =
+            |a: &SetUp, b: &SetUp| (a.estimator, a.force, &a.sensors) == (b.estimator, b.force, &b.sensors);
+        let differ = set_ups.windows(2).any(|pair| !same(&pair[0], &pair[1]));
+        let results = |outcome: &ArmOutcome| {
+            let arm = study.study.arms.iter().position(|arm| arm.name == outcome.name)?;
+            let set_up = differ.then(|| set_ups[arm].clone());
+            ArmResults::of(outcome, &study.study.arms[arm], set_up, study.judging())
+        };
+        Self { arms: outcomes.iter().filter_map(results).collect() }
+    }
+
+    /// The arm called `name`.
+    pub fn arm(&self, name: &str) -> Option<&ArmResults> {
+        self.arms.iter().find(|arm| arm.name == name)
+    }
+}
+
+impl SetUp {
+    fn of(arm: &Arm) -> Self {
+        let place = |sensor: &palpate_mechanics::sensing::Sensor| SensorPlace {
+            measure: sensor.kind,
+            position_mm: 1e3 * sensor.position.x_m,
+        };
+        let bench = &arm.rig.bench;
+        Self {
+            estimator: arm.rig.estimator.kind(),
+            force: if bench.force_n.is_some() { Force::Known } else { Force::Unknown },
+            layout: arm.layout.as_ref().map(|asked| asked.method.name()),
+            sensors: bench.layout.sensors.iter().map(place).collect(),
+        }
+    }
+}
+
+impl ArmResults {
+    fn of(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
+        let spread = |figure: &dyn Fn(&TrainedSeed) -> Option<f64>| {
+            Spread::of(outcome.fits.iter().filter_map(figure).collect())
+        };
+        let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
+            spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
+        };
+        let length_m = arm.rig.bench.surface.extent().length_m;
+        let allowed = allowed(arm, judging);
+        let portions = judging.portions.iter().filter_map(|portion| {
+            Some(PortionResults {
+                portion: *portion,
+                error_percent: error(Some(*portion), |s| s.average_m)?,
+                max_error_percent: error(Some(*portion), |s| s.largest_m)?,
+                limit_error_percent: allowed
+                    .as_ref()
+                    .and_then(|allowed| Some(percentage_error(mean(allowed, Some(*portion))?, length_m))),
+            })
+        });
+        let outcomes = || outcome.fits.iter().filter_map(|fit| fit.locator.training_outcome());
+        let converged = outcomes().filter(|o| o.status == TrainingStatus::Converged).count();
+        let limit = allowed.as_ref().and_then(|allowed| {
+            Some(LimitResults {
+                limit_error_percent: percentage_error(mean(allowed, None)?, length_m),
+                error_over_limit: spread(&|fit| limit_ratio(&fit.locator.bench, &fit.evaluation)),
+            })
+        });
+        Some(Self {
+            name: outcome.name.clone(),
+            set_up,
+            seeds: outcome.fits.len(),
+            converged: outcomes().next().map(|_| converged),
+            epochs: Spread::of(outcomes().map(|outcome| f64::from(outcome.epochs)).collect()),
+            error_percent: error(None, |s| s.average_m)?,
+            max_error_percent: error(None, |s| s.largest_m)?,
+            effective_length_percent: spread(&|fit| {
+                Some(fit.evaluation.effective_percent(judging.tolerance_m))
+            })?,
+            portions: portions.collect(),
+            training_span: judging.training_span.then(|| training_span(outcome, arm)).flatten(),
+            limit,
+            coverage_percent: spread(&|fit| fit.evaluation.coverage_percent()),
+        })
+    }
+}
+
+/// Positions where locators are judged, with the mean error there of an estimator at the limit, in metres.
+fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
+    let force_n = touched_bench(&arm.rig).force_n?;
+    let errors_m = expected_errors_m(&arm.rig.bench, force_n, &judging.positions)?;
+    Some(judging.positions.iter().copied().zip(errors_m).collect())
+}
+
+/// The mean within a portion, or of all.
+fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
+    let inside = |at: Position| portion.is_none_or(|portion| portion.contains(at));
+    let inner: Vec<f64> = figures.iter().filter(|(at, _)| inside(*at)).map(|(_, figure)| *figure).collect();
+    (!inner.is_empty()).then(|| inner.iter().sum::<f64>() / inner.len() as f64)
+}
+
+fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults> {
+    let training = arm.rig.training.as_ref()?;
+    let positions = training.positions(arm.rig.bench.surface.extent()).ok()?;
+    let (low, high) = positions
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at.x_m), high.max(at.x_m)));
+    let span = Portion { from_m: low, to_m: high };
+    let error = |inside: bool| {
+        let part = |fit: &TrainedSeed| {
+            let Evaluation { length_m, located } = &fit.evaluation;
+            let located = located.iter().filter(|located| span.contains(located.truth) == inside);
+            let part = Evaluation { length_m: *length_m, located: located.copied().collect() };
+            percent(&part, None, |s| s.average_m)
+        };
+        Spread::of(outcome.fits.iter().filter_map(part).collect())
+    };
+    Some(TrainingSpanResults {
+        training_span: span,
+        error_percent_within_training: error(true),
+        error_percent_beyond_training: error(false),
+    })
+}
+
+/// One figure of the errors within a portion, in % of the length.
+pub(super) fn percent(
+    evaluation: &Evaluation,
+    portion: Option<Portion>,
+    pick: fn(ErrorSummary) -> f64,
+) -> Option<f64> {
+    evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.length_m))
+}
