@@ -7,6 +7,7 @@ mod elliptic;
 mod random_order;
 pub mod regression;
 mod sparse_cholesky;
+pub mod watch;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{NORMAL_95, chi_squared_bound, normal_distribution, normal_quantile};

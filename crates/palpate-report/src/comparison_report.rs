@@ -7,7 +7,8 @@ use super::maps::error_map;
 use super::numbers::{counted, number};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
 use super::{Axis, Chart, Series};
-use palpate_estimators::evaluation::{Comparison, Evaluation, limit_ratio, percentage_error};
+use palpate_estimators::estimator::Comparison;
+use palpate_estimators::evaluation::{Evaluation, limit_ratio, percentage_error};
 use palpate_estimators::setup::Bench;
 
 /// Stretches of the surface over which errors are summed up.
@@ -62,7 +63,7 @@ impl ComparisonReport<'_> {
 
     fn summary(&self) -> Markup {
         let best = self.comparisons.first();
-        let mean = best.and_then(|best| best.evaluation.summary(None));
+        let mean = best.and_then(|best| best.tried.evaluation.summary(None));
         html! {
             li { (counted(self.comparisons.len(), "estimator", "estimators")) " on " (self.trials) "." }
             @if let (Some(best), Some(mean)) = (best, mean) {
@@ -70,7 +71,7 @@ impl ComparisonReport<'_> {
                     "The least mean error is that of " b { (best.estimator.kind()) } ": "
                     (number(mean.average_m * 1e3)) " mm, median " (number(mean.median_m * 1e3)) " mm."
                 }
-                @if let Some(ratio) = limit_ratio(self.bench, &best.evaluation) {
+                @if let Some(ratio) = limit_ratio(self.bench, &best.tried.evaluation) {
                     li { "That is " (number(ratio)) " times what physics allows where the limit is small." }
                 }
             }
@@ -79,7 +80,7 @@ impl ComparisonReport<'_> {
 
     fn table(&self) -> Table {
         let rows = self.comparisons.iter().filter_map(|comparison| {
-            let evaluation = &comparison.evaluation;
+            let evaluation = &comparison.tried.evaluation;
             let summary = evaluation.summary(None)?;
             Some(vec![
                 text(comparison.estimator.kind()),
@@ -91,8 +92,8 @@ impl ComparisonReport<'_> {
                 value(evaluation.effective_percent(self.tolerance_m)),
                 value(evaluation.coverage_percent()),
                 value(limit_ratio(self.bench, evaluation)),
-                value(comparison.fit_seconds * 1e3),
-                value(comparison.locate_ns * 1e-3),
+                value(comparison.tried.fit_seconds * 1e3),
+                value(comparison.tried.locate_ns * 1e-3),
             ])
         });
         let columns = [
@@ -135,7 +136,7 @@ impl ComparisonReport<'_> {
         // The last colour is black, which the limit has.
         const COLOURS: usize = 6;
         let series = |(i, comparison): (usize, &Comparison)| {
-            let (label, points) = (comparison.estimator.kind(), points(&comparison.evaluation));
+            let (label, points) = (comparison.estimator.kind(), points(&comparison.tried.evaluation));
             let drawn = if i < COLOURS { Series::line } else { Series::dashes };
             drawn(label, i % COLOURS, points)
         };
@@ -145,7 +146,7 @@ impl ComparisonReport<'_> {
     fn errors_map(&self) -> Figure {
         let shown = self.comparisons.iter().take(MOST_MAPS);
         let evaluations: Vec<(&str, &Evaluation)> =
-            shown.map(|comparison| (comparison.estimator.kind(), &comparison.evaluation)).collect();
+            shown.map(|comparison| (comparison.estimator.kind(), &comparison.tried.evaluation)).collect();
         let what = "Median error of each estimator, from the best mean to the worst and all on one scale";
         error_map(self.bench, "Median error over the surface", what, &evaluations)
     }

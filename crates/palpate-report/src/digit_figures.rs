@@ -6,7 +6,7 @@ use super::error_lines::in_thousandths;
 use super::numbers::{counted, mm, stated};
 use super::page::Figure;
 use super::{Axis, Chart, Marker, Series};
-use palpate_estimators::evaluation::LinearTheory;
+use palpate_estimators::digit::LinearTheory;
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{Force, Limit, LimitCurve};

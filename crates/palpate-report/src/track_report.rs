@@ -7,7 +7,7 @@ use super::numbers::{counted, number, stated, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
 use super::{Axis, BandPoint, Chart, Marker, Series};
 use palpate_estimators::estimator::Track;
-use palpate_estimators::evaluation::{SpeedErrors, TrackErrors, tracked_of};
+use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 

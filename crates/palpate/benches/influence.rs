@@ -4,8 +4,8 @@
 
 use cpu_time::ThreadTime;
 use palpate_core::{Estimate, Status};
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
-use palpate_estimators::method::FitTask;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::clean_reading;

@@ -3,8 +3,8 @@
 
 use cpu_time::ThreadTime;
 use palpate_estimators::arrangement::every;
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
-use palpate_estimators::method::FitTask;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{CleanSensors, simulate};

@@ -3,10 +3,9 @@
 
 use cpu_time::ThreadTime;
 use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
-use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
-use palpate_estimators::simulate::{simulate, simulate_moving};
+use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;

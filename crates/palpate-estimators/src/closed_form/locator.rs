@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::balance::Balance;
 use super::posterior::{Posterior, RARE};
 use super::segment::Segment;
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;

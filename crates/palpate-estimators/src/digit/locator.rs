@@ -7,7 +7,7 @@ use super::gauges::gauges;
 use super::likelihood::Likelihood;
 use super::posterior::{Piece, Posterior};
 use super::shape::DigitShape;
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;

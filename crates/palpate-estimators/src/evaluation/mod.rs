@@ -1,22 +1,19 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
-mod comparison;
 mod cross_validation;
-mod linear_theory;
+mod limit_ratio;
 mod statistics;
-mod tracking;
+mod trial;
 
-pub use comparison::{Choice, Comparison, Trial, choose, contenders, limit_ratio, try_estimator};
 pub use cross_validation::{CrossValidationError, cross_validate};
-pub use linear_theory::LinearTheory;
+pub use limit_ratio::limit_ratio;
 pub use statistics::{Spread, median, percentile};
-pub use tracking::{
-    FollowError, Followed, SPEED_RATIOS, SpeedErrors, SweepError, TrackErrors, follow, sweep_speeds,
-    tracked_of,
-};
+pub use trial::{Trial, Tried, try_estimator};
 
-use crate::estimator::{Cells, ContactEstimate, Locator, ReadingError};
+use crate::fit::{Fitted, Locate, ReadingError};
+use crate::load_profile::Cells;
 use crate::recording::Recording;
+use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 
@@ -94,7 +91,7 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
 
 /// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
 /// (e − t)ᵀ·C⁻¹·(e − t) ≤ 5.991, the 95th percentile of χ² with two degrees of freedom.
-fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
+pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
     if extent.width_m.is_none() {
         let (low, high) = uncertainty.x_95_m;
@@ -111,7 +108,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// [`ReadingError`] when the recording's channels are not the locator's.
-    pub fn of(locator: &Locator, recording: &Recording) -> Result<Self, ReadingError> {
+    pub fn of<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let locate = |row: &crate::recording::Row| {
             let contact = locator.locate(&row.reading)?.contact;
             Ok(Located {

@@ -1,7 +1,7 @@
 //! Features as a recording fixes them.
 
 use super::{FeatureKind, NoFeatures};
-use crate::method::LocatorFault;
+use crate::fit::LocatorFault;
 use crate::recording::Recording;
 
 /// From a reading to standardized features: (source − centre)/spread, so that each has mean 0 and variance 1 over the

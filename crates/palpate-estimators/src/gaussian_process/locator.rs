@@ -3,7 +3,7 @@
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
 use crate::features::Features;
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;

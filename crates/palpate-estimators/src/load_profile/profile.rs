@@ -8,7 +8,7 @@ use super::patches::{Patch, find_patches};
 use super::resolution::Resolution;
 use super::smoothness::{Mixture, Problem};
 use super::{Cells, LoadSensors};
-use crate::method::ReadingError;
+use crate::fit::ReadingError;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{NORMAL_95, chi_squared_bound};
 

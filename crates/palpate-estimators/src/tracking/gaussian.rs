@@ -3,7 +3,7 @@
 //! Symbols: m mean and P covariance of the state; s the unknowns of a [`ContactFit`], which are entries of the state; g and A pull
 //! and information of the fit; A = L·Lᵀ.
 
-use crate::method::ContactFit;
+use crate::likelihood::ContactFit;
 
 pub(super) type Matrix<const N: usize> = [[f64; N]; N];
 

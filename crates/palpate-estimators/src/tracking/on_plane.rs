@@ -8,7 +8,7 @@ use super::belief::{Belief, Moments};
 use super::birth::{Births, FORCES, MOST_PARTS, WIDEST, better_force_n};
 use super::gaussian::{Change, Gaussian};
 use super::step::{MOTIONS, Step, motion_of};
-use crate::method::{ContactFit, PlaneLikelihood};
+use crate::likelihood::{ContactFit, PlaneLikelihood};
 use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;

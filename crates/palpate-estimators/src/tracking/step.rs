@@ -7,7 +7,7 @@
 use super::bank::{Dynamics, SeenNumbers};
 use super::config::TrackerConfig;
 use super::gaussian::{Change, Gaussian, Matrix};
-use crate::method::LineLikelihood;
+use crate::likelihood::LineLikelihood;
 use palpate_mechanics::surface::modal::Oscillator;
 use std::f64::consts::PI;
 

@@ -1,7 +1,7 @@
 //! What a tracker answers.
 
 use super::belief::Moments;
-use crate::method::Likelihood;
+use crate::likelihood::Likelihood;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;

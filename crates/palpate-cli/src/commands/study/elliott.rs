@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
 use palpate_estimators::evaluation::Spread;
+use palpate_numerics::watch::Watch;
 use palpate_report::{ReportFile, elliott_report};
 use palpate_studies::elliott::{COMPONENTS, Elliott, ElliottError, ElliottFindings, PRESENTATIONS, RIG_TOML};
 use std::path::Path;
@@ -39,8 +40,8 @@ impl BuiltIn for Elliott {
         self.most_rounds()
     }
 
-    fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<ElliottFindings>, ElliottError> {
-        self.run(keep_going)
+    fn run(&self, watch: Watch) -> Result<ElliottFindings, ElliottError> {
+        self.run(watch)
     }
 
     fn report(&self, findings: &ElliottFindings) -> Vec<ReportFile> {

@@ -5,8 +5,9 @@
 use super::locator::PlaneLocator;
 use super::refine::solve;
 use super::search::Search;
+use crate::fit::Locate;
 use crate::influence::belief::ForceBelief;
-use crate::method::{ContactFit, Geometry, Likelihood, Locate, PlaneLikelihood};
+use crate::likelihood::{ContactFit, Geometry, Likelihood, PlaneLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;

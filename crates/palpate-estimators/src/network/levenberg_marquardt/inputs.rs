@@ -4,7 +4,7 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
-use crate::method::LocatorFault;
+use crate::fit::LocatorFault;
 use crate::recording::Recording;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::symmetric_eigen;

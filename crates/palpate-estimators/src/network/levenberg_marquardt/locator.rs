@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::NetworkInputs;
 use super::perceptron::jacobians;
 use super::training::Trained;
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::network::Topology;
 use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};

@@ -1,4 +1,4 @@
-//! Watches a study as it runs: a row for every network that is kept, and a step of the bar for every fit.
+//! The tally of a study as it runs: a row for every network that is kept, and a step of the bar for every fit.
 
 use super::checkpoint::CheckpointFile;
 use crate::failure::{Complaint, Failure};
@@ -14,7 +14,7 @@ pub fn presentations(prepared: &PreparedStudy, arm: usize, fit: &TrainedSeed) ->
 }
 
 /// Called by every training thread.
-pub struct Watch<'a> {
+pub struct Tally<'a> {
     prepared: &'a PreparedStudy,
     table: &'a NetworksCsv<'a>,
     bar: ProgressBar,
@@ -42,7 +42,7 @@ struct ArmTally {
     presentations: f64,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> Tally<'a> {
     /// Watches a run that has `done` behind it.
     pub fn new(
         prepared: &'a PreparedStudy,
@@ -90,12 +90,13 @@ impl<'a> Watch<'a> {
         self.state().error.is_some()
     }
 
-    /// Takes the bar away.
-    pub fn finish(self) -> Result<(), Failure> {
+    /// Takes the bar away, and tells how many fits of each arm are finished.
+    pub fn finish(&self) -> Result<Vec<u64>, Failure> {
         self.bar.finish_and_clear();
-        match self.state.into_inner().unwrap_or_else(PoisonError::into_inner).error {
+        let mut state = self.state();
+        match state.error.take() {
             Some(error) => Err(Complaint::new(format!("cannot write networks.csv: {error}")).into()),
-            None => Ok(()),
+            None => Ok(state.arms.iter().map(|arm| arm.finished as u64).collect()),
         }
     }
 

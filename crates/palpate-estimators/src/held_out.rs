@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::LocatorFault;
+use crate::fit::LocatorFault;
 use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Position;
 

@@ -1,26 +1,27 @@
-//! The linear theory of bending, judged on the clean readings of a flexible digit that is bent exactly.
+//! The linear theory of bending, judged on the clean readings of a digit that is bent exactly.
 
-use crate::estimator::{EstimatorConfig, Fitting, Locator};
-use crate::setup::Bench;
-use crate::simulate::{CleanSensors, simulate_at};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::{Digit, Surface};
 
+use super::{DigitConfig, DigitLocator, DigitTheory};
+use crate::fit::{Fit, Fitted};
+use crate::setup::Bench;
+use crate::simulate::{CleanSensors, simulate_at};
+
 /// A locator by the linear theory, and the exact readings that it is asked for.
 pub struct LinearTheory<'a> {
-    locator: Locator,
+    locator: Fitted<DigitLocator>,
     sensors: CleanSensors<'a>,
 }
 
 impl<'a> LinearTheory<'a> {
-    /// On the bench of a digit; `None` where no estimator by the linear theory suits its sensors.
-    pub fn of(bench: &'a Bench, digit: &'a Digit) -> Option<Self> {
+    /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
+    pub fn of(bench: &Bench, digit: &'a Digit) -> Option<Self> {
         let unknown = Bench { force_n: None, ..bench.clone() };
         let pressed = Bench { force_n: Some(digit.characteristic_force_n()), ..bench.clone() };
         // The estimator learns nothing, but every fit wants a recording.
         let recording = simulate_at(&pressed, &[Position::along(digit.length_m())], 1, 0).ok()?;
-        let fitting = Fitting::prepare(&unknown, &EstimatorConfig::LINEAR_DIGIT, &recording).ok()?;
-        let locator = fitting.fit(0, &mut || true).ok()??;
+        let locator = DigitConfig { theory: DigitTheory::Linear }.fit(&unknown, &recording).ok()?;
         Some(Self { locator, sensors: CleanSensors::new(digit, &bench.layout) })
     }
 
