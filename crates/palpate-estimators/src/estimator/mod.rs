@@ -13,8 +13,8 @@ mod tracking;
 pub use crate::fit::LocatorProvenance;
 pub use crate::fit::ReadingError;
 pub use crate::load_profile::{
-    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution,
-    patch_limits,
+    Cells, CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler,
+    Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use choice::{CHOICE_FOLDS, Choice, Comparison, choose, contenders};
