@@ -42,8 +42,8 @@ fn main() {
 }
 
 fn fit(bench: &Bench, recording: &Recording) -> PlaneLocator {
-    let fitted = InfluenceConfig::default().fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true);
-    fitted.expect("the presses suit the bench").expect("nobody stops it")
+    let fitted = InfluenceConfig::default().fit_plane(FitTask::new(bench, recording));
+    fitted.expect("the presses suit the bench")
 }
 
 /// Median time of an estimate, readings being all alike.
