@@ -8,9 +8,8 @@ use crate::{
     EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
-use palpate_estimators::estimator::Fitting;
 use palpate_estimators::evaluation::{Evaluation, Portion};
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_rig::Rig;
