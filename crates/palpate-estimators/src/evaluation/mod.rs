@@ -1,17 +1,16 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
-mod cross_validation;
 mod limit_ratio;
 mod statistics;
 mod trial;
 
-pub use cross_validation::{CrossValidationError, cross_validate};
 pub use limit_ratio::limit_ratio;
-pub use palpate_numerics::percentile;
+pub use palpate_numerics::{median, percentile};
 pub use statistics::Spread;
-pub use trial::{Trial, Tried, try_estimator};
+pub use trial::{CrossValidationError, Trial, Tried, cross_validate, try_estimator};
 
 use crate::fit::{Fitted, Locate, ReadingError};
+use crate::load_profile::Cells;
 use crate::recording::Recording;
 use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
@@ -151,6 +150,38 @@ impl Evaluation {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+    }
+
+    /// The median error of the contacts in each cell, in metres; NaN where there is none.
+    pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
+        let mut errors: Vec<Vec<f64>> = vec![Vec::new(); cells.len()];
+        for located in &self.located {
+            errors[cells.cell_of(located.truth)].push(located.error_m());
+        }
+        errors.into_iter().map(|errors| median(errors).unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
+    /// for a stretch without contacts.
+    pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
+        let extent = Extent { length_m: self.length_m, width_m: None };
+        let cells = Cells { extent, columns: count, rows: 1 };
+        let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
+        for located in &self.located {
+            stretches[cells.cell_of(located.truth)].push(located);
+        }
+        let point = |stretch: &Vec<&Located>| {
+            let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
+            Some((mean_m, median(stretch.iter().map(|located| located.error_m()).collect())?))
+        };
+        stretches.iter().filter_map(point).collect()
+    }
+
+    /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
+    pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
+        let mut errors: Vec<f64> = self.located.iter().map(Located::error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
     /// Errors of each distinct position, by x and then y.

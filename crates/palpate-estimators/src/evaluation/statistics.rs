@@ -14,6 +14,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// The same spread in another unit, of which one of this makes `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
+    }
+
     /// The spread of some values, in any order; `None` of nothing.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);

@@ -191,6 +191,11 @@ impl LoadProfile {
         (force / measure, (low.max(0.0) / measure, high / measure))
     }
 
+    /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
+    pub fn density_sd(&self, cell: usize) -> f64 {
+        self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
+    }
+
     /// The ends of the total force's 95 % interval, in newtons.
     pub fn total_95_n(&self) -> (f64, f64) {
         let (low, high) = normal_interval_95(self.total_n, self.total_sd_n);

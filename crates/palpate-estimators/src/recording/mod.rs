@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{Schema, read, read_pair};
-pub use csv_out::write;
+pub use csv_out::{csv_row, write};
 pub use folds::{Fold, TooFewPositions};
 pub use reading_parser::ReadingParser;
 pub use timed::{TimedParser, TimedReading, TimedRecording, write_timed};

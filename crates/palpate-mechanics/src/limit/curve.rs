@@ -78,6 +78,18 @@ impl LimitCurve {
         })
     }
 
+    /// A figure of the bound by x in metres, from left to right; on a plane its mean across the width. NaN where there is no bound.
+    pub fn by_x(&self, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
+        let mut points: Vec<&LimitPoint> = self.points.iter().collect();
+        points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
+        let columns = points.chunk_by(|a, b| a.position.x_m == b.position.x_m);
+        let mean = |column: &[&LimitPoint]| {
+            let figures = column.iter().map(|point| point.bound.as_ref().map_or(f64::NAN, &figure));
+            figures.sum::<f64>() / column.len() as f64
+        };
+        columns.map(|column| (column[0].position.x_m, mean(column))).collect()
+    }
+
     /// The curve in short; `None` where no position has a bound.
     pub fn summary(&self) -> Option<LimitSummary> {
         let mut bounds: Vec<(Position, Bound)> =
