@@ -10,7 +10,7 @@ mod support {
 use palpate_numerics::watch::Watch;
 use std::fs;
 
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
 use palpate_rig::Rig;

@@ -7,7 +7,7 @@ use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
-use palpate_estimators::simulate::{CleanSensors, simulate};
+use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::median;
