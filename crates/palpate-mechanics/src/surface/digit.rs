@@ -54,6 +54,37 @@ impl Digit {
     /// end. A vertical load of 10 turns the contact by 82°, a normal one by 157°.
     pub const MOST_LOAD: f64 = 10.0;
 
+    /// A finger of this length, width and thickness, in metres, and Young's modulus, in pascals, pushed across itself.
+    ///
+    /// # Errors
+    /// [`DigitError`] for a number that is not positive and finite.
+    ///
+    /// ```
+    /// use palpate_mechanics::surface::Digit;
+    /// use palpate_mechanics::units::{gpa, mm};
+    ///
+    /// let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0))?;
+    /// assert!((digit.bending_stiffness() - 0.0208).abs() < 1e-4); // N·m²
+    /// # Ok::<(), palpate_mechanics::surface::DigitError>(())
+    /// ```
+    pub fn new(
+        length_m: f64,
+        width_m: f64,
+        thickness_m: f64,
+        youngs_modulus_pa: f64,
+    ) -> Result<Self, DigitError> {
+        let direction = ForceDirection::Normal;
+        let digit = Self { length_m, width_m, thickness_m, youngs_modulus_pa, direction };
+        digit.validate()?;
+        Ok(digit)
+    }
+
+    /// The same, touched by forces of this direction.
+    #[must_use]
+    pub fn with_direction(self, direction: ForceDirection) -> Self {
+        Self { direction, ..self }
+    }
+
     /// Checks that every dimension is positive and finite, and that the stiffness is so too.
     ///
     /// # Errors
