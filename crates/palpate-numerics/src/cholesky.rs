@@ -4,10 +4,19 @@
 //! nearly all of the n³/3 multiply-adds, and is a matrix product, which ndarray hands to a tuned kernel.
 
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 
 /// Columns that are factored before the rest of the matrix is updated.
 const BLOCK: usize = 64;
+
+/// Columns that are factored one after the other; more are halved.
+const NARROW: usize = 16;
+
+/// Rows that are solved for side by side.
+const LANES: usize = 8;
+
+/// Columns of a triangle that are updated as a rectangle, what is above the diagonal in vain.
+const GRAM: usize = 48;
 
 /// The factor L of A = L·Lᵀ, lower triangular.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,11 +47,7 @@ impl Cholesky {
     pub fn factor(mut matrix: Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let size = matrix.nrows();
         assert_eq!(size, matrix.ncols(), "a matrix to be factored is square");
-        for start in (0..size).step_by(BLOCK) {
-            let end = (start + BLOCK).min(size);
-            factor_panel(&mut matrix, start, end)?;
-            update_trailing(&mut matrix, start, end);
-        }
+        factor_panel(matrix.view_mut()).map_err(|error| NotPositiveDefinite { size, ..error })?;
         for (row, mut values) in matrix.outer_iter_mut().enumerate() {
             values.slice_mut(s![row + 1..]).fill(0.0);
         }
@@ -162,37 +167,79 @@ impl Cholesky {
     }
 }
 
-/// Factors columns `start..end`, from the diagonal down.
-fn factor_panel(matrix: &mut Array2<f64>, start: usize, end: usize) -> Result<(), NotPositiveDefinite> {
-    let size = matrix.nrows();
-    for j in start..end {
-        let (above, mut below) = matrix.view_mut().split_at(Axis(0), j + 1);
-        let row = above.row(j).slice(s![start..j]).to_owned();
-        let pivot = above[[j, j]] - row.dot(&row);
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return Err(NotPositiveDefinite { row: j + 1, size, pivot });
+/// Factors the first `columns` of a matrix of which only the lower triangle is read, and takes L₂₁·L₂₁ᵀ off that of the rest.
+pub(super) fn factor_leading(matrix: ArrayViewMut2<'_, f64>, columns: usize) -> Result<(), NotPositiveDefinite> {
+    let (mut left, right) = matrix.split_at(Axis(1), columns);
+    factor_panel(left.view_mut())?;
+    let (_, right) = right.split_at(Axis(0), columns);
+    subtract_gram(right, left.slice(s![columns.., ..]));
+    Ok(())
+}
+
+/// Factors columns, from the diagonal down: one half after the other (Gustavson, *Recursion leads to automatic variable blocking
+/// for dense linear-algebra algorithms*, 1997).
+fn factor_panel(mut panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinite> {
+    let columns = panel.ncols();
+    if columns <= NARROW {
+        return factor_narrow(panel);
+    }
+    let half = (columns / 2).next_multiple_of(NARROW);
+    factor_leading(panel.view_mut(), half)?;
+    let right = panel.slice_mut(s![half.., half..]);
+    factor_panel(right).map_err(|error| NotPositiveDefinite { row: error.row + half, ..error })
+}
+
+/// Factors at most [`NARROW`] columns: the square on the diagonal element by element, then the rows below, some side by side.
+fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinite> {
+    let (size, columns) = panel.dim();
+    let (mut square, mut below) = panel.split_at(Axis(0), columns);
+    let mut lower = [[0.0; NARROW]; NARROW];
+    for i in 0..columns {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            let rest = square[[i, j]] - sum;
+            lower[i][j] = if j < i { rest / lower[j][j] } else { rest.sqrt() };
+            if i == j && !(rest > 0.0 && rest.is_finite()) {
+                return Err(NotPositiveDefinite { row: j + 1, size, pivot: rest });
+            }
+            square[[i, j]] = lower[i][j];
         }
-        let root = pivot.sqrt();
-        for mut lower in below.outer_iter_mut() {
-            let sum = lower.slice(s![start..j]).dot(&row);
-            lower[j] = (lower[j] - sum) / root;
+    }
+    for mut rows in below.axis_chunks_iter_mut(Axis(0), LANES) {
+        // A column each.
+        let mut x = [[0.0; LANES]; NARROW];
+        for (lane, row) in rows.outer_iter().enumerate() {
+            x.iter_mut().zip(row).for_each(|(x, value)| x[lane] = *value);
         }
-        matrix[[j, j]] = root;
+        for j in 0..columns {
+            let (done, rest) = x.split_at_mut(j);
+            let mut sum = [0.0; LANES];
+            for (done, l) in done.iter().zip(&lower[j]) {
+                sum.iter_mut().zip(done).for_each(|(sum, x)| *sum += x * l);
+            }
+            rest[0].iter_mut().zip(&sum).for_each(|(x, sum)| *x = (*x - sum) / lower[j][j]);
+        }
+        for (lane, row) in rows.outer_iter_mut().enumerate() {
+            x.iter().zip(row).for_each(|(x, value)| *value = x[lane]);
+        }
     }
     Ok(())
 }
 
-/// Takes the finished columns `start..end` off the lower triangle to their right, block column by block column.
-fn update_trailing(matrix: &mut Array2<f64>, start: usize, end: usize) {
-    let panel = matrix.slice(s![end.., start..end]).to_owned();
-    for column in (0..panel.nrows()).step_by(BLOCK) {
-        let width = BLOCK.min(panel.nrows() - column);
-        let left = panel.slice(s![column.., ..]);
-        let right = panel.slice(s![column..column + width, ..]);
-        let from = end + column;
-        let mut target = matrix.slice_mut(s![from.., from..from + width]);
-        general_mat_mul(-1.0, &left, &right.t(), 1.0, &mut target);
+/// Takes A·Aᵀ off the lower triangle of a matrix, A having as many rows; or off its first columns.
+fn subtract_gram(mut matrix: ArrayViewMut2<'_, f64>, a: ArrayView2<'_, f64>) {
+    let columns = matrix.ncols();
+    if columns <= GRAM {
+        general_mat_mul(-1.0, &a, &a.slice(s![..columns, ..]).t(), 1.0, &mut matrix);
+        return;
     }
+    let half = (columns / 2).next_multiple_of(LANES);
+    let (above, below) = a.split_at(Axis(0), half);
+    let (mut top, bottom) = matrix.split_at(Axis(0), half);
+    let (mut left, right) = bottom.split_at(Axis(1), half);
+    subtract_gram(top.slice_mut(s![.., ..half]), above);
+    general_mat_mul(-1.0, &below, &above.t(), 1.0, &mut left);
+    subtract_gram(right, below);
 }
 
 #[cfg(test)]

@@ -19,5 +19,5 @@ pub use distributions::{
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
 pub use random_order::random_order;
-pub use sparse_cholesky::{EliminationOrder, SparseCholesky, SparseCholeskyError, SparseSymmetric};
+pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};
 pub use statistics::{mean, mean_and_variance, median, percentile, root_mean_square, standard_error};

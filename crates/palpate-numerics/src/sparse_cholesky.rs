@@ -1,14 +1,34 @@
-//! Cholesky factors of sparse matrices; the one place that knows the library which computes them.
+//! Cholesky factorisation A = L·Lᵀ of a sparse symmetric positive definite matrix, by the multifrontal method (Duff and Reid,
+//! *The multifrontal solution of indefinite sparse symmetric linear equations*, 1983; Liu, *The multifrontal method for sparse
+//! matrix solution: theory and practice*, 1992).
+//!
+//! Columns of L that follow each other and have nearly the same pattern are a supernode. It is eliminated in a small dense
+//! matrix, its front, whose rows and columns are that pattern: its columns of A, to which the update matrices of its children
+//! are added; of which the first columns are factored; what they take off the others is the update matrix for the parent, the
+//! supernode of the first row that is left. So nearly all multiply-adds are in products of dense matrices.
+//!
+//! Columns are eliminated in their order in A. One that keeps L sparse, such as nested dissection, is the caller's to choose.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use std::mem;
+use std::ops::Range;
 
-/// A symmetric matrix, which grows by columns: its elements on and above the diagonal.
+use ndarray::linalg::general_mat_mul;
+use ndarray::{ArrayView2, ArrayViewMut2};
+
+use super::cholesky::factor_leading;
+
+/// Columns of L that are stored side by side, at most.
+const PANEL: usize = 64;
+
+/// Supernodes of fewer columns take in their parent's next one though up to [`MOST_ZEROS`] of what is stored becomes zeros:
+/// larger fronts are worth that.
+const SMALL: usize = 48;
+const MOST_ZEROS: f64 = 1.0 / 3.0;
+
+/// As [`MOST_ZEROS`], in supernodes that are large enough.
+const FEW_ZEROS: f64 = 0.02;
+
+/// A symmetric matrix, which grows by columns: its elements on and below the diagonal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SparseSymmetric {
     column_starts: Vec<usize>,
@@ -16,19 +36,44 @@ pub struct SparseSymmetric {
     values: Vec<f64>,
 }
 
-/// In which order unknowns are eliminated; it decides how many numbers the factor has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EliminationOrder {
-    /// As the matrix numbers them, for a caller who knows a good order.
-    AsNumbered,
-    /// By approximate minimum degree, after Amestoy, Davis and Duff (1996).
-    MinimumDegree,
+/// The factor L of A = L·Lᵀ, lower triangular and sparse. It is computed by one thread.
+pub struct SparseCholesky {
+    size: usize,
+    panels: Vec<Panel>,
+    /// The panels' numbers, one panel after the other.
+    values: Vec<f64>,
 }
 
-/// A = L·Lᵀ with a sparse L. Its numbers do not depend on how many threads there are: it uses one.
-pub struct SparseCholesky {
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
+/// Columns of L, dense and row by row: first the square on the diagonal, then the rows below it that are not 0.
+struct Panel {
+    columns: Range<usize>,
+    below: Vec<usize>,
+    /// Where its numbers start.
+    start: usize,
+}
+
+/// Columns that are eliminated together.
+struct Supernode {
+    columns: Range<usize>,
+    /// Rows and columns of its front, ascending: the supernode's own, then those below.
+    pattern: Vec<usize>,
+    /// Elements below the diagonal of its columns of L that are known to be 0 and stored nevertheless.
+    zeros: usize,
+}
+
+/// The update matrices that wait for the fronts of their parents.
+struct Fronts<'a> {
+    /// By the first row of their pattern.
+    waiting: Vec<Vec<Update<'a>>>,
+    /// Of each row of the matrix, where it is in the present front.
+    places: Vec<usize>,
+}
+
+/// What the elimination of a supernode adds to rows and columns further on.
+struct Update<'a> {
+    pattern: &'a [usize],
+    /// The lower triangle, row by row.
+    triangle: Vec<f64>,
 }
 
 /// Why a sparse matrix has no Cholesky factor.
@@ -58,14 +103,13 @@ impl SparseSymmetric {
         }
     }
 
-    /// Adds the next column: row and value of its elements, each row once. Those below the diagonal are left out, for
-    /// their mirror images are in later columns.
-    pub fn push_column(&mut self, elements: &mut [(usize, f64)]) {
+    /// Adds the next column: row and value of its elements. Those above the diagonal are left out, for their mirror images
+    /// are in earlier columns.
+    pub fn push_column(&mut self, elements: impl IntoIterator<Item = (usize, f64)>) {
         let column = self.size();
-        elements.sort_unstable_by_key(|(row, _)| *row);
-        for (row, value) in elements.iter().take_while(|(row, _)| *row <= column) {
-            self.rows.push(*row);
-            self.values.push(*value);
+        for (row, value) in elements.into_iter().filter(|(row, _)| *row >= column) {
+            self.rows.push(row);
+            self.values.push(value);
         }
         self.column_starts.push(self.rows.len());
     }
@@ -74,6 +118,10 @@ impl SparseSymmetric {
     pub fn size(&self) -> usize {
         self.column_starts.len() - 1
     }
+
+    fn elements(&self, column: usize) -> Range<usize> {
+        self.column_starts[column]..self.column_starts[column + 1]
+    }
 }
 
 impl SparseCholesky {
@@ -81,34 +129,30 @@ impl SparseCholesky {
     ///
     /// # Errors
     /// [`SparseCholeskyError`] when it is not positive definite, or too large.
-    pub fn new(matrix: &SparseSymmetric, order: EliminationOrder) -> Result<Self, SparseCholeskyError> {
+    ///
+    /// # Panics
+    /// When an element's row is beyond the last column.
+    pub fn new(matrix: &SparseSymmetric) -> Result<Self, SparseCholeskyError> {
         let size = matrix.size();
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(size, size, &matrix.column_starts, None, &matrix.rows);
-        let ordering = match order {
-            EliminationOrder::AsNumbered => SymmetricOrdering::Identity,
-            EliminationOrder::MinimumDegree => SymmetricOrdering::Amd,
-        };
         let no_memory = SparseCholeskyError::OutOfMemory { size };
-        let symbolic =
-            factorize_symbolic_cholesky(pattern, Side::Upper, ordering, CholeskySymbolicParams::default())
-                .map_err(|_| no_memory)?;
-        let mut values = zeros(symbolic.len_val()).ok_or(no_memory)?;
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| no_memory)?;
-        let factored = symbolic.factorize_numeric_llt(
-            &mut values,
-            SparseColMatRef::new(pattern, &matrix.values),
-            Side::Upper,
-            LltRegularization::default(),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        );
-        match factored {
-            Ok(_) => Ok(Self { symbolic, values }),
-            Err(LltError::NonPositivePivot { .. }) => Err(SparseCholeskyError::NotPositiveDefinite { size }),
+        let supernodes = supernodes(matrix);
+        let largest = supernodes.iter().map(|node| node.pattern.len()).max().unwrap_or(0);
+        let mut space = room(largest * largest).ok_or(no_memory)?;
+        space.resize(largest * largest, 0.0);
+        let stored = supernodes.iter().map(Supernode::stored_numbers).sum();
+        let mut factor = Self { size, panels: Vec::new(), values: room(stored).ok_or(no_memory)? };
+        let mut fronts = Fronts::new(size);
+        for node in &supernodes {
+            let front = &mut space[..node.pattern.len().pow(2)];
+            fronts.assemble(matrix, node, front);
+            let square = (node.pattern.len(), node.pattern.len());
+            let matrix = ArrayViewMut2::from_shape(square, &mut *front).expect("a front is square");
+            factor_leading(matrix, node.columns.len())
+                .map_err(|_| SparseCholeskyError::NotPositiveDefinite { size })?;
+            factor.store(node, front);
+            fronts.keep_update(node, front).ok_or(no_memory)?;
         }
+        Ok(factor)
     }
 
     /// The solution x of A·x = b in the place of b; or of several b, one after the other, in one sweep through the factor,
@@ -117,87 +161,364 @@ impl SparseCholesky {
     /// # Panics
     /// When b is not as long as the matrix, or a multiple of that.
     pub fn solve_in_place(&self, b: &mut [f64]) {
-        let (rows, columns) = (self.symbolic.nrows(), b.len() / self.symbolic.nrows().max(1));
-        let scratch = self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
-        let mut memory = MemBuffer::new(scratch);
-        let right_side = MatMut::from_column_major_slice_mut(b, rows, columns);
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            right_side,
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        if b.is_empty() {
+            return;
+        }
+        let count = b.len() / self.size;
+        let mut b = ArrayViewMut2::from_shape((count, self.size), b).expect("whole right-hand sides");
+        // The numbers of one row, of all right-hand sides, side by side.
+        let mut x: Vec<f64> = b.t().iter().copied().collect();
+        for panel in &self.panels {
+            self.solve_lower(panel, count, &mut x);
+        }
+        for panel in self.panels.iter().rev() {
+            self.solve_upper(panel, count, &mut x);
+        }
+        let x = ArrayView2::from_shape((self.size, count), &x).expect("as long as b");
+        b.assign(&x.t());
     }
 
     /// How many numbers L is stored in, some zeros among them.
     pub fn stored_numbers(&self) -> usize {
         self.values.len()
     }
+
+    /// Keeps the factored columns of a front.
+    fn store(&mut self, node: &Supernode, front: &[f64]) {
+        for own in node.panels() {
+            let first = node.columns.start;
+            self.panels.push(Panel {
+                columns: first + own.start..first + own.end,
+                below: node.pattern[own.end..].to_vec(),
+                start: self.values.len(),
+            });
+            for row in front.chunks_exact(node.pattern.len()).skip(own.start) {
+                self.values.extend_from_slice(&row[own.clone()]);
+            }
+        }
+    }
+
+    /// The square of a panel, and what is below it.
+    fn blocks(&self, panel: &Panel) -> (&[f64], ArrayView2<'_, f64>) {
+        let (width, height) = (panel.columns.len(), panel.below.len());
+        let (square, below) = self.values[panel.start..].split_at(width * width);
+        let below = ArrayView2::from_shape((height, width), &below[..height * width]);
+        (square, below.expect("rows as long as the panel is wide"))
+    }
+
+    /// The panel's columns of L⁻¹·x, in place.
+    fn solve_lower(&self, panel: &Panel, count: usize, x: &mut [f64]) {
+        let own = &mut x[panel.columns.start * count..panel.columns.end * count];
+        // A load at a few places concerns few of the panels.
+        if own.iter().all(|x| *x == 0.0) {
+            return;
+        }
+        let width = panel.columns.len();
+        let (square, below) = self.blocks(panel);
+        for (i, l) in square.chunks_exact(width).enumerate() {
+            let (done, rest) = own.split_at_mut(i * count);
+            let row = &mut rest[..count];
+            for (l, done) in l.iter().zip(done.chunks_exact(count)) {
+                subtract_multiple(row, *l, done);
+            }
+            row.iter_mut().for_each(|x| *x /= l[i]);
+        }
+        let own = ArrayView2::from_shape((width, count), own).expect("a row each column");
+        let changes = below.dot(&own);
+        for (row, change) in panel.below.iter().zip(changes.outer_iter()) {
+            let change = change.to_slice().expect("a product is stored row by row");
+            subtract_multiple(&mut x[row * count..][..count], 1.0, change);
+        }
+    }
+
+    /// The panel's rows of L⁻ᵀ·x, in place.
+    fn solve_upper(&self, panel: &Panel, count: usize, x: &mut [f64]) {
+        let width = panel.columns.len();
+        let (square, below) = self.blocks(panel);
+        let mut found = Vec::with_capacity(panel.below.len() * count);
+        for row in &panel.below {
+            found.extend_from_slice(&x[row * count..][..count]);
+        }
+        let found = ArrayView2::from_shape((panel.below.len(), count), &found).expect("a row each");
+        let own = &mut x[panel.columns.start * count..panel.columns.end * count];
+        let mut rows = ArrayViewMut2::from_shape((width, count), &mut *own).expect("a row each column");
+        general_mat_mul(-1.0, &below.t(), &found, 1.0, &mut rows);
+        for (i, l) in square.chunks_exact(width).enumerate().rev() {
+            let (rest, row) = own.split_at_mut(i * count);
+            let row = &mut row[..count];
+            row.iter_mut().for_each(|x| *x /= l[i]);
+            for (l, rest) in l.iter().zip(rest.chunks_exact_mut(count)) {
+                subtract_multiple(rest, *l, row);
+            }
+        }
+    }
 }
 
-/// `count` zeros, if there is memory for them.
-fn zeros(count: usize) -> Option<Vec<f64>> {
+impl Supernode {
+    /// Rows below its columns.
+    fn below(&self) -> &[usize] {
+        &self.pattern[self.columns.len()..]
+    }
+
+    /// Takes in the next column, which brings `rows` that its pattern lacks, unless too much of it became zeros.
+    fn take_in(&mut self, rows: &[usize]) -> bool {
+        let width = self.columns.len();
+        let zeros = self.zeros + width * rows.len();
+        let most = if width < SMALL { MOST_ZEROS } else { FEW_ZEROS };
+        let taken = zeros as f64 <= most * ((width + 1) * (self.pattern.len() + rows.len())) as f64;
+        if taken {
+            self.zeros = zeros;
+            self.columns.end += 1;
+            self.pattern.extend_from_slice(rows);
+            self.pattern.sort_unstable();
+        }
+        taken
+    }
+
+    /// Its own columns in the front, in panels.
+    fn panels(&self) -> impl Iterator<Item = Range<usize>> {
+        let width = self.columns.len();
+        (0..width).step_by(PANEL).map(move |start| start..width.min(start + PANEL))
+    }
+
+    fn stored_numbers(&self) -> usize {
+        self.panels().map(|own| own.len() * (self.pattern.len() - own.start)).sum()
+    }
+}
+
+/// The supernodes of a matrix. A supernode takes in the column behind it when that is the first row below it, and when it then
+/// stores few zeros (relaxed supernodes: Ashcraft and Grimes, *The influence of relaxed supernode partitions on the multifrontal
+/// method*, 1989).
+fn supernodes(matrix: &SparseSymmetric) -> Vec<Supernode> {
+    let mut supernodes: Vec<Supernode> = Vec::new();
+    // Of each column, its children: the supernodes of which it is the first row below.
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); matrix.size()];
+    // Of each row, the last supernode that was found to have it in its pattern.
+    let mut owner = vec![usize::MAX; matrix.size()];
+    for column in 0..matrix.size() {
+        let mut others = mem::take(&mut children[column]);
+        let before = others.pop_if(|child| *child + 1 == supernodes.len());
+        let mut rows = matrix.rows[matrix.elements(column)].to_vec();
+        rows.extend(others.iter().flat_map(|child| supernodes[*child].below()));
+        let new_of = |rows: &[usize], index: usize, owner: &mut [usize]| -> Vec<usize> {
+            let mut is_new = |row: &usize| mem::replace(&mut owner[*row], index) != index;
+            rows.iter().copied().filter(|row| is_new(row)).collect()
+        };
+        let taken = before.filter(|before| {
+            let lacking = new_of(&rows, *before, &mut owner);
+            supernodes[*before].take_in(&lacking)
+        });
+        let index = taken.unwrap_or_else(|| {
+            rows.push(column);
+            rows.extend(before.iter().flat_map(|child| supernodes[*child].below()));
+            let mut pattern = new_of(&rows, supernodes.len(), &mut owner);
+            pattern.sort_unstable();
+            supernodes.push(Supernode { columns: column..column + 1, pattern, zeros: 0 });
+            supernodes.len() - 1
+        });
+        if let Some(parent) = supernodes[index].below().first() {
+            children[*parent].push(index);
+        }
+    }
+    supernodes
+}
+
+impl<'a> Fronts<'a> {
+    fn new(size: usize) -> Self {
+        Self { waiting: (0..size).map(|_| Vec::new()).collect(), places: vec![0; size] }
+    }
+
+    /// Writes the lower triangle of a supernode's front before its elimination: its columns of the matrix, and the update
+    /// matrices of its children.
+    fn assemble(&mut self, matrix: &SparseSymmetric, node: &Supernode, front: &mut [f64]) {
+        let size = node.pattern.len();
+        for (place, row) in node.pattern.iter().enumerate() {
+            self.places[*row] = place;
+        }
+        for (i, row) in front.chunks_exact_mut(size).enumerate() {
+            row[..=i].fill(0.0);
+        }
+        for (own, column) in node.columns.clone().enumerate() {
+            for element in matrix.elements(column) {
+                front[self.places[matrix.rows[element]] * size + own] += matrix.values[element];
+            }
+            for update in mem::take(&mut self.waiting[column]) {
+                self.extend_add(&update, size, front);
+            }
+        }
+    }
+
+    /// Adds an update matrix to a front of `size` rows.
+    fn extend_add(&self, update: &Update, size: usize, front: &mut [f64]) {
+        let places: Vec<usize> = update.pattern.iter().map(|row| self.places[*row]).collect();
+        let mut triangle = &update.triangle[..];
+        for (i, place) in places.iter().enumerate() {
+            let (row, rest) = triangle.split_at(i + 1);
+            let target = &mut front[place * size..][..size];
+            for (value, place) in row.iter().zip(&places) {
+                target[*place] += value;
+            }
+            triangle = rest;
+        }
+    }
+
+    /// Keeps what the elimination of a supernode left of its front; `None` when there is no memory for it.
+    fn keep_update(&mut self, node: &'a Supernode, front: &[f64]) -> Option<()> {
+        let (size, width) = (node.pattern.len(), node.columns.len());
+        let Some(parent) = node.below().first() else { return Some(()) };
+        let mut triangle = room((size - width) * (size - width + 1) / 2)?;
+        for (i, row) in front.chunks_exact(size).enumerate().skip(width) {
+            triangle.extend_from_slice(&row[width..=i]);
+        }
+        self.waiting[*parent].push(Update { pattern: node.below(), triangle });
+        Some(())
+    }
+}
+
+/// x ← x − factor·y.
+fn subtract_multiple(x: &mut [f64], factor: f64, y: &[f64]) {
+    for (x, y) in x.iter_mut().zip(y) {
+        *x -= factor * y;
+    }
+}
+
+/// An empty list with room for `count` numbers, if there is memory for them.
+fn room(count: usize) -> Option<Vec<f64>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
-    values.resize(count, 0.0);
     Some(values)
 }
 
 #[cfg(test)]
 mod tests {
-    use ndarray::{Array1, Array2};
+    use ndarray::{Array1, Array2, s};
     use proptest::prelude::*;
 
     use super::*;
     use crate::Cholesky;
 
-    /// A band matrix with a heavy diagonal, sparse and dense.
-    fn matrices(elements: &[f64], band: usize) -> (SparseSymmetric, Array2<f64>) {
+    /// A symmetric matrix with a heavy diagonal, of which about one element in `rarity` is not 0, sparse and dense.
+    fn matrices(elements: &[f64], rarity: usize) -> (SparseSymmetric, Array2<f64>) {
         let size = elements.len();
-        let element = |row: usize, column: usize| match row.abs_diff(column) {
-            0 => 2.0 * band as f64 + 1.0,
-            apart if apart <= band => elements[row.max(column)] * elements[row.min(column)],
+        let element = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+            (i, j) if i == j => size as f64,
+            (i, j) if (7 * i + 11 * j + i * j) % rarity == 0 => elements[i] * elements[j],
             _ => 0.0,
         };
-        let mut sparse = SparseSymmetric::with_capacity(size * (band + 1));
-        for column in 0..size {
-            let rows = (column.saturating_sub(band)..size.min(column + band + 1)).rev();
-            sparse.push_column(&mut rows.map(|row| (row, element(row, column))).collect::<Vec<_>>());
+        let dense = Array2::from_shape_fn((size, size), |(i, j)| element(i, j));
+        (sparse(&dense), dense)
+    }
+
+    fn sparse(dense: &Array2<f64>) -> SparseSymmetric {
+        let mut sparse = SparseSymmetric::with_capacity(dense.len());
+        for column in dense.columns() {
+            sparse.push_column(column.iter().copied().enumerate().filter(|(_, value)| *value != 0.0));
         }
-        (sparse, Array2::from_shape_fn((size, size), |(row, column)| element(row, column)))
+        sparse
+    }
+
+    impl SparseCholesky {
+        /// L, dense.
+        fn lower(&self) -> Array2<f64> {
+            let mut lower = Array2::zeros((self.size, self.size));
+            for panel in &self.panels {
+                let (square, below) = self.blocks(panel);
+                let mut columns = lower.slice_mut(s![.., panel.columns.clone()]);
+                for (i, row) in square.chunks_exact(panel.columns.len()).enumerate() {
+                    (0..=i).for_each(|j| columns[[panel.columns.start + i, j]] = row[j]);
+                }
+                for (row, values) in panel.below.iter().zip(below.outer_iter()) {
+                    columns.row_mut(*row).assign(&values);
+                }
+            }
+            lower
+        }
+    }
+
+    fn largest(values: &Array2<f64>) -> f64 {
+        values.iter().fold(0.0, |largest, value| value.abs().max(largest))
     }
 
     proptest! {
         #[test]
-        fn solutions_are_those_of_the_dense_factor(
-            elements in proptest::collection::vec(-1.0..1.0f64, 1..120), band in 0..8usize,
+        fn the_factor_gives_the_matrix_back(
+            elements in proptest::collection::vec(-1.0..1.0f64, 1..150), rarity in 1..60usize,
         ) {
-            let (sparse, dense) = matrices(&elements, band);
-            let expected = Cholesky::factor(dense).unwrap().solve(&Array1::from(elements.clone()));
-            for order in [EliminationOrder::AsNumbered, EliminationOrder::MinimumDegree] {
-                let factor = SparseCholesky::new(&sparse, order).unwrap();
-                let mut x = elements.clone();
-                factor.solve_in_place(&mut x);
-                prop_assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).abs() < 1e-12));
-                prop_assert!(factor.stored_numbers() >= elements.len());
+            let (sparse, dense) = matrices(&elements, rarity);
+            let lower = SparseCholesky::new(&sparse).unwrap().lower();
+            prop_assert!(largest(&(lower.dot(&lower.t()) - &dense)) < 1e-13 * dense.nrows() as f64);
+            prop_assert!(largest(&(&lower - &Cholesky::factor(dense).unwrap().lower())) < 1e-13);
+        }
+
+        #[test]
+        fn solutions_are_those_of_the_dense_factor_however_many_at_once(
+            elements in proptest::collection::vec(-1.0..1.0f64, 1..150), rarity in 1..60usize, count in 1..6usize,
+        ) {
+            let (sparse, dense) = matrices(&elements, rarity);
+            let factor = SparseCholesky::new(&sparse).unwrap();
+            let right_side = |which: usize| elements.iter().enumerate().map(move |(i, e)| if i % count == which { *e } else { 0.0 });
+            let mut together: Vec<f64> = (0..count).flat_map(right_side).collect();
+            factor.solve_in_place(&mut together);
+            let dense = Cholesky::factor(dense).unwrap();
+            for (which, found) in together.chunks_exact(elements.len()).enumerate() {
+                let mut alone: Vec<f64> = right_side(which).collect();
+                let expected = dense.solve(&Array1::from(alone.clone()));
+                factor.solve_in_place(&mut alone);
+                prop_assert_eq!(&alone, found);
+                prop_assert!(found.iter().zip(&expected).all(|(x, expected)| (x - expected).abs() < 1e-13));
             }
+        }
+
+        #[test]
+        fn solutions_do_not_depend_on_the_order(
+            elements in proptest::collection::vec(-1.0..1.0f64, 1..80), rarity in 1..40usize, step in 1..80usize,
+        ) {
+            let (sparse_matrix, dense) = matrices(&elements, rarity);
+            let size = elements.len();
+            let mut order: Vec<usize> = (0..size).collect();
+            order.sort_by_key(|i| (i * step % 83, *i));
+            let permuted = Array2::from_shape_fn((size, size), |(i, j)| dense[[order[i], order[j]]]);
+            let mut x = elements.clone();
+            SparseCholesky::new(&sparse_matrix).unwrap().solve_in_place(&mut x);
+            let mut y: Vec<f64> = order.iter().map(|i| elements[*i]).collect();
+            SparseCholesky::new(&sparse(&permuted)).unwrap().solve_in_place(&mut y);
+            prop_assert!(order.iter().zip(&y).all(|(i, y)| (x[*i] - y).abs() < 1e-13));
         }
     }
 
     #[test]
     fn a_matrix_that_is_not_positive_definite_is_refused() {
-        let mut matrix = SparseSymmetric::with_capacity(3);
-        matrix.push_column(&mut [(0, 4.0)]);
-        matrix.push_column(&mut [(1, 1.0), (0, 2.0)]);
-        let refused = SparseCholesky::new(&matrix, EliminationOrder::AsNumbered).err();
-        assert_eq!(refused, Some(SparseCholeskyError::NotPositiveDefinite { size: 2 }));
+        let singular = Array2::from_elem((40, 40), 1.0);
+        let mut indefinite = Array2::from_diag(&Array1::linspace(1.0, 90.0, 90));
+        indefinite[[70, 70]] = -1e-9;
+        let not_finite = Array2::from_elem((1, 1), f64::NAN);
+        for matrix in [singular, indefinite, not_finite, Array2::zeros((2, 2))] {
+            let refused = SparseCholesky::new(&sparse(&matrix)).err();
+            assert_eq!(refused, Some(SparseCholeskyError::NotPositiveDefinite { size: matrix.nrows() }));
+        }
     }
 
     #[test]
-    fn an_empty_matrix_has_an_empty_factor() {
-        let factor =
-            SparseCholesky::new(&SparseSymmetric::with_capacity(0), EliminationOrder::AsNumbered).unwrap();
+    fn a_factor_too_large_for_memory_is_refused() {
+        // An arrow whose shaft is eliminated last fills nothing, one whose shaft is eliminated first fills everything.
+        let size = 3_000_000;
+        let mut matrix = SparseSymmetric::with_capacity(2 * size);
+        matrix.push_column((0..size).map(|row| (row, 1.0)));
+        (1..size).for_each(|column| matrix.push_column([(column, 2.0)]));
+        let refused = SparseCholesky::new(&matrix).err();
+        assert_eq!(refused, Some(SparseCholeskyError::OutOfMemory { size }));
+    }
+
+    #[test]
+    fn the_smallest_matrices_have_factors() {
+        let factor = SparseCholesky::new(&SparseSymmetric::with_capacity(0)).unwrap();
         factor.solve_in_place(&mut []);
         assert_eq!(factor.stored_numbers(), 0);
+        let mut matrix = SparseSymmetric::with_capacity(1);
+        matrix.push_column([(0, 4.0)]);
+        let factor = SparseCholesky::new(&matrix).unwrap();
+        let mut x = [2.0, 6.0];
+        factor.solve_in_place(&mut x);
+        assert_eq!((x, factor.stored_numbers()), ([0.5, 1.5], 1));
     }
 }

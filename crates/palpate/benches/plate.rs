@@ -1,5 +1,5 @@
 //! A plate of 200 × 200 elements with nine sensors: CPU seconds, all on one thread, and memory until their influences over
-//! the whole plate are known, influences a second afterwards, and what the order of elimination and reciprocity save.
+//! the whole plate are known, influences a second afterwards, what reciprocity saves, and the factors of coarser meshes.
 
 use std::hint::black_box;
 
@@ -8,13 +8,12 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Plate, Surface};
-use palpate_numerics::EliminationOrder;
 
 const SIDE_M: f64 = 0.3;
 const EVALUATIONS: usize = 4_000_000;
 
 fn main() {
-    let plate = plate(200);
+    let plate = square(200);
     let start = ProcessTime::now();
     plate.solve().expect("the plate is sound");
     let factored_s = start.elapsed().as_secs_f64();
@@ -51,27 +50,17 @@ fn main() {
     );
 
     for elements in [48, PlateSpec::DEFAULT_ELEMENTS, 200] {
-        compare_orders(elements);
-    }
-}
-
-/// Nested dissection beside minimum degree.
-fn compare_orders(elements: usize) {
-    for (name, order) in [
-        ("nested dissection", EliminationOrder::AsNumbered),
-        ("minimum degree", EliminationOrder::MinimumDegree),
-    ] {
         let start = ProcessTime::now();
-        let numbers = plate(elements).factor_size(order).expect("the plate is sound");
+        let numbers = square(elements).factor_size().expect("the plate is sound");
         println!(
-            "{elements} × {elements}, {name}: {:.2} s, {:.1} million numbers",
+            "{elements} × {elements}: {:.2} s, {:.1} million numbers",
             start.elapsed().as_secs_f64(),
             numbers as f64 * 1e-6
         );
     }
 }
 
-fn plate(elements: usize) -> Plate {
+fn square(elements: usize) -> Plate {
     let spec = PlateSpec {
         length_m: SIDE_M,
         width_m: SIDE_M,

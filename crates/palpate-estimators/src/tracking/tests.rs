@@ -140,7 +140,7 @@ fn the_pulls_of_a_fit_are_the_slopes_of_its_misfit() {
         };
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
         let score = fit(unknowns).score[k];
-        assert!((slope + 2.0 * score).abs() < 1e-4 * score.abs(), "{k}: {slope} {pull}");
+        assert!((slope + 2.0 * score).abs() < 1e-4 * score.abs(), "{k}: {slope} {score}");
     }
 }
 

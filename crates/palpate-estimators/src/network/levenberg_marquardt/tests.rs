@@ -190,7 +190,7 @@ fn what_cannot_be_trained_is_named() {
     };
     let good = LevenbergMarquardt::default();
     assert_eq!(message(good.clone(), &one), "the recording has 1 distinct positions; at least 2 are needed");
-    let hollow = LevenbergMarquardt { nuisance: vec![3, 0], ..good.clone() };
+    let hollow = LevenbergMarquardt { hidden: vec![3, 0], ..good.clone() };
     assert_eq!(
         message(hollow, &two),
         "a network with hidden nodes 0 cannot be trained; it must be at least 1"

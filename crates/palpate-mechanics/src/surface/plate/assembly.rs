@@ -27,7 +27,6 @@ pub(super) fn stiffness_matrix(
 ) -> SparseSymmetric {
     let under = springs_by_degree(springs);
     let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
-    let mut elements = Vec::new();
     for unknown in 0..unknowns.count() {
         let degree = unknowns.degree(unknown);
         let mut column = element_column(mesh, element, degree);
@@ -36,11 +35,8 @@ pub(super) fn stiffness_matrix(
                 column.add(mesh, *other, spring.stiffness_n_per_m * factor * other_factor);
             }
         }
-        elements.clear();
-        elements.extend(
-            column.entries(mesh).filter_map(|(degree, value)| Some((unknowns.place(degree)?, value))),
-        );
-        matrix.push_column(&mut elements);
+        let elements = column.entries(mesh);
+        matrix.push_column(elements.filter_map(|(degree, value)| Some((unknowns.place(degree)?, value))));
     }
     matrix
 }

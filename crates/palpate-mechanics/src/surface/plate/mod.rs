@@ -28,7 +28,6 @@ use crate::contact::Position;
 use crate::sensing::SensorKind;
 use full_scale::FullScales;
 use influence::{NotANumber, PlateInfluence};
-use palpate_numerics::EliminationOrder;
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -100,13 +99,12 @@ impl Plate {
         self.solved().map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// Factors its equations once more, unknowns eliminated in this order, and says how many numbers the factor is stored in:
-    /// what orders are judged by. Plates themselves are eliminated as they are numbered, by nested dissection.
+    /// How many numbers the factor of its equations is stored in.
     ///
     /// # Errors
     /// As [`Plate::solve`].
-    pub fn factor_size(&self, order: EliminationOrder) -> Result<usize, PlateError> {
-        solved::factor_size(&self.spec, order).map_err(|reason| PlateError::Unsolvable { reason })
+    pub fn factor_size(&self) -> Result<usize, PlateError> {
+        self.solved().map(Solved::stored_numbers).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
     fn solved(&self) -> Result<&Solved, Unsolvable> {

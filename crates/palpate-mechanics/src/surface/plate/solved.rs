@@ -11,7 +11,7 @@ use super::mesh::{Derivative, Mesh};
 use super::spec::{PlateSpec, PointSupport, PointSupportKind};
 use super::stiffness::element_stiffness;
 use super::unknowns::Unknowns;
-use palpate_numerics::{Cholesky, EliminationOrder, SparseCholesky, SparseCholeskyError};
+use palpate_numerics::{Cholesky, SparseCholesky};
 
 /// The factored equations of a plate.
 ///
@@ -50,9 +50,15 @@ impl Solved {
         let mesh = Mesh::new(spec.extent(), spec.elements);
         let unknowns = Unknowns::new(&mesh, spec.edges);
         let springs = springs(spec, &mesh);
-        let factor = factor(spec, &mesh, &unknowns, &springs, EliminationOrder::AsNumbered)?;
+        let element = element_stiffness(&mesh, spec.flexural_rigidity(), spec.poissons_ratio);
+        let factor = SparseCholesky::new(&stiffness_matrix(&mesh, &unknowns, &element, &springs))?;
         let simple_supports = SimpleSupports::new(spec, springs, &unknowns, &factor)?;
         Ok(Self { mesh, unknowns, factor, simple_supports })
+    }
+
+    /// How many numbers the factor is stored in.
+    pub fn stored_numbers(&self) -> usize {
+        self.factor.stored_numbers()
     }
 
     /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by.
@@ -117,24 +123,6 @@ impl SimpleSupports {
             add(u, -force, solution);
         }
     }
-}
-
-/// How many numbers the factor is stored in when unknowns are eliminated in this order.
-pub(super) fn factor_size(spec: &PlateSpec, order: EliminationOrder) -> Result<usize, Unsolvable> {
-    let mesh = Mesh::new(spec.extent(), spec.elements);
-    let unknowns = Unknowns::new(&mesh, spec.edges);
-    Ok(factor(spec, &mesh, &unknowns, &springs(spec, &mesh), order)?.stored_numbers())
-}
-
-fn factor(
-    spec: &PlateSpec,
-    mesh: &Mesh,
-    unknowns: &Unknowns,
-    springs: &[Spring],
-    order: EliminationOrder,
-) -> Result<SparseCholesky, SparseCholeskyError> {
-    let element = element_stiffness(mesh, spec.flexural_rigidity(), spec.poissons_ratio);
-    SparseCholesky::new(&stiffness_matrix(mesh, unknowns, &element, springs), order)
 }
 
 /// The springs under the plate, one for each support in its order: the elastic ones, and γ under the simple ones.

@@ -60,7 +60,7 @@ fn no_factor_is_larger_than_was_estimated() {
         let plate = plate(spec);
         let (columns, rows) = mesh_of(&plate).nodes();
         let estimated = 16.0 * coupled_pairs(columns, rows);
-        let stored = plate.factor_size(EliminationOrder::AsNumbered).unwrap() as f64;
+        let stored = plate.factor_size().unwrap() as f64;
         println!(
             "{columns} × {rows} nodes: {stored} numbers, {:.3} of those that couple",
             stored / estimated
