@@ -7,7 +7,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
 use palpate_mechanics::surface::SurfaceSpec;
 
-use crate::document::{At, Place};
+use crate::document::At;
 use crate::error::{RigError, RigProblem};
 use crate::recording::{ColumnKey, RecordingKeys};
 use crate::values::{AtLeastZero, Count, Finite, Fraction, Grid, Length, NotNegative, OneOrMany, Point};
