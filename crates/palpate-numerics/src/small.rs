@@ -18,7 +18,7 @@ pub const ROUNDING: f64 = 1e-14;
 /// An unknown that is held has no pivot. Its row and column count for nothing, and it is 0 in every solution and inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ldl<const N: usize> {
-    /// L below its diagonal.
+    /// L below its diagonal; zeros above it.
     lower: Matrix<N>,
     /// D; 0 for what is held.
     pivots: [f64; N],
@@ -98,11 +98,7 @@ impl<const N: usize> Ldl<N> {
     #[inline]
     pub fn root(&self) -> Matrix<N> {
         let roots = self.pivots.map(f64::sqrt);
-        let entry = |i: usize, j: usize| match i.cmp(&j) {
-            std::cmp::Ordering::Less => 0.0,
-            std::cmp::Ordering::Equal => roots[j],
-            std::cmp::Ordering::Greater => self.lower[i][j] * roots[j],
-        };
+        let entry = |i: usize, j: usize| if i == j { roots[j] } else { self.lower[i][j] * roots[j] };
         std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }
 
