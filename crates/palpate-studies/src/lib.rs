@@ -21,7 +21,7 @@ pub use prepare::{PreparedStudy, StudyRunError};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,
 };
-pub use run::{ArmOutcome, Observer, RunOptions, Trained, TrainedSeed};
+pub use run::{ArmOutcome, OnTrained, RunOptions, Trained, TrainedSeed};
 
 #[cfg(test)]
 mod tests;

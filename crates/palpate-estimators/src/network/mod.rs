@@ -27,4 +27,4 @@ pub use palpate_core::Activation;
 pub use patterns::Patterns;
 pub use prepared::PreparedNetwork;
 pub use topology::Topology;
-pub use train::{SeedQueue, TrainingTask, train_many, train_one};
+pub use train::{TrainingQueue, TrainingTask, train_many, train_one};

@@ -14,14 +14,15 @@
 
 use super::lanes::{Lanes, OrderDrawer, Real, Streams, activate, derivative};
 use super::{PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
+use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Trains the network of one seed; `None` when `keep_going`, asked once an epoch, says no.
+/// Trains the network of one seed; `watch` is told of every epoch.
 #[inline(always)]
 pub(super) fn train<V: Lanes<1>>(
     task: &TrainingTask,
     seed: u64,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<TrainedNetwork> {
+    watch: Watch,
+) -> Result<TrainedNetwork, Cancelled> {
     let patterns = task.patterns;
     let inputs = inputs_with_bias::<V>(task);
     let targets: Vec<V> = patterns.target_values.iter().map(|&t| value(t)).collect();
@@ -30,7 +31,8 @@ pub(super) fn train<V: Lanes<1>>(
     let drawer = OrderDrawer::new(patterns.count());
     let mut order: Vec<u32> = (0..patterns.count() as u32).collect();
     let mut epochs = 0;
-    while keep_going() {
+    loop {
+        watch.round()?;
         if task.rule.order == PresentationOrder::Shuffled {
             drawer.draw_one(&mut stream, &mut order);
         }
@@ -46,14 +48,13 @@ pub(super) fn train<V: Lanes<1>>(
         epochs += 1;
         let [error] = error.to_array();
         if let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), task.rule) {
-            return Some(TrainedNetwork {
+            return Ok(TrainedNetwork {
                 topology: task.topology.clone(),
                 weights: network.weights(),
                 outcome,
             });
         }
     }
-    None
 }
 
 #[inline(always)]

@@ -1,6 +1,7 @@
 //! A batch against readings one by one, and every instruction set against plain arrays.
 
 use super::{fit, noisy};
+use crate::fit::Locate;
 use crate::fixtures::paper;
 use crate::influence::InfluenceConfig;
 use crate::influence::answer::NOTHING;
@@ -8,7 +9,6 @@ use crate::influence::batch::Rows;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;
-use crate::method::Locate;
 use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
 use rand::SeedableRng;

@@ -4,7 +4,8 @@ use super::forward::{self, Batch};
 use super::portable::Array;
 use super::single::{self, Layer};
 use super::{Lanes, kernel};
-use crate::network::{SeedQueue, TrainedNetwork, TrainingTask, scalar};
+use crate::network::{TrainedNetwork, TrainingQueue, TrainingTask, scalar};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Width of a floating-point number in training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -84,28 +85,31 @@ pub(crate) fn train_lanes(
     set: InstructionSet,
     precision: Precision,
     task: &TrainingTask,
-    queue: &mut dyn SeedQueue,
-) {
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let set = if InstructionSet::available().contains(&set) { set } else { InstructionSet::Portable };
     match (set, precision) {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
-        (InstructionSet::Avx512, Precision::F64) => unsafe { avx512::<super::avx512::F64x8, 8>(task, queue) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `available` has found the features.
-        (InstructionSet::Avx512, Precision::F32) => unsafe {
-            avx512::<super::avx512::F32x16, 16>(task, queue);
+        (InstructionSet::Avx512, Precision::F64) => unsafe {
+            avx512::<super::avx512::F64x8, 8>(task, queue, watch)
         },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
-        (InstructionSet::Avx2, Precision::F64) => unsafe { fma::<super::avx2::F64x4, 4>(task, queue) },
+        (InstructionSet::Avx512, Precision::F32) => unsafe {
+            avx512::<super::avx512::F32x16, 16>(task, queue, watch)
+        },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `available` has found the features.
-        (InstructionSet::Avx2, Precision::F32) => unsafe { fma::<super::avx2::F32x8, 8>(task, queue) },
-        (_, Precision::F64) if has_fma() => fused::<Array<f64, 4, true>, 4>(task, queue),
-        (_, Precision::F32) if has_fma() => fused::<Array<f32, 8, true>, 8>(task, queue),
-        (_, Precision::F64) => kernel::train::<Array<f64, 4, false>, 4>(task, queue),
-        (_, Precision::F32) => kernel::train::<Array<f32, 8, false>, 8>(task, queue),
+        (InstructionSet::Avx2, Precision::F64) => unsafe { fma::<super::avx2::F64x4, 4>(task, queue, watch) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `available` has found the features.
+        (InstructionSet::Avx2, Precision::F32) => unsafe { fma::<super::avx2::F32x8, 8>(task, queue, watch) },
+        (_, Precision::F64) if has_fma() => fused::<Array<f64, 4, true>, 4>(task, queue, watch),
+        (_, Precision::F32) if has_fma() => fused::<Array<f32, 8, true>, 8>(task, queue, watch),
+        (_, Precision::F64) => kernel::train::<Array<f64, 4, false>, 4>(task, queue, watch),
+        (_, Precision::F32) => kernel::train::<Array<f32, 8, false>, 8>(task, queue, watch),
     }
 }
 
@@ -114,13 +118,13 @@ pub(crate) fn train_scalar(
     precision: Precision,
     task: &TrainingTask,
     seed: u64,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<TrainedNetwork> {
+    watch: Watch,
+) -> Result<TrainedNetwork, Cancelled> {
     match precision {
-        Precision::F64 if has_fma() => fused_scalar::<Array<f64, 1, true>>(task, seed, keep_going),
-        Precision::F32 if has_fma() => fused_scalar::<Array<f32, 1, true>>(task, seed, keep_going),
-        Precision::F64 => scalar::train::<Array<f64, 1, false>>(task, seed, keep_going),
-        Precision::F32 => scalar::train::<Array<f32, 1, false>>(task, seed, keep_going),
+        Precision::F64 if has_fma() => fused_scalar::<Array<f64, 1, true>>(task, seed, watch),
+        Precision::F32 if has_fma() => fused_scalar::<Array<f32, 1, true>>(task, seed, watch),
+        Precision::F64 => scalar::train::<Array<f64, 1, false>>(task, seed, watch),
+        Precision::F32 => scalar::train::<Array<f32, 1, false>>(task, seed, watch),
     }
 }
 
@@ -128,41 +132,57 @@ pub(crate) fn train_scalar(
 /// The machine must have AVX-512 F and DQ.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,fma")]
-unsafe fn avx512<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
-    kernel::train::<V, N>(task, queue);
+unsafe fn avx512<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
+    kernel::train::<V, N>(task, queue, watch)
 }
 
 /// # Safety
 /// The machine must have AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-unsafe fn fma<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
-    kernel::train::<V, N>(task, queue);
+unsafe fn fma<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
+    kernel::train::<V, N>(task, queue, watch)
 }
 
 /// The kernel where the compiler may use the machine's multiply-add. Call it only where [`has_fma`].
-fn fused<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
+fn fused<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     #[cfg(target_arch = "x86_64")]
     {
         /// # Safety
         /// The machine must have FMA.
         #[target_feature(enable = "fma")]
-        unsafe fn inner<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
-            kernel::train::<V, N>(task, queue);
+        unsafe fn inner<V: Lanes<N>, const N: usize>(
+            task: &TrainingTask,
+            queue: &mut dyn TrainingQueue,
+            watch: Watch,
+        ) -> Result<(), Cancelled> {
+            kernel::train::<V, N>(task, queue, watch)
         }
         // SAFETY: the caller has asked `has_fma`.
-        unsafe { inner::<V, N>(task, queue) }
+        unsafe { inner::<V, N>(task, queue, watch) }
     }
     #[cfg(not(target_arch = "x86_64"))]
-    kernel::train::<V, N>(task, queue);
+    kernel::train::<V, N>(task, queue, watch)
 }
 
 /// The twin where the compiler may use the machine's multiply-add. Call it only where [`has_fma`].
 fn fused_scalar<V: Lanes<1>>(
     task: &TrainingTask,
     seed: u64,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<TrainedNetwork> {
+    watch: Watch,
+) -> Result<TrainedNetwork, Cancelled> {
     #[cfg(target_arch = "x86_64")]
     {
         /// # Safety
@@ -171,15 +191,15 @@ fn fused_scalar<V: Lanes<1>>(
         unsafe fn inner<V: Lanes<1>>(
             task: &TrainingTask,
             seed: u64,
-            keep_going: &mut dyn FnMut() -> bool,
-        ) -> Option<TrainedNetwork> {
-            scalar::train::<V>(task, seed, keep_going)
+            watch: Watch,
+        ) -> Result<TrainedNetwork, Cancelled> {
+            scalar::train::<V>(task, seed, watch)
         }
         // SAFETY: the caller has asked `has_fma`.
-        unsafe { inner::<V>(task, seed, keep_going) }
+        unsafe { inner::<V>(task, seed, watch) }
     }
     #[cfg(not(target_arch = "x86_64"))]
-    scalar::train::<V>(task, seed, keep_going)
+    scalar::train::<V>(task, seed, watch)
 }
 
 /// Sends a batch through its network, a reading a lane, with `set`; another one than [`InstructionSet::available`] has is replaced by the

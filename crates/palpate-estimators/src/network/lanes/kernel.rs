@@ -11,19 +11,25 @@
 use super::order::{OrderDrawer, Streams};
 use super::{Lanes, Real, Table, logistic};
 use crate::network::{
-    Activation, BackPropagation, PresentationOrder, SeedQueue, TrainedNetwork, TrainingOutcome, TrainingTask,
+    Activation, BackPropagation, PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingQueue,
+    TrainingTask,
 };
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::mem::swap;
 
 /// Trains every network of the queue. A lane whose network has finished takes the next seed.
 #[inline(always)]
-pub(super) fn train<V: Lanes<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
+pub(super) fn train<V: Lanes<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let topology = task.topology;
     let one_hidden_layer = topology.layers() == 2;
     if one_hidden_layer && topology.row_len(0) == 9 && topology.row_len(1) == 11 {
-        train_shape::<V, N, 9, 11>(task, queue);
+        train_shape::<V, N, 9, 11>(task, queue, watch)
     } else {
-        train_shape::<V, N, ANY, ANY>(task, queue);
+        train_shape::<V, N, ANY, ANY>(task, queue, watch)
     }
 }
 
@@ -41,19 +47,22 @@ fn row_len<const KNOWN: usize>(len: usize) -> usize {
 #[inline(always)]
 fn train_shape<V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
     task: &TrainingTask,
-    queue: &mut dyn SeedQueue,
-) {
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let mut group = Group::<V, N, FIRST, UPPER>::new(task);
     for lane in 0..N {
         group.start_next(lane, queue);
     }
     group.sum_first_pattern();
-    while group.is_busy() && queue.keep_going() {
+    while group.is_busy() {
+        watch.round()?;
         let errors = group.run_epoch();
         if group.retire(errors.to_array(), queue) {
             group.sum_first_pattern();
         }
     }
+    Ok(())
 }
 
 /// The network in one lane.
@@ -130,7 +139,7 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
     }
 
     /// Puts the queue's next network into a lane, or leaves the lane idle.
-    fn start_next(&mut self, lane: usize, queue: &mut dyn SeedQueue) {
+    fn start_next(&mut self, lane: usize, queue: &mut dyn TrainingQueue) {
         let Some(seed) = queue.next_seed() else {
             self.occupants[lane] = None;
             return;
@@ -155,7 +164,7 @@ impl<'t, V: Lanes<N>, const N: usize, const FIRST: usize, const UPPER: usize> Gr
     }
 
     /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
-    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue) -> bool {
+    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn TrainingQueue) -> bool {
         let mut replaced = false;
         for (lane, error) in errors.into_iter().enumerate() {
             let Some(occupant) = &mut self.occupants[lane] else { continue };
