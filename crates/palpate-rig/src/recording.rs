@@ -38,9 +38,9 @@ pub(crate) struct RecordingKeys {
     /// The unit of forces.
     pub force_unit: Option<At<String>>,
     /// A coordinate that readings depend on and nobody wants to know.
-    pub hidden: Option<At<ColumnKey>>,
+    pub nuisance: Option<At<ColumnKey>>,
     /// The unit of that coordinate.
-    pub hidden_unit: Option<At<String>>,
+    pub nuisance_unit: Option<At<String>>,
     /// The file's coordinates of the surface's left end or lower left corner.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
@@ -72,7 +72,7 @@ impl At<RecordingKeys> {
         self.check_numbered(extent)?;
         let own = Columns::own(&layout.names(), &layout.kinds(), extent);
         let force_unit = unit(&self.force_unit, Dimension::Force, SensorKind::Reaction.unit())?;
-        let hidden_unit = match &self.hidden_unit {
+        let nuisance_unit = match &self.nuisance_unit {
             None => Unit::NONE,
             Some(symbol) => Unit::from_symbol(symbol)
                 .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: symbol.to_string() }))?,
@@ -85,14 +85,14 @@ impl At<RecordingKeys> {
             frame: self.frame(extent)?,
             channels: self.channels(&layout.kinds(), own.channels)?,
             force: force.map(|values| ForceColumn { values, need: Need::Required }).or(own.force),
-            hidden: self.value("hidden", &self.hidden, &self.hidden_unit, hidden_unit)?,
+            nuisance: self.value("nuisance", &self.nuisance, &self.nuisance_unit, nuisance_unit)?,
         })
     }
 
     /// Without a header, columns must be numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
-        let values = [&self.force, &self.hidden].into_iter().flatten();
+        let values = [&self.force, &self.nuisance].into_iter().flatten();
         let channels = self.channels.iter().flat_map(|channels| channels.iter());
         let named = |key: &&At<ColumnKey>| matches!(***key, ColumnKey::Text(_));
         match positions.clone().chain(values).chain(channels).find(named) {
