@@ -261,7 +261,10 @@ impl At<MustHaveKeys> {
             None => return Err(self.place.missing("measure")),
             Some(measure) => {
                 let offer = offers.iter().position(|offer| offer.kind == **measure);
-                offer.ok_or_else(|| measure.place.refuse("one of `kinds`"))?
+                offer.ok_or_else(|| {
+                    let one = format!("{{ measure = \"{}\", noise = … }}", **measure);
+                    measure.place.refuse(format!("one of `kinds`; add {one} there"))
+                })?
             }
         };
         Ok(MustHave { offer, position })
@@ -364,7 +367,10 @@ mod tests {
         assert!(plate("\"50 mm\"").is_ok());
         assert!(plate("[[\"50 mm\", \"60 mm\"]]").is_ok());
         let told = [plate("20"), plate("[\"50 mm\"]")].map(|rig| rig.unwrap_err().to_string());
-        assert_eq!(told[0], "a number of `sites` does not say where on a plane they are");
-        assert!(told[1].starts_with("`sites` has a single length where a pair"), "{}", told[1]);
+        assert_eq!(
+            told[0],
+            "`sites` is 20; it must be a distance such as \"10 mm\", or a list of pairs, on a plane"
+        );
+        assert!(told[1].starts_with("`sites` is 50 mm; it must be a pair of lengths"), "{}", told[1]);
     }
 }

@@ -71,17 +71,21 @@ impl At<RecordingKeys> {
     pub fn build(&self, layout: &Layout, extent: Extent) -> Result<Columns, RigError> {
         self.check_numbered(extent)?;
         let own = Columns::own(&layout.names(), &layout.kinds(), extent);
+        let force_unit = unit(&self.force_unit, Dimension::Force, SensorKind::Reaction.unit())?;
+        let nuisance_unit = match &self.nuisance_unit {
+            None => Unit::NONE,
+            Some(symbol) => Unit::from_symbol(symbol)
+                .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: symbol.to_string() }))?,
+        };
+        let force = self.value("force", &self.force, &self.force_unit, force_unit)?;
         Ok(Columns {
             header: if self.header { Header::Present } else { Header::Absent },
             position: self.positions(extent)?.unwrap_or(own.position),
-            position_unit: match &self.position_unit {
-                Some(symbol) => unit(symbol, Dimension::Length)?,
-                None => own.position_unit,
-            },
+            position_unit: unit(&self.position_unit, Dimension::Length, own.position_unit)?,
             frame: self.frame(extent)?,
-            channels: self.channels(layout, own.channels)?,
-            force: self.force(own.force)?,
-            nuisance: self.nuisance()?,
+            channels: self.channels(&layout.kinds(), own.channels)?,
+            force: force.map(|values| ForceColumn { values, need: Need::Required }).or(own.force),
+            nuisance: self.value("nuisance", &self.nuisance, &self.nuisance_unit, nuisance_unit)?,
         })
     }
 
@@ -103,32 +107,55 @@ impl At<RecordingKeys> {
     }
 
     fn positions(&self, extent: Extent) -> Result<Option<PositionColumns>, RigError> {
-        match (&self.position, &self.x, &self.y) {
-            (None, None, None) => Ok(None),
-            (Some(_), Some(other), _) | (Some(_), None, Some(other)) => Err(other.place.unused("`position`")),
-            (Some(x), None, None) if extent.is_plane() => {
-                Err(x.place.unused("a surface that has a width; use `x` and `y`"))
+        match (&self.position, &self.x, &self.y, extent.is_plane()) {
+            (None, None, None, _) => Ok(None),
+            (Some(_), Some(key), _, _) | (Some(_), None, Some(key), _) => Err(key.place.unused("`position`")),
+            (Some(x), None, None, false) => Ok(Some(PositionColumns::Along(x.column()))),
+            (Some(x), None, None, true) => Err(x.place.unused("a surface that has a width; use `x` and `y`")),
+            (None, Some(_), None, _) => Err(self.place.missing("y")),
+            (None, None, Some(_), _) => Err(self.place.missing("x")),
+            (None, Some(_), Some(y), false) => Err(y.place.unused("a surface without a width")),
+            (None, Some(x), Some(y), true) => {
+                Ok(Some(PositionColumns::Plane { x: x.column(), y: y.column() }))
             }
-            (Some(x), None, None) => Ok(Some(PositionColumns::Along(x.column()))),
-            (None, Some(_), None) => Err(self.place.missing("y")),
-            (None, None, Some(_)) => Err(self.place.missing("x")),
-            (None, Some(_), Some(y)) if !extent.is_plane() => {
-                Err(y.place.unused("a surface without a width"))
-            }
-            (None, Some(x), Some(y)) => Ok(Some(PositionColumns::Plane { x: x.column(), y: y.column() })),
         }
     }
 
-    fn channels(&self, layout: &Layout, own: Vec<ValueColumn>) -> Result<Vec<ValueColumn>, RigError> {
-        let kinds = layout.kinds();
-        let units = self.channel_units(&kinds)?;
+    /// Origin and rounding; as many coordinates as the surface has.
+    fn frame(&self, extent: Extent) -> Result<Frame, RigError> {
+        let origin = match &self.origin {
+            None => Position::default(),
+            Some(origin) => match (origin.as_slice(), extent.is_plane()) {
+                ([x], false) => Position::along(x.si),
+                ([x, y], true) => Position { x_m: x.si, y_m: y.si },
+                (_, false) => return Err(origin.place.refuse("a list of 1")),
+                (_, true) => return Err(origin.place.refuse("a list of 2, x and y")),
+            },
+        };
+        Ok(Frame { origin, round_m: self.round.map(|round| round.si) })
+    }
+
+    fn channels(&self, kinds: &[SensorKind], own: Vec<ValueColumn>) -> Result<Vec<ValueColumn>, RigError> {
+        let dimensions = kinds.iter().map(|kind| kind.dimension());
+        let one_each = || format!("a list of {}, one for each sensor", kinds.len());
+        let units: Vec<Unit> = match self.channel_unit.as_ref().map(|key| (&key.place, &**key)) {
+            None => kinds.iter().map(|kind| kind.unit()).collect(),
+            Some((_, ChannelUnitKeys::Text(symbol))) => {
+                dimensions.map(|wanted| unit_of(symbol, wanted)).collect::<Result<_, _>>()?
+            }
+            Some((place, ChannelUnitKeys::List(symbols))) if symbols.len() != kinds.len() => {
+                return Err(place.refuse(one_each()));
+            }
+            Some((_, ChannelUnitKeys::List(symbols))) => {
+                let each = symbols.iter().zip(dimensions);
+                each.map(|(symbol, wanted)| unit_of(symbol, wanted)).collect::<Result<_, _>>()?
+            }
+        };
         let columns: Vec<Column> = match &self.channels {
             None => own.into_iter().map(|channel| channel.column).collect(),
+            Some(listed) if listed.len() != kinds.len() => return Err(listed.place.refuse(one_each())),
             Some(listed) => {
                 let columns: Vec<_> = listed.iter().map(|channel| channel.column()).collect();
-                if columns.len() != kinds.len() {
-                    return Err(listed.place.refuse(one_each(kinds.len())));
-                }
                 if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
                     let place = &listed[again].place;
                     return Err(place.refuse_as(format!("{} again", place.written), "a column of its own"));
@@ -139,59 +166,21 @@ impl At<RecordingKeys> {
         Ok(columns.into_iter().zip(units).map(|(column, unit)| ValueColumn { column, unit }).collect())
     }
 
-    /// One unit per sensor: those given, or those in which palpate writes.
-    fn channel_units(&self, kinds: &[SensorKind]) -> Result<Vec<Unit>, RigError> {
-        let Some(key) = &self.channel_unit else { return Ok(kinds.iter().map(|kind| kind.unit()).collect()) };
-        match &**key {
-            ChannelUnitKeys::Text(symbol) => {
-                kinds.iter().map(|kind| unit(symbol, kind.dimension())).collect()
+    /// The column that is said at `key`, of which the unit cannot be said alone.
+    fn value(
+        &self,
+        key: &str,
+        column: &Option<At<ColumnKey>>,
+        symbol: &Option<At<String>>,
+        unit: Unit,
+    ) -> Result<Option<ValueColumn>, RigError> {
+        match (column, symbol) {
+            (None, Some(symbol)) => {
+                let (section, key) = (self.place.path.clone(), key.to_owned());
+                Err(RigProblem::MissingKey { section, key }.at(&symbol.place))
             }
-            ChannelUnitKeys::List(symbols) if symbols.len() == kinds.len() => {
-                kinds.iter().zip(symbols).map(|(kind, symbol)| unit(symbol, kind.dimension())).collect()
-            }
-            ChannelUnitKeys::List(_) => Err(key.place.refuse(one_each(kinds.len()))),
+            (column, _) => Ok(column.as_ref().map(|column| ValueColumn { column: column.column(), unit })),
         }
-    }
-
-    fn force(&self, own: Option<ForceColumn>) -> Result<Option<ForceColumn>, RigError> {
-        let unit = match (&self.force, &self.force_unit) {
-            (None, None) => return Ok(own),
-            (None, Some(unit)) => return Err(self.lacks("force", unit)),
-            (Some(_), None) => SensorKind::Reaction.unit(),
-            (Some(_), Some(symbol)) => unit(symbol, Dimension::Force)?,
-        };
-        let values = self.force.as_ref().map(|force| ValueColumn { column: force.column(), unit });
-        Ok(values.map(|values| ForceColumn { values, need: Need::Required }))
-    }
-
-    fn nuisance(&self) -> Result<Option<ValueColumn>, RigError> {
-        let unit = match (&self.nuisance, &self.nuisance_unit) {
-            (None, None) => return Ok(None),
-            (None, Some(unit)) => return Err(self.lacks("nuisance", unit)),
-            (Some(_), None) => Unit::NONE,
-            (Some(_), Some(symbol)) => Unit::from_symbol(symbol)
-                .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: (**symbol).clone() }))?,
-        };
-        Ok(self.nuisance.as_ref().map(|nuisance| ValueColumn { column: nuisance.column(), unit }))
-    }
-
-    /// The error for a unit without its column.
-    fn lacks(&self, key: &'static str, unit: &At<String>) -> RigError {
-        RigProblem::MissingKey { section: self.place.path.clone(), key: key.to_owned() }.at(&unit.place)
-    }
-
-    /// Origin and rounding; as many coordinates as the surface has.
-    fn frame(&self, extent: Extent) -> Result<Frame, RigError> {
-        let round_m = self.round.map(|round| round.si);
-        let origin = match (self.origin.as_ref().map(|origin| (origin, origin.as_slice())), extent.is_plane())
-        {
-            (None, _) => Position::default(),
-            (Some((_, [x])), false) => Position::along(x.si),
-            (Some((_, [x, y])), true) => Position { x_m: x.si, y_m: y.si },
-            (Some((origin, _)), true) => return Err(origin.place.refuse("a list of 2, x and y")),
-            (Some((origin, _)), false) => return Err(origin.place.refuse("a list of 1")),
-        };
-        Ok(Frame { origin, round_m })
     }
 }
 
@@ -204,12 +193,13 @@ impl ColumnKey {
     }
 }
 
-fn one_each(sensors: usize) -> String {
-    format!("a list of {sensors}, one for each sensor")
+/// The unit that is said, or palpate's own.
+fn unit(symbol: &Option<At<String>>, wanted: Dimension, own: Unit) -> Result<Unit, RigError> {
+    symbol.as_ref().map_or(Ok(own), |symbol| unit_of(symbol, wanted))
 }
 
-fn unit(symbol: &At<String>, wanted: Dimension) -> Result<Unit, RigError> {
-    let text = (**symbol).clone();
+fn unit_of(symbol: &At<String>, wanted: Dimension) -> Result<Unit, RigError> {
+    let text = symbol.to_string();
     match Unit::from_symbol(symbol) {
         Some(unit) if unit.dimension() == wanted => Ok(unit),
         _ if wanted == Dimension::None => Err(symbol.place.invalid(UnitError::UnwantedUnit { text })),

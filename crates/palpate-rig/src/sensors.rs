@@ -86,13 +86,15 @@ pub(crate) fn build(
 
 /// What a sensor of `surface` measures.
 pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result<SensorKind, RigError> {
+    let place = &measure.place;
     match **measure {
-        SensorKind::Raw if surface.model().is_some() => Err(measure.place.refuse(
-            "another kind: a raw channel has no model, and only a measured surface has raw channels",
-        )),
         SensorKind::Strain => Ok(SensorKind::Strain),
         _ if matches!(surface, SurfaceSpec::Digit(_)) => {
-            Err(measure.place.refuse("strain on a digit, which is read by strain gauges"))
+            Err(place.refuse("strain on a digit, which is read by strain gauges"))
+        }
+        SensorKind::Raw if surface.model().is_some() => {
+            Err(place
+                .refuse("another kind: no model explains a raw channel; only a measured surface has them"))
         }
         kind => Ok(kind),
     }

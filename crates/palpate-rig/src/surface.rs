@@ -132,21 +132,7 @@ pub(crate) struct PlateKeys {
 )]
 pub(crate) enum EdgesKeys {
     Text(Edge),
-    Table(EachEdgeKeys),
-}
-
-/// How each edge is held; free where nothing is said.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct EachEdgeKeys {
-    /// The edge x = 0.
-    pub left: Option<Edge>,
-    /// The edge x = length.
-    pub right: Option<Edge>,
-    /// The edge y = 0.
-    pub bottom: Option<Edge>,
-    /// The edge y = width.
-    pub top: Option<Edge>,
+    Table(Edges),
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -325,14 +311,11 @@ impl PlateKeys {
     fn build(&self, place: &Place) -> Result<Plate, RigError> {
         let extent = Extent { length_m: self.length.si, width_m: Some(self.width.si) };
         let edges = match self.edges.as_deref() {
-            None => Edges::all(Edge::Free),
+            None => Edges::default(),
             Some(EdgesKeys::Text(edge)) => Edges::all(*edge),
-            Some(EdgesKeys::Table(EachEdgeKeys { left, right, bottom, top })) => {
-                let [left, right, bottom, top] =
-                    [left, right, bottom, top].map(|edge| edge.unwrap_or(Edge::Free));
-                Edges { left, right, bottom, top }
-            }
+            Some(EdgesKeys::Table(edges)) => *edges,
         };
+        let supports = self.supports().iter().map(|support| support.build(extent));
         let spec = PlateSpec {
             length_m: self.length.si,
             width_m: self.width.si,
@@ -340,12 +323,8 @@ impl PlateKeys {
             youngs_modulus_pa: self.youngs_modulus.si,
             poissons_ratio: self.poissons_ratio.si,
             edges,
-            supports: self
-                .supports()
-                .iter()
-                .map(|support| support.build(extent))
-                .collect::<Result<_, _>>()?,
-            elements: self.elements.as_ref().map_or(PlateSpec::DEFAULT_ELEMENTS, |elements| elements.get()),
+            supports: supports.collect::<Result<_, _>>()?,
+            elements: self.elements.as_deref().map_or(PlateSpec::DEFAULT_ELEMENTS, |elements| elements.get()),
         };
         Plate::new(spec).map_err(|error| RigProblem::Plate(error).at(self.place_of(error).unwrap_or(place)))
     }

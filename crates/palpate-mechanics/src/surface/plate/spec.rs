@@ -28,9 +28,9 @@ pub struct PlateSpec {
     pub elements: usize,
 }
 
-/// How each edge is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// How each edge is held; free where nothing is said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Edges {
     /// The edge x = 0.
     pub left: Edge,
@@ -43,7 +43,7 @@ pub struct Edges {
 }
 
 /// How an edge is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
     /// Its deflection is zero, and it can turn.
@@ -51,6 +51,7 @@ pub enum Edge {
     /// Its deflection and its slope are zero.
     Clamped,
     /// Nothing holds it.
+    #[default]
     Free,
 }
 
@@ -98,12 +99,6 @@ impl Edges {
     pub const fn all(edge: Edge) -> Self {
         Self { left: edge, right: edge, bottom: edge, top: edge }
     }
-}
-
-impl Edge {
-    /// Every way, with its name in a rig.
-    pub const NAMED: [(&'static str, Self); 3] =
-        [("simple", Self::Simple), ("clamped", Self::Clamped), ("free", Self::Free)];
 }
 
 impl PointSupport {
