@@ -6,11 +6,11 @@ use crate::{
     EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
-use palpate_estimators::estimator::EstimatorConfig;
+use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Evaluation, Portion};
 use palpate_estimators::fit::Fit;
 use palpate_estimators::network::Precision;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
@@ -218,7 +218,7 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
 /// The rig of the paper, whose network is trained for a few epochs.
 fn quick_rig(max_epochs: u32) -> Rig {
     let mut rig = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap();
-    let EstimatorConfig::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
+    let Estimator::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
     network.training.max_epochs = max_epochs;
     rig
 }
@@ -227,9 +227,9 @@ fn quick_rig(max_epochs: u32) -> Rig {
 fn an_evaluation_says_whose_answers_it_holds() {
     let rig = quick_rig(50);
     let recording = rig.simulate(0).unwrap();
-    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
+    let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let positions: Vec<_> = recording.distinct_positions();
-    let other = simulate_at(&rig.bench, &positions, 3, 1).unwrap();
+    let other = simulate_at(&rig.setup, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
     for (recording, judged, said) in [
         (&recording, Judged::Locator(&locator), "this very recording"),
@@ -262,7 +262,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
 fn an_evaluation_of_nothing_has_a_report() {
     let rig = quick_rig(5);
     let recording = rig.simulate(0).unwrap();
-    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
+    let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
         evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
@@ -277,12 +277,12 @@ fn an_evaluation_of_nothing_has_a_report() {
 /// The report of the limit of the paper's beam over these sensors, for what is known of the force.
 fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
-    let bench = Bench::new(beam).sensors(sensors).unwrap();
-    let limit = bench.cramer_rao_bound().unwrap();
+    let setup = Setup::new(beam).sensors(sensors).unwrap();
+    let limit = setup.cramer_rao_bound().unwrap();
     let curve = |force| LimitCurve::over(&limit, 3.0, force).unwrap();
     limit_report(&LimitReport {
         title: "The limit of <paper>",
-        bench: &bench,
+        setup: &setup,
         limit: &limit,
         known: &curve(Force::Known),
         unknown: &curve(Force::Unknown),
@@ -320,7 +320,7 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
     assert!(page(&study_report(&run.report())).contains(&assumed), "the paper's readings are clean");
     for (noise_sd, drawn) in [(um(5.0), true), (0.0, false)] {
         let mut rig = quick_rig(5);
-        rig.bench.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
+        rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
         let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {
             title: "Errors",
