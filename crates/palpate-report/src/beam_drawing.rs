@@ -1,10 +1,10 @@
 //! A beam on its bench as SVG text: supports, sensors, load and the deflected shape.
 
-use super::geometry::{Point, Rect};
+use super::drawing::geometry::{Point, Rect};
+use super::drawing::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, REFERENCE, Svg, palette};
+use super::drawing::text;
+use super::drawing::ticks::plain;
 use super::numbers::stated;
-use super::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, REFERENCE, Svg, palette};
-use super::text;
-use super::ticks::plain;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
@@ -24,7 +24,7 @@ const ARROW_TAIL_Y: f64 = 34.0;
 /// Middle of the undeflected beam.
 const BEAM_Y: f64 = 92.0;
 const BEAM_HALF_THICKNESS: f64 = 3.0;
-/// The same of the thickest stretch of a stepped beam, and of any stretch at least.
+/// Half the drawn thickness of the thickest stretch of a stepped beam, and of any stretch at least.
 const STEPPED_HALF_THICKNESS: (f64, f64) = (5.5, 1.2);
 /// Room beneath the beam for the deflected shape, at its deepest.
 const DEFLECTION_ROOM: f64 = 56.0;
@@ -51,7 +51,7 @@ pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (Strin
     (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }.svg(), load)
 }
 
-/// The same of a beam on any supports.
+/// The beam on any supports, bent by `force_n` newtons, as SVG; and where the force is drawn.
 pub(super) fn supported_beam_drawing(
     beam: &SupportedBeam,
     layout: &Layout,

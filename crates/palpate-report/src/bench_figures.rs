@@ -19,17 +19,17 @@ pub(super) fn bench_figure(
 ) -> Option<Figure> {
     let ((svg, load), held, solution) = match surface {
         SurfaceSpec::Beam(beam) => {
-            (beam_drawing(beam, layout, force_n), "on two wedges".to_owned(), "in closed form")
+            (beam_drawing(beam, layout, force_n), " on two wedges".to_owned(), "in closed form")
         }
         SurfaceSpec::SupportedBeam(beam) => {
             let drawing = supported_beam_drawing(beam, layout, force_n);
-            (drawing, format!("{},", beam.spec().supports_in_words()), "as beam theory has it exactly")
+            (drawing, format!(", {},", beam.spec().supports_in_words()), "as beam theory has it exactly")
         }
         SurfaceSpec::Digit(digit) => return Some(shapes_figure(what, digit, layout, force_n)),
         SurfaceSpec::Plate(_) | SurfaceSpec::Measured(_) => return None,
     };
     let caption = html! {
-        (what) ": a beam " (held) " and " (counted(layout.len(), "sensor", "sensors")) ", with " (stated(force_n)) " N at "
+        (what) ": a beam" (held) " and " (counted(layout.len(), "sensor", "sensors")) ", with " (stated(force_n)) " N at "
         (mm(load.x_m)) " mm. Blue: the bent beam, " (solution) "."
     };
     Some(Figure::new(format!("{what}: beam, supports, sensors and load"), svg, caption))

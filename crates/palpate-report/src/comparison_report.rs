@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::error_lines::{in_thousandths, limit_in_words, limit_line};
+use super::error_lines::{in_milli, limit_in_words, limit_line};
 use super::maps::error_map;
 use super::numbers::{counted, number};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
@@ -51,7 +51,7 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
             Section::new("along", heading).figure(errors),
             Section::new("share", "How many readings are how good").figure(report.share_figure()),
         ],
-        made: html! { " from " (report.trials) "; seed " (report.seed) ". Times are of this machine and this run" },
+        source: html! { " from " (report.trials) "; seed " (report.seed) ". Times are of this machine and this run" },
     }
     .files()
 }
@@ -153,7 +153,7 @@ impl ComparisonReport<'_> {
 
     fn along_figure(&self) -> Figure {
         let length_mm = self.setup.surface.extent().length_m * 1e3;
-        let mut series = self.series(|evaluation| in_thousandths(evaluation.median_by_stretch_m(STRETCHES)));
+        let mut series = self.series(|evaluation| in_milli(evaluation.median_by_stretch_m(STRETCHES)));
         series.extend(limit_line(self.setup));
         let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);
         let y = Axis::log10("location error, mm");

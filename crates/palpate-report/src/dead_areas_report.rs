@@ -23,7 +23,7 @@ pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Vec<
             Section::new("between", "Errors between sensors").figures(folded).table(report.folded_table()),
             Section::new("how", "How it was done").text(report.how()),
         ],
-        made: html! { ", seed " (study.seed) },
+        source: html! { ", seed " (study.seed) },
     }
     .files()
 }

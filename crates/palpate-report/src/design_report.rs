@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use super::bench_figures::{bench_figure, sites_chart};
-use super::error_lines::in_thousandths;
-use super::extremes::Extremes;
+use super::drawing::extremes::Extremes;
+use super::error_lines::in_milli;
 use super::maps::{self, compared_maps, limits_mm, sensors_mm};
 use super::numbers::{counted, mm, number, quantity, stated};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
@@ -65,7 +65,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
         lead: Markup::default(),
         summary: report.summary(),
         sections,
-        made: html! { ", seed " (report.seed) },
+        source: html! { ", seed " (report.seed) },
     }
     .files()
 }
@@ -90,8 +90,9 @@ impl<'a> SensorDesignReport<'a> {
     fn summary(&self) -> Markup {
         let Some(best) = self.best() else { return html! {} };
         let limit = |designed: &Designed| designed.assessment.mean_limit_m.map_or(f64::NAN, |m| m * 1e3);
-        let error =
-            |designed: &Designed| self.verification(designed.method).map(|told| told.mean_error_m * 1e3);
+        let error = |designed: &Designed| {
+            self.verification(designed.method).map(|verified| verified.mean_error_m * 1e3)
+        };
         let compared = |even: f64, best: f64| {
             let percent = 100.0 * (1.0 - best / even);
             let word = if percent >= 0.0 { "below" } else { "above" };
@@ -113,10 +114,10 @@ impl<'a> SensorDesignReport<'a> {
                 @if let Some(even) = even { (compared(limit(even), limit(best))) }
                 "; force " (self.problem.force().name()) "."
             }
-            @if let (Some(told), Some(even)) = (error(best), even.and_then(error)) {
+            @if let (Some(best), Some(even)) = (error(best), even.and_then(error)) {
                 li {
-                    "Calibrated and asked in simulation, its locator is off by " b { (number(told)) " mm" } " on average"
-                    (compared(even, told)) "."
+                    "Calibrated and asked in simulation, its locator is off by " b { (number(best)) " mm" } " on average"
+                    (compared(even, best)) "."
                 }
             }
         }
@@ -126,24 +127,24 @@ impl<'a> SensorDesignReport<'a> {
         let design = self.problem.design();
         let scale = design.criterion.score_scale();
         let rows = self.designed.iter().map(|designed| {
-            let worth = &designed.assessment;
-            let star = if worth.keeps_constraints { "" } else { " *" };
-            let told = self.verification(designed.method);
-            let error = told.map_or("–".to_owned(), |told| {
-                format!("{:.3} ± {:.3}", told.mean_error_m * 1e3, told.standard_error_m * 1e3)
+            let assessed = &designed.assessment;
+            let star = if assessed.keeps_constraints { "" } else { " *" };
+            let verified = self.verification(designed.method);
+            let error = verified.map_or("–".to_owned(), |verified| {
+                format!("{:.3} ± {:.3}", verified.mean_error_m * 1e3, verified.standard_error_m * 1e3)
             });
             let mut cells = vec![
                 text(format!("{}{star}", designed.method.name())),
-                value(worth.score * scale),
-                value_mm(worth.mean_limit_m),
-                value_mm(worth.worst_limit_m),
-                value(worth.within_tolerance_percent),
-                value(worth.score_one_dead.map(|score| score * scale)),
-                value_mm(worth.mean_error_m),
+                value(assessed.score * scale),
+                value_mm(assessed.mean_limit_m),
+                value_mm(assessed.worst_limit_m),
+                value(assessed.within_tolerance_percent),
+                value(assessed.score_one_dead.map(|score| score * scale)),
+                value_mm(assessed.mean_error_m),
                 text(error),
             ];
             if design.has_costs() {
-                cells.push(text(stated(worth.cost)));
+                cells.push(text(stated(assessed.cost)));
             }
             cells
         });
@@ -193,7 +194,7 @@ impl<'a> SensorDesignReport<'a> {
         let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());
         let limits = |designed: &Designed| {
             let curve = self.limit_of(designed)?;
-            Some(in_thousandths(curve.by_x(|bound| bound.sd_position_m)))
+            Some(in_milli(curve.by_x(|bound| bound.sd_position_m)))
         };
         let of_even = even.and_then(|even| Some(Series::dashes(name(even), 6, limits(even)?)));
         let of_best = limits(best).map(|limits| Series::line(name(best), 0, limits));
@@ -269,7 +270,7 @@ impl<'a> SensorDesignReport<'a> {
     fn counts_figure(&self) -> Option<Figure> {
         let (first, last) = (self.counts.first()?, self.counts.last()?);
         let curve = |of: fn(&CountPoint) -> Option<Assessment>| -> Vec<(f64, f64)> {
-            let limit_m = |point| of(point).and_then(|worth| worth.mean_limit_m).unwrap_or(f64::NAN);
+            let limit_m = |point| of(point).and_then(|assessed| assessed.mean_limit_m).unwrap_or(f64::NAN);
             self.counts.iter().map(|point| (point.count as f64, limit_m(point) * 1e3)).collect()
         };
         let (even, designed) = (curve(|point| point.even), curve(|point| Some(point.designed)));
@@ -321,10 +322,10 @@ impl<'a> SensorDesignReport<'a> {
             .iter()
             .map(|offer| {
                 let channel = &offer.channel;
-                let told = |value| quantity(value, offer.kind.dimension());
-                let mut words = format!("{}, noise {}", offer.kind, told(channel.noise_sd));
+                let in_unit = |value| quantity(value, offer.kind.dimension());
+                let mut words = format!("{}, noise {}", offer.kind, in_unit(channel.noise_sd));
                 if channel.resolution > 0.0 {
-                    words += &format!(", resolution {}", told(channel.resolution));
+                    words += &format!(", resolution {}", in_unit(channel.resolution));
                 }
                 if design.has_costs() {
                     words += &format!(", cost {}", stated(offer.cost));

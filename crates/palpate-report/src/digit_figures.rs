@@ -2,7 +2,7 @@
 
 use maud::html;
 
-use super::error_lines::in_thousandths;
+use super::error_lines::in_milli;
 use super::numbers::{counted, mm, stated};
 use super::page::Figure;
 use super::{Axis, Chart, Marker, Series};
@@ -30,7 +30,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
     let points = |contact: Contact| {
         let shape = digit.shape(contact);
         let point = |i| shape.point(f64::from(i) / f64::from(SHAPE_STEPS) * l);
-        in_thousandths((0..=SHAPE_STEPS).map(point).map(|[x_m, y_m]| (x_m, y_m)).collect())
+        in_milli((0..=SHAPE_STEPS).map(point).map(|[x_m, y_m]| (x_m, y_m)).collect())
     };
     let at = |share: f64| Contact { position: Position::along(share * l), force_n };
     let mut series = vec![Series::dashes("untouched", 6, points(Contact { force_n: 0.0, ..at(1.0) }))];
@@ -38,7 +38,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
         let label = format!("{} N at {} mm", stated(force_n), mm(share * l));
         series.push(Series::line(label, colour, points(at(share))));
         let [x_m, y_m] = digit.shape(at(share)).point(share * l);
-        series.push(Series::markers("", colour, in_thousandths(vec![(x_m, y_m)]), Marker::Circle));
+        series.push(Series::markers("", colour, in_milli(vec![(x_m, y_m)]), Marker::Circle));
     }
     let gauges = layout.sensors.iter().map(|sensor| (sensor.position.x_m * 1e3, 0.0)).collect();
     series.push(Series::markers("strain gauges", 6, gauges, Marker::Square));
@@ -60,7 +60,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
 
 /// The least standard deviation of the force along the finger.
 pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
-    let points = in_thousandths(unknown.by_x(|bound| bound.sd_force_n.unwrap_or(f64::NAN)));
+    let points = in_milli(unknown.by_x(|bound| bound.sd_force_n.unwrap_or(f64::NAN)));
     let chart = Chart::new(
         "The least standard deviation of an estimated force",
         Axis::linear("contact position, mm").from_to(0.0, unknown.extent.length_m * 1e3),

@@ -22,7 +22,7 @@ pub fn elliott_report(study: &Elliott, findings: &ElliottFindings) -> Vec<Report
             Section::new("table", "All chains").table(report.table()),
             Section::new("how", "How it was done").text(report.how()),
         ],
-        made: html! { ", seed " (study.seed) },
+        source: html! { ", seed " (study.seed) },
     }
     .files()
 }

@@ -32,7 +32,7 @@ pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
     Some(line(&curve(setup, &setup.layout).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
-/// The same; where deflection sensors are clean, for a noise that the legend states.
+/// The limit as [`limit_line`] has it; where deflection sensors are clean, the limit for a noise that the legend states.
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(setup, &setup.layout) {
@@ -77,10 +77,10 @@ fn curve(setup: &Setup, layout: &Layout) -> Result<LimitCurve, LimitError> {
 }
 
 fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {
-    Series::dashes(label, colour, in_thousandths(curve.by_x(Bound::mean_error_m)))
+    Series::dashes(label, colour, in_milli(curve.by_x(Bound::mean_error_m)))
 }
 
-/// Pairs of SI units in thousandths: metres in mm, newtons in mN.
-pub(super) fn in_thousandths(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+/// Points with both coordinates in thousandths of their unit: metres in mm, newtons in mN.
+pub(super) fn in_milli(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.into_iter().map(|(x, y)| (x * 1e3, y * 1e3)).collect()
 }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::error_lines::{banded, in_thousandths, limit_in_words, limit_line, tolerance_mark};
+use super::error_lines::{banded, in_milli, limit_in_words, limit_line, tolerance_mark};
 use super::maps::error_map;
 use super::numbers::{counted, listed, mm, number, stretch, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, words};
@@ -69,7 +69,7 @@ pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
             Section::new("table", "Errors in numbers").table(report.errors_table()),
             Section::new("judged", report.judged_heading()).table(report.facts_table()),
         ],
-        made: report.made(),
+        source: report.source_in_words(),
     }
     .files()
 }
@@ -189,7 +189,7 @@ impl EvaluationReport<'_> {
         colour: usize,
         coordinate: impl Fn(&Located) -> (f64, f64),
     ) -> Vec<Series> {
-        let mut pairs = in_thousandths(self.evaluation.located.iter().map(coordinate).collect());
+        let mut pairs = in_milli(self.evaluation.located.iter().map(coordinate).collect());
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         if pairs.len() <= MOST_MARKERS {
             return vec![Series::markers(label, colour, pairs, Marker::Circle)];
@@ -273,7 +273,7 @@ impl EvaluationReport<'_> {
         format!("{}, {}: {}", names.len(), listed(&kinds), names.join(", "))
     }
 
-    fn made(&self) -> Markup {
+    fn source_in_words(&self) -> Markup {
         let seed = match self.judged {
             Judged::Locator(locator) => locator.provenance.seed,
             Judged::CrossValidated { seed, .. } => seed,

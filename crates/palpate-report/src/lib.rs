@@ -17,20 +17,14 @@
 
 mod beam_drawing;
 mod bench_figures;
-mod chart;
-mod chart_svg;
 mod comparison_report;
 mod dead_areas_report;
 mod design_report;
 mod digit_figures;
+mod drawing;
 mod elliott_report;
 mod error_lines;
 mod evaluation_report;
-mod extremes;
-mod geometry;
-mod heat_map;
-mod layout;
-mod legend;
 mod limit_report;
 mod maps;
 mod numbers;
@@ -40,27 +34,22 @@ mod paper_report;
 mod png;
 mod position_report;
 mod profile_report;
-mod scale;
 mod study_parts;
 mod study_report;
-mod svg;
-mod text;
-mod ticks;
 mod track_report;
 
 #[cfg(test)]
 mod tests;
 
-pub use chart::{
-    Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
-};
-pub use chart_svg::chart_to_svg;
 pub use comparison_report::{ComparisonReport, comparison_report};
 pub use dead_areas_report::dead_areas_report;
 pub use design_report::{SensorDesignReport, sensor_design_report};
+pub use drawing::{
+    Axis, AxisRange, BandPoint, Chart, ErrorPoint, HeatMap, HeatPanel, Mark, Marker, Scale, Series,
+    SeriesKind, Stroke, Ticks, chart_to_svg, heat_map_to_svg,
+};
 pub use elliott_report::elliott_report;
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};
-pub use heat_map::{HeatMap, HeatPanel, heat_map_to_svg};
 pub use limit_report::{LimitReport, limit_report};
 pub use page::ReportFile;
 pub use paper_report::paper_report;

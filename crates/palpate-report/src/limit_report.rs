@@ -4,8 +4,8 @@ use maud::{Markup, html};
 
 use super::bench_figures::bench_figure;
 use super::digit_figures::{force_limit_figure, linear_theory_figures};
-use super::error_lines::in_thousandths;
-use super::extremes::Extremes;
+use super::drawing::extremes::Extremes;
+use super::error_lines::in_milli;
 use super::maps::{limits_mm, sensors_mm};
 use super::numbers::{counted, mm, number, place, quantity, stated};
 use super::page::{
@@ -36,7 +36,7 @@ pub struct LimitReport<'a> {
     pub limit: &'a CramerRaoBound<'a>,
     /// The limit all over the surface for a known force.
     pub known: &'a LimitCurve,
-    /// The same for an unknown force.
+    /// The limit all over the surface for an unknown force.
     pub unknown: &'a LimitCurve,
     /// What is known of the force on this bench, which the warnings are about.
     pub force: Force,
@@ -47,6 +47,31 @@ pub struct LimitReport<'a> {
 }
 
 /// Reports a limit: `report.html`, one self-contained page, and its figures as SVG files.
+///
+/// ```
+/// use palpate_estimators::setup::Setup;
+/// use palpate_mechanics::limit::{Force, LimitCurve};
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, um};
+/// use palpate_report::{LimitReport, limit_report};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let bench = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+/// let limit = bench.cramer_rao_bound()?;
+/// let files = limit_report(&LimitReport {
+///     title: "What physics allows on the paper's beam",
+///     bench: &bench,
+///     limit: &limit,
+///     known: &LimitCurve::over(&limit, 3.0, Force::Known)?,
+///     unknown: &LimitCurve::over(&limit, 3.0, Force::Unknown)?,
+///     force: Force::Known,
+///     warnings: &[],
+///     listed: &[],
+/// });
+/// assert_eq!(files.iter().map(|file| file.name.as_str()).collect::<Vec<_>>(), ["report.html", "figure-1.svg", "figure-2.svg"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
     let (layout, force_n) = (&report.setup.layout, report.known.force_n);
     let (heading, figure) = if report.known.extent.is_plane() {
@@ -69,7 +94,7 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
             Section::new("warnings", "What this bench cannot tell").text(report.warnings_in_words()),
             Section::new("meaning", "What the limit means").text(meaning()),
         ],
-        made: Markup::default(),
+        source: Markup::default(),
     }
     .files()
 }
@@ -110,7 +135,7 @@ impl LimitReport<'_> {
     fn limit_figure(&self) -> Figure {
         let length_mm = self.known.extent.length_m * 1e3;
         let line = |curve: &LimitCurve, label, colour| {
-            Series::line(label, colour, in_thousandths(curve.by_x(|bound| bound.sd_position_m)))
+            Series::line(label, colour, in_milli(curve.by_x(|bound| bound.sd_position_m)))
         };
         let series =
             vec![line(self.known, "force known", 0), line(self.unknown, "force unknown, estimated along", 1)];
@@ -275,13 +300,13 @@ fn noise_in_words(sensor: &Sensor) -> String {
     if channel.dead {
         return "dead: left out".to_owned();
     }
-    let told = |value| quantity(value, sensor.kind.dimension());
+    let in_unit = |value| quantity(value, sensor.kind.dimension());
     let mut parts = Vec::new();
     if channel.noise_sd > 0.0 {
-        parts.push(format!("standard deviation {}", told(channel.noise_sd)));
+        parts.push(format!("standard deviation {}", in_unit(channel.noise_sd)));
     }
     if channel.resolution > 0.0 {
-        parts.push(format!("resolution {}", told(channel.resolution)));
+        parts.push(format!("resolution {}", in_unit(channel.resolution)));
     }
     parts.join(", ")
 }

@@ -29,11 +29,11 @@ pub(crate) fn number(value: f64) -> String {
 
 /// An SI value with its unit, in print: "5 µm" where files and the terminal have "5 um".
 pub(crate) fn quantity(value: f64, dimension: Dimension) -> String {
-    let told = Quantity { value, dimension }.to_string();
-    match told.split_once(" u") {
+    let text = Quantity { value, dimension }.to_string();
+    match text.split_once(" u") {
         Some((number, "e")) => format!("{number} µε"),
         Some((number, unit)) => format!("{number} µ{unit}"),
-        None => told,
+        None => text,
     }
 }
 

@@ -24,8 +24,8 @@ pub(crate) struct Page {
     /// What was found, as the items of a list.
     pub summary: Markup,
     pub sections: Vec<Section>,
-    /// What the page was made from, after "Made by palpate 1.2.3".
-    pub made: Markup,
+    /// What the page was made from, as it goes on after "Made by palpate 1.2.3"; may be empty.
+    pub source: Markup,
 }
 
 /// A headed part of a page, which links can lead to.
@@ -181,7 +181,7 @@ pub(crate) fn value(value: impl Into<Option<f64>>) -> Markup {
     text(number(value.into().unwrap_or(f64::NAN)))
 }
 
-/// The same of a length in metres, in millimetres.
+/// A length in metres as a number of millimetres; a dash for none.
 pub(crate) fn value_mm(length_m: impl Into<Option<f64>>) -> Markup {
     value(length_m.into().map(|length_m| length_m * 1e3))
 }
@@ -237,12 +237,12 @@ impl Page {
                     style { (PreEscaped(STYLE)) }
                 }
                 body {
-                    header { h1 { (self.title) } (self.lead) div.summary { ul { (self.summary) } } }
+                    header { h1 { (self.title) } (self.lead) @if !self.summary.0.is_empty() { div.summary { ul { (self.summary) } } } }
                     nav aria-label="Contents" {
                         ul { @for section in &self.sections { li { a href={ "#" (section.id) } { (section.heading) } } } }
                     }
                     main { @for body in bodies { (body) } }
-                    footer { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) (self.made) "." } }
+                    footer { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) (self.source) "." } }
                 }
             }
         };

@@ -53,9 +53,17 @@ pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngErr
     Ok(all)
 }
 
-/// The PNG bytes of an SVG document drawn `scale` times its own size, each side rounded to whole pixels.
+/// PNG bytes of an SVG document drawn `scale` times its own size, each side rounded to whole pixels.
 ///
 /// Every text is set in the built-in font, whatever family it names.
+///
+/// ```
+/// use palpate_report::{Chart, chart_to_svg, svg_to_png};
+///
+/// let png = svg_to_png(&chart_to_svg(&Chart::default()), 2.0)?;
+/// assert!(png.starts_with(b"\x89PNG"));
+/// # Ok::<(), palpate_report::PngError>(())
+/// ```
 ///
 /// # Errors
 /// Text that is not SVG, and a scale that gives no pixels or a side longer than 16,384.

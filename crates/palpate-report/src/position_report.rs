@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::bench_figures::{row_axis, row_height};
-use super::extremes::Extremes;
+use super::drawing::extremes::Extremes;
 use super::maps::{Designed, compared_maps, in_mm};
 use super::numbers::{counted, mm, number};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
@@ -43,7 +43,7 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
         lead: Markup::default(),
         summary: report.summary(),
         sections: vec![positions.table(report.places()), errors, meaning],
-        made: html! { ", seed " (report.problem.budget().seed) },
+        source: html! { ", seed " (report.problem.budget().seed) },
     }
     .files()
 }
@@ -87,13 +87,13 @@ impl<'a> PositionDesignReport<'a> {
 
     fn table(&self) -> Table {
         let rows = self.placed.iter().map(|placed| {
-            let told = &placed.verification;
+            let verified = &placed.verification;
             vec![
                 text(placed.placement.name()),
-                value_mm(told.median_error_m),
-                value_mm(told.mean_error_m),
-                value_mm(told.standard_error_m),
-                value(told.within_tolerance_percent),
+                value_mm(verified.median_error_m),
+                value_mm(verified.mean_error_m),
+                value_mm(verified.standard_error_m),
+                value(verified.within_tolerance_percent),
             ]
         });
         let columns = [

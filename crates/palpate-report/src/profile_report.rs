@@ -58,7 +58,7 @@ pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
                 .table(report.reading_table()),
             Section::new("meaning", "What the profile means").text(meaning()),
         ],
-        made: Markup::default(),
+        source: Markup::default(),
     }
     .files()
 }

@@ -9,9 +9,9 @@ use super::{Axis, Chart, Series, StudyReport};
 use palpate_estimators::evaluation::{Located, Portion, Spread};
 use palpate_studies::{Arm, ArmOutcome, ArmResults};
 
-/// How an arm is drawn and named.
+/// An arm among the lines of a figure.
 #[derive(Clone, Copy)]
-pub(crate) struct Drawn<'a> {
+pub(crate) struct ArmLine<'a> {
     pub arm: &'a str,
     pub label: &'a str,
     pub colour: usize,
@@ -82,24 +82,24 @@ pub(crate) fn along(outcome: &ArmOutcome, figure: impl Fn(&Located) -> f64) -> V
 }
 
 /// The location error of an arm in mm along the surface, with a band over its seeds where there are several; nothing without a fit.
-pub(crate) fn errors(report: &StudyReport, drawn: &Drawn, with_band: bool) -> Vec<Series> {
-    let Some(outcome) = report.outcome(drawn.arm) else { return Vec::new() };
+pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
+    let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
     let along = along(outcome, |located| located.error_m() * 1e3);
-    banded(drawn.label, drawn.colour, &along, with_band && outcome.fits.len() > 1)
+    banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
 /// Location error along the surface, in mm on a logarithmic axis, against the limit of the first arm; `None` where no arm has a fit.
-pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[Drawn]) -> Option<Chart> {
-    let mut series: Vec<Series> = arms.iter().flat_map(|drawn| errors(report, drawn, true)).collect();
+pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[ArmLine]) -> Option<Chart> {
+    let mut series: Vec<Series> = arms.iter().flat_map(|line| errors(report, line, true)).collect();
     if series.is_empty() {
         return None;
     }
-    series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(&report.arm(drawn.arm)?.rig.setup)));
-    Some(error_chart_of(report, title, series))
+    series.extend(arms.iter().find_map(|line| limit_line_or_assumed(&report.arm(line.arm)?.rig.setup)));
+    Some(chart_of_errors(report, title, series))
 }
 
-/// The same of series that are already there.
-pub(crate) fn error_chart_of(report: &StudyReport, title: &str, series: Vec<Series>) -> Chart {
+/// A chart of location errors in mm along the surface, on a logarithmic axis, with the tolerance.
+pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Series>) -> Chart {
     let length_mm = report.length_m() * 1e3;
     let x = Axis::linear("load position, mm").from_to(0.0, length_mm);
     let y = Axis::log10("location error, mm").from_to(LEAST_ERROR_MM, length_mm);
@@ -194,7 +194,7 @@ fn stacked(spread: Spread, shown: fn(f64) -> String) -> Markup {
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }
 
-/// The same text without a place to break a line.
+/// A text that no line is broken within.
 fn unbroken(text: &str) -> String {
     text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
@@ -228,8 +228,8 @@ fn counted_seeds(seeds: u64) -> String {
     }
 }
 
-/// Which study and seeds a page is of.
-pub(crate) fn made(report: &StudyReport) -> Markup {
+/// The study and the seeds that a page was made from.
+pub(crate) fn source(report: &StudyReport) -> Markup {
     let run = report.run;
     html! {
         " from the study " code { (run.study) } ", SHA-256 " code { (run.study_sha256) } ", " (report.seeds_in_words())

@@ -6,7 +6,9 @@ use super::bench_figures::{row_axis, row_height, sites_chart};
 use super::error_lines::{limit_in_words, limit_line_of_arm};
 use super::numbers::{counted, listed, mm, number, stretch};
 use super::page::{Figure, Page, ReportFile, Section, Table, text, wide};
-use super::study_parts::{Drawn, arms_table, error_chart, error_chart_of, errors, glossary, made, run_table};
+use super::study_parts::{
+    ArmLine, arms_table, chart_of_errors, error_chart, errors, glossary, run_table, source,
+};
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::evaluation::Spread;
 use palpate_mechanics::sensing::Layout;
@@ -51,7 +53,7 @@ pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
         lead: Markup::default(),
         summary: summary(report),
         sections,
-        made: made(report),
+        source: source(report),
     }
     .files()
 }
@@ -102,20 +104,20 @@ fn overview(report: &StudyReport) -> Option<Figure> {
         return None;
     }
     let mut series = Vec::new();
-    for (k, shown) in shown(report).into_iter().enumerate() {
+    for (k, figure) in compared(report).into_iter().enumerate() {
         let y = |i: usize| row_height(arms.len(), i) + BESIDE * (0.5 - k as f64);
-        let spreads = || arms.iter().enumerate().filter_map(|(i, arm)| Some((i, (shown.error)(arm)?)));
+        let spreads = || arms.iter().enumerate().filter_map(|(i, arm)| Some((i, (figure.error)(arm)?)));
         // A range over the seeds is a line of its own, without an entry in the legend.
         series.extend(
             spreads().map(|(i, spread)| Series::line("", k, vec![(spread.p05, y(i)), (spread.p95, y(i))])),
         );
         let medians = spreads().map(|(i, spread)| (spread.median, y(i))).collect();
         let marker = [Marker::Circle, Marker::Square][k % 2];
-        series.push(Series::markers(&shown.label, k, medians, marker));
+        series.push(Series::markers(&figure.label, k, medians, marker));
         let limits: Vec<(f64, f64)> =
-            arms.iter().enumerate().filter_map(|(i, arm)| Some(((shown.limit)(arm)?, y(i)))).collect();
+            arms.iter().enumerate().filter_map(|(i, arm)| Some(((figure.limit)(arm)?, y(i)))).collect();
         if !limits.is_empty() {
-            series.push(Series::markers(format!("limit, {}", shown.label), k, limits, Marker::Cross));
+            series.push(Series::markers(format!("limit, {}", figure.label), k, limits, Marker::Cross));
         }
     }
     let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
@@ -130,8 +132,8 @@ fn overview(report: &StudyReport) -> Option<Figure> {
     Some(Figure::chart(&chart, caption))
 }
 
-/// One of the figures that arms are compared by.
-struct Shown {
+/// A figure that arms are compared by.
+struct Compared {
     label: String,
     error: fn(&ArmResults) -> Option<Spread>,
     limit: fn(&ArmResults) -> Option<f64>,
@@ -139,9 +141,9 @@ struct Shown {
 
 /// The error over all positions and in the first portion; or, where a study tells them apart, between training positions and
 /// beyond them.
-fn shown(report: &StudyReport) -> Vec<Shown> {
+fn compared(report: &StudyReport) -> Vec<Compared> {
     if report.study.judging().training_span {
-        let span = |label: &str, error: fn(&ArmResults) -> Option<Spread>| Shown {
+        let span = |label: &str, error: fn(&ArmResults) -> Option<Spread>| Compared {
             label: label.to_owned(),
             error,
             limit: |_| None,
@@ -153,12 +155,12 @@ fn shown(report: &StudyReport) -> Vec<Shown> {
             span("beyond them", |arm| arm.training_span.as_ref()?.error_percent_beyond_training),
         ];
     }
-    let all = report.judged_portion().map(|portion| Shown {
+    let all = report.judged_portion().map(|portion| Compared {
         label: stretch(portion),
         error: |arm| Some(arm.error_percent),
         limit: |arm| Some(arm.limit.as_ref()?.limit_error_percent),
     });
-    let first = report.study.judging().portions.first().map(|portion| Shown {
+    let first = report.study.judging().portions.first().map(|portion| Compared {
         label: stretch(*portion),
         error: |arm| Some(arm.portions.first()?.error_percent),
         limit: |arm| arm.portions.first()?.limit_error_percent,
@@ -223,16 +225,16 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
     let seeds = report.outcome(&arm.name)?.fits.len();
     let title = format!("Location error of {}", arm.name);
     let label = if seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
-    let drawn = Drawn { arm: &arm.name, label, colour };
+    let line = ArmLine { arm: &arm.name, label, colour };
     let (chart, limit) = if arm.rig.setup.force_n.is_some() {
-        let chart = error_chart(report, &title, &[drawn])?;
+        let chart = error_chart(report, &title, &[line])?;
         let words = limit_in_words(&chart);
         (chart, words)
     } else {
         let limit = limit_of(arm, 6, "limit: what physics allows");
         let words = limit.as_ref().map_or("", |_| " Black dashes: the limit for a force that is not known.");
-        let series = errors(report, &drawn, true).into_iter().chain(limit).collect();
-        (error_chart_of(report, &title, series), words.to_owned())
+        let series = errors(report, &line, true).into_iter().chain(limit).collect();
+        (chart_of_errors(report, &title, series), words.to_owned())
     };
     let caption = html! {
         "Location error of " b { (arm.name) } " by load position, over " (counted(seeds, "seed", "seeds")) "." (limit)
@@ -243,7 +245,7 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
 fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
     let bands = arms.len() <= MOST_BANDS;
     let drawn = |(colour, arm): (usize, &&Arm)| {
-        errors(report, &Drawn { arm: &arm.name, label: &arm.name, colour }, bands)
+        errors(report, &ArmLine { arm: &arm.name, label: &arm.name, colour }, bands)
     };
     let mut series: Vec<Series> = arms.iter().enumerate().flat_map(drawn).collect();
     let errors = series.len();
@@ -259,7 +261,7 @@ fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
         "."
         @if limited { " Dashes: the limit of each." }
     };
-    Some(Figure::chart(&error_chart_of(report, title, series).with_height(480), caption))
+    Some(Figure::chart(&chart_of_errors(report, title, series).with_height(480), caption))
 }
 
 fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {

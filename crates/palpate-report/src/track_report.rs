@@ -56,7 +56,7 @@ pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
         lead: Markup::default(),
         summary: report.summary(),
         sections,
-        made: html! { " from " (report.source) },
+        source: html! { " from " (report.source) },
     }
     .files()
 }

@@ -5,7 +5,7 @@ use maud::html;
 use super::Paper;
 use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
-use crate::study_parts::{Drawn, along, error_chart};
+use crate::study_parts::{ArmLine, along, error_chart};
 use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
 use palpate_estimators::evaluation::Spread;
 use palpate_studies::ArmResults;
@@ -137,12 +137,12 @@ impl Paper<'_> {
 
     fn errors_of(&self, title: &str, families: &[Family]) -> Option<Chart> {
         let arms: Vec<String> = families.iter().map(|family| format!("{}-10", family.name)).collect();
-        let drawn: Vec<Drawn> = arms
+        let lines: Vec<ArmLine> = arms
             .iter()
             .zip(families)
-            .map(|(arm, family)| Drawn { arm, label: family.label, colour: family.colour })
+            .map(|(arm, family)| ArmLine { arm, label: family.label, colour: family.colour })
             .collect();
-        error_chart(self.report, title, &drawn)
+        error_chart(self.report, title, &lines)
     }
 
     /// Each family's medians with bars, and the paper's points beside them; `None` where no arm was run.

@@ -14,7 +14,7 @@ use super::StudyReport;
 use super::bench_figures::bench_figure;
 use super::numbers::{counted, listed};
 use super::page::{Page, ReportFile, Section};
-use super::study_parts::{arms_table, glossary, made, run_table};
+use super::study_parts::{arms_table, glossary, run_table, source};
 use super::study_report::{least_error, longest};
 use palpate_estimators::evaluation::Spread;
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, claims, published_figures};
@@ -35,7 +35,7 @@ pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
         lead: lead(),
         summary: paper.summary(),
         sections: paper.sections(),
-        made: made(report),
+        source: source(report),
     }
     .files()
 }

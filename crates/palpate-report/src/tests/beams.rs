@@ -1,7 +1,7 @@
 //! Properties of the drawing of a beam.
 
-use super::super::beam_drawing::BeamDrawing;
 use super::{Seen, see};
+use crate::beam_drawing::BeamDrawing;
 use palpate_mechanics::surface::BeamSupportKind;
 
 const BLUE: &str = "#0072b2";

@@ -1,8 +1,8 @@
 //! Properties that hold for every chart, however awkward its data.
 
-use super::super::layout::Layout;
-use super::super::*;
 use super::{Seen, overlap, see};
+use crate::drawing::layout::Layout;
+use crate::*;
 use proptest::prelude::*;
 
 const BLUE: &str = "#0072b2";

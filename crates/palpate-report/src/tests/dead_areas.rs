@@ -1,6 +1,6 @@
 //! The report of dead areas has every arm in its figures and tables.
 
-use super::super::dead_areas_report;
+use crate::dead_areas_report;
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use palpate_studies::dead_areas::{DeadAreas, RIG_TOML};

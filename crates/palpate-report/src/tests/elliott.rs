@@ -1,6 +1,6 @@
 //! The report of Elliott's chain has every chain in its table, and its figures.
 
-use super::super::elliott_report;
+use crate::elliott_report;
 use palpate_estimators::evaluation::Spread;
 use palpate_rig::Rig;
 use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, RIG_TOML};

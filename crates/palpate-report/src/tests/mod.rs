@@ -4,13 +4,14 @@ mod beams;
 mod charts;
 mod dead_areas;
 mod elliott;
+mod maps;
 mod pages;
 mod parts;
 #[cfg(feature = "png")]
 mod pictures;
 
-use super::geometry::Rect;
-use super::text;
+use crate::drawing::geometry::Rect;
+use crate::drawing::text;
 
 /// A drawing read back.
 struct Seen {

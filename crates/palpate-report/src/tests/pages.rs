@@ -1,17 +1,24 @@
 //! Whole reports: what a reader and a browser need is there, whatever was run.
 
-use palpate_estimators::fit::Fit;
-use palpate_numerics::watch::Watch;
 use std::collections::BTreeSet;
 
 use crate::{
     EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
+use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Evaluation, Portion};
+use palpate_estimators::fit::Fit;
 use palpate_estimators::network::Precision;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
+use palpate_mechanics::sensing::SensorGroup;
+use palpate_mechanics::sensing::SensorKind::{Deflection, Reaction};
+use palpate_mechanics::surface::Beam;
+use palpate_mechanics::units::{gpa, mm, newtons, um};
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use palpate_studies::{ArmOutcome, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, paper};
 
@@ -208,10 +215,17 @@ fn a_study_of_sensors_shows_its_layouts_and_the_limit() {
     assert!(!text.contains("iterations") && !text.contains("did not converge"), "{text}");
 }
 
+/// The rig of the paper, whose network is trained for a few epochs.
+fn quick_rig(max_epochs: u32) -> Rig {
+    let mut rig = Rig::from_toml(include_str!("../../../../examples/paper.toml")).unwrap();
+    let Estimator::Network(network) = &mut rig.estimator else { panic!("the paper has a network") };
+    network.training.max_epochs = max_epochs;
+    rig
+}
+
 #[test]
 fn an_evaluation_says_whose_answers_it_holds() {
-    let rig =
-        Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "50")).unwrap();
+    let rig = quick_rig(50);
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let positions: Vec<_> = recording.distinct_positions();
@@ -246,8 +260,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
 
 #[test]
 fn an_evaluation_of_nothing_has_a_report() {
-    let rig =
-        Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "5")).unwrap();
+    let rig = quick_rig(5);
     let recording = rig.simulate(0).unwrap();
     let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let files = evaluation_report(&EvaluationReport {
@@ -261,12 +274,13 @@ fn an_evaluation_of_nothing_has_a_report() {
     assert_sound(&files, &[1, 2]);
 }
 
-/// The report of a rig's limit, for what is known of the force.
-fn limits(toml: &str, force: Force) -> Vec<ReportFile> {
-    let setup = Rig::from_toml(toml).unwrap().setup;
+/// The report of the limit of the paper's beam over these sensors, for what is known of the force.
+fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
+    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
+    let setup = Setup::new(beam).sensors(sensors).unwrap();
     let limit = setup.cramer_rao_bound().unwrap();
     let curve = |force| LimitCurve::over(&limit, 3.0, force).unwrap();
-    let files = limit_report(&LimitReport {
+    limit_report(&LimitReport {
         title: "The limit of <paper>",
         setup: &setup,
         limit: &limit,
@@ -274,26 +288,22 @@ fn limits(toml: &str, force: Force) -> Vec<ReportFile> {
         unknown: &curve(Force::Unknown),
         force,
         warnings: &limit_warnings(&limit, 3.0, force).unwrap(),
-        listed: &[0.0, 0.05, 0.2].map(palpate_mechanics::contact::Position::along),
-    });
-    files
+        listed: &[0.0, 0.05, 0.2].map(Position::along),
+    })
 }
 
 #[test]
 fn a_limit_is_drawn_and_told() {
-    let paper = include_str!("../../../../examples/paper.toml");
-    let reactions = paper
-        .replace("\"deflection\"\ncount = 8 ", "\"reaction\"\npositions = [\"0 mm\", \"400 mm\"] ")
-        .replace("5 um", "0.01 N");
-    let one = paper.replace("count = 8 ", "count = 1 ");
+    let deflections = |count| Deflection.evenly(count).noise(um(5.0));
+    let reactions = Reaction.at([mm(0.0), mm(400.0)]).noise(newtons(0.01));
     let cases = [
-        (paper, Force::Known, "7.7 %"),
-        (paper, Force::Unknown, "reaction sensors at the supports"),
-        (&reactions, Force::Unknown, "Nothing to warn of"),
-        (&one, Force::Unknown, "do not tell the position anywhere"),
+        (deflections(8), Force::Known, "7.7 %"),
+        (deflections(8), Force::Unknown, "reaction sensors at the supports"),
+        (reactions, Force::Unknown, "Nothing to warn of"),
+        (deflections(1), Force::Unknown, "do not tell the position anywhere"),
     ];
-    for (toml, force, said) in cases {
-        let files = limits(toml, force);
+    for (sensors, force, said) in cases {
+        let files = limits(sensors, force);
         assert_sound(&files, &[1, 2]);
         let text = shown_text(page(&files));
         for fact in [said, "3 N", "Cramér–Rao", "standard deviation"] {
@@ -308,9 +318,9 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
     let assumed = format!("{legend} at 5 µm noise");
     let run = run(&with_arms(&[("only", "{ arrangement = \"even\", count = 5 }")]), 1);
     assert!(page(&study_report(&run.report())).contains(&assumed), "the paper's readings are clean");
-    let quick = include_str!("../../../../examples/paper.toml").replace("1_000_000", "5");
-    for (toml, drawn) in [(quick.clone(), true), (quick.replace("5 um", "0 um"), false)] {
-        let rig = Rig::from_toml(&toml).unwrap();
+    for (noise_sd, drawn) in [(um(5.0), true), (0.0, false)] {
+        let mut rig = quick_rig(5);
+        rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
         let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {
             title: "Errors",

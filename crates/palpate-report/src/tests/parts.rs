@@ -1,10 +1,10 @@
 //! Properties of the parts that a chart is laid out with.
 
-use super::super::chart::{Axis, Ticks};
-use super::super::geometry::Rect;
-use super::super::scale::AxisScale;
-use super::super::ticks::{self, Tick};
-use super::super::{svg, text};
+use crate::drawing::geometry::Rect;
+use crate::drawing::scale::AxisScale;
+use crate::drawing::ticks::{self, Tick};
+use crate::drawing::{svg, text};
+use crate::{Axis, Ticks};
 use proptest::prelude::*;
 
 fn labels(ticks: &[Tick]) -> Vec<&str> {

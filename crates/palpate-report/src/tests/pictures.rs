@@ -1,9 +1,9 @@
 //! Figures as PNG, and what a font makes of their texts.
 
-use super::super::png::parse;
-use super::super::svg::{Anchor, INK, Label, Svg};
-use super::super::{PngError, ReportFile, chart_to_svg, svg_to_png, text, with_png_copies};
 use super::charts::awkward;
+use crate::drawing::svg::{Anchor, INK, Label, Svg};
+use crate::png::parse;
+use crate::{PngError, ReportFile, chart_to_svg, svg_to_png, text, with_png_copies};
 use resvg::usvg;
 
 #[test]

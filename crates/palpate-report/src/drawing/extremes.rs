@@ -7,7 +7,7 @@ const LOGARITHMIC_FROM: f64 = 10.0;
 
 /// The least and the greatest of some values; zeros where none of them is a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Extremes {
+pub(crate) struct Extremes {
     pub least: f64,
     pub greatest: f64,
 }

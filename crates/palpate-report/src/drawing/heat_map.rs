@@ -64,6 +64,25 @@ impl HeatPanel {
 
 /// Draws the maps as one self-contained SVG document: x to the right, y upward, a millimetre as long both ways, with one
 /// colour bar for all. The scale is logarithmic where the largest value is ten times the smallest, and all are positive.
+///
+/// ```
+/// use palpate_estimators::load_profile::Cells;
+/// use palpate_mechanics::surface::Extent;
+/// use palpate_report::{HeatMap, HeatPanel, heat_map_to_svg};
+///
+/// let cells = Cells { extent: Extent { length_m: 0.3, width_m: Some(0.2) }, columns: 3, rows: 2 };
+/// let values = (0..6).map(f64::from).collect();
+/// let svg = heat_map_to_svg(&HeatMap {
+///     title: "Errors over a plate".to_owned(),
+///     cells,
+///     panels: vec![HeatPanel::new("influence", values)],
+///     dots_mm: vec![(75.0, 100.0), (225.0, 100.0)],
+///     label: "error, mm".to_owned(),
+///     most: f64::INFINITY,
+///     width_px: 640,
+/// });
+/// assert!(svg.contains("Errors over a plate"));
+/// ```
 pub fn heat_map_to_svg(map: &HeatMap) -> String {
     let width_px = map.width_px.clamp(320, 4000);
     let layout = Layout::new(map, f64::from(width_px));
