@@ -9,7 +9,8 @@ mod support {
 
 use std::fs;
 
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
+use palpate_numerics::simd::InstructionSet;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
 use palpate_rig::Rig;

@@ -8,7 +8,8 @@ use super::sensors::WeightedContacts;
 use palpate_estimators::estimator::{
     EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError,
 };
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
+use palpate_numerics::simd::InstructionSet;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{SimulateError, simulate_at};

@@ -6,6 +6,7 @@ mod eigen;
 mod elliptic;
 mod random_order;
 pub mod regression;
+pub mod simd;
 mod sparse_cholesky;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};

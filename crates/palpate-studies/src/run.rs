@@ -8,7 +8,8 @@ use super::seed_by_seed::SeedBySeed;
 use super::{PreparedStudy, StudyRunError};
 use palpate_estimators::estimator::{Locator, LocatorQueue};
 use palpate_estimators::evaluation::Evaluation;
-use palpate_estimators::network::{InstructionSet, TrainingOutcome};
+use palpate_estimators::network::TrainingOutcome;
+use palpate_numerics::simd::InstructionSet;
 
 /// One fitted seed of an arm.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::*;
 use palpate_design::sensors::DesignError;
-use palpate_estimators::network::InstructionSet;
+use palpate_numerics::simd::InstructionSet;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
 
@@ -56,7 +56,7 @@ fn prepare(study: Study) -> PreparedStudy {
 }
 
 fn run(study: &PreparedStudy, seeds: u64, threads: usize) -> Vec<ArmOutcome> {
-    let options = RunOptions { seeds, threads, set: InstructionSet::Portable };
+    let options = RunOptions { seeds, threads, set: InstructionSet::PORTABLE };
     study.run(options, Vec::new(), &Unwatched).unwrap()
 }
 
@@ -154,7 +154,7 @@ fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
         "[[arm]]\nname = \"few\"\ntraining = { count = 1, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
     );
     let prepared = prepare(few);
-    let options = RunOptions { seeds: 2, threads: 2, set: InstructionSet::Portable };
+    let options = RunOptions { seeds: 2, threads: 2, set: InstructionSet::PORTABLE };
     let failed = prepared.run(options, Vec::new(), &Unwatched).unwrap_err();
     assert!(matches!(&failed, StudyRunError::Fit { arm, .. } if arm == "few"), "{failed}");
     let auto = beam("[[arm]]\nname = \"any\"\nestimator = { kind = \"auto\" }");

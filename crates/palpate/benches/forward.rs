@@ -5,7 +5,8 @@
 use std::hint::black_box;
 
 use cpu_time::ThreadTime;
-use palpate_estimators::network::{BatchNetwork, InstructionSet, NetworkConfig, PreparedNetwork, Topology};
+use palpate_estimators::network::{BatchNetwork, NetworkConfig, PreparedNetwork, Topology};
+use palpate_numerics::simd::InstructionSet;
 
 const ROUNDS: usize = 15;
 const READINGS: usize = 4096;

@@ -5,7 +5,7 @@ use crate::progress::StageWatch;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate_estimators::evaluation::Spread;
-use palpate_estimators::network::InstructionSet;
+use palpate_numerics::simd::InstructionSet;
 use palpate_mechanics::units::format_count;
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::dead_areas::DeadAreas;
@@ -190,7 +190,7 @@ fn facts(
         seeds: options.seeds,
         threads: options.threads,
         precision,
-        arithmetic: format!("{}, {} lanes", options.set, options.set.lanes(precision)),
+        arithmetic: format!("{}, {} lanes", options.set, precision.lanes()),
         presentations,
         seconds,
         presentations_per_second: presentations as f64 / seconds,

@@ -9,8 +9,8 @@ use crate::influence::InfluenceFitError;
 use crate::method::{Fit, FitTask};
 use crate::neighbours::NeighboursFitError;
 use crate::network::{
-    InstructionSet, LevenbergMarquardtFitError, NetworkFitError, NetworkFitting, Precision, SeedQueue,
-    TrainedNetwork, TrainingOutcome, train_many, train_one,
+    LevenbergMarquardtFitError, NetworkFitError, NetworkFitting, Precision, SeedQueue, TrainedNetwork,
+    TrainingOutcome, train_many, train_one,
 };
 use crate::recording::Recording;
 use crate::setup::Bench;
@@ -112,7 +112,7 @@ impl Fitting {
     pub fn fit(&self, seed: u64, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<Locator>, FitError> {
         let method = match &self.method {
             MethodFitting::Network(network) => {
-                let trained = train_one(Precision::F64, &network.task(), seed, keep_going);
+                let trained = train_one(&network.task(), seed, keep_going);
                 trained.map(|trained| Method::Network(network.locator(trained)))
             }
             MethodFitting::Other(config, recording) => {
@@ -122,11 +122,11 @@ impl Fitting {
         Ok(method.map(|method| self.locator(seed, method)))
     }
 
-    /// Trains a network for every seed of the queue, as many at once as `set` has lanes; takes nothing from the queue
+    /// Trains a network for every seed of the queue, as many at once as there are lanes; takes nothing from the queue
     /// for another method. A seed gives the same locator as [`Fitting::fit`] does in the same precision.
-    pub fn fit_many(&self, set: InstructionSet, precision: Precision, queue: &mut dyn LocatorQueue) {
+    pub fn fit_many(&self, precision: Precision, queue: &mut dyn LocatorQueue) {
         if let MethodFitting::Network(network) = &self.method {
-            train_many(set, precision, &network.task(), &mut Seeds { fitting: self, network, queue });
+            train_many(InstructionSet::best(), precision, &network.task(), &mut Seeds { fitting: self, network, queue });
         }
     }
 

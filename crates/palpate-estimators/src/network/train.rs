@@ -1,7 +1,31 @@
 //! The trainer's two doors: one network, or many side by side.
 
-use super::lanes::{InstructionSet, Precision, train_lanes, train_scalar};
+mod kernel;
+mod order;
+
 use super::{BackPropagation, Patterns, Topology, TrainedNetwork};
+use palpate_numerics::simd::{InstructionSet, Kernel, Simd, run_loops};
+
+/// Width of a floating-point number in training.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 64 bits.
+    #[default]
+    F64,
+    /// 32 bits: twice the lanes.
+    F32,
+}
+
+impl Precision {
+    /// Networks that train side by side.
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::F64 => 8,
+            Self::F32 => 16,
+        }
+    }
+}
 
 /// What every network of a group is trained on.
 #[derive(Clone, Copy, Debug)]
@@ -24,21 +48,77 @@ pub trait SeedQueue {
     fn keep_going(&mut self) -> bool;
 }
 
-/// Trains the queue's networks, as many at once as the machine has lanes. A seed gives the same network in whatever
-/// lane, thread or company it is trained.
+/// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in whatever lane, thread or company
+/// it is trained.
 pub fn train_many(set: InstructionSet, precision: Precision, task: &TrainingTask, queue: &mut dyn SeedQueue) {
-    train_lanes(set, precision, task, queue);
+    set.run(InLanes { precision, task, queue });
 }
 
-/// Trains one network by the scalar twin: the same bits as [`train_many`] gives for the seed. `None` when
-/// `keep_going`, asked once an epoch, says no.
+/// Trains one network: the same bits as [`train_many`] gives for the seed in 64 bits. `None` when `keep_going`, asked once an epoch, says
+/// no.
 pub fn train_one(
-    precision: Precision,
     task: &TrainingTask,
     seed: u64,
     keep_going: &mut dyn FnMut() -> bool,
 ) -> Option<TrainedNetwork> {
-    train_scalar(precision, task, seed, keep_going)
+    let mut queue = OneSeed { seed: Some(seed), keep_going, network: None };
+    run_loops(Alone { task, queue: &mut queue });
+    queue.network
+}
+
+/// Networks side by side, one a lane.
+struct InLanes<'a> {
+    precision: Precision,
+    task: &'a TrainingTask<'a>,
+    queue: &'a mut dyn SeedQueue,
+}
+
+impl Kernel for InLanes<'_> {
+    type Output = ();
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        match self.precision {
+            Precision::F64 => kernel::train::<S, S::F64, 8>(self.task, self.queue),
+            Precision::F32 => kernel::train::<S, S::F32, 16>(self.task, self.queue),
+        }
+    }
+}
+
+/// Networks one after the other, in one lane: two thirds faster than in a vector whose other lanes are idle.
+struct Alone<'a> {
+    task: &'a TrainingTask<'a>,
+    queue: &'a mut dyn SeedQueue,
+}
+
+impl Kernel for Alone<'_> {
+    type Output = ();
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        kernel::train::<S, S::Array<f64, 1>, 1>(self.task, self.queue);
+    }
+}
+
+/// The queue of one seed.
+struct OneSeed<'a> {
+    seed: Option<u64>,
+    keep_going: &'a mut dyn FnMut() -> bool,
+    network: Option<TrainedNetwork>,
+}
+
+impl SeedQueue for OneSeed<'_> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.seed.take()
+    }
+    fn finished(&mut self, _: u64, network: TrainedNetwork) {
+        self.network = Some(network);
+    }
+    fn keep_going(&mut self) -> bool {
+        (self.keep_going)()
+    }
 }
 
 #[cfg(test)]

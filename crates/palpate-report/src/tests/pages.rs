@@ -8,7 +8,8 @@ use crate::{
 };
 use palpate_estimators::estimator::Fitting;
 use palpate_estimators::evaluation::{Evaluation, Portion};
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
+use palpate_numerics::simd::InstructionSet;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_rig::Rig;
@@ -34,7 +35,7 @@ impl Observer for Unwatched {
 
 fn run(toml: &str, seeds: u64) -> Run {
     let study = PreparedStudy::new(Study::from_toml(toml).unwrap(), &mut |_, _| true).unwrap().unwrap();
-    let options = RunOptions { seeds, threads: 1, set: InstructionSet::Portable };
+    let options = RunOptions { seeds, threads: 1, set: InstructionSet::PORTABLE };
     let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
     let results = StudyResults::of(&outcomes, &study);
     let facts = RunFacts {
