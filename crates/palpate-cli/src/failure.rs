@@ -3,6 +3,7 @@
 use miette::{
     Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };
+use palpate_numerics::watch::Cancelled;
 use std::fmt;
 use std::io::IsTerminal;
 use std::ops::Range;
@@ -27,6 +28,11 @@ impl Failure {
     /// Ctrl-C before anything was written.
     pub fn stopped() -> Self {
         Self::Interrupted("stopped; nothing was written".to_owned())
+    }
+
+    /// Why long work ended early: it was stopped, or its input is bad.
+    pub fn of(error: &(dyn std::error::Error + 'static)) -> Self {
+        if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 
     /// Says what happened on stderr.

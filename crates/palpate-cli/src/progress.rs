@@ -2,6 +2,8 @@
 
 use crate::interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
+use palpate_numerics::watch::Progress;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// A bar of `length` steps on stderr.
@@ -16,73 +18,75 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// Watches fits of at most `rounds` rounds in all: a bar, and Ctrl-C.
-pub struct FitWatch {
+/// Observes long work for a [`Watch`](palpate_numerics::watch::Watch): a bar on a terminal, and Ctrl-C.
+pub struct Observer {
     bar: ProgressBar,
+    state: Mutex<State>,
+}
+
+struct State {
     rounds: u64,
+    stage: &'static str,
     start: Instant,
-}
-
-impl FitWatch {
-    /// Begins to watch.
-    pub fn new(rounds: u64) -> Self {
-        Self { bar: bar(rounds, "fitting"), rounds: 0, start: Instant::now() }
-    }
-
-    /// Counts a round; false once somebody pressed Ctrl-C.
-    pub fn keep_going(&mut self) -> bool {
-        // Often enough for the eye, seldom enough to cost nothing.
-        const EVERY: u64 = 64;
-        self.rounds += 1;
-        if self.rounds.is_multiple_of(EVERY) {
-            self.bar.set_position(self.rounds);
-            let rate = self.rounds as f64 / self.start.elapsed().as_secs_f64();
-            let most = duration(self.bar.length().unwrap_or(0).saturating_sub(self.rounds) as f64 / rate);
-            self.bar.set_prefix(format!("{rate:.0} epochs/s, at most {most} left"));
-        }
-        !interrupt::asked()
-    }
-}
-
-impl Drop for FitWatch {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
-    }
 }
 
 /// Steps of the bar of a whole stage.
 const STAGE_STEPS: f64 = 1000.0;
 
-/// A bar that begins anew with every stage.
-pub struct StageWatch {
-    bar: ProgressBar,
-    stage: &'static str,
-    start: Instant,
-}
-
-impl StageWatch {
-    pub fn new() -> Self {
-        Self { bar: bar(STAGE_STEPS as u64, "beginning"), stage: "", start: Instant::now() }
+impl Observer {
+    /// Of an iteration of at most so many rounds.
+    pub fn of_rounds(most: u64) -> Self {
+        Self::new(bar(most, "fitting"))
     }
 
-    /// Shows how far a stage, in words, has come; false once somebody pressed Ctrl-C.
-    pub fn keep_going(&mut self, stage: &'static str, share: f64) -> bool {
-        if self.stage != stage {
-            self.stage = stage;
-            self.start = Instant::now();
-            self.bar.set_message(stage);
+    /// Of work that reports stages; the bar begins anew with every stage.
+    pub fn of_stages() -> Self {
+        Self::new(bar(STAGE_STEPS as u64, "beginning"))
+    }
+
+    fn new(bar: ProgressBar) -> Self {
+        Self { bar, state: Mutex::new(State { rounds: 0, stage: "", start: Instant::now() }) }
+    }
+
+    /// Shows progress; false once somebody pressed Ctrl-C.
+    pub fn observe(&self, progress: Progress) -> bool {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        match progress {
+            Progress::Round => self.round(&mut state),
+            Progress::Stage { name, share } => self.stage(&mut state, name, share),
+        }
+        !interrupt::asked()
+    }
+
+    fn round(&self, state: &mut State) {
+        // Often enough for the eye, seldom enough to cost nothing.
+        const EVERY: u64 = 64;
+        state.rounds += 1;
+        // Rounds within a stage do not move its bar.
+        if state.stage.is_empty() && state.rounds.is_multiple_of(EVERY) {
+            self.bar.set_position(state.rounds);
+            let rate = state.rounds as f64 / state.start.elapsed().as_secs_f64();
+            let most = duration(self.bar.length().unwrap_or(0).saturating_sub(state.rounds) as f64 / rate);
+            self.bar.set_prefix(format!("{rate:.0} epochs/s, at most {most} left"));
+        }
+    }
+
+    fn stage(&self, state: &mut State, name: &'static str, share: f64) {
+        if state.stage != name {
+            state.stage = name;
+            state.start = Instant::now();
+            self.bar.set_message(name);
             self.bar.set_prefix("");
         }
         if share > 0.0 {
             self.bar.set_position((share * STAGE_STEPS) as u64);
-            let left_s = self.start.elapsed().as_secs_f64() * (1.0 - share) / share;
+            let left_s = state.start.elapsed().as_secs_f64() * (1.0 - share) / share;
             self.bar.set_prefix(format!("about {} left of this", duration(left_s)));
         }
-        !interrupt::asked()
     }
 }
 
-impl Drop for StageWatch {
+impl Drop for Observer {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

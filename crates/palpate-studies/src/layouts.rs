@@ -2,35 +2,33 @@
 
 use super::{Arm, AskedLayout, Study, StudyRunError};
 use palpate_design::sensors::SensorDesign;
-use palpate_design::sensors::{DesignError, KeepGoing, Method, SensorProblem};
+use palpate_design::sensors::{DesignError, Method, SensorProblem};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::Layout;
+use palpate_numerics::watch::Watch;
 
 /// Seed of the searches, the same whatever the study's seeds are: a layout is part of what an arm is.
 const SEED: u64 = 0;
 
-/// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same. `None`
-/// when `keep_going` says no.
-pub(super) fn lay_out(mut study: Study, keep_going: &mut KeepGoing) -> Result<Option<Study>, StudyRunError> {
+/// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same.
+pub(super) fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     let mut found: Vec<(Wish, Layout)> = Vec::new();
     for arm in &mut study.arms {
         let Some((asked, wish)) = wish(arm) else { continue };
         let layout = match found.iter().find(|(other, _)| *other == wish) {
             Some((_, layout)) => layout.clone(),
             None => {
-                let designed = wish.layout(keep_going).map_err(|error| StudyRunError::Design {
-                    arm: arm.name.clone(),
-                    place: asked.place,
-                    error,
+                let layout = wish.layout(watch).map_err(|error| match error {
+                    DesignError::Cancelled(cancelled) => StudyRunError::Cancelled(cancelled),
+                    error => StudyRunError::Design { arm: arm.name.clone(), place: asked.place, error },
                 })?;
-                let Some(layout) = designed else { return Ok(None) };
                 found.push((wish, layout.clone()));
                 layout
             }
         };
         arm.rig.bench.layout = layout;
     }
-    Ok(Some(study))
+    Ok(study)
 }
 
 /// What a layout follows from.
@@ -42,11 +40,9 @@ struct Wish {
 }
 
 impl Wish {
-    fn layout(&self, keep_going: &mut KeepGoing) -> Result<Option<Layout>, DesignError> {
-        let problem = SensorProblem::new(&self.bench, &self.design, keep_going)?;
-        let Some(problem) = problem else { return Ok(None) };
-        let designed = problem.by_method(self.method, SEED, keep_going)?;
-        Ok(designed.map(|designed| designed.layout))
+    fn layout(&self, watch: Watch) -> Result<Layout, DesignError> {
+        let problem = SensorProblem::new(&self.bench, &self.design, watch)?;
+        Ok(problem.by_method(self.method, SEED, watch)?.layout)
     }
 }
 

@@ -6,13 +6,16 @@ use super::layouts::lay_out;
 use super::run::{Trained, TrainedSeed};
 use super::seed_by_seed::{SeedBySeed, touched_bench};
 use super::{Arm, Judging, Study};
-use palpate_design::sensors::{DesignError, KeepGoing};
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Fitting, Locator, ReadingError};
+use palpate_design::sensors::DesignError;
+use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, Method, ReadingError};
 use palpate_estimators::evaluation::Evaluation;
-use palpate_estimators::network::TrainingOutcome;
+use palpate_estimators::fit::FitTask;
+use palpate_estimators::network::{NetworkConfig, TrainingOutcome};
 use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::ChannelModel;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::RigSimulationError;
 
 /// Why a study cannot be run.
@@ -52,6 +55,9 @@ pub enum StudyRunError {
         /// Why.
         error: ReadingError,
     },
+    /// The run was stopped; what was finished has been observed.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A study that is ready to be run.
@@ -66,41 +72,56 @@ pub struct PreparedStudy {
 #[derive(Clone, Debug)]
 pub(super) enum PreparedArm {
     /// Networks on perfect sensors: one recording for all seeds, and one to judge by.
-    InLanes { fitting: Box<Fitting>, judged: Recording },
+    InLanes(Box<InLanes>),
     /// Anything else.
     SeedBySeed(SeedBySeed),
 }
 
+/// An arm of networks on perfect sensors.
+#[derive(Clone, Debug)]
+pub(super) struct InLanes {
+    /// What is fitted: networks.
+    pub estimator: EstimatorConfig,
+    pub bench: Bench,
+    pub recording: Recording,
+    pub judged: Recording,
+}
+
+impl InLanes {
+    pub fn task<'a>(&'a self, watch: Watch<'a>) -> FitTask<'a> {
+        FitTask::new(&self.bench, &self.recording).watch(watch)
+    }
+}
+
 impl PreparedStudy {
-    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share; `None` when `keep_going`,
-    /// asked often while layouts are searched for, says no.
+    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share.
     ///
     /// # Errors
-    /// [`StudyRunError`], naming the arm.
-    pub fn new(study: Study, keep_going: &mut KeepGoing) -> Result<Option<Self>, StudyRunError> {
-        let Some(study) = lay_out(study, keep_going)? else { return Ok(None) };
-        let arms = study.arms.iter().map(|arm| PreparedArm::of(arm, &study.judging));
+    /// [`StudyRunError`], naming the arm, or when `watch` stopped the search for layouts.
+    pub fn new(study: Study, watch: Watch) -> Result<Self, StudyRunError> {
+        let study = lay_out(study, watch)?;
+        let arms = study.arms.iter().map(|arm| PreparedArm::of(arm, &study));
         let arms = arms.collect::<Result<_, _>>()?;
-        Ok(Some(Self { study, arms }))
+        Ok(Self { study, arms })
     }
 
     /// Whether an arm's networks are trained in lanes, and so kept in `networks.csv`. Others are fitted again when a run is resumed.
     pub fn is_in_lanes(&self, arm: usize) -> bool {
-        matches!(self.arms[arm], PreparedArm::InLanes { .. })
+        matches!(self.arms[arm], PreparedArm::InLanes(_))
     }
 
     /// Patterns that an epoch of each arm presents; 0 for an estimator that is not trained by epochs.
     pub fn patterns(&self, arm: usize) -> usize {
         match &self.arms[arm] {
-            PreparedArm::InLanes { fitting, .. } => fitting.patterns(),
+            PreparedArm::InLanes(arm) => arm.recording.rows.len(),
             PreparedArm::SeedBySeed(arm) => arm.patterns,
         }
     }
 
     /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
     pub(super) fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
-        let PreparedArm::InLanes { judged, .. } = &self.arms[arm] else { return None };
-        let evaluation = Evaluation::of(&locator, judged).ok()?;
+        let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
+        let evaluation = Evaluation::of(&locator, &prepared.judged).ok()?;
         Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
     }
 
@@ -113,8 +134,11 @@ impl PreparedStudy {
         weights: Vec<f64>,
         outcome: TrainingOutcome,
     ) -> Option<Trained> {
-        let PreparedArm::InLanes { fitting, .. } = &self.arms[arm] else { return None };
-        self.judge(arm, seed, fitting.restore(seed, weights, outcome)?)
+        let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
+        let EstimatorConfig::Network(network) = &prepared.estimator else { return None };
+        let task = prepared.task(Watch::NONE).seed(seed);
+        let locator = network.restore(task, weights, outcome).ok()??;
+        self.judge(arm, seed, locator.map(Method::Network))
     }
 
     /// How the study judges.
@@ -124,20 +148,20 @@ impl PreparedStudy {
 }
 
 impl PreparedArm {
-    fn of(arm: &Arm, judging: &Judging) -> Result<Self, StudyRunError> {
+    fn of(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
+        let judging = &study.judging;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
-        let unfitted = |error| StudyRunError::Fit { arm: arm.name.clone(), error };
         let bench = &arm.rig.bench;
         let perfect = bench.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
-            EstimatorConfig::Network(_) if perfect => {
+            EstimatorConfig::Network(network) if perfect => {
                 let judged = simulate_at(&touched_bench(&arm.rig), &judging.positions, 1, 0)
                     .map_err(|error| simulated(error.into()))?;
                 let recording = arm.rig.simulate(0).map_err(simulated)?;
-                let fitting = Fitting::prepare(bench, &arm.rig.estimator, &recording).map_err(unfitted)?;
-                Ok(Self::InLanes { fitting: Box::new(fitting), judged })
+                let network = NetworkConfig { precision: study.precision, ..network.clone() };
+                let estimator = EstimatorConfig::Network(network);
+                Ok(Self::InLanes(Box::new(InLanes { estimator, bench: bench.clone(), recording, judged })))
             }
-            EstimatorConfig::Auto => Err(unfitted(FitError::Undecided)),
             _ => Ok(Self::SeedBySeed(SeedBySeed::of(&arm.rig, judging).map_err(simulated)?)),
         }
     }

@@ -3,13 +3,14 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::prepare::PreparedArm;
+use super::prepare::{InLanes, PreparedArm};
 use super::seed_by_seed::SeedBySeed;
 use super::{PreparedStudy, StudyRunError};
-use palpate_estimators::estimator::{Locator, LocatorQueue};
-use palpate_estimators::evaluation::Evaluation;
+use palpate_estimators::estimator::{FitError, Locator, Method};
+use palpate_estimators::evaluation::{Evaluation, Located, Spread};
+use palpate_estimators::fit::{Fit, SeedQueue};
 use palpate_estimators::network::TrainingOutcome;
-use palpate_numerics::simd::InstructionSet;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// One fitted seed of an arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +48,22 @@ pub struct ArmOutcome {
     pub fits: Vec<TrainedSeed>,
 }
 
+impl ArmOutcome {
+    /// The spread over the seeds of a figure of each contact, the mean of all readings of a seed at a position: by x in metres.
+    pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Spread)> {
+        let means = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
+            let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
+            let mean =
+                |readings: &[Located]| readings.iter().map(&figure).sum::<f64>() / readings.len() as f64;
+            positions.map(|readings| (readings[0].truth.x_m, mean(readings))).collect()
+        };
+        let seeds: Vec<Vec<(f64, f64)>> = self.fits.iter().map(means).collect();
+        let at = |i: usize| Spread::of(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
+        let first = seeds.first().into_iter().flatten();
+        first.enumerate().filter_map(|(i, (x_m, _))| Some((*x_m, at(i)?))).collect()
+    }
+}
+
 /// How a study is run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
@@ -54,29 +71,24 @@ pub struct RunOptions {
     pub seeds: u64,
     /// Threads that fit; at least 1.
     pub threads: usize,
-    /// The arithmetic of the lanes.
-    pub set: InstructionSet,
 }
 
-/// Watches a run from many threads at once.
-pub trait Observer: Sync {
-    /// A seed was fitted.
-    fn trained(&self, trained: &Trained);
-    /// Asked often; on `false` the run gives up what is not finished.
-    fn keep_going(&self) -> bool;
-}
+/// Is told of every seed that is fitted, from many threads at once.
+pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
     /// Fits every seed of every arm but those in `done`, which may hold networks trained in lanes only, and answers with all of them. A seed gives the same locator
     /// whatever the number of threads and whatever was done before.
     ///
     /// # Errors
-    /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read.
+    /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read, or when `watch` stopped the run; what
+    /// was finished by then `on_trained` has been told of.
     pub fn run(
         &self,
         options: RunOptions,
         done: Vec<Trained>,
-        observer: &dyn Observer,
+        on_trained: &OnTrained,
+        watch: Watch,
     ) -> Result<Vec<ArmOutcome>, StudyRunError> {
         let is_done = |arm: usize, seed: u64| done.iter().any(|t| t.arm == arm && t.fit.seed == seed);
         let work: Vec<ArmWork> = (0..self.arms.len())
@@ -87,17 +99,24 @@ impl PreparedStudy {
             .collect();
         let finished = Mutex::new(done);
         let failed = Mutex::new(None);
+        // A failure of one thread stops the others.
+        let go_on = |progress| lock(&failed).is_none() && watch.report(progress).is_ok();
+        let watch = Watch::new(&go_on);
         std::thread::scope(|scope| {
             for _ in 0..options.threads.max(1) {
                 scope.spawn(|| {
-                    let mut queue = Queue { study: self, arm: 0, work: &work, observer, finished: &finished };
+                    let mut queue =
+                        Queue { study: self, arm: 0, work: &work, on_trained, finished: &finished };
                     for arm in self.arms_by_cost() {
                         queue.arm = arm;
-                        match &self.arms[arm] {
-                            PreparedArm::InLanes { fitting, .. } => {
-                                fitting.fit_many(options.set, self.study.precision, &mut queue);
-                            }
-                            PreparedArm::SeedBySeed(prepared) => queue.fit_each(prepared, &failed),
+                        let fitted = match &self.arms[arm] {
+                            PreparedArm::InLanes(prepared) => queue.fit_in_lanes(prepared, watch),
+                            PreparedArm::SeedBySeed(prepared) => queue.fit_each(prepared, watch),
+                        };
+                        if let Err(error) = fitted {
+                            // The first error is the cause; a cancellation by it comes later.
+                            lock(&failed).get_or_insert(error);
+                            return;
                         }
                     }
                 });
@@ -148,39 +167,47 @@ struct Queue<'a> {
     study: &'a PreparedStudy,
     arm: usize,
     work: &'a [ArmWork],
-    observer: &'a dyn Observer,
+    on_trained: &'a OnTrained<'a>,
     finished: &'a Mutex<Vec<Trained>>,
 }
 
 impl Queue<'_> {
-    /// Fits seed after seed of an arm, until none is left, the observer says no, or some thread has failed.
-    fn fit_each(&mut self, prepared: &SeedBySeed, failed: &Mutex<Option<StudyRunError>>) {
+    /// Fits many seeds of an arm side by side.
+    fn fit_in_lanes(&mut self, prepared: &InLanes, watch: Watch) -> Result<(), StudyRunError> {
+        let name = &self.study.study.arms[self.arm].name;
+        prepared.estimator.fit_many(prepared.task(watch), self).map_err(|error| unfitted(name, error))
+    }
+
+    /// Fits seed after seed of an arm, until none is left.
+    fn fit_each(&mut self, prepared: &SeedBySeed, watch: Watch) -> Result<(), StudyRunError> {
         let arm = &self.study.study.arms[self.arm];
-        let observer = self.observer;
-        let mut keep_going = || observer.keep_going() && lock(failed).is_none();
-        while keep_going() {
-            let Some(seed) = self.next_seed() else { return };
-            match prepared.fit((&arm.name, &arm.rig), seed, &mut keep_going) {
-                Ok(None) => return,
-                Ok(Some(fit)) => self.finish(Trained { arm: self.arm, fit }),
-                Err(error) => {
-                    lock(failed).get_or_insert(error);
-                }
-            }
+        while let Some(seed) = self.next_seed() {
+            watch.round()?;
+            let fit = prepared.fit((&arm.name, &arm.rig), seed, watch)?;
+            self.finish(Trained { arm: self.arm, fit });
         }
+        Ok(())
     }
 
     fn finish(&self, trained: Trained) {
-        self.observer.trained(&trained);
+        (self.on_trained)(&trained);
         lock(self.finished).push(trained);
     }
+}
+
+/// Why an arm cannot be fitted, or that it was stopped.
+pub(super) fn unfitted(arm: &str, error: FitError) -> StudyRunError {
+    if Cancelled::caused(&error) {
+        return Cancelled.into();
+    }
+    StudyRunError::Fit { arm: arm.to_owned(), error }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl LocatorQueue for Queue<'_> {
+impl SeedQueue<Method> for Queue<'_> {
     fn next_seed(&mut self) -> Option<u64> {
         let work = &self.work[self.arm];
         let next = work.taken.fetch_add(1, Ordering::Relaxed);
@@ -192,9 +219,5 @@ impl LocatorQueue for Queue<'_> {
         if let Some(trained) = self.study.judge(self.arm, seed, locator) {
             self.finish(trained);
         }
-    }
-
-    fn keep_going(&mut self) -> bool {
-        self.observer.keep_going()
     }
 }

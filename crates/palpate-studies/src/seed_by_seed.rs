@@ -1,12 +1,14 @@
 //! Arms whose every seed has a recording of its own.
 
-use super::run::TrainedSeed;
+use super::run::{TrainedSeed, unfitted};
 use super::{Judging, StudyRunError};
-use palpate_estimators::estimator::{EstimatorConfig, Fitting};
+use palpate_estimators::estimator::EstimatorConfig;
 use palpate_estimators::evaluation::Evaluation;
+use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
+use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, RigSimulationError};
 
 /// Where an arm is pressed, first to fit and then to judge.
@@ -34,13 +36,13 @@ impl SeedBySeed {
     }
 
     /// Simulates, fits and judges. Calibration and judgement share the bench's gains and offsets, which a seed's first draws
-    /// decide; what is judged by has the contact's force. `None` when `keep_going` says no.
+    /// decide; what is judged by has the contact's force.
     pub fn fit(
         &self,
         (name, rig): (&str, &Rig),
         seed: u64,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<TrainedSeed>, StudyRunError> {
+        watch: Watch,
+    ) -> Result<TrainedSeed, StudyRunError> {
         let arm = || name.to_owned();
         // The noise of a row is the same whatever the force, and each row is used once.
         let recorded = |bench: &Bench| {
@@ -51,12 +53,11 @@ impl SeedBySeed {
         let (training, judged) = rows.split_at(self.training);
         let training = recorded(&rig.pressed_bench())?.subset(training);
         let judged = recorded(&touched_bench(rig))?.subset(judged);
-        let unfitted = |error| StudyRunError::Fit { arm: arm(), error };
-        let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &training).map_err(unfitted)?;
-        let Some(locator) = fitting.fit(seed, keep_going).map_err(unfitted)? else { return Ok(None) };
+        let task = FitTask { bench: &rig.bench, recording: &training, seed, watch };
+        let locator = rig.estimator.fit_task(task).map_err(|error| unfitted(name, error))?;
         let evaluation = Evaluation::of(&locator, &judged)
             .map_err(|error| StudyRunError::Reading { arm: arm(), error })?;
-        Ok(Some(TrainedSeed { seed, locator, evaluation }))
+        Ok(TrainedSeed { seed, locator, evaluation })
     }
 }
 

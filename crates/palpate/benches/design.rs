@@ -8,6 +8,8 @@ use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_numerics::median;
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 
 const SITES: usize = 100_000;
@@ -31,7 +33,7 @@ fn main() {
 /// The median CPU time of some rounds, and what the last of them gives.
 fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
     let mut last = None;
-    let mut times: Vec<f64> = (0..ROUNDS)
+    let times: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             // What the round before gave is let go untimed.
             last = None;
@@ -40,17 +42,13 @@ fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
             start.elapsed().as_secs_f64()
         })
         .collect();
-    times.sort_by(f64::total_cmp);
-    (times[ROUNDS / 2], last.expect("there is a round"))
+    (median(times).expect("rounds"), last.expect("there is a round"))
 }
 
 fn by_limit(bench: &Bench, design: &SensorDesign) {
-    let go_on = &mut |_, _| true;
-    let (rows_s, _) = timed(|| SensorProblem::new(bench, design, &mut |_, _| true).expect("a sound design"));
-    let problem = SensorProblem::new(bench, design, go_on).expect("a sound design").expect("nobody stops it");
-    let (search_s, designed) = timed(|| {
-        problem.greedy_exchange(0, &mut |_, _| true).expect("it is judged").expect("nobody stops it")
-    });
+    let (rows_s, _) = timed(|| SensorProblem::new(bench, design, Watch::NONE).expect("a sound design"));
+    let problem = SensorProblem::new(bench, design, Watch::NONE).expect("a sound design");
+    let (search_s, designed) = timed(|| problem.greedy_exchange(0, Watch::NONE).expect("it is judged"));
     let limit_mm = designed.assessment.mean_limit_m.unwrap_or(f64::NAN) * 1e3;
     println!("{SENSORS} of {SITES} sites by the limit, {} contacts:", problem.contacts().len());
     println!(

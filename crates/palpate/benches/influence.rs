@@ -4,12 +4,13 @@
 
 use cpu_time::ThreadTime;
 use palpate_core::{Estimate, Status};
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
-use palpate_estimators::method::FitTask;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 201;
@@ -21,14 +22,14 @@ fn main() {
     let recording = rig.simulate(0).expect("the paper's rig can be simulated");
     for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
         let config = InfluenceConfig { from, ..InfluenceConfig::default() };
-        let mut times: Vec<f64> = (0..21)
+        let times: Vec<f64> = (0..21)
             .map(|_| {
                 let start = ThreadTime::now();
                 std::hint::black_box(fit(config, &rig.bench, &recording));
                 start.elapsed().as_secs_f64()
             })
             .collect();
-        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(&mut times) * 1e3);
+        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
     }
     for force_n in [Some(3.0), None] {
         let bench = Bench { force_n, ..rig.bench.clone() };
@@ -45,8 +46,8 @@ fn main() {
 }
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    let fitted = config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true);
-    fitted.expect("the presses suit the bench").expect("nobody stops it")
+    let fitted = config.fit_beam(FitTask::new(bench, recording));
+    fitted.expect("the presses suit the bench")
 }
 
 /// Nanoseconds a reading.
@@ -79,10 +80,5 @@ fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
         std::hint::black_box(&mut estimates);
         batch.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
     }
-    Times { single: median(&mut single), batch: median(&mut batch) }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    Times { single: median(single).expect("rounds"), batch: median(batch).expect("rounds") }
 }

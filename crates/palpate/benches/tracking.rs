@@ -2,11 +2,12 @@
 //! medians; and how much closer the track is than its readings, at several speeds, in the mean of several recordings.
 
 use cpu_time::ThreadTime;
-use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
-use palpate_estimators::evaluation::{Followed, TrackErrors, follow};
+use palpate_estimators::estimator::{Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::fit::Fit;
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
-use palpate_estimators::simulate::{simulate, simulate_moving};
+use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;
@@ -35,8 +36,7 @@ fn main() {
 fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
     let bench = Bench { force_n, ..rig.bench.clone() };
     let recording = rig.simulate(1).expect("the example can be simulated");
-    let fitting = Fitting::prepare(&bench, &rig.estimator, &recording).expect("the presses suit the bench");
-    fitting.fit(0, &mut || true).expect("the presses suit the bench").expect("nobody stops it")
+    rig.estimator.fit(&bench, &recording).expect("the presses suit the bench")
 }
 
 fn measure(locator: &Locator, rig: &Rig) {
@@ -86,7 +86,7 @@ fn measure(locator: &Locator, rig: &Rig) {
 fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecording) -> f64 {
     let tracking = locator.tracking(&config).expect("an influence locator");
     let rows = &timed.recording.rows;
-    let mut rates: Vec<f64> = (0..ROUNDS)
+    let rates: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             let mut tracker = Tracker::new(tracking.likelihood(), config);
             let start = ThreadTime::now();
@@ -96,6 +96,5 @@ fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecordi
             rows.len() as f64 / start.elapsed().as_secs_f64()
         })
         .collect();
-    rates.sort_by(f64::total_cmp);
-    rates[ROUNDS / 2]
+    median(rates).expect("rounds")
 }

@@ -1,11 +1,14 @@
-//! Presentations per second of the paper's 8–10–1 network: each instruction set against the scalar twin, one core, in
-//! CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
+//! Presentations per second of the paper's 8–10–1 network: side by side by each instruction set, against one
+//! after the other; one core, in CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
 
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{
-    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, SeedQueue,
-    Topology, TrainedNetwork, TrainingTask, train_many, train_one,
+    BackPropagation, NetworkConfig, Patterns, Precision, PresentationOrder, Topology, TrainedNetwork,
+    TrainingQueue, TrainingTask, train_many, train_one,
 };
+use palpate_numerics::median;
+use palpate_numerics::simd::InstructionSet;
+use palpate_numerics::watch::Watch;
 
 const ROUNDS: usize = 9;
 const EPOCHS: u32 = 400;
@@ -34,14 +37,17 @@ fn price_of_shuffling(precision: Precision) {
                 ..BackPropagation::default()
             };
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
-            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
             let start = ThreadTime::now();
-            train_many(set, precision, &task, &mut queue);
+            train_many(set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             start.elapsed().as_secs_f64()
         });
         shares.push(100.0 * (seconds[0] - seconds[1]) / seconds[0]);
     }
-    println!("30 patterns, {precision:?}, {set}: shuffling takes {:.1} % of the time", median(&mut shares));
+    println!(
+        "30 patterns, {precision:?}, {set}: shuffling takes {:.1} % of the time",
+        median(shares).expect("rounds")
+    );
 }
 
 fn compare(count: usize, precision: Precision) {
@@ -54,43 +60,35 @@ fn compare(count: usize, precision: Precision) {
     for _ in 0..ROUNDS {
         let start = ThreadTime::now();
         for seed in 0..4 {
-            train_one(precision, &task, seed, &mut || true);
+            train_one(precision, &task, seed, Watch::NONE).expect("nobody stops it");
         }
         rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
         for (set, rates) in sets.iter().zip(&mut rates[1..]) {
-            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
             let start = ThreadTime::now();
-            train_many(*set, precision, &task, &mut queue);
-            let presentations = f64::from(EPOCHS) * (count * 4 * set.lanes(precision)) as f64;
+            train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
+            let presentations = f64::from(EPOCHS) * (count * 4 * precision.lanes()) as f64;
             rates.push(presentations / start.elapsed().as_secs_f64());
         }
     }
-    let medians: Vec<f64> = rates.iter_mut().map(|r| median(r)).collect();
-    println!("{count} patterns, {precision:?}: scalar twin {:.2} M/s", medians[0] / 1e6);
+    let medians: Vec<f64> = rates.into_iter().map(|r| median(r).expect("rounds")).collect();
+    println!("{count} patterns, {precision:?}: one after the other {:.2} M/s", medians[0] / 1e6);
     for (set, rate) in sets.iter().zip(&medians[1..]) {
         println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 struct Seeds {
     left: u64,
 }
 
-impl SeedQueue for Seeds {
+impl TrainingQueue for Seeds {
     fn next_seed(&mut self) -> Option<u64> {
         self.left = self.left.checked_sub(1)?;
         Some(self.left)
     }
     fn finished(&mut self, _: u64, network: TrainedNetwork) {
         std::hint::black_box(network);
-    }
-    fn keep_going(&mut self) -> bool {
-        true
     }
 }
 

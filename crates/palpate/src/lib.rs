@@ -1,4 +1,34 @@
-//! Turns an elastic surface with a few sensors into a calibrated contact locator.
+//! palpate turns an elastic surface with a few sensors into a calibrated contact locator: press at known places, fit, and
+//! every later reading says where the surface is touched, how hard, and how sure that is.
+//!
+//! ```
+//! use palpate::prelude::*;
+//!
+//! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+//! let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+//! let training = Training::even(10).repeated(10).with_force(newtons(3.0));
+//! let presses = setup.simulate(&training, 0)?;
+//! let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+//! let estimate = locator.locate(&presses.rows[40].reading)?;
+//! let (position, force_n) = (estimate.contact.position, estimate.contact.force_n.unwrap());
+//! assert!((position.x_m - mm(180.0)).abs() < mm(1.0) && (force_n - newtons(3.0)).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`prelude`] has what most programs use; the crates beneath have the rest:
+//!
+//! | crate | what for |
+//! |---|---|
+//! | [`mechanics`] | surfaces, sensors, what they read, and the Cramér–Rao bound |
+//! | [`estimators`] | recordings, estimators, tracking, load profiles, evaluation |
+//! | [`design`] | where to put the sensors and where to press |
+//! | [`rig`] | the TOML file that says what is on the bench |
+//! | [`numerics`] | linear algebra, Gaussian-process regression, distributions |
+//!
+//! Lengths are in metres, forces in newtons, moduli in pascals; functions such as [`mm`](prelude::mm) say the unit where a
+//! number is written. The examples in the folder `examples` of this crate are complete programs.
+
+pub mod prelude;
 
 pub use palpate_design as design;
 pub use palpate_estimators as estimators;

@@ -4,9 +4,9 @@ use crate::failure::{Complaint, Failure};
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
-use palpate_estimators::evaluation::{
-    Comparison, Trial, contenders, limit_ratio, percentage_error, try_estimator,
-};
+use palpate_estimators::estimator::{Comparison, contenders};
+use palpate_estimators::evaluation::{Trial, limit_ratio, percentage_error, try_estimator};
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
@@ -182,10 +182,10 @@ fn compare(
     for contender in contenders {
         bar.set_prefix(contender.kind());
         let clock = || start.elapsed().as_secs_f64();
-        let keep_going = &mut || !interrupt::asked();
-        match try_estimator(&rig.bench, &contender, trials, arguments.seed, &clock, keep_going) {
-            Ok(Some(comparison)) => comparisons.push(comparison),
-            Ok(None) => return Err(Failure::stopped()),
+        let go_on = |_| !interrupt::asked();
+        match try_estimator(&rig.bench, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
+            Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
+            Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
             Err(error) => left_out.push(LeftOut { name: contender.kind(), why: error.to_string() }),
         }
         bar.inc(1);
@@ -196,11 +196,11 @@ fn compare(
 }
 
 fn mean_m(comparison: &Comparison) -> f64 {
-    comparison.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
+    comparison.tried.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
 }
 
 fn row(rig: &Rig, comparison: &Comparison, tolerance_m: f64) -> Option<Row> {
-    let evaluation = &comparison.evaluation;
+    let evaluation = &comparison.tried.evaluation;
     let summary = evaluation.summary(None)?;
     Some(Row {
         name: comparison.estimator.kind(),
@@ -215,8 +215,8 @@ fn row(rig: &Rig, comparison: &Comparison, tolerance_m: f64) -> Option<Row> {
         effective_percent: evaluation.effective_percent(tolerance_m),
         coverage_95: evaluation.coverage_percent(),
         limit_ratio: limit_ratio(&rig.bench, evaluation),
-        fit_seconds: comparison.fit_seconds,
-        locate_ns: comparison.locate_ns,
+        fit_seconds: comparison.tried.fit_seconds,
+        locate_ns: comparison.tried.locate_ns,
     })
 }
 

@@ -1,15 +1,17 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
 use crate::failure::{Complaint, Failure};
-use crate::progress::FitWatch;
+use crate::progress::Observer;
 use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, output};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
+use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
+use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
@@ -129,11 +131,11 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
         None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
-    let mut watch = FitWatch::new(folds as u64 * rig.estimator.most_rounds());
-    let evaluation =
-        cross_validate(&rig.bench, &rig.estimator, &recording, folds, seed, &mut || watch.keep_going());
-    drop(watch);
-    let evaluation = evaluation.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
+    let observer = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds());
+    let observe = |progress| observer.observe(progress);
+    let task = FitTask::new(&rig.bench, &recording).seed(seed).watch(Watch::new(&observe));
+    let evaluation = cross_validate(&rig.estimator, task, folds).map_err(|error| Failure::of(&error))?;
+    drop(observer);
     Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
 }
 

@@ -1,14 +1,16 @@
 //! `palpate fit`: calibrate an estimator.
 
 use crate::failure::{Complaint, Failure};
-use crate::progress::FitWatch;
+use crate::progress::Observer;
 use crate::recording_files::RecordingFiles;
 use crate::{input, interrupt, output};
-use palpate_estimators::estimator::{EstimatorConfig, Fitting};
-use palpate_estimators::evaluation::choose;
+use palpate_estimators::estimator::choose;
+use palpate_estimators::estimator::{CHOICE_FOLDS, EstimatorConfig};
+use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use std::path::PathBuf;
 
@@ -54,14 +56,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
-    let fitting = Fitting::prepare(&rig.bench, &rig.estimator, &recording).map_err(Complaint::new)?;
-    let mut watch = FitWatch::new(rig.estimator.most_rounds());
-    let locator = fitting.fit(arguments.seed, &mut || watch.keep_going());
-    drop(watch);
-    let locator = locator.map_err(Complaint::new)?;
-    let Some(locator) = locator else {
-        return Err(Failure::stopped());
-    };
+    let observer = Observer::of_rounds(rig.estimator.most_rounds());
+    let observe = |progress| observer.observe(progress);
+    let task = FitTask::new(&rig.bench, &recording).seed(arguments.seed).watch(Watch::new(&observe));
+    let locator = rig.estimator.fit_task(task).map_err(|error| Failure::of(&error))?;
+    drop(observer);
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
@@ -95,17 +94,16 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     if rig.estimator != EstimatorConfig::Auto {
         return Ok(rig);
     }
-    const FOLDS: usize = 5;
-    let choice =
-        choose(&rig.bench, &rig.estimator, recording, FOLDS, arguments.seed, &mut || !interrupt::asked());
-    let choice = choice.map_err(Complaint::new)?.ok_or_else(Failure::stopped)?;
+    let go_on = |_| !interrupt::asked();
+    let task = FitTask::new(&rig.bench, recording).seed(arguments.seed).watch(Watch::new(&go_on));
+    let choice = choose(task).map_err(|error| Failure::of(&error))?;
     let errors: Vec<String> = choice
         .mean_errors_m
         .iter()
         .map(|(kind, error_m)| format!("{kind} {}", format_length_mm(*error_m)))
         .collect();
     eprintln!(
-        "auto: {} has the least mean error at positions held out ({FOLDS} folds): {}",
+        "auto: {} has the least mean error at positions held out ({CHOICE_FOLDS} folds): {}",
         choice.best.kind(),
         errors.join(", ")
     );

@@ -1,19 +1,19 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
 use crate::failure::{Complaint, Failure};
-use crate::progress::StageWatch;
+use crate::progress::Observer;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate_estimators::evaluation::Spread;
-use palpate_numerics::simd::InstructionSet;
 use palpate_mechanics::units::format_count;
+use palpate_numerics::simd::InstructionSet;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::dead_areas::DeadAreas;
 use palpate_studies::elliott::Elliott;
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
-    ArmOutcome, ArmResults, NetworksCsv, Observer, PreparedStudy, RunFacts, RunOptions, StudyResults,
-    StudyRunError, Trained,
+    ArmOutcome, ArmResults, NetworksCsv, PreparedStudy, RunFacts, RunOptions, StudyResults, StudyRunError,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,11 +22,11 @@ mod built_in;
 mod checkpoint;
 mod dead_areas;
 mod elliott;
-mod watch;
+mod tally;
 
 use built_in::BuiltIn;
 use checkpoint::CheckpointFile;
-use watch::Watch;
+use tally::Tally;
 
 /// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
 #[derive(clap::Args)]
@@ -83,14 +83,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let options = RunOptions {
         seeds: arguments.seeds.unwrap_or(study.seeds),
         threads: arguments.threads.map_or_else(cores, usize::from),
-        set: InstructionSet::best(),
     };
     let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(&study.name));
-    let mut watch = StageWatch::new();
-    let prepared = PreparedStudy::new(study, &mut |stage, share| watch.keep_going(stage.in_words(), share));
-    drop(watch);
+    let observer = Observer::of_stages();
+    let observe = |progress| observer.observe(progress);
+    let prepared = PreparedStudy::new(study, Watch::new(&observe));
+    drop(observer);
     let prepared = prepared.map_err(|error| complaint(&error, &name, &text))?;
-    let prepared = prepared.ok_or_else(Failure::stopped)?;
     let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
 
     let results = StudyResults::of(&outcomes, &prepared);
@@ -113,6 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     let complaint = Complaint::new(error);
     match error {
+        StudyRunError::Cancelled(_) => Failure::stopped(),
         StudyRunError::Design { place, error, .. } => {
             complaint.help(error.help()).at_span(name, text, place.clone()).into()
         }
@@ -141,28 +141,28 @@ fn train(
         (None, Vec::new())
     };
     let resumed: Vec<(usize, u64)> = done.iter().map(|trained| (trained.arm, trained.fit.seed)).collect();
-    let watch = Watch::new(prepared, options, &table, file, &done);
+    let tally = Tally::new(prepared, options, &table, file, &done);
     let start = Instant::now();
-    let outcomes = prepared.run(options, done, &watch);
+    let go_on = |_| !interrupt::asked() && !tally.failed();
+    let outcomes = prepared.run(options, done, &|trained| tally.note(trained), Watch::new(&go_on));
     let seconds = start.elapsed().as_secs_f64();
-    watch.finish()?;
-    let outcomes = outcomes.map_err(Complaint::new)?;
-
-    let wanted = prepared.study.arms.len() as u64 * options.seeds;
-    let finished: u64 = outcomes.iter().map(|outcome| outcome.fits.len() as u64).sum();
-    if finished < wanted {
+    let finished = tally.finish()?;
+    if matches!(outcomes, Err(StudyRunError::Cancelled(Cancelled))) {
+        let wanted = prepared.study.arms.len() as u64 * options.seeds;
         return Err(Failure::Interrupted(if keeps {
-            let kept = outcomes.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
-            let kept: usize = kept.map(|(_, outcome)| outcome.fits.len()).sum();
+            let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
+            let kept: u64 = kept.map(|(_, fits)| fits).sum();
             let path = out.join(checkpoint::NAME);
             format!(
                 "stopped; {kept} of {wanted} networks are in {}; --resume goes on from them",
                 path.display()
             )
         } else {
+            let finished: u64 = finished.iter().sum();
             format!("stopped after {finished} of {wanted} fits; nothing was written")
         }));
     }
+    let outcomes = outcomes.map_err(Complaint::new)?;
     if keeps {
         checkpoint::write_sorted(out, &table, prepared, &outcomes)?;
     }
@@ -179,7 +179,7 @@ fn facts(
     let mut presentations = 0;
     for (arm, outcome) in outcomes.iter().enumerate() {
         for fit in outcome.fits.iter().filter(|fit| !resumed.contains(&(arm, fit.seed))) {
-            presentations += watch::presentations(prepared, arm, fit);
+            presentations += tally::presentations(prepared, arm, fit);
         }
     }
     let precision = prepared.study.precision;
@@ -190,7 +190,7 @@ fn facts(
         seeds: options.seeds,
         threads: options.threads,
         precision,
-        arithmetic: format!("{}, {} lanes", options.set, precision.lanes()),
+        arithmetic: format!("{}, {} lanes", InstructionSet::best(), precision.lanes()),
         presentations,
         seconds,
         presentations_per_second: presentations as f64 / seconds,
@@ -302,14 +302,4 @@ fn short(claim: &str) -> String {
     let cut: String = claim.chars().take(MOST).collect();
     let end = cut.rfind(' ').unwrap_or(cut.len());
     cut[..end].trim_end_matches(',').to_owned() + " …"
-}
-
-impl Observer for Watch<'_> {
-    fn trained(&self, trained: &Trained) {
-        self.note(trained);
-    }
-
-    fn keep_going(&self) -> bool {
-        !interrupt::asked() && !self.failed()
-    }
 }

@@ -7,8 +7,8 @@ use crate::lines::Lines;
 use crate::table::table;
 use crate::{input, output};
 use palpate_estimators::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
-use palpate_estimators::evaluation::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate_estimators::recording::{CsvError, TimedParser, TimedReading};
+use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::ModalBeam;
@@ -208,11 +208,11 @@ impl Stream<'_> {
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
         let line = if self.arguments.json {
-            track_line::json(track, line, self.extent.is_plane())?
+            track_line::json(track, line, self.extent.is_plane())? + "\n"
         } else {
             self.columns.csv(track)
         };
-        output::print(out, (line + "\n").as_bytes())
+        output::print(out, line.as_bytes())
     }
 
     fn skip(&mut self, error: &CsvError) {

@@ -1,9 +1,11 @@
 //! Calibrating a centroid by least squares.
 
 use ndarray::{Array1, Array2};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::{CentroidLocator, Weighing};
-use crate::method::{Fit, FitTask, HeldOutSpread};
+use crate::fit::{ChannelMismatch, Fit, FitTask};
+use crate::held_out::HeldOutSpread;
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
@@ -39,27 +41,27 @@ pub enum CentroidFitError {
     /// Every sensor sits at the same place, or all readings are alike.
     #[error("the centroids of the recording do not tell its positions apart: {0}")]
     Alike(#[from] NotPositiveDefinite),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Fit for CentroidConfig {
-    type Locator = CentroidLocator;
+    type Method = CentroidLocator;
     type Error = CentroidFitError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<CentroidLocator>, CentroidFitError> {
+    fn fit_method(&self, task: FitTask) -> Result<CentroidLocator, CentroidFitError> {
         let mut locator = uncalibrated(task.bench, task.recording)?;
         let terms = locator.weighing.terms(locator.channel_scales.len(), locator.extent.width_m.is_some());
         task.recording.check_distinct_positions(terms)?;
         let rows: Vec<&Row> = task.recording.rows.iter().collect();
         locator.map = calibrate(&locator, &rows)?;
-        let Some(errors) = held_out_errors(&locator, task.recording, terms, keep_going) else {
-            return Ok(None);
-        };
+        let errors = held_out_errors(&locator, task.recording, terms, task.watch)?;
         locator.spread = HeldOutSpread::of(&errors);
-        Ok(Some(locator))
+        Ok(locator)
     }
 }
 
@@ -126,34 +128,32 @@ fn calibrate(locator: &CentroidLocator, rows: &[&Row]) -> Result<Vec<Vec<f64>>, 
 }
 
 /// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; none where
-/// a fold leaves fewer positions than `terms`. `None` when `keep_going` says no.
+/// a fold leaves fewer positions than `terms`.
 fn held_out_errors(
     locator: &CentroidLocator,
     recording: &Recording,
     terms: usize,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<Vec<[f64; 2]>> {
+    watch: Watch,
+) -> Result<Vec<[f64; 2]>, Cancelled> {
     let positions = recording.distinct_positions().len();
     let folds = recording.folds(positions.min(FOLDS)).unwrap_or_default();
     let mut errors = Vec::with_capacity(recording.rows.len());
     for fold in folds {
-        if !keep_going() {
-            return None;
-        }
+        watch.round()?;
         let held_out: Vec<&Row> = fold.held_out.iter().map(|i| &recording.rows[*i]).collect();
         let training = recording.subset(&fold.training);
         if training.check_distinct_positions(terms).is_err() {
-            return Some(Vec::new());
+            return Ok(Vec::new());
         }
         let rows: Vec<&Row> = training.rows.iter().collect();
-        let Ok(map) = calibrate(locator, &rows) else { return Some(Vec::new()) };
+        let Ok(map) = calibrate(locator, &rows) else { return Ok(Vec::new()) };
         let judged = CentroidLocator { map, ..locator.clone() };
         for row in held_out {
             let Some(position) = judged.position(&row.reading) else { continue };
             errors.push([position.x_m - row.position.x_m, position.y_m - row.position.y_m]);
         }
     }
-    Some(errors)
+    Ok(errors)
 }
 
 /// Positions are held out one by one up to this many, and in groups beyond.

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::method::{HeldOutSpread, Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
+use crate::held_out::HeldOutSpread;
 use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;

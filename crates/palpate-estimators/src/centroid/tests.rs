@@ -1,7 +1,7 @@
 //! The centroid on readings for which it is exact, and on those for which it is not.
 
 use super::*;
-use crate::method::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
@@ -16,8 +16,8 @@ fn recording(bench: &Bench, rows: Vec<Row>) -> Recording {
 
 fn fit(bench: &Bench, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitError> {
     let recording = recording(bench, rows);
-    let task = FitTask { bench, recording: &recording, seed: 0 };
-    let locator = CentroidConfig.fit(task, &mut || true)?.unwrap();
+    let task = FitTask::new(bench, &recording);
+    let locator = CentroidConfig.fit_method(task)?;
     assert_eq!(locator.check(bench), Ok(()));
     let text = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<CentroidLocator>(&text).unwrap().check(bench), Ok(()));

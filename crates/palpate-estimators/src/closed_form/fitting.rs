@@ -1,10 +1,11 @@
 //! What the closed form asks of a bench.
 
 use super::ClosedFormLocator;
-use crate::method::{Fit, FitTask};
+use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::SurfaceSpec;
+use palpate_numerics::watch::Cancelled;
 
 /// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
 ///
@@ -45,18 +46,20 @@ pub enum ClosedFormFitError {
         /// Sensors that are not dead and whose influence is not 0 everywhere.
         found: usize,
     },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Fit for ClosedFormConfig {
-    type Locator = ClosedFormLocator;
+    type Method = ClosedFormLocator;
     type Error = ClosedFormFitError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        _: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<ClosedFormLocator>, ClosedFormFitError> {
-        locator(task.bench).map(Some)
+    fn fit_method(&self, task: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
+        locator(task.bench)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Clean readings over the whole beam, noise against its propagation, and what the closed form must not claim.
 
 use super::*;
-use crate::method::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_core::Status;
@@ -40,8 +40,8 @@ fn fit(bench: &Bench) -> Result<ClosedFormLocator, ClosedFormFitError> {
     let provenance = Provenance { source: "test".into(), rows: 1, digests: vec![], seed: None };
     let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
     let recording = Recording { channels, kinds, rows: vec![row], provenance };
-    let task = FitTask { bench, recording: &recording, seed: 0 };
-    let locator = ClosedFormConfig.fit(task, &mut || true)?.unwrap();
+    let task = FitTask::new(bench, &recording);
+    let locator = ClosedFormConfig.fit_method(task)?;
     assert_eq!(locator.check(bench), Ok(()));
     Ok(locator)
 }

@@ -1,9 +1,10 @@
 //! What the digit's estimator asks of a bench.
 
+use palpate_numerics::watch::Cancelled;
 use serde::{Deserialize, Serialize};
 
 use super::DigitLocator;
-use crate::method::{Fit, FitTask};
+use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Digit, SurfaceSpec};
@@ -69,14 +70,20 @@ pub enum DigitFitError {
         /// The largest, in newtons.
         most_n: f64,
     },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Fit for DigitConfig {
-    type Locator = DigitLocator;
+    type Method = DigitLocator;
     type Error = DigitFitError;
 
-    fn fit(&self, task: FitTask, _: &mut dyn FnMut() -> bool) -> Result<Option<DigitLocator>, DigitFitError> {
-        locator(task.bench, self.theory).map(Some)
+    fn fit_method(&self, task: FitTask) -> Result<DigitLocator, DigitFitError> {
+        locator(task.bench, self.theory)
     }
 }
 

@@ -1,7 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimator::{ContactEstimate, EstimatorConfig, Fitting, Locator, Method, Status};
+use crate::estimator::{ContactEstimate, EstimatorConfig, Locator, Method, Status};
+use crate::fit::Fit;
 use crate::fixtures;
 use crate::setup::Bench;
 use crate::simulate::{clean_reading, simulate_at};
@@ -22,7 +23,7 @@ fn locator(bench: &Bench, theory: DigitTheory) -> Locator {
     let pressed = Bench { force_n: Some(1.0), ..bench.clone() };
     let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
     let config = EstimatorConfig::Digit(DigitConfig { theory });
-    Fitting::prepare(bench, &config, &recording).unwrap().fit(0, &mut || true).unwrap().unwrap()
+    config.fit(bench, &recording).unwrap()
 }
 
 fn method(locator: &Locator) -> &DigitLocator {
@@ -249,8 +250,7 @@ fn benches_that_do_not_suit_are_refused_in_words() {
         let pressed = Bench { force_n: Some(1.0), ..bench.clone() };
         let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
         let config = EstimatorConfig::Digit(DigitConfig::default());
-        let fitting = Fitting::prepare(bench, &config, &recording).unwrap();
-        fitting.fit(0, &mut || true).unwrap_err().to_string()
+        config.fit(bench, &recording).unwrap_err().to_string()
     };
     let with = |change: &dyn Fn(&mut Bench)| {
         let mut bench = good.clone();
@@ -276,8 +276,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
         from: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()
     });
-    let locator =
-        Fitting::prepare(&rig.bench, &config, &recording).unwrap().fit(0, &mut || true).unwrap().unwrap();
+    let locator = config.fit(&rig.bench, &recording).unwrap();
     let limit = rig.bench.cramer_rao_bound().unwrap();
     let positions: Vec<Position> =
         (0..200).map(|i| Position::along(0.03 + 0.09 * f64::from(i) / 200.0)).collect();

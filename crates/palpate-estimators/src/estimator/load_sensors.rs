@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Locator, Method};
 use crate::influence::InfluenceLocator;
-use crate::load_profile::{LoadChannel, LoadSensors, LoadSensorsError};
+use crate::load_profile::{LoadChannel, LoadSensors, LoadSensorsError, Profiler};
 use crate::setup::Bench;
 
 /// The sensors of a bench, by mechanics.
@@ -13,6 +13,16 @@ use crate::setup::Bench;
 /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
 pub fn bench_load_sensors(bench: &Bench) -> Result<LoadSensors<'_>, LoadSensorsError> {
     LoadSensors::new(bench.surface.model().ok_or(LoadSensorsError::NoModel)?, &bench.layout)
+}
+
+impl<'a> Profiler<'a> {
+    /// For readings of a setup, by mechanics.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] as for [`bench_load_sensors`].
+    pub fn of(bench: &'a Bench) -> Result<Self, LoadSensorsError> {
+        Ok(Self::new(bench_load_sensors(bench)?))
+    }
 }
 
 impl Locator {

@@ -3,38 +3,16 @@
 use crate::centroid::CentroidLocator;
 use crate::closed_form::ClosedFormLocator;
 use crate::digit::{DigitLocator, DigitShape};
+use crate::fit::{Fitted, Locate, LocatorFault};
 use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
-use crate::method::{Locate, LocatorFault, ReadingError};
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
-use crate::recording::Provenance;
 use crate::setup::Bench;
 use palpate_core::Estimate;
 
-/// A fitted estimator. It carries its surface, layout, scaling and provenance, so that nothing it needs is outside it.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Locator {
-    /// The surface that is touched, and its sensors.
-    pub bench: Bench,
-    /// Where it comes from.
-    pub provenance: LocatorProvenance,
-    /// The method and what it learned.
-    pub method: Method,
-}
-
-/// Where a locator comes from.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LocatorProvenance {
-    /// Version of palpate that fitted it.
-    pub palpate: String,
-    /// Seed of the fit.
-    pub seed: u64,
-    /// The recording that it was fitted to.
-    pub recording: Provenance,
-}
+/// A locator of any estimator: what files hold.
+pub type Locator = Fitted<Method>;
 
 /// The methods that can locate.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -59,9 +37,39 @@ pub enum Method {
     Centroid(CentroidLocator),
 }
 
+macro_rules! methods {
+    ($($variant:ident($method:ty)),* $(,)?) => {
+        $(impl From<$method> for Method {
+            fn from(method: $method) -> Self {
+                Self::$variant(method)
+            }
+        })*
+    };
+}
+
+methods! {
+    Network(NetworkLocator),
+    NetworkLm(LevenbergMarquardtLocator),
+    Influence(InfluenceLocator),
+    GaussianProcess(GaussianProcessLocator),
+    ClosedForm(ClosedFormLocator),
+    Digit(DigitLocator),
+    Neighbours(NeighboursLocator),
+    Centroid(CentroidLocator),
+}
+
+impl Locate for Method {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        self.as_locate().locate(reading)
+    }
+
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+        self.as_locate().check(bench)
+    }
+}
+
 impl Method {
-    /// What every method can do.
-    fn locate(&self) -> &dyn Locate {
+    fn as_locate(&self) -> &dyn Locate {
         match self {
             Self::Network(network) => network,
             Self::NetworkLm(networks) => networks,
@@ -72,6 +80,16 @@ impl Method {
             Self::Neighbours(neighbours) => neighbours,
             Self::Centroid(centroid) => centroid,
         }
+    }
+}
+
+impl<M> Fitted<M>
+where
+    Method: From<M>,
+{
+    /// The same locator as one of any estimator.
+    pub fn into_locator(self) -> Locator {
+        self.map(Method::from)
     }
 }
 
@@ -98,29 +116,12 @@ pub enum LeaveOutError {
 }
 
 impl Locator {
-    /// Where the surface is touched when the sensors read `reading`: one value a channel, in SI units or raw.
-    ///
-    /// # Errors
-    /// [`ReadingError`] for another number of channels or a value that is not finite.
-    pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        ReadingError::check(reading, self.bench.layout.len())?;
-        Ok(self.method.locate().locate(reading))
-    }
-
     /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
     pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
         match &self.method {
             Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
             _ => None,
         }
-    }
-
-    /// Checks what a file may have got wrong.
-    ///
-    /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
-    pub fn check(&self) -> Result<(), LocatorFault> {
-        self.method.locate().check(&self.bench)
     }
 
     /// Leaves a dead channel out of all sums from now on, without fitting again.

@@ -1,7 +1,7 @@
 //! The locator file: JSON with a format version.
 
 use super::Locator;
-use crate::method::LocatorFault;
+use crate::fit::LocatorFault;
 
 /// The `format` of every locator file.
 const FORMAT: &str = "palpate-locator";

@@ -2,7 +2,7 @@
 
 use super::{Locator, Method};
 use crate::influence::{BeamLikelihood, InfluenceLocator, PlateLikelihood};
-use crate::method::Likelihood;
+use crate::likelihood::Likelihood;
 use crate::tracking::TrackerConfig;
 use palpate_mechanics::surface::SurfaceSpec;
 

@@ -4,22 +4,18 @@ use ndarray::Array2;
 
 use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
 use crate::features::{FeatureKind, Features};
-use crate::method::{Fit, FitTask};
+use crate::fit::{Fit, FitTask};
 use palpate_numerics::regression::{Regression, Samples};
 
 /// Distinct positions without which a position cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
 
 impl Fit for GaussianProcessConfig {
-    type Locator = GaussianProcessLocator;
+    type Method = GaussianProcessLocator;
     type Error = GaussianProcessError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<GaussianProcessLocator>, GaussianProcessError> {
-        let FitTask { bench, recording, seed } = task;
+    fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
+        let FitTask { bench, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let kind = self.features.unwrap_or_else(|| FeatureKind::for_bench(bench));
         let features = Features::fit(kind, recording)?;
@@ -37,12 +33,7 @@ impl Fit for GaussianProcessConfig {
             Samples { coordinates: coordinates.view(), outputs: outputs.view(), noise_variance: None };
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
-        let process = regression.fit(samples, keep_going)?;
-        Ok(process.map(|process| GaussianProcessLocator {
-            features,
-            process,
-            extent,
-            force_n: bench.force_n,
-        }))
+        let process = regression.fit(samples, watch)?;
+        Ok(GaussianProcessLocator { features, process, extent, force_n: bench.force_n })
     }
 }

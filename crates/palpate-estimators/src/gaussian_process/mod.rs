@@ -8,8 +8,10 @@ mod fitting;
 mod locator;
 
 use crate::features::{FeatureKind, NoFeatures};
+use crate::fit::ChannelMismatch;
 use crate::recording::TooFewPositions;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
+use palpate_numerics::watch::Cancelled;
 
 pub use locator::GaussianProcessLocator;
 
@@ -44,6 +46,12 @@ pub enum GaussianProcessError {
     /// What the regression has to say.
     #[error(transparent)]
     Regression(#[from] RegressionError),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
-use crate::method::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
@@ -32,8 +32,8 @@ fn recording_of(rows: Vec<Row>) -> Recording {
 }
 
 fn fit(bench: &Bench, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
-    let task = FitTask { bench, recording, seed: 1 };
-    GaussianProcessConfig::default().fit(task, &mut || true).map(|locator| locator.unwrap())
+    let task = FitTask::new(bench, recording).seed(1);
+    GaussianProcessConfig::default().fit_method(task)
 }
 
 /// Four bell-shaped sensors along 400 mm, and noise.

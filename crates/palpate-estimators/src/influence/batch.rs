@@ -51,12 +51,7 @@ impl Kernel for LocateRows<'_> {
 }
 
 #[inline(always)]
-fn locate_each<V: Eight>(
-    search: &Search,
-    rows: Rows,
-    scratch: &mut Scratch,
-    estimates: &mut [Estimate],
-) {
+fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
     let channels = rows.channels.max(1);
     let count = estimates.len().min(rows.readings.len() / channels);
     let eights = count - count % 8;

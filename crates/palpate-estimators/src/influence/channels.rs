@@ -1,7 +1,7 @@
 //! The channels of a locator with a model, besides their influence functions.
 
 use super::belief::ForceBelief;
-use crate::method::LocatorFault;
+use crate::fit::LocatorFault;
 
 /// What is learnt of the channels besides their influence functions.
 #[derive(Clone, Debug, PartialEq)]

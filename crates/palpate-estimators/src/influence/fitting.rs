@@ -7,10 +7,11 @@ use super::learning::{Learnt, learn};
 use super::locator::{BeamLocator, BeamParts};
 use super::measured::MeasuredError;
 use super::table::InfluenceTable;
-use crate::method::FitTask;
+use crate::fit::{ChannelMismatch, FitTask};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::watch::Cancelled;
 
 /// Why influence functions cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -69,23 +70,25 @@ pub enum InfluenceFitError {
         /// What failed.
         problem: NotPositiveDefinite,
     },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
-/// Fits the influence functions of a one-dimensional surface with a model; `None` when `keep_going` says no.
-pub(super) fn fit_modelled(
-    config: InfluenceConfig,
-    task: FitTask,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Result<Option<BeamLocator>, InfluenceFitError> {
+/// Fits the influence functions of a one-dimensional surface with a model.
+pub(super) fn fit_modelled(config: InfluenceConfig, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
     let sensors = task.bench.layout.len();
     let mut table = empty_table(sensors, task.bench.surface.extent().length_m);
     let places = around_nodes(&table);
     let fill = &mut |s: usize, learnt: &Learnt| fill(&mut table, s, learnt, &places);
-    let Some(channels) = learn(config.from, task, &places, fill, keep_going)? else { return Ok(None) };
+    let channels = learn(config.from, task, &places, fill)?;
     let Channels { offsets, noise_sd, reference_force_n } = channels;
     let parts = BeamParts { table, offsets, noise_sd };
     let force = force_belief(config, task.bench);
-    Ok(Some(BeamLocator::new(parts, dead(task.bench), force, reference_force_n, config.contacts)))
+    Ok(BeamLocator::new(parts, dead(task.bench), force, reference_force_n, config.contacts))
 }
 
 /// What a bench and the settings say of the force.

@@ -7,7 +7,7 @@ use super::hyperparameters::{MOST_PRESSES, most_evident};
 use super::posterior::{Posterior, SensorPresses};
 use super::presses::Presses;
 use super::prior::{Mean, Prior, Remainders, Spread};
-use crate::method::FitTask;
+use crate::fit::FitTask;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Surface;
@@ -35,15 +35,13 @@ impl Learnt<'_, '_> {
     }
 }
 
-/// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`;
-/// `None` when `keep_going`, asked now and then, says no.
+/// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.
 pub(super) fn learn(
     from: InfluenceSource,
     task: FitTask,
     places: &[Position],
     take: &mut dyn FnMut(usize, &Learnt),
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Result<Option<Channels>, InfluenceFitError> {
+) -> Result<Channels, InfluenceFitError> {
     let surface = task.bench.surface.model().ok_or(InfluenceFitError::NoModel)?;
     let layout = &task.bench.layout;
     check_sensors(layout)?;
@@ -73,12 +71,10 @@ pub(super) fn learn(
         if living.is_empty() {
             continue;
         }
-        if !keep_going() {
-            return Ok(None);
-        }
+        task.watch.round()?;
         lesson.learn_kind(kind, &living, &mut channels, take)?;
     }
-    Ok(Some(channels))
+    Ok(channels)
 }
 
 fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {

@@ -8,7 +8,7 @@ use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
 use super::table_function::FittedInfluence;
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};

@@ -14,6 +14,7 @@ mod learning;
 mod likelihood;
 mod locator;
 pub mod measured;
+mod moments;
 mod plane;
 mod posterior;
 mod presses;
@@ -36,7 +37,7 @@ pub use scratch::Scratch;
 pub use table::InfluenceTable;
 pub use table_function::FittedInfluence;
 
-use crate::method::{Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Bench;
 use measured::{MeasuredConfig, MeasuredLocator};
 use palpate_core::Estimate;
@@ -55,25 +56,19 @@ pub enum InfluenceLocator {
 }
 
 impl Fit for InfluenceConfig {
-    type Locator = InfluenceLocator;
+    type Method = InfluenceLocator;
     type Error = InfluenceFitError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<InfluenceLocator>, InfluenceFitError> {
+    fn fit_method(&self, task: FitTask) -> Result<InfluenceLocator, InfluenceFitError> {
         if task.bench.surface.model().is_none() {
             self.check_measured()?;
-            let fitted = MeasuredConfig::default().fit(task, keep_going)?;
-            return Ok(fitted.map(|locator| InfluenceLocator::Measured(Box::new(locator))));
+            let fitted = MeasuredConfig::default().fit_method(task)?;
+            return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
         if task.bench.surface.extent().is_plane() {
-            let fitted = self.fit_plane(task, keep_going)?;
-            return Ok(fitted.map(|locator| InfluenceLocator::Plane(Box::new(locator))));
+            return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));
         }
-        let fitted = self.fit_beam(task, keep_going)?;
-        Ok(fitted.map(|locator| InfluenceLocator::Beam(Box::new(locator))))
+        Ok(InfluenceLocator::Beam(Box::new(self.fit_beam(task)?)))
     }
 }
 
@@ -91,29 +86,21 @@ impl InfluenceConfig {
         }
     }
 
-    /// Fits the influence functions of a plane with a model; `None` when `keep_going`, asked now and then, says no.
+    /// Fits the influence functions of a plane with a model.
     ///
     /// # Errors
     /// [`InfluenceFitError`] when the surface has no model, several contacts are to be told apart, or the recording says
     /// too little.
-    pub fn fit_plane(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<PlaneLocator>, InfluenceFitError> {
-        plane::fit_plane(*self, task, keep_going)
+    pub fn fit_plane(&self, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
+        plane::fit_plane(*self, task)
     }
 
-    /// Fits the influence functions of a line with a model; `None` when `keep_going`, asked now and then, says no.
+    /// Fits the influence functions of a line with a model.
     ///
     /// # Errors
     /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
-    pub fn fit_beam(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<BeamLocator>, InfluenceFitError> {
-        fitting::fit_modelled(*self, task, keep_going)
+    pub fn fit_beam(&self, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
+        fitting::fit_modelled(*self, task)
     }
 }
 

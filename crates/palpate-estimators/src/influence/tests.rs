@@ -2,8 +2,8 @@ mod batch;
 mod reference;
 
 use super::*;
+use crate::fit::Locate;
 use crate::fixtures::{faulty_paper, paper};
-use crate::method::Locate;
 use crate::recording::Recording;
 use crate::setup::Bench;
 use crate::simulate::{clean_reading, displaced};
@@ -19,7 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const SOURCES: [InfluenceSource; 2] = [InfluenceSource::Recording, InfluenceSource::Corrected];
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
+    config.fit_beam(FitTask::new(bench, recording)).unwrap()
 }
 
 fn clean(bench: &Bench, contacts: &[(f64, f64)]) -> Vec<f64> {
@@ -270,7 +270,7 @@ fn presses_that_say_too_little_are_refused() {
     let rig = paper(5e-6, 1);
     let mut recording = rig.simulate(1);
     let refuse = |config: InfluenceConfig, bench: &Bench, recording: &Recording| {
-        config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap_err()
+        config.fit_beam(FitTask::new(bench, recording)).unwrap_err()
     };
     let from = InfluenceSource::Recording;
     recording.rows.truncate(2);

@@ -3,9 +3,11 @@
 use super::search::{means, nearest};
 use super::{Neighbour, NeighboursLocator};
 use crate::features::{FeatureKind, Features, NoFeatures};
-use crate::method::{Fit, FitTask, HeldOutSpread};
+use crate::fit::{ChannelMismatch, Fit, FitTask};
+use crate::held_out::HeldOutSpread;
 use crate::recording::{Row, TooFewPositions};
 use palpate_mechanics::contact::Position;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
 /// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
@@ -31,50 +33,45 @@ pub enum NeighboursFitError {
     /// Nothing to compare readings by.
     #[error(transparent)]
     Features(#[from] NoFeatures),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Fit for NeighboursConfig {
-    type Locator = NeighboursLocator;
+    type Method = NeighboursLocator;
     type Error = NeighboursFitError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<NeighboursLocator>, NeighboursFitError> {
+    fn fit_method(&self, task: FitTask) -> Result<NeighboursLocator, NeighboursFitError> {
         let recording = task.recording;
         recording.check_distinct_positions(2)?;
         let features = Features::fit(FeatureKind::for_bench(task.bench), recording)?;
         let neighbour =
             |row: &Row| Neighbour { features: features.apply(&row.reading), position: row.position };
         let rows: Vec<Neighbour> = recording.rows.iter().map(neighbour).collect();
-        let Some(errors) = held_out_errors(&rows, self.most.max(1), keep_going) else { return Ok(None) };
+        let errors = held_out_errors(&rows, self.most.max(1), task.watch)?;
         let square = |errors: &Vec<[f64; 2]>| errors.iter().flatten().map(|e| e * e).sum::<f64>();
         let best = (0..errors.len()).min_by(|a, b| square(&errors[*a]).total_cmp(&square(&errors[*b])));
         let best = best.unwrap_or(0);
-        Ok(Some(NeighboursLocator {
+        Ok(NeighboursLocator {
             extent: task.bench.surface.extent(),
             features,
             count: best + 1,
             rows,
             force_n: task.bench.force_n,
             spread: errors.get(best).and_then(|errors| HeldOutSpread::of(errors)),
-        }))
+        })
     }
 }
 
-/// Errors (x, y) in metres of every row by 1, 2, … neighbours at other positions, up to `most` or as many as every row has;
-/// `None` when `keep_going`, asked at every row, says no.
-fn held_out_errors(
-    rows: &[Neighbour],
-    most: usize,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<Vec<Vec<[f64; 2]>>> {
+/// Errors (x, y) in metres of every row by 1, 2, … neighbours at other positions, up to `most` or as many as every row has.
+fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
     for (i, row) in rows.iter().enumerate() {
-        if !keep_going() {
-            return None;
-        }
+        watch.round()?;
         let others = rows.iter().filter(|other| other.position != row.position);
         let means = means(&nearest(others, &row.features, most));
         if i == 0 {
@@ -84,5 +81,5 @@ fn held_out_errors(
         let off = |mean: &Position| [mean.x_m - row.position.x_m, mean.y_m - row.position.y_m];
         errors.iter_mut().zip(&means).for_each(|(errors, mean)| errors.push(off(mean)));
     }
-    Some(errors)
+    Ok(errors)
 }

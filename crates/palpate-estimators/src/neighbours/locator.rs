@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::search::{means, nearest};
 use crate::features::Features;
-use crate::method::{HeldOutSpread, Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
+use crate::held_out::HeldOutSpread;
 use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;

@@ -1,7 +1,7 @@
 //! Neighbours on surfaces whose readings are the position itself.
 
 use super::*;
-use crate::method::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
@@ -35,8 +35,8 @@ fn fit(bench: &Bench, rows: Vec<Row>) -> Result<NeighboursLocator, NeighboursFit
     let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };
     let recording =
         Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance };
-    let task = FitTask { bench, recording: &recording, seed: 0 };
-    let locator = NeighboursConfig::default().fit(task, &mut || true)?.unwrap();
+    let task = FitTask::new(bench, &recording);
+    let locator = NeighboursConfig::default().fit_method(task)?;
     assert_eq!(locator.check(bench), Ok(()));
     let text = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<NeighboursLocator>(&text).unwrap().check(bench), Ok(()));

@@ -1,6 +1,6 @@
 //! What a rig's `[estimator] kind = "network"` says: topology, coding and training of a network.
 
-use super::Activation;
+use super::{Activation, Precision};
 
 /// A feed-forward network and how it is trained. The default is the founding paper's: one hidden layer of ten
 /// logistic nodes, a logistic output, and back-propagation with learning rate 0.7 and momentum 0.9.
@@ -20,6 +20,8 @@ pub struct NetworkConfig {
     pub input_scale: InputScale,
     /// How the weights are found.
     pub training: BackPropagation,
+    /// The arithmetic of training; estimates are made in 64 bits whatever it is.
+    pub precision: Precision,
 }
 
 impl Default for NetworkConfig {
@@ -32,6 +34,7 @@ impl Default for NetworkConfig {
             output: OutputCoding::Normalized,
             input_scale: InputScale::FullScale,
             training: BackPropagation::default(),
+            precision: Precision::F64,
         }
     }
 }

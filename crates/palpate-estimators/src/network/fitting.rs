@@ -2,11 +2,15 @@
 
 use super::{
     InputScale, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
-    TrainedNetwork, TrainingTask,
+    TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
 };
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use crate::network::locator::ChannelScaling;
 use crate::recording::Recording;
 use palpate_mechanics::surface::{Extent, Surface};
+use palpate_numerics::mean_and_variance;
+use palpate_numerics::simd::InstructionSet;
+use palpate_numerics::watch::Cancelled;
 
 /// Why a network cannot be fitted to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,6 +38,12 @@ pub enum NetworkFitError {
         /// Its value.
         value: f64,
     },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A network that is ready to be trained: its patterns and how readings and positions were coded into them.
@@ -50,7 +60,78 @@ pub struct NetworkFitting {
     extent: Extent,
 }
 
+impl Fit for NetworkConfig {
+    type Method = NetworkLocator;
+    type Error = NetworkFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<NetworkLocator, NetworkFitError> {
+        let fitting = NetworkFitting::of(self, task)?;
+        let network = train_one(self.precision, &fitting.task(), task.seed, task.watch)?;
+        Ok(fitting.locator(network))
+    }
+
+    /// Trains as many networks side by side as there are lanes.
+    fn fit_many(
+        &self,
+        task: FitTask,
+        queue: &mut dyn SeedQueue<NetworkLocator>,
+    ) -> Result<(), NetworkFitError> {
+        task.check_channels()?;
+        let fitting = NetworkFitting::of(self, task)?;
+        let mut queue = Coded { fitting: &fitting, task, queue };
+        let set = InstructionSet::best();
+        Ok(train_many(set, self.precision, &fitting.task(), &mut queue, task.watch)?)
+    }
+}
+
+impl NetworkConfig {
+    /// The locator that an earlier fit gave, from its weights and outcome; `None` when their number is not the network's.
+    ///
+    /// # Errors
+    /// [`NetworkFitError`] when the recording cannot be coded.
+    pub fn restore(
+        &self,
+        task: FitTask,
+        weights: Vec<f64>,
+        outcome: TrainingOutcome,
+    ) -> Result<Option<Fitted<NetworkLocator>>, NetworkFitError> {
+        task.check_channels()?;
+        let fitting = NetworkFitting::of(self, task)?;
+        let topology = fitting.topology.clone();
+        Ok((weights.len() == topology.weight_count()).then(|| {
+            let network = TrainedNetwork { topology, weights, outcome };
+            Fitted::new(task, fitting.locator(network))
+        }))
+    }
+}
+
+/// A queue of trained networks in front of a queue of locators.
+struct Coded<'a> {
+    fitting: &'a NetworkFitting,
+    task: FitTask<'a>,
+    queue: &'a mut dyn SeedQueue<NetworkLocator>,
+}
+
+impl TrainingQueue for Coded<'_> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.queue.next_seed()
+    }
+
+    fn finished(&mut self, seed: u64, network: TrainedNetwork) {
+        self.queue.fitted(seed, Fitted::new(self.task.seed(seed), self.fitting.locator(network)));
+    }
+}
+
 impl NetworkFitting {
+    /// Codes the recording of a fit.
+    ///
+    /// # Errors
+    /// [`NetworkFitError`] as for [`NetworkFitting::prepare`].
+    pub fn of(config: &NetworkConfig, task: FitTask) -> Result<Self, NetworkFitError> {
+        let surface = &task.bench.surface;
+        Self::prepare(config, surface.extent(), surface.model(), task.bench.force_n, task.recording)
+    }
+
     /// Codes a recording of a surface (with its model, where it has one, and its known force in newtons).
     ///
     /// # Errors
@@ -129,9 +210,7 @@ fn channel_scaling(
             }
             (InputScale::FullScale, None) => (0.0, largest(), "largest reading"),
             (InputScale::Standardized, _) => {
-                let count = recording.rows.len() as f64;
-                let mean = column(c).sum::<f64>() / count;
-                let variance = column(c).map(|r| (r - mean).powi(2)).sum::<f64>() / count;
+                let (mean, variance) = mean_and_variance(column(c));
                 (mean, variance.sqrt(), "standard deviation")
             }
         };

@@ -1,7 +1,7 @@
 //! A fitted network: scaling, weights and coding, all that a reading needs to become a position.
 
 use super::{PreparedNetwork, Topology, TrainingOutcome};
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;

@@ -25,4 +25,4 @@ pub use palpate_core::Activation;
 pub use patterns::Patterns;
 pub use prepared::PreparedNetwork;
 pub use topology::Topology;
-pub use train::{Precision, SeedQueue, TrainingTask, train_many, train_one};
+pub use train::{Precision, TrainingQueue, TrainingTask, train_many, train_one};

@@ -217,8 +217,8 @@ fn logistic<V: Vector<4, Real = f64>>(z: V) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_numerics::simd::Array;
     use Activation::{Linear, Logistic, Tanh};
+    use palpate_numerics::simd::Array;
 
     fn topology(sizes: &[usize], biases: bool, activations: (Activation, Activation)) -> Topology {
         let (hidden_activation, output_activation) = activations;

@@ -5,6 +5,7 @@ mod order;
 
 use super::{BackPropagation, Patterns, Topology, TrainedNetwork};
 use palpate_numerics::simd::{InstructionSet, Kernel, Simd, run_loops};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Width of a floating-point number in training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -39,85 +40,95 @@ pub struct TrainingTask<'a> {
 }
 
 /// Where a lane group takes its seeds from and leaves its networks.
-pub trait SeedQueue {
+pub trait TrainingQueue {
     /// The next network to train.
     fn next_seed(&mut self) -> Option<u64>;
     /// Takes a network whose training ended.
     fn finished(&mut self, seed: u64, network: TrainedNetwork);
-    /// Asked once an epoch; on `false` the group gives up what it has not finished.
-    fn keep_going(&mut self) -> bool;
 }
 
 /// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in whatever lane, thread or company
 /// it is trained.
-pub fn train_many(set: InstructionSet, precision: Precision, task: &TrainingTask, queue: &mut dyn SeedQueue) {
-    set.run(InLanes { precision, task, queue });
+///
+/// # Errors
+/// [`Cancelled`] when `watch`, told of every epoch, stops it; what was not finished is given up.
+pub fn train_many(
+    set: InstructionSet,
+    precision: Precision,
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
+    set.run(InLanes(Training { precision, task, queue, watch }))
 }
 
-/// Trains one network: the same bits as [`train_many`] gives for the seed in 64 bits. `None` when `keep_going`, asked once an epoch, says
-/// no.
+/// Trains one network: the same bits as [`train_many`] gives for the seed.
+///
+/// # Errors
+/// [`Cancelled`] when `watch`, told of every epoch, stops it.
 pub fn train_one(
+    precision: Precision,
     task: &TrainingTask,
     seed: u64,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<TrainedNetwork> {
-    let mut queue = OneSeed { seed: Some(seed), keep_going, network: None };
-    run_loops(Alone { task, queue: &mut queue });
-    queue.network
+    watch: Watch,
+) -> Result<TrainedNetwork, Cancelled> {
+    let mut queue = OneSeed { seed: Some(seed), network: None };
+    run_loops(Alone(Training { precision, task, queue: &mut queue, watch }))?;
+    Ok(queue.network.expect("a queue that nobody stops is trained to its end"))
+}
+
+struct Training<'a> {
+    precision: Precision,
+    task: &'a TrainingTask<'a>,
+    queue: &'a mut dyn TrainingQueue,
+    watch: Watch<'a>,
 }
 
 /// Networks side by side, one a lane.
-struct InLanes<'a> {
-    precision: Precision,
-    task: &'a TrainingTask<'a>,
-    queue: &'a mut dyn SeedQueue,
-}
+struct InLanes<'a>(Training<'a>);
 
 impl Kernel for InLanes<'_> {
-    type Output = ();
+    type Output = Result<(), Cancelled>;
     const FUSED: bool = true;
 
     #[inline(always)]
-    fn run<S: Simd>(self) {
-        match self.precision {
-            Precision::F64 => kernel::train::<S, S::F64, 8>(self.task, self.queue),
-            Precision::F32 => kernel::train::<S, S::F32, 16>(self.task, self.queue),
+    fn run<S: Simd>(self) -> Result<(), Cancelled> {
+        let Training { precision, task, queue, watch } = self.0;
+        match precision {
+            Precision::F64 => kernel::train::<S, S::F64, 8>(task, queue, watch),
+            Precision::F32 => kernel::train::<S, S::F32, 16>(task, queue, watch),
         }
     }
 }
 
-/// Networks one after the other, in one lane: two thirds faster than in a vector whose other lanes are idle.
-struct Alone<'a> {
-    task: &'a TrainingTask<'a>,
-    queue: &'a mut dyn SeedQueue,
-}
+/// Networks one after the other: one is trained faster alone than among lanes that are idle.
+struct Alone<'a>(Training<'a>);
 
 impl Kernel for Alone<'_> {
-    type Output = ();
+    type Output = Result<(), Cancelled>;
     const FUSED: bool = true;
 
     #[inline(always)]
-    fn run<S: Simd>(self) {
-        kernel::train::<S, S::Array<f64, 1>, 1>(self.task, self.queue);
+    fn run<S: Simd>(self) -> Result<(), Cancelled> {
+        let Training { precision, task, queue, watch } = self.0;
+        match precision {
+            Precision::F64 => kernel::train::<S, S::Array<f64, 1>, 1>(task, queue, watch),
+            Precision::F32 => kernel::train::<S, S::Array<f32, 1>, 1>(task, queue, watch),
+        }
     }
 }
 
-/// The queue of one seed.
-struct OneSeed<'a> {
+struct OneSeed {
     seed: Option<u64>,
-    keep_going: &'a mut dyn FnMut() -> bool,
     network: Option<TrainedNetwork>,
 }
 
-impl SeedQueue for OneSeed<'_> {
+impl TrainingQueue for OneSeed {
     fn next_seed(&mut self) -> Option<u64> {
         self.seed.take()
     }
     fn finished(&mut self, _: u64, network: TrainedNetwork) {
         self.network = Some(network);
-    }
-    fn keep_going(&mut self) -> bool {
-        (self.keep_going)()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::gaussian::{Change, Gaussian};
 use super::step::{MOTIONS, OF_CONTACT, contact};
-use crate::method::ContactFit;
+use crate::likelihood::ContactFit;
 
 /// What a step of time does to the M members of a bank, states of N numbers.
 pub(super) trait Dynamics<const N: usize, const M: usize> {

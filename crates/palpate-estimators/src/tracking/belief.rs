@@ -4,7 +4,7 @@ use super::bank::Bank;
 use super::gaussian::Gaussian;
 use super::on_plane::{self, OnPlane};
 use super::step::{OnLine, Step, V, W, X, contact, contacts, seen_on_line};
-use crate::method::{ContactFit, Geometry, Likelihood, LineLikelihood};
+use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
 use palpate_mechanics::contact::{Contact, Position};
 
 /// A bank of a surface with as many contacts.

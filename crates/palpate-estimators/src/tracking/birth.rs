@@ -9,7 +9,7 @@ use super::belief::{Belief, Seen};
 use super::config::TrackerConfig;
 use super::gaussian::Gaussian;
 use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact, seen_on_line};
-use crate::method::{ContactFit, LineLikelihood};
+use crate::likelihood::{ContactFit, LineLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
 use std::f64::consts::PI;

@@ -4,7 +4,7 @@ use super::belief::Belief;
 use super::config::TrackerConfig;
 use super::track::{Track, TrackError, Tracked};
 use super::tracker::Tracker;
-use crate::method::Likelihood;
+use crate::likelihood::Likelihood;
 
 /// A [`Tracker`] that remembers, so that it can go back.
 pub struct SmoothTracker<'a> {

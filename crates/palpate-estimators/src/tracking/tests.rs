@@ -4,9 +4,10 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::fit::FitTask;
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, InfluenceConfig};
-use crate::method::{FitTask, Likelihood, LineLikelihood};
+use crate::likelihood::{Likelihood, LineLikelihood};
 use crate::setup::Bench;
 use crate::simulate::{CleanSensors, clean_reading};
 use palpate_mechanics::contact::{Contact, Position};
@@ -22,8 +23,8 @@ fn rig() -> Example {
 fn likelihood(rig: &Example, force_n: Option<f64>) -> BeamLikelihood {
     let recording = rig.simulate(1);
     let bench = Bench { force_n, ..rig.bench.clone() };
-    let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
-    BeamLikelihood::new(&InfluenceConfig::default().fit_beam(task, &mut || true).unwrap().unwrap())
+    let task = FitTask::new(&bench, &recording);
+    BeamLikelihood::new(&InfluenceConfig::default().fit_beam(task).unwrap())
 }
 
 /// When, the true contact, and the reading.
@@ -163,9 +164,9 @@ fn two_readings(rig: &Example, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Co
 fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
     let (rig, motions) = two_moving_loads();
     let recording = rig.simulate(1);
-    let task = FitTask { bench: &rig.bench, recording: &recording, seed: 0 };
+    let task = FitTask::new(&rig.bench, &recording);
     let config = InfluenceConfig { contacts: 2, ..InfluenceConfig::default() };
-    let likelihood = BeamLikelihood::new(&config.fit_beam(task, &mut || true).unwrap().unwrap());
+    let likelihood = BeamLikelihood::new(&config.fit_beam(task).unwrap());
     let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
     let (mut wrong, mut all) = (0, 0);
     let (mut tracked, mut alone) = (Vec::new(), Vec::new());

@@ -5,7 +5,7 @@ use super::birth::Births;
 use super::config::TrackerConfig;
 use super::step::Step;
 use super::track::{Track, TrackError, Tracked};
-use crate::method::{Geometry, Likelihood, LineLikelihood};
+use crate::likelihood::{Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 
 /// The most hypotheses that are held possible at once.

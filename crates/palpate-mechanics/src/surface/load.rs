@@ -23,6 +23,11 @@ pub struct UniformLoad {
 }
 
 impl UniformLoad {
+    /// A force in newtons over a stretch of a line, from its left end to its right one, in metres.
+    pub const fn along(from_m: f64, to_m: f64, force_n: f64) -> Self {
+        Self { from: Position::along(from_m), to: Position::along(to_m), force_n }
+    }
+
     /// The middle of it, where its force acts as a whole.
     pub fn centre(&self) -> Position {
         Position { x_m: self.from.x_m.midpoint(self.to.x_m), y_m: self.from.y_m.midpoint(self.to.y_m) }

@@ -1,6 +1,7 @@
 //! Why a regression cannot be made.
 
 use crate::NotPositiveDefinite;
+use crate::watch::Cancelled;
 
 /// Samples that no Gaussian process can be fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -60,4 +61,7 @@ pub enum RegressionError {
     /// The covariance matrix of the rows does not factor.
     #[error("the rows' covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
+    /// The search for hyperparameters was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }

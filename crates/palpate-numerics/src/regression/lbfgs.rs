@@ -3,6 +3,8 @@
 
 use std::collections::VecDeque;
 
+use crate::small::dot;
+
 /// Pairs of steps and gradient changes that are remembered.
 const MEMORY: usize = 12;
 /// No step changes a variable by more than this; the variables are logarithms, so that is a factor of 7.
@@ -34,13 +36,15 @@ struct Pair {
     change: Vec<f64>,
 }
 
-/// Walks downhill from `start`. `function` writes its gradient and gives its value, an infinity where it has none;
-/// the search ends at once when it says `None`, and the result is `None` too.
-pub(super) fn minimise(
+/// Minimises from `start`. `function` writes its gradient and gives its value, an infinity where it has none.
+///
+/// # Errors
+/// The first that `function` returns, which ends the search at once.
+pub(super) fn minimise<E>(
     start: &[f64],
     stop: Stop,
-    mut function: impl FnMut(&[f64], &mut [f64]) -> Option<f64>,
-) -> Option<Minimum> {
+    mut function: impl FnMut(&[f64], &mut [f64]) -> Result<f64, E>,
+) -> Result<Minimum, E> {
     let mut point = start.to_vec();
     let mut gradient = vec![0.0; point.len()];
     let mut value = function(&point, &mut gradient)?;
@@ -85,7 +89,7 @@ pub(super) fn minimise(
         }
         (point, value, gradient) = (next, next_value, next_gradient);
     }
-    Some(Minimum { point, value })
+    Ok(Minimum { point, value })
 }
 
 /// −H·g, by the two loops.
@@ -114,10 +118,6 @@ fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
     if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 fn add(to: &mut [f64], factor: f64, other: &[f64]) {
     for (to, other) in to.iter_mut().zip(other) {
         *to += factor * other;
@@ -126,7 +126,10 @@ fn add(to: &mut [f64], factor: f64, other: &[f64]) {
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
     use super::*;
+    use crate::watch::Cancelled;
 
     const STOP: Stop = Stop { evaluations: 300, decrease: 1e-14 };
 
@@ -135,7 +138,7 @@ mod tests {
         let rosenbrock = |x: &[f64], g: &mut [f64]| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
             (g[0], g[1]) = (-2.0 * a - 400.0 * x[0] * b, 200.0 * b);
-            Some(a * a + 100.0 * b * b)
+            Ok::<f64, Infallible>(a * a + 100.0 * b * b)
         };
         let minimum = minimise(&[-1.2, 1.0], STOP, rosenbrock).unwrap();
         assert!(minimum.point.iter().all(|x| (x - 1.0).abs() < 1e-4), "{minimum:?}");
@@ -146,7 +149,7 @@ mod tests {
         // Defined for x > 0 only, least at x = 0.01.
         let cliff = |x: &[f64], g: &mut [f64]| {
             g[0] = 1.0 - 0.01 / x[0];
-            Some(if x[0] > 0.0 { x[0] - 0.01 * x[0].ln() } else { f64::INFINITY })
+            Ok::<f64, Infallible>(if x[0] > 0.0 { x[0] - 0.01 * x[0].ln() } else { f64::INFINITY })
         };
         let minimum = minimise(&[1.0], STOP, cliff).unwrap();
         assert!((minimum.point[0] - 0.01).abs() < 1e-6, "{minimum:?}");
@@ -158,8 +161,8 @@ mod tests {
         let slope = |_: &[f64], g: &mut [f64]| {
             g[0] = 1.0;
             left -= 1;
-            (left > 0).then_some(f64::from(left))
+            if left > 0 { Ok(f64::from(left)) } else { Err(Cancelled) }
         };
-        assert!(minimise(&[0.0], STOP, slope).is_none());
+        assert!(minimise(&[0.0], STOP, slope).is_err());
     }
 }

@@ -7,6 +7,7 @@ use super::groups::Groups;
 use super::lbfgs::{Stop, minimise};
 use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, Trend};
 use crate::random_order;
+use crate::watch::{Cancelled, Watch};
 
 /// How a Gaussian process is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -38,41 +39,30 @@ const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
 const STARTS: [(f64, f64); 3] = [(1.0, 1e-2), (0.3, 1e-3), (3.0, 1e-5)];
 
 impl Regression {
-    /// Finds the hyperparameters and the posterior; `None` when `keep_going`, asked often, says no.
+    /// Finds the hyperparameters and the posterior.
     ///
     /// All outputs share length scales and noise ratio; each has its own signal variance. The logarithms of the
     /// hyperparameters have normal priors so wide (a factor of e² for length scales, e⁵ for a fitted noise ratio, one
     /// standard deviation each way) that they matter only where a handful of rows say nothing.
     ///
     /// # Errors
-    /// [`RegressionError`], with the row or value that no regression can use.
-    pub fn fit(
-        &self,
-        samples: Samples,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<GaussianProcess>, RegressionError> {
+    /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
+    pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::of(samples)?;
-        let Some(found) = self.search(&groups, keep_going) else { return Ok(None) };
-        GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found).map(Some)
+        let found = self.search(&groups, watch)?;
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found)
     }
 
     /// As [`Self::fit`], every output with hyperparameters of its own: one process an output.
     ///
     /// # Errors
     /// [`RegressionError`], with the row or value that no regression can use.
-    pub fn fit_each(
-        &self,
-        samples: Samples,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Vec<GaussianProcess>>, RegressionError> {
+    pub fn fit_each(&self, samples: Samples, watch: Watch) -> Result<Vec<GaussianProcess>, RegressionError> {
         let mut processes = Vec::with_capacity(samples.outputs.ncols());
         for column in samples.outputs.axis_chunks_iter(Axis(1), 1) {
-            let Some(process) = self.fit(Samples { outputs: column, ..samples }, keep_going)? else {
-                return Ok(None);
-            };
-            processes.push(process);
+            processes.push(self.fit(Samples { outputs: column, ..samples }, watch)?);
         }
-        Ok(Some(processes))
+        Ok(processes)
     }
 
     /// The posterior with hyperparameters that are known.
@@ -89,7 +79,7 @@ impl Regression {
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters)
     }
 
-    fn search(&self, groups: &Groups, keep_going: &mut dyn FnMut() -> bool) -> Option<Hyperparameters> {
+    fn search(&self, groups: &Groups, watch: Watch) -> Result<Hyperparameters, Cancelled> {
         let prior = Prior::of(groups);
         let order = random_order(groups.len(), self.seed);
         let first = |count: usize| {
@@ -99,15 +89,15 @@ impl Regression {
         };
         let search = groups.len().min(self.search_points.max(2));
         let trial = first(search.min(TRIAL_POINTS));
-        let mut best = self.follow(&trial, &prior, &prior.start(STARTS[0]), TRIAL, keep_going)?;
+        let mut best = self.follow(&trial, &prior, &prior.start(STARTS[0]), TRIAL, watch)?;
         for start in &STARTS[1..] {
-            let found = self.follow(&trial, &prior, &prior.start(*start), TRIAL, keep_going)?;
+            let found = self.follow(&trial, &prior, &prior.start(*start), TRIAL, watch)?;
             if found.1 < best.1 {
                 best = found;
             }
         }
-        let best = self.follow(&first(search), &prior, &best.0, FINAL, keep_going)?;
-        Some(Hyperparameters::from_logarithms(&best.0))
+        let best = self.follow(&first(search), &prior, &best.0, FINAL, watch)?;
+        Ok(Hyperparameters::from_logarithms(&best.0))
     }
 
     /// Logarithms of the hyperparameters that maximise posterior density from `start`, and minus its logarithm.
@@ -117,23 +107,21 @@ impl Regression {
         prior: &Prior,
         start: &[f64],
         stop: Stop,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Option<(Vec<f64>, f64)> {
+        watch: Watch,
+    ) -> Result<(Vec<f64>, f64), Cancelled> {
         let evidence = Evidence { groups, kernel: self.kernel, trend: self.trend };
         let minimum = minimise(start, stop, |logarithms, gradient| {
-            if !keep_going() {
-                return None;
-            }
+            watch.round()?;
             let hyperparameters = Hyperparameters::from_logarithms(logarithms);
             let log_evidence = evidence.with_gradient(&hyperparameters, gradient);
             // No factor: a cliff for the search to back away from.
             let Some(log_evidence) = log_evidence.ok().filter(|value| value.is_finite()) else {
-                return Some(f64::INFINITY);
+                return Ok(f64::INFINITY);
             };
             gradient.iter_mut().for_each(|slope| *slope = -*slope);
-            Some(prior.minus_log_density(logarithms, gradient) - log_evidence)
+            Ok(prior.minus_log_density(logarithms, gradient) - log_evidence)
         })?;
-        Some((minimum.point, minimum.value))
+        Ok((minimum.point, minimum.value))
     }
 }
 

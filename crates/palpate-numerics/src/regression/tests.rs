@@ -1,5 +1,6 @@
 //! Properties of the regression, against a dense computation on every row as it came.
 
+use crate::watch::{Cancelled, Watch};
 use ndarray::{Array1, Array2, array};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -17,7 +18,7 @@ fn samples<'a>(x: &'a Array2<f64>, y: &'a Array2<f64>, noise: Option<&'a [f64]>)
 }
 
 fn fit(regression: Regression, samples: Samples) -> GaussianProcess {
-    regression.fit(samples, &mut || true).unwrap().unwrap()
+    regression.fit(samples, Watch::NONE).unwrap()
 }
 
 /// Points in a square, every one `repeats` times, and two noisy outputs.
@@ -292,7 +293,7 @@ fn awkward_samples_give_an_answer() {
 #[test]
 fn samples_that_are_none_are_refused() {
     let refused = |x: &Array2<f64>, y: &Array2<f64>, noise: Option<&[f64]>| {
-        Regression::default().fit(samples(x, y, noise), &mut || true).unwrap_err()
+        Regression::default().fit(samples(x, y, noise), Watch::NONE).unwrap_err()
     };
     let (x, y) = (array![[0.0], [1.0]], array![[0.0], [1.0]]);
     assert!(matches!(
@@ -310,7 +311,9 @@ fn samples_that_are_none_are_refused() {
     let h = Hyperparameters { length_scales: vec![0.0], noise_ratio: 1.0 };
     let error = Regression::default().condition(samples(&x, &y, None), &h).unwrap_err();
     assert!(matches!(error, RegressionError::Hyperparameter { number: 1, .. }));
-    assert!(Regression::default().fit(samples(&x, &y, None), &mut || false).unwrap().is_none());
+    let stop = |_| false;
+    let stopped = Regression::default().fit(samples(&x, &y, None), Watch::new(&stop)).unwrap_err();
+    assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
 #[test]

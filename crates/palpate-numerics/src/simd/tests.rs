@@ -44,7 +44,8 @@ fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     let eight = std::array::from_fn(|i| V::load(&numbers(shift + i)));
     let vectors = [a.truncate(), a.or((shift * 37) as u8, b), V::sums(&eight)].map(V::to_array);
     assert_eq!(vectors[2], eight.map(V::sum));
-    let bits = [a.at_most(b), a.at_most(a), a.below(b), a.below(a), nan.at_most(a), nan.below(a), a.below(nan)];
+    let bits =
+        [a.at_most(b), a.at_most(a), a.below(b), a.below(a), nan.at_most(a), nan.below(a), a.below(nan)];
     (vectors.to_vec(), bits.to_vec(), a.sum())
 }
 

@@ -110,7 +110,8 @@ macro_rules! transpose {
                         }
                         let [a, b, c, d] = squares;
                         let (a, b, c, d) = (transmute(a), transmute(b), transmute(c), transmute(d));
-                        let (ab_low, ab_high, cd_low, cd_high) = ($low(a, b), $high(a, b), $low(c, d), $high(c, d));
+                        let (ab_low, ab_high, cd_low, cd_high) =
+                            ($low(a, b), $high(a, b), $low(c, d), $high(c, d));
                         columns[4 * half].0[r] = $shuffle::<0b01_00_01_00>(ab_low, cd_low);
                         columns[4 * half + 1].0[r] = $shuffle::<0b11_10_11_10>(ab_low, cd_low);
                         columns[4 * half + 2].0[r] = $shuffle::<0b01_00_01_00>(ab_high, cd_high);

@@ -14,8 +14,10 @@ use serde::Serialize;
 
 use palpate_estimators::centroid::CentroidConfig;
 use palpate_estimators::estimator::EstimatorConfig;
-use palpate_estimators::evaluation::{Trial, contenders, try_estimator};
+use palpate_estimators::estimator::contenders;
+use palpate_estimators::evaluation::{Trial, try_estimator};
 use palpate_mechanics::sensing::{Layout, Sensor};
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
@@ -70,34 +72,38 @@ pub struct DeadAreaFindings {
     pub left_out: Vec<(String, &'static str, usize, String)>,
 }
 
+/// Why a study of dead areas does not come to its end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DeadAreasError {
+    /// The rig cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] RigSimulationError),
+    /// It was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
 impl DeadAreas {
-    /// Runs the study; `None` when `keep_going`, asked often, says no.
+    /// Runs the study.
     ///
     /// # Errors
-    /// [`RigSimulationError`] for a rig without a model, a force or training positions.
-    pub fn run(
-        &self,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<DeadAreaFindings>, RigSimulationError> {
+    /// [`DeadAreasError`] for a rig without a model, a force or training positions, or when `watch` stopped it.
+    pub fn run(&self, watch: Watch) -> Result<DeadAreaFindings, DeadAreasError> {
         let mut findings = DeadAreaFindings { rows: Vec::new(), left_out: Vec::new() };
         for &count in &self.counts {
             let rig = self.with_sensors(count);
             let trials = rig.trials(self.calibrations, self.seed)?;
             for estimator in self.estimators(&rig) {
-                if !self.judge("distributive", &rig, &estimator, &trials, &mut findings, keep_going) {
-                    return Ok(None);
-                }
+                self.judge("distributive", &rig, &estimator, &trials, &mut findings, watch)?;
             }
             for spread in [Spread::Metres(FIXED_SPREAD_M), Spread::Pitches(0.5)] {
                 let array = ArraySensor::like(&rig, count, spread)?;
                 let trials = array.trials(self.calibrations, self.seed);
                 let estimator = EstimatorConfig::Centroid(CentroidConfig);
-                if !self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, keep_going) {
-                    return Ok(None);
-                }
+                self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
             }
         }
-        Ok(Some(findings))
+        Ok(findings)
     }
 
     /// The most often that [`DeadAreas::run`] asks whether to go on while it fits.
@@ -133,7 +139,7 @@ impl DeadAreas {
         estimators
     }
 
-    /// Adds an estimator's row; false when it was stopped.
+    /// Adds an estimator's row.
     fn judge(
         &self,
         sensing: &str,
@@ -141,13 +147,12 @@ impl DeadAreas {
         estimator: &EstimatorConfig,
         trials: &[Trial],
         findings: &mut DeadAreaFindings,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> bool {
+        watch: Watch,
+    ) -> Result<(), Cancelled> {
         let sensors = rig.bench.layout.len();
-        match try_estimator(&rig.bench, estimator, trials, self.seed, &|| 0.0, keep_going) {
-            Ok(None) => return false,
-            Ok(Some(comparison)) => {
-                let evaluation = &comparison.evaluation;
+        match try_estimator(&rig.bench, estimator, trials, self.seed, &|| 0.0, watch) {
+            Ok(tried) => {
+                let evaluation = &tried.evaluation;
                 findings.rows.push(DeadAreaRow {
                     sensing: sensing.to_owned(),
                     estimator: estimator.kind(),
@@ -157,11 +162,12 @@ impl DeadAreas {
                     folded: FoldedErrors::of(evaluation, &rig.bench.layout, self.tolerance_m),
                 });
             }
+            Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
             Err(error) => {
                 findings.left_out.push((sensing.to_owned(), estimator.kind(), sensors, error.to_string()));
             }
         }
-        true
+        Ok(())
     }
 }
 

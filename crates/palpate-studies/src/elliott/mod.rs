@@ -12,18 +12,19 @@ pub use karhunen_loeve::KarhunenLoeve;
 use karhunen_loeve::{raw_layout, without_model};
 use serde::Serialize;
 
-use palpate_estimators::estimator::{
-    EstimatorConfig, FitError, Fitting, Locator, ReadingError, Track, TrackerConfig,
-};
-use palpate_estimators::evaluation::{Evaluation, FollowError, Spread, TrackErrors, Trial, follow};
+use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, ReadingError, Track, TrackerConfig};
+use palpate_estimators::evaluation::{Evaluation, Spread, Trial};
+use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{InputScale, NetworkConfig};
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::SimulateError;
+use palpate_estimators::track_errors::{FollowError, TrackErrors, follow};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Bound;
 use palpate_mechanics::sensing::NoiseError;
 use palpate_mechanics::surface::{Extent, ResponseGradient};
+use palpate_numerics::watch::Watch;
 use palpate_rig::{Rig, RigSimulationError};
 
 /// The bench of the study, as a rig.
@@ -72,6 +73,18 @@ pub enum Chain {
     Filter,
     /// The same, with all readings.
     Smoother,
+}
+
+impl std::fmt::Display for Chain {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Chain::Components(count) => return write!(out, "network on {count} components"),
+            Chain::Readings => "network on all readings",
+            Chain::Influence => "influence locator",
+            Chain::Filter => "influence locator, filter",
+            Chain::Smoother => "influence locator, smoother",
+        })
+    }
 }
 
 /// How one chain did, over the calibrations.
@@ -144,12 +157,12 @@ struct Judged {
 }
 
 impl Elliott {
-    /// Runs the study; `None` when `keep_going`, asked often, says no.
+    /// Runs the study.
     ///
     /// # Errors
     /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
     /// are not there.
-    pub fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<ElliottFindings>, ElliottError> {
+    pub fn run(&self, watch: Watch) -> Result<ElliottFindings, ElliottError> {
         let sensors = self.rig.bench.layout.len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
             return Err(ElliottError::Components { components, sensors });
@@ -162,7 +175,7 @@ impl Elliott {
             let moving = self.rig.simulate_moving(seed.wrapping_add(OTHER_NOISE))?;
             let reduction = KarhunenLoeve::of(&trial.training, &noise_sd);
             let bench = TrialBench { trial, moving: &moving, reduction: &reduction, seed };
-            let Some(every) = self.judge(&bench, keep_going)? else { return Ok(None) };
+            let every = self.judge(&bench, watch)?;
             for (judged, one) in judged.iter_mut().zip(every) {
                 judged.push(one);
             }
@@ -173,7 +186,7 @@ impl Elliott {
         let row = |(chain, judged): (Chain, Vec<Judged>)| self.row(chain, &judged, first, &contacts);
         let rows = self.chains().into_iter().zip(judged).map(row).collect::<Option<_>>();
         let rows = rows.ok_or(ElliottError::NoCalibration)?;
-        Ok(Some(ElliottFindings { variance_percent: first.variance_percent(), rows }))
+        Ok(ElliottFindings { variance_percent: first.variance_percent(), rows })
     }
 
     /// The most often that [`Elliott::run`] asks whether to go on while it fits.
@@ -203,11 +216,7 @@ impl Elliott {
     }
 
     /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
-    fn judge(
-        &self,
-        bench: &TrialBench,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Vec<Judged>>, ElliottError> {
+    fn judge(&self, bench: &TrialBench, watch: Watch) -> Result<Vec<Judged>, ElliottError> {
         let whole = &self.rig.bench;
         let network = EstimatorConfig::Network(self.network());
         let mut judged = Vec::new();
@@ -224,15 +233,15 @@ impl Elliott {
                 columns: None,
             };
             let bench = TrialBench { trial: &trial, moving: &moving, ..*bench };
-            let Some(locator) = bench.fit(&reduced, &network, keep_going)? else { return Ok(None) };
+            let locator = bench.fit(&reduced, &network, watch)?;
             judged.push(self.judge_readings(&locator, &bench)?);
         }
-        let Some(locator) = bench.fit(whole, &network, keep_going)? else { return Ok(None) };
+        let locator = bench.fit(whole, &network, watch)?;
         judged.push(self.judge_readings(&locator, bench)?);
-        let Some(locator) = bench.fit(whole, &self.rig.estimator, keep_going)? else { return Ok(None) };
+        let locator = bench.fit(whole, &self.rig.estimator, watch)?;
         judged.push(self.judge_readings(&locator, bench)?);
         judged.extend(self.judge_tracks(&locator, bench)?);
-        Ok(Some(judged))
+        Ok(judged)
     }
 
     /// A locator's errors, reading by reading.
@@ -315,13 +324,8 @@ struct TrialBench<'a> {
 }
 
 impl TrialBench<'_> {
-    fn fit(
-        &self,
-        of: &Bench,
-        estimator: &EstimatorConfig,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Locator>, FitError> {
-        Fitting::prepare(of, estimator, &self.trial.training)?.fit(self.seed, keep_going)
+    fn fit(&self, of: &Bench, estimator: &EstimatorConfig, watch: Watch) -> Result<Locator, FitError> {
+        estimator.fit_task(FitTask { bench: of, recording: &self.trial.training, seed: self.seed, watch })
     }
 }
 

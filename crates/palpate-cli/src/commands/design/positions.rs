@@ -7,14 +7,14 @@ mod tables;
 
 use super::say_files;
 use crate::failure::{Complaint, Failure};
-use crate::progress::StageWatch;
+use crate::progress::Observer;
 use crate::recording_files::RecordingFiles;
 use crate::{input, output};
-use palpate_design::positions::{Budget, Placed, PositionError, PositionProblem, Stage, best_placed};
+use palpate_design::positions::{Budget, Placed, PositionError, PositionProblem, best_placed};
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{PositionDesignReport, position_design_report};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 
 /// Where to press: training positions by rules and by search, scored by the location error after calibrating.
 ///
@@ -92,12 +92,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         budget(arguments, &rig),
     )
     .map_err(complain)?;
-    let watch = Mutex::new(StageWatch::new());
-    let keep_going = |stage: Stage, share| {
-        watch.lock().unwrap_or_else(PoisonError::into_inner).keep_going(stage.in_words(), share)
-    };
-    let placed = problem.all(&keep_going).map_err(complain)?.ok_or_else(Failure::stopped)?;
-    drop(watch);
+    let observer = Observer::of_stages();
+    let observe = |progress| observer.observe(progress);
+    let placed = problem.all(Watch::new(&observe)).map_err(complain)?;
+    drop(observer);
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
         rig_file::write(path, &text, best, problem.budget().repeats, problem.is_plane())?;
@@ -145,5 +143,8 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 fn complaint(error: &PositionError, rig: &Path) -> Failure {
+    if Cancelled::caused(error) {
+        return Failure::stopped();
+    }
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
 }

@@ -7,15 +7,17 @@ mod tables;
 
 use super::say_files;
 use crate::failure::{Complaint, Failure};
-use crate::progress::StageWatch;
+use crate::progress::Observer;
 use crate::{input, output};
 use counts::{Counts, counts};
+use palpate_design::sensors::CalibrationError;
 use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::limit::LimitError;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{SensorDesignReport, sensor_design_report};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
@@ -82,13 +84,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::check_writable(path)?;
     }
     let (bench, design) = what_to_design(arguments, &rig)?;
-    let mut watch = StageWatch::new();
+    let observer = Observer::of_stages();
+    let observe = |progress| observer.observe(progress);
+    let watch = Watch::new(&observe);
     let problem =
-        SensorProblem::new(&bench, &design, &mut |stage, share| watch.keep_going(stage.in_words(), share))
-            .map_err(|error| complaint(&error, &arguments.rig))?
-            .ok_or_else(Failure::stopped)?;
-    let outcome = outcome(arguments, &rig, &problem, &mut watch)?;
-    drop(watch);
+        SensorProblem::new(&bench, &design, watch).map_err(|error| complaint(&error, &arguments.rig))?;
+    let outcome = outcome(arguments, &rig, &problem, watch)?;
+    drop(observer);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
         rig_file::write(path, &text, &best.layout)?;
     }
@@ -124,19 +126,13 @@ fn outcome<'a>(
     arguments: &'a Arguments,
     rig: &Rig,
     problem: &'a SensorProblem<'a>,
-    watch: &mut StageWatch,
+    watch: Watch,
 ) -> Result<Outcome<'a>, Failure> {
     let complain = |error: DesignError| complaint(&error, &arguments.rig);
-    let designed = problem.all(arguments.seed, &mut |stage, share| watch.keep_going(stage.in_words(), share));
-    let designed = designed.map_err(complain)?.ok_or_else(Failure::stopped)?;
+    let designed = problem.all(arguments.seed, watch).map_err(complain)?;
     let counts = match &arguments.counts {
         None => Vec::new(),
-        Some(range) => {
-            let curve = problem.counts(range.clone(), arguments.seed, &mut |stage, share| {
-                watch.keep_going(stage.in_words(), share)
-            });
-            curve.map_err(complain)?.ok_or_else(Failure::stopped)?
-        }
+        Some(range) => problem.counts(range.clone(), arguments.seed, watch).map_err(complain)?,
     };
     let calibrations = arguments.verify.unwrap_or(if arguments.out.is_some() { 3 } else { 0 });
     let mut verified = Vec::new();
@@ -147,11 +143,15 @@ fn outcome<'a>(
                 &rig.estimator,
                 usize::from(calibrations),
                 arguments.seed,
-                &mut |stage, share| watch.keep_going(stage.in_words(), share),
+                watch,
             );
-            let complain =
-                |error| Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display()));
-            verified.push((designed.method, verification.map_err(complain)?.ok_or_else(Failure::stopped)?));
+            let complain = |error: CalibrationError| match Failure::of(&error) {
+                Failure::BadInput(_) => {
+                    Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
+                }
+                stopped => stopped,
+            };
+            verified.push((designed.method, verification.map_err(complain)?));
         }
     }
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
@@ -178,5 +178,8 @@ fn write_report(outcome: &Outcome, bench: &Bench, out: &Path) -> Result<(), Fail
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {
+    if Cancelled::caused(error) {
+        return Failure::stopped();
+    }
     Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
 }

@@ -1,11 +1,11 @@
 //! Studies that are built in beside the paper's: run whole, reported, and told as a table.
 
 use super::Arguments;
-use crate::failure::{Complaint, Failure};
+use crate::failure::Failure;
 use crate::output;
-use crate::progress::FitWatch;
-use palpate_report::{ReportError, ReportFile};
-use std::fmt::Display;
+use crate::progress::Observer;
+use palpate_numerics::watch::Watch;
+use palpate_report::ReportFile;
 use std::path::Path;
 
 /// What sets one such study apart from another.
@@ -13,7 +13,7 @@ pub trait BuiltIn {
     /// The name under which `palpate study` knows it.
     const NAME: &'static str;
     type Findings: serde::Serialize;
-    type Error: Display;
+    type Error: std::error::Error + 'static;
 
     /// Calibrations, and the seed of the first.
     fn seeds(&self) -> (u64, u64);
@@ -21,10 +21,10 @@ pub trait BuiltIn {
     /// The most often that [`BuiltIn::run`] asks whether to go on.
     fn most_rounds(&self) -> u64;
 
-    /// What it finds; `None` when `keep_going` says no.
-    fn run(&self, keep_going: &mut dyn FnMut() -> bool) -> Result<Option<Self::Findings>, Self::Error>;
+    /// What it finds.
+    fn run(&self, watch: Watch) -> Result<Self::Findings, Self::Error>;
 
-    fn report(&self, findings: &Self::Findings) -> Result<Vec<ReportFile>, ReportError>;
+    fn report(&self, findings: &Self::Findings) -> Vec<ReportFile>;
 
     /// The findings for people.
     fn tell(findings: &Self::Findings) -> String;
@@ -43,10 +43,10 @@ struct ResultsFile<F> {
 
 /// Runs a study, writes its report and results, and prints them.
 pub fn run<S: BuiltIn>(study: &S, arguments: &Arguments) -> Result<(), Failure> {
-    let mut watch = FitWatch::new(study.most_rounds());
-    let findings = study.run(&mut || watch.keep_going()).map_err(Complaint::new)?;
-    drop(watch);
-    let findings = findings.ok_or_else(Failure::stopped)?;
+    let observer = Observer::of_rounds(study.most_rounds());
+    let observe = |progress| observer.observe(progress);
+    let findings = study.run(Watch::new(&observe)).map_err(|error| Failure::of(&error))?;
+    drop(observer);
     let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(S::NAME));
     output::write_report(&out, study.report(&findings))?;
     let (calibrations, seed) = study.seeds();

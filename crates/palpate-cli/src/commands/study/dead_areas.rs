@@ -5,9 +5,9 @@ use super::built_in::BuiltIn;
 use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
-use palpate_report::{ReportError, ReportFile, dead_areas_report};
-use palpate_rig::RigSimulationError;
-use palpate_studies::dead_areas::{COUNTS, DeadAreaFindings, DeadAreas, RIG_TOML};
+use palpate_numerics::watch::Watch;
+use palpate_report::{ReportFile, dead_areas_report};
+use palpate_studies::dead_areas::{COUNTS, DeadAreaFindings, DeadAreas, DeadAreasError, RIG_TOML};
 use std::path::Path;
 
 /// Calibrations at each count, unless `--seeds` says another number.
@@ -29,7 +29,7 @@ pub fn study(arguments: &Arguments) -> Result<DeadAreas, Failure> {
 impl BuiltIn for DeadAreas {
     const NAME: &'static str = "dead-areas";
     type Findings = DeadAreaFindings;
-    type Error = RigSimulationError;
+    type Error = DeadAreasError;
 
     fn seeds(&self) -> (u64, u64) {
         (self.calibrations, self.seed)
@@ -39,14 +39,11 @@ impl BuiltIn for DeadAreas {
         self.most_rounds()
     }
 
-    fn run(
-        &self,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<DeadAreaFindings>, RigSimulationError> {
-        self.run(keep_going)
+    fn run(&self, watch: Watch) -> Result<DeadAreaFindings, DeadAreasError> {
+        self.run(watch)
     }
 
-    fn report(&self, findings: &DeadAreaFindings) -> Result<Vec<ReportFile>, ReportError> {
+    fn report(&self, findings: &DeadAreaFindings) -> Vec<ReportFile> {
         dead_areas_report(self, findings)
     }
 

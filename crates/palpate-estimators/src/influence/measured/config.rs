@@ -1,9 +1,11 @@
 //! How the surface is to be learnt, and why it cannot be.
 
 use super::Scale;
+use crate::fit::ChannelMismatch;
 use crate::recording::TooFewPositions;
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
+use palpate_numerics::watch::Cancelled;
 
 /// How readings are to be learnt as a function of position and hidden coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,4 +64,10 @@ pub enum MeasuredError {
     /// The noise of the channels has no whitening.
     #[error("the noise covariance of the channels cannot be factored: {0}")]
     Noise(#[from] NotPositiveDefinite),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }

@@ -1,5 +1,6 @@
 //! From a recording to a locator.
 
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::collections::HashMap;
 
 use ndarray::{Array1, Array2};
@@ -8,7 +9,7 @@ use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
 use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
-use crate::method::{Fit, FitTask};
+use crate::fit::{Fit, FitTask};
 use crate::recording::Recording;
 use crate::setup::Bench;
 use palpate_numerics::chi_squared_bound;
@@ -25,15 +26,11 @@ const MOST_HIDDEN_OF_PLANE: usize = 16;
 const LEAST_NOISE: f64 = 1e-10;
 
 impl Fit for MeasuredConfig {
-    type Locator = MeasuredLocator;
+    type Method = MeasuredLocator;
     type Error = MeasuredError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<MeasuredLocator>, MeasuredError> {
-        let FitTask { bench, recording, seed } = task;
+    fn fit_method(&self, task: FitTask) -> Result<MeasuredLocator, MeasuredError> {
+        let FitTask { bench, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let (role, hidden) = hidden_coordinate(bench, recording)?;
         let presses = Presses::of(self, bench, recording, hidden.as_deref())?;
@@ -44,7 +41,7 @@ impl Fit for MeasuredConfig {
         };
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
-        let Some(process) = regression.fit(samples, keep_going)? else { return Ok(None) };
+        let process = regression.fit(samples, watch)?;
         let whitening = presses.whitening(&process, role)?;
         // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
         let whitening = match misfit(&presses, &regression, &process, &whitening)? {
@@ -52,11 +49,9 @@ impl Fit for MeasuredConfig {
             None => whitening,
         };
         let axes = presses.axes(&process, bench);
-        let Some(coarse) = presses.table(axes, &process, &whitening, keep_going) else { return Ok(None) };
+        let coarse = presses.table(axes, &process, &whitening, watch)?;
         let finer = presses.finer(axes, coarse.too_coarse());
-        let table =
-            if finer == axes { Some(coarse) } else { presses.table(finer, &process, &whitening, keep_going) };
-        let Some(table) = table else { return Ok(None) };
+        let table = if finer == axes { coarse } else { presses.table(finer, &process, &whitening, watch)? };
         // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
         let factor = table.too_coarse();
         let (table, whitening) = (table.widened(factor), whitening.widened(factor));
@@ -70,7 +65,7 @@ impl Fit for MeasuredConfig {
             force_n: bench.force_n,
         };
         locator.residual_limit = residual_limit(&locator, recording);
-        Ok(Some(locator))
+        Ok(locator)
     }
 }
 
@@ -189,14 +184,14 @@ impl Presses {
         Ok(Whitening::of(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
     }
 
-    /// The process at every node; `None` when `keep_going` says no.
+    /// The process at every node.
     fn table(
         &self,
         axes: [Axis; 3],
         process: &GaussianProcess,
         whitening: &Whitening,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Option<Table> {
+        watch: Watch,
+    ) -> Result<Table, Cancelled> {
         let [x, y, hidden] = axes;
         let channels = self.means.ncols();
         let nodes = x.count * y.count * hidden.count;
@@ -206,8 +201,8 @@ impl Presses {
         let mut white = vec![0.0; channels];
         let signal = process.signal_variance(0);
         for node in 0..nodes {
-            if node % 64 == 0 && !keep_going() {
-                return None;
+            if node % 64 == 0 {
+                watch.round()?;
             }
             let place = node / hidden.count;
             let mut at = vec![x.at((place / y.count) as f64)];
@@ -221,7 +216,7 @@ impl Presses {
             means.extend_from_slice(&white);
             variances.push(if signal > 0.0 { variance[0] / signal } else { 0.0 });
         }
-        Some(Table::new(axes, means, variances, channels))
+        Ok(Table::new(axes, means, variances, channels))
     }
 
     /// The axes of position with about `factor` times the nodes, as far as there may be so many.

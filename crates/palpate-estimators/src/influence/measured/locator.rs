@@ -4,7 +4,7 @@ use palpate_core::{Estimate, Status};
 
 use super::posterior::Posterior;
 use super::{Axis, Scale, Table, Whitening};
-use crate::method::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 

@@ -1,6 +1,7 @@
 //! The method on surfaces whose readings are known functions, and on other people's recordings by the protocol that
 //! comes with them.
 
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::fs::File;
 
 use palpate_core::Status;
@@ -9,9 +10,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad, strip};
 use crate::influence::{InfluenceConfig, InfluenceSource};
-use crate::method::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
@@ -38,8 +39,8 @@ fn recording_of(rows: Vec<Row>) -> Recording {
 }
 
 fn try_fit(bench: &Bench, recording: &Recording) -> Result<MeasuredLocator, MeasuredError> {
-    let task = FitTask { bench, recording, seed: 1 };
-    MeasuredConfig::default().fit(task, &mut || true).map(|locator| locator.unwrap())
+    let task = FitTask::new(bench, recording).seed(1);
+    MeasuredConfig::default().fit_method(task)
 }
 
 fn fit(bench: &Bench, recording: &Recording) -> MeasuredLocator {
@@ -193,10 +194,12 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
     }
     let logarithms = MeasuredConfig { readings: Some(Scale::Logarithm), ..MeasuredConfig::default() };
     let recording = recording_of(vec![row(0.01, [1.0, 2.0]), row(0.02, [1.0, -2.0])]);
-    let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
-    let error = logarithms.fit(task, &mut || true).unwrap_err();
+    let task = FitTask::new(&bench, &recording);
+    let error = logarithms.fit_method(task).unwrap_err();
     assert_eq!(error, MeasuredError::NoLogarithm { what: "a reading", row: 2, value: -2.0 });
-    assert_eq!(MeasuredConfig::default().fit(task, &mut || false), Ok(None));
+    let stop = |_| false;
+    let stopped = MeasuredConfig::default().fit_method(task.watch(Watch::new(&stop))).unwrap_err();
+    assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
 #[test]
@@ -301,8 +304,8 @@ fn settings_that_need_mechanics_are_refused() {
     let recording = Recording { channels, kinds, rows: vec![], provenance };
     let good = InfluenceConfig::default();
     let refused = |config: InfluenceConfig| {
-        let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
-        config.fit(task, &mut || true).unwrap_err().to_string()
+        let task = FitTask::new(&bench, &recording);
+        config.fit_method(task).unwrap_err().to_string()
     };
     assert!(refused(InfluenceConfig { from: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
     assert!(refused(InfluenceConfig { contacts: 2, ..good }).contains("several contacts"));

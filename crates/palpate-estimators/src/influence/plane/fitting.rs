@@ -2,18 +2,17 @@
 
 use super::locator::PlaneLocator;
 use super::table::PlaneTable;
+use crate::fit::FitTask;
 use crate::influence::InfluenceConfig;
 use crate::influence::fitting::{InfluenceFitError, dead, force_belief};
 use crate::influence::learning::{Learnt, learn};
-use crate::method::FitTask;
 use palpate_mechanics::contact::Position;
 
-/// Fits the influence functions of a plane with a model; `None` when `keep_going` says no.
+/// Fits the influence functions of a plane with a model.
 pub(in crate::influence) fn fit_plane(
     config: InfluenceConfig,
     task: FitTask,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Result<Option<PlaneLocator>, InfluenceFitError> {
+) -> Result<PlaneLocator, InfluenceFitError> {
     if config.contacts > 1 {
         return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
     }
@@ -25,6 +24,6 @@ pub(in crate::influence) fn fit_plane(
             table.variances[node * table.sensors + s] = learnt.variance(node);
         }
     };
-    let Some(channels) = learn(config.from, task, &places, fill, keep_going)? else { return Ok(None) };
-    Ok(Some(PlaneLocator::new(table, channels, dead(task.bench), force_belief(config, task.bench))))
+    let channels = learn(config.from, task, &places, fill)?;
+    Ok(PlaneLocator::new(table, channels, dead(task.bench), force_belief(config, task.bench)))
 }

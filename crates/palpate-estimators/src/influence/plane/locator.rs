@@ -3,9 +3,9 @@
 use super::answer::locate;
 use super::search::{Scratch, Search};
 use super::table::PlaneTable;
+use crate::fit::{Locate, LocatorFault};
 use crate::influence::belief::ForceBelief;
 use crate::influence::channels::{self, Channels};
-use crate::method::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};

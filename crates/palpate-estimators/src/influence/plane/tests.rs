@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::arrangement::cells;
+use crate::fit::{FitTask, Locate};
 use crate::fixtures::{Example, plate};
 use crate::influence::{ForceBelief, InfluenceConfig, InfluenceFitError, InfluenceSource};
-use crate::method::{FitTask, Locate};
 use crate::recording::Recording;
 use crate::setup::Bench;
 use crate::simulate::CleanSensors;
@@ -32,7 +32,7 @@ const NOISE: ChannelModel = ChannelModel {
 };
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> PlaneLocator {
-    config.fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true).unwrap().unwrap()
+    config.fit_plane(FitTask::new(bench, recording)).unwrap()
 }
 
 fn sensors(bench: &Bench) -> CleanSensors<'_> {
@@ -96,7 +96,7 @@ fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch>
             let is_covered = found.uncertainty.map(|uncertainty| {
                 let [xx, xy, _, yy, ..] = uncertainty.covariance;
                 let square = dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx;
-                square <= super::modes::ELLIPSE_95 * (xx * yy - xy * xy)
+                square <= palpate_numerics::ELLIPSE_95 * (xx * yy - xy * xy)
             });
             let limit_m = [bound.sd_position_m, bound.mean_error_m()];
             touches.push(Touch { error_m: dx.hypot(dy), limit_m, is_covered });
@@ -310,8 +310,8 @@ fn what_a_plane_cannot_do_is_refused_in_words() {
     let rig = rig();
     let mut recording = rig.simulate(1);
     let refuse = |config: InfluenceConfig, recording: &Recording| {
-        let task = FitTask { bench: &rig.bench, recording, seed: 0 };
-        config.fit_plane(task, &mut || true).unwrap_err()
+        let task = FitTask::new(&rig.bench, recording);
+        config.fit_plane(task).unwrap_err()
     };
     let several = refuse(InfluenceConfig { contacts: 2, ..InfluenceConfig::default() }, &recording);
     assert_eq!(

@@ -1,13 +1,13 @@
 //! A batch against readings one by one, and every instruction set against plain arrays.
 
 use super::{fit, noisy};
+use crate::fit::Locate;
 use crate::fixtures::paper;
 use crate::influence::InfluenceConfig;
 use crate::influence::answer::NOTHING;
 use crate::influence::batch::{LocateRows, Rows};
 use crate::influence::belief::ForceBelief;
 use crate::influence::scratch::Scratch;
-use crate::method::Locate;
 use crate::setup::Bench;
 use palpate_core::{Estimate, Status};
 use palpate_numerics::simd::InstructionSet;

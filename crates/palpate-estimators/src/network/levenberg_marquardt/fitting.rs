@@ -1,14 +1,16 @@
 //! From a recording to an ensemble of networks.
 
 use ndarray::Array2;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::training::{Trained, Training};
 use super::{LevenbergMarquardtLocator, Member, NetworkInputs, OutputScale};
 use crate::features::NoFeatures;
-use crate::method::{Fit, FitTask};
+use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, TooFewPositions};
 use crate::setup::Bench;
+use palpate_numerics::mean_and_variance;
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
@@ -60,17 +62,19 @@ pub enum LevenbergMarquardtFitError {
         /// How many were tried.
         trainings: usize,
     },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 impl Fit for LevenbergMarquardtConfig {
-    type Locator = LevenbergMarquardtLocator;
+    type Method = LevenbergMarquardtLocator;
     type Error = LevenbergMarquardtFitError;
 
-    fn fit(
-        &self,
-        task: FitTask,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<LevenbergMarquardtLocator>, LevenbergMarquardtFitError> {
+    fn fit_method(&self, task: FitTask) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
         self.check()?;
         task.recording.check_distinct_positions(2)?;
         let inputs = NetworkInputs::of(&task.bench.layout, task.recording)?;
@@ -84,15 +88,15 @@ impl Fit for LevenbergMarquardtConfig {
             targets,
             max_iterations: self.max_iterations,
         };
-        let Some(members) = self.ensemble(&training, task.seed, keep_going)? else { return Ok(None) };
-        Ok(Some(LevenbergMarquardtLocator {
+        let members = self.ensemble(&training, task.seed, task.watch)?;
+        Ok(LevenbergMarquardtLocator {
             extent: task.bench.surface.extent(),
             force_n: task.bench.force_n,
             inputs,
             topology,
             scales,
             members,
-        }))
+        })
     }
 }
 
@@ -121,28 +125,20 @@ impl LevenbergMarquardtConfig {
         &self,
         training: &Training,
         seed: u64,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Vec<Member>>, LevenbergMarquardtFitError> {
+        watch: Watch,
+    ) -> Result<Vec<Member>, LevenbergMarquardtFitError> {
         let trainings = 2 * self.ensemble;
         let mut trained: Vec<Trained> = Vec::new();
         for i in 0..trainings as u64 {
             let seed = seed.wrapping_mul(trainings as u64).wrapping_add(i);
-            let mut stopped = false;
-            let mut ask = || {
-                stopped = stopped || !keep_going();
-                !stopped
-            };
-            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, &mut ask));
-            if stopped {
-                return Ok(None);
-            }
+            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, watch)?);
         }
         if trained.is_empty() {
             return Err(LevenbergMarquardtFitError::Diverged { trainings });
         }
         trained.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         trained.truncate(self.ensemble);
-        Ok(Some(trained.into_iter().map(Member::of).collect()))
+        Ok(trained.into_iter().map(Member::of).collect())
     }
 }
 
@@ -178,8 +174,7 @@ fn truths<'a>(bench: &Bench, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) 
 fn output_scales(bench: &Bench, recording: &Recording) -> Vec<OutputScale> {
     let count = recording.rows.len();
     let scale = |truth: &dyn Fn(usize) -> f64| {
-        let mean = (0..count).map(truth).sum::<f64>() / count as f64;
-        let variance = (0..count).map(|i| (truth(i) - mean).powi(2)).sum::<f64>() / count as f64;
+        let (mean, variance) = mean_and_variance((0..count).map(truth));
         OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
     };
     truths(bench, recording).iter().map(|truth| scale(truth.as_ref())).collect()

@@ -1,11 +1,12 @@
 //! Derivatives against differences, evidence against a line's closed form, and the paper's beam.
 
 use ndarray::Array2;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::evidence::Hyperparameters;
 use super::perceptron::{jacobians, outputs};
 use super::*;
-use crate::method::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate};
 use crate::network::{Activation, Topology};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Bench;
@@ -121,8 +122,8 @@ fn judge(
 }
 
 fn fit(bench: &Bench, recording: &Recording) -> LevenbergMarquardtLocator {
-    let task = FitTask { bench, recording, seed: 1 };
-    let locator = LevenbergMarquardtConfig::default().fit(task, &mut || true).unwrap().unwrap();
+    let task = FitTask::new(bench, recording).seed(1);
+    let locator = LevenbergMarquardtConfig::default().fit_method(task).unwrap();
     assert_eq!(locator.check(bench), Ok(()));
     locator
 }
@@ -165,9 +166,9 @@ fn position_and_force_come_out_together() {
     let bench = bench(0.0, None);
     let contacts = (0..10).flat_map(|i| [1.0, 2.0, 4.0].map(|force_n| (0.02 + 0.04 * f64::from(i), force_n)));
     let recording = recording(&bench, contacts, 0);
-    let task = FitTask { bench: &bench, recording: &recording, seed: 1 };
+    let task = FitTask::new(&bench, &recording).seed(1);
     let config = LevenbergMarquardtConfig { ensemble: 2, ..LevenbergMarquardtConfig::default() };
-    let locator = config.fit(task, &mut || true).unwrap().unwrap();
+    let locator = config.fit_method(task).unwrap();
     let (mean_m, _) = judge(&locator, &bench, (40, 360), 3.0);
     assert!(mean_m < 2e-3, "{mean_m}");
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
@@ -184,8 +185,8 @@ fn what_cannot_be_trained_is_named() {
     let one = recording(&bench, std::iter::repeat_n((0.1, 3.0), 5), 0);
     let two = recording(&bench, [(0.1, 3.0), (0.2, 3.0)].into_iter(), 0);
     let message = |config: LevenbergMarquardtConfig, recording: &Recording| {
-        let task = FitTask { bench: &bench, recording, seed: 0 };
-        config.fit(task, &mut || true).unwrap_err().to_string()
+        let task = FitTask::new(&bench, recording);
+        config.fit_method(task).unwrap_err().to_string()
     };
     let good = LevenbergMarquardtConfig::default();
     assert_eq!(message(good.clone(), &one), "the recording has 1 distinct positions; at least 2 are needed");
@@ -196,8 +197,10 @@ fn what_cannot_be_trained_is_named() {
     );
     let none = LevenbergMarquardtConfig { ensemble: 0, ..good.clone() };
     assert!(message(none, &two).contains("networks in its ensemble 0"));
-    let task = FitTask { bench: &bench, recording: &two, seed: 0 };
-    assert_eq!(good.fit(task, &mut || false), Ok(None));
+    let task = FitTask::new(&bench, &two);
+    let stop = |_| false;
+    let stopped = good.fit_method(task.watch(Watch::new(&stop))).unwrap_err();
+    assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
 /// A soft strip's recording, by its path in the folder of real recordings; `None`, said in one line, where the folder is absent.
@@ -227,9 +230,9 @@ fn a_real_strip_at_positions_held_out() {
     let mut errors_mm = Vec::new();
     for fold in recording.folds(5).unwrap() {
         let training = recording.subset(&fold.training);
-        let task = FitTask { bench: &bench, recording: &training, seed: 1 };
+        let task = FitTask::new(&bench, &training).seed(1);
         let config = LevenbergMarquardtConfig { ensemble: 1, ..LevenbergMarquardtConfig::default() };
-        let locator = config.fit(task, &mut || true).unwrap().unwrap();
+        let locator = config.fit_method(task).unwrap();
         let error_mm = |i: &usize| {
             let row = &recording.rows[*i];
             1e3 * locator.locate(&row.reading).contact.position.distance_m(row.position)

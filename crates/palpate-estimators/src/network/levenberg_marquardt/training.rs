@@ -1,6 +1,7 @@
 //! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994).
 
 use ndarray::{Array1, Array2, Axis};
+use palpate_numerics::watch::{Cancelled, Watch};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -59,18 +60,15 @@ impl Training<'_> {
         }
     }
 
-    /// Trains from the weights of a seed; `None` when `keep_going`, asked at every iteration, says no, or when the weights leave the
-    /// numbers.
-    pub(super) fn run(&self, seed: u64, keep_going: &mut dyn FnMut() -> bool) -> Option<Trained> {
+    /// Trains from the weights of a seed; `None` when the weights leave the numbers.
+    pub(super) fn run(&self, seed: u64, watch: Watch) -> Result<Option<Trained>, Cancelled> {
         let mut weights = self.initial_weights(seed);
         // Starting from little noise: where rows are few, "all is noise" is a maximum of the evidence too.
         let mut hyper = Hyperparameters { alpha: 0.01, betas: vec![1e4; self.topology.outputs()] };
         let (mut mu, mut iterations, mut calm) = (1.0, 0, 0);
         let mut place = self.place(&weights);
         while iterations < self.max_iterations && calm < 3 {
-            if !keep_going() {
-                return None;
-            }
+            watch.round()?;
             iterations += 1;
             let before = hyper.clone();
             let moved = self.step(&mut weights, &place, &hyper, &mut mu);
@@ -80,7 +78,7 @@ impl Training<'_> {
             if moved && !iterations.is_multiple_of(STEPS_A_UPDATE) {
                 continue;
             }
-            let a = Cholesky::factor(hyper.curvature(&place.products, 0.0)).ok()?;
+            let Ok(a) = Cholesky::factor(hyper.curvature(&place.products, 0.0)) else { return Ok(None) };
             let gammas = hyper.effective_parameters(&a, &place.products);
             hyper.update(&gammas, self.inputs.nrows(), &squares(&place.errors), weights.dot(&weights));
             let drift = (hyper.alpha / before.alpha).ln().abs()
@@ -88,7 +86,7 @@ impl Training<'_> {
             calm = if drift < SETTLED { calm + 1 } else { 0 };
             mu = mu.min(0.1 * MOST_DAMPING);
         }
-        self.finish(&weights, &place, hyper, iterations)
+        Ok(self.finish(&weights, &place, hyper, iterations))
     }
 
     /// Weights so small that every node starts within the bend of its tanh: normal with variance 1/inputs of the node.

@@ -9,24 +9,29 @@
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
 
 use super::order::{OrderDrawer, Streams, column_len};
-use super::{SeedQueue, TrainingTask};
+use super::{TrainingQueue, TrainingTask};
 use crate::network::{
     Activation, BackPropagation, PresentationOrder, TrainedNetwork, TrainingOutcome, logistic,
 };
 use palpate_numerics::simd::{LOOK_UP, Real, Simd, Vector};
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::mem::swap;
 
 /// Trains every network of the queue with the vectors `V` of `S`. A lane whose network has finished takes the next seed.
 #[inline(always)]
-pub(super) fn train<S: Simd, V: Vector<N>, const N: usize>(task: &TrainingTask, queue: &mut dyn SeedQueue) {
+pub(super) fn train<S: Simd, V: Vector<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let topology = task.topology;
     let row_lens: Vec<usize> = (0..topology.layers()).map(|k| topology.row_len(k)).collect();
     // Where registers hold the inputs of two patterns, to know the paper's shape saves a tenth of the time; elsewhere a fiftieth, which
     // does not pay for the code.
     if const { S::REGISTERS >= 2 * 9 } && row_lens == [9, 11] {
-        train_shape::<V, N, 9, 11>(task, queue);
+        train_shape::<V, N, 9, 11>(task, queue, watch)
     } else {
-        train_shape::<V, N, ANY, ANY>(task, queue);
+        train_shape::<V, N, ANY, ANY>(task, queue, watch)
     }
 }
 
@@ -44,19 +49,22 @@ fn row_len<const KNOWN: usize>(len: usize) -> usize {
 #[inline(always)]
 fn train_shape<V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
     task: &TrainingTask,
-    queue: &mut dyn SeedQueue,
-) {
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
     let mut group = Group::<V, N, FIRST, UPPER>::new(task);
     for lane in 0..N {
         group.start_next(lane, queue);
     }
     group.sum_first_pattern();
-    while group.is_busy() && queue.keep_going() {
+    while group.is_busy() {
+        watch.round()?;
         let errors = group.run_epoch();
         if group.retire(errors.to_array(), queue) {
             group.sum_first_pattern();
         }
     }
+    Ok(())
 }
 
 /// The network in one lane.
@@ -133,7 +141,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
     }
 
     /// Puts the queue's next network into a lane, or leaves the lane idle.
-    fn start_next(&mut self, lane: usize, queue: &mut dyn SeedQueue) {
+    fn start_next(&mut self, lane: usize, queue: &mut dyn TrainingQueue) {
         let Some(seed) = queue.next_seed() else {
             self.occupants[lane] = None;
             return;
@@ -158,7 +166,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
     }
 
     /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
-    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue) -> bool {
+    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn TrainingQueue) -> bool {
         let mut replaced = false;
         for (lane, error) in errors.into_iter().enumerate() {
             let Some(occupant) = &mut self.occupants[lane] else { continue };

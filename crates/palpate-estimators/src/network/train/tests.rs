@@ -32,7 +32,7 @@ struct Seeds {
     networks: Vec<(u64, TrainedNetwork)>,
 }
 
-impl SeedQueue for Seeds {
+impl TrainingQueue for Seeds {
     fn next_seed(&mut self) -> Option<u64> {
         let seed = (self.next < self.end).then_some(self.next)?;
         self.next += 1;
@@ -40,9 +40,6 @@ impl SeedQueue for Seeds {
     }
     fn finished(&mut self, seed: u64, network: TrainedNetwork) {
         self.networks.push((seed, network));
-    }
-    fn keep_going(&mut self) -> bool {
-        true
     }
 }
 
@@ -64,7 +61,7 @@ fn networks(
     seeds: u64,
 ) -> Vec<TrainedNetwork> {
     let mut queue = Seeds { next: 0, end: seeds, networks: Vec::new() };
-    train_many(set, precision, task, &mut queue);
+    train_many(set, precision, task, &mut queue, Watch::NONE).unwrap();
     queue.networks.sort_by_key(|(seed, _)| *seed);
     assert_eq!(queue.networks.len() as u64, seeds);
     queue.networks.into_iter().map(|(_, network)| network).collect()
@@ -74,13 +71,10 @@ fn compare_with_twin(config: &NetworkConfig, patterns: &Patterns, seeds: u64) {
     let topology = Topology::new(config, patterns.inputs, patterns.outputs);
     let task = TrainingTask { topology: &topology, patterns, rule: &config.training };
     for precision in [Precision::F64, Precision::F32] {
-        let twin: Vec<_> =
-            (0..seeds).map(|seed| run_loops(Twin { precision, task: &task, seed })).collect();
-        if precision == Precision::F64 {
-            let alone: Vec<_> =
-                (0..seeds).filter_map(|seed| train_one(&task, seed, &mut || true)).collect();
-            assert_eq!(alone, twin, "one by one, {config:?}");
-        }
+        let twin: Vec<_> = (0..seeds).map(|seed| run_loops(Twin { precision, task: &task, seed })).collect();
+        let alone: Vec<_> =
+            (0..seeds).filter_map(|seed| train_one(precision, &task, seed, Watch::NONE).ok()).collect();
+        assert_eq!(alone, twin, "one by one, {precision:?}, {config:?}");
         for set in InstructionSet::available() {
             assert_eq!(networks(set, precision, &task, seeds), twin, "{set}, {precision:?}, {config:?}");
         }
@@ -178,7 +172,7 @@ fn one_update_goes_down_the_gradient_of_finite_differences() {
         let after = |epochs: u32| {
             let rule = BackPropagation { max_epochs: epochs, ..config.training };
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
-            train_one(&task, 3, &mut || true).unwrap().weights
+            train_one(Precision::F64, &task, 3, Watch::NONE).unwrap().weights
         };
         let (first, second) = (after(1), after(2));
         // The first update has no momentum yet, the second repeats a share of it: Δw₂ = α Δw₁ − η ∂E/∂w.

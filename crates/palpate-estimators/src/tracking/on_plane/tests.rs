@@ -1,8 +1,9 @@
 //! A plate in balance under a contact that slides over it, lets go and comes down again.
 
+use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{InfluenceConfig, InfluenceLocator, InfluenceSource, PlateLikelihood};
-use crate::method::{Fit, FitTask, Likelihood, PlaneLikelihood};
+use crate::likelihood::{Likelihood, PlaneLikelihood};
 use crate::setup::Bench;
 use crate::tracking::tests::{Timed, timed_readings, wrongly_touching};
 use crate::tracking::{SmoothTracker, Tracker, TrackerConfig};
@@ -20,9 +21,9 @@ fn likelihood(rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
 fn likelihood_from(from: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
     let recording = rig.simulate(1);
     let bench = Bench { force_n, ..rig.bench.clone() };
-    let task = FitTask { bench: &bench, recording: &recording, seed: 0 };
+    let task = FitTask::new(&bench, &recording);
     let config = InfluenceConfig { from, ..InfluenceConfig::default() };
-    match config.fit(task, &mut || true).unwrap().unwrap() {
+    match config.fit_method(task).unwrap() {
         InfluenceLocator::Plane(plane) => PlateLikelihood::new(&plane),
         other => panic!("{other:?}"),
     }

@@ -3,10 +3,11 @@
 use super::{Arguments, complaint, findings};
 use crate::failure::Failure;
 use crate::output;
-use crate::progress::StageWatch;
+use crate::progress::Observer;
 use crate::table::table;
 use palpate_design::positions::{Advice, next_press};
 use palpate_estimators::recording::Recording;
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 
 /// Presses that a table shows.
@@ -39,12 +40,11 @@ struct Next {
 
 pub fn run(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
     let contacts = rig.design.as_ref().map(|design| &design.contacts);
-    let mut watch = StageWatch::new();
-    let advice = next_press(&rig.bench, contacts, recording, arguments.stop_below, &mut || {
-        watch.keep_going("learning from the recording", f64::NAN)
-    });
-    drop(watch);
-    let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?.ok_or_else(Failure::stopped)?;
+    let observer = Observer::of_stages();
+    let observe = |progress| observer.observe(progress);
+    let advice = next_press(&rig.bench, contacts, recording, arguments.stop_below, Watch::new(&observe));
+    drop(observer);
+    let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?;
     if arguments.json {
         return output::say_json(&told(arguments, &advice));
     }

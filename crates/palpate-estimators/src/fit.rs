@@ -1,0 +1,295 @@
+//! The two traits of estimators: [`Fit`] calibrates, [`Locate`] locates; and the locator that fitting gives.
+
+use palpate_core::Estimate;
+use palpate_mechanics::sensing::Layout;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+use crate::recording::{Provenance, Recording};
+use crate::setup::Bench;
+
+/// What an estimator is fitted to.
+#[derive(Clone, Copy, Debug)]
+pub struct FitTask<'a> {
+    /// Surface, sensors, known force.
+    pub bench: &'a Bench,
+    /// Readings with their contacts; as many channels as the bench has sensors, and at least one row.
+    pub recording: &'a Recording,
+    /// Fixes whatever the method draws at random.
+    pub seed: u64,
+    /// Is told of the progress, and may stop the fit.
+    pub watch: Watch<'a>,
+}
+
+impl<'a> FitTask<'a> {
+    /// A fit with seed 0 that nobody watches.
+    pub fn new(bench: &'a Bench, recording: &'a Recording) -> Self {
+        Self { bench, recording, seed: 0, watch: Watch::NONE }
+    }
+
+    /// The same from another seed.
+    #[must_use]
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same, watched.
+    #[must_use]
+    pub fn watch(self, watch: Watch<'a>) -> Self {
+        Self { watch, ..self }
+    }
+
+    /// Checks that the recording has a channel for every sensor.
+    ///
+    /// # Errors
+    /// [`ChannelMismatch`], with both numbers.
+    pub fn check_channels(&self) -> Result<(), ChannelMismatch> {
+        let (needed, found) = (self.bench.layout.len(), self.recording.channels.len());
+        if needed == found { Ok(()) } else { Err(ChannelMismatch { needed, found }) }
+    }
+}
+
+/// A recording whose channels are not the setup's sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the recording has {found} channels; the bench has {needed} sensors")]
+pub struct ChannelMismatch {
+    /// Sensors of the setup.
+    pub needed: usize,
+    /// Channels of the recording.
+    pub found: usize,
+}
+
+/// Where [`Fit::fit_many`] takes its seeds from and leaves what it fitted.
+pub trait SeedQueue<M> {
+    /// The seed of the next fit; `None` when all are taken.
+    fn next_seed(&mut self) -> Option<u64>;
+    /// Takes a locator.
+    fn fitted(&mut self, seed: u64, locator: Fitted<M>);
+}
+
+/// An estimator: a configured method that can be fitted.
+///
+/// ```
+/// use palpate_estimators::arrangement::Training;
+/// use palpate_estimators::fit::Fit;
+/// use palpate_estimators::influence::InfluenceConfig;
+/// use palpate_estimators::setup::Bench;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, newtons, um};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10), 0)?;
+/// let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+/// let estimate = locator.locate(&presses.rows[4].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(180.0)).abs() < mm(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait Fit {
+    /// What the method learns.
+    type Method: Locate;
+    /// Why it cannot be fitted.
+    type Error: From<Cancelled> + From<ChannelMismatch> + std::error::Error + Send + Sync + 'static;
+
+    /// Fits the method alone, to as many channels as the setup has sensors; see [`Fit::fit`].
+    ///
+    /// # Errors
+    /// When the recording does not suit the method, or the watch stopped it.
+    fn fit_method(&self, task: FitTask) -> Result<Self::Method, Self::Error>;
+
+    /// Fits to a recording of a setup, with seed 0.
+    ///
+    /// # Errors
+    /// When the recording does not suit the setup or the method.
+    fn fit(&self, bench: &Bench, recording: &Recording) -> Result<Fitted<Self::Method>, Self::Error> {
+        self.fit_task(FitTask::new(bench, recording))
+    }
+
+    /// Fits with a seed, watched.
+    ///
+    /// # Errors
+    /// When the recording does not suit the setup or the method, or the watch stopped it.
+    fn fit_task(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+        task.check_channels()?;
+        Ok(Fitted::new(task, self.fit_method(task)?))
+    }
+
+    /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same
+    /// locator as [`Fit::fit_task`] does; methods that can, fit many seeds at once.
+    ///
+    /// # Errors
+    /// When the recording does not suit the setup or the method, or the watch stopped it; what was fitted before is in the
+    /// queue.
+    fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Self::Method>) -> Result<(), Self::Error> {
+        while let Some(seed) = queue.next_seed() {
+            queue.fitted(seed, self.fit_task(task.seed(seed))?);
+        }
+        Ok(())
+    }
+}
+
+/// A fitted method.
+pub trait Locate {
+    /// Where the surface is touched when the sensors read `reading`: one finite value a channel, in SI units or raw.
+    fn locate(&self, reading: &[f64]) -> Estimate;
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    fn check(&self, bench: &Bench) -> Result<(), LocatorFault>;
+}
+
+/// A locator: a fitted method with its setup and provenance, so that nothing it needs is outside it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fitted<M> {
+    /// The surface that is touched, and its sensors.
+    pub bench: Bench,
+    /// Where it comes from.
+    pub provenance: LocatorProvenance,
+    /// The method and what it learnt.
+    pub method: M,
+}
+
+/// Where a locator comes from.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LocatorProvenance {
+    /// Version of palpate that fitted it.
+    pub palpate: String,
+    /// Seed of the fit.
+    pub seed: u64,
+    /// The recording that it was fitted to.
+    pub recording: Provenance,
+}
+
+impl<M> Fitted<M> {
+    /// The locator of a method that was fitted to a task.
+    pub fn new(task: FitTask, method: M) -> Self {
+        let provenance = LocatorProvenance {
+            palpate: env!("CARGO_PKG_VERSION").to_owned(),
+            seed: task.seed,
+            recording: task.recording.provenance.clone(),
+        };
+        Self { bench: task.bench.clone(), provenance, method }
+    }
+
+    /// The same locator with its method as another type.
+    pub fn map<N>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
+        Fitted { bench: self.bench, provenance: self.provenance, method: convert(self.method) }
+    }
+
+    /// The sensors, a channel of a reading each.
+    pub fn layout(&self) -> &Layout {
+        &self.bench.layout
+    }
+}
+
+impl<M: Locate> Fitted<M> {
+    /// Where the surface is touched when the sensors read `reading`: one value a channel, in SI units or raw.
+    ///
+    /// # Errors
+    /// [`ReadingError`] for another number of channels or a value that is not finite.
+    pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
+        ReadingError::check(reading, self.bench.layout.len())?;
+        Ok(self.method.locate(reading))
+    }
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    pub fn check(&self) -> Result<(), LocatorFault> {
+        self.method.check(&self.bench)
+    }
+}
+
+/// A reading that nothing can be told from.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ReadingError {
+    /// Another number of channels.
+    #[error("the reading has {found} channels; the locator has {needed}")]
+    Channels {
+        /// Channels of the locator.
+        needed: usize,
+        /// Channels of the reading.
+        found: usize,
+    },
+    /// A value that is no number.
+    #[error("channel {channel} reads {value}; it must be a finite number")]
+    NotFinite {
+        /// Which channel, from 1.
+        channel: usize,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl ReadingError {
+    /// Checks that a reading has `needed` values, all finite.
+    ///
+    /// # Errors
+    /// [`ReadingError`], naming the first that is not.
+    pub fn check(reading: &[f64], needed: usize) -> Result<(), Self> {
+        let found = reading.len();
+        if needed != found {
+            return Err(Self::Channels { needed, found });
+        }
+        match reading.iter().position(|value| !value.is_finite()) {
+            Some(i) => Err(Self::NotFinite { channel: i + 1, value: reading[i] }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A locator whose numbers do not fit together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LocatorFault {
+    /// A list has the wrong length.
+    #[error("the locator has {found} {what}; it must have {needed}")]
+    Count {
+        /// What the list holds.
+        what: &'static str,
+        /// Length that the rest asks for.
+        needed: usize,
+        /// Length of the list.
+        found: usize,
+    },
+    /// A number that is infinite, not a number, or beyond its bound.
+    #[error("the locator's {what} number {number} is not {bound}")]
+    BadNumber {
+        /// What the list holds.
+        what: &'static str,
+        /// Which one, from 1.
+        number: usize,
+        /// What it must be.
+        bound: &'static str,
+    },
+}
+
+impl LocatorFault {
+    /// Checks the length of a list.
+    ///
+    /// # Errors
+    /// [`LocatorFault::Count`] when `found` is not `needed`.
+    pub fn check_count(what: &'static str, needed: usize, found: usize) -> Result<(), Self> {
+        if needed == found { Ok(()) } else { Err(Self::Count { what, needed, found }) }
+    }
+
+    /// Checks the numbers of a list.
+    ///
+    /// # Errors
+    /// [`LocatorFault::BadNumber`] for the first that is not finite or not `good`.
+    pub fn check_numbers(
+        what: &'static str,
+        numbers: impl IntoIterator<Item = f64>,
+        good: impl Fn(f64) -> bool,
+        bound: &'static str,
+    ) -> Result<(), Self> {
+        match numbers.into_iter().position(|number| !(number.is_finite() && good(number))) {
+            Some(i) => Err(Self::BadNumber { what, number: i + 1, bound }),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Uncertainty from errors at positions that a method was not fitted to.
+
+use serde::{Deserialize, Serialize};
+
+use crate::fit::LocatorFault;
+use palpate_core::Uncertainty;
+use palpate_mechanics::contact::Position;
+use palpate_numerics::root_mean_square;
+
+/// How far a method was off at positions that it had not seen: an uncertainty for methods without a noise model.
+///
+/// The half-width of the 95 % interval is the conformal one (Vovk, Gammerman and Shafer 2005): of n absolute errors in rising order, number
+/// ⌈0.95·(n + 1)⌉, which covers a further contact like those held out with probability at least 0.95.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOutSpread {
+    /// Root mean square error along x and y, in metres.
+    pub rms_m: [f64; 2],
+    /// Half-width of the 95 % interval along x and y, in metres.
+    pub half_95_m: [f64; 2],
+}
+
+impl HeldOutSpread {
+    /// Fewest errors of which number ⌈0.95·(n + 1)⌉ exists.
+    pub const FEWEST: usize = 19;
+
+    /// The spread of errors (x, y) in metres; `None` of fewer than [`HeldOutSpread::FEWEST`], which bound no 95 % interval.
+    pub fn of(errors_m: &[[f64; 2]]) -> Option<Self> {
+        if errors_m.len() < Self::FEWEST {
+            return None;
+        }
+        let axis = |axis: usize| {
+            let mut sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let number = (0.95 * (sizes.len() + 1) as f64).ceil() as usize;
+            (root_mean_square(&sizes), sizes[number.min(sizes.len()) - 1])
+        };
+        let ((rms_x, half_x), (rms_y, half_y)) = (axis(0), axis(1));
+        Some(Self { rms_m: [rms_x, rms_y], half_95_m: [half_x, half_y] })
+    }
+
+    /// The uncertainty of an estimate at `position`.
+    pub fn uncertainty(&self, position: Position) -> Uncertainty {
+        let [half_x, half_y] = self.half_95_m;
+        Uncertainty {
+            covariance: [self.rms_m[0].powi(2), 0.0, 0.0, self.rms_m[1].powi(2), 0.0, 0.0],
+            x_95_m: (position.x_m - half_x, position.x_m + half_x),
+            y_95_m: (position.y_m - half_y, position.y_m + half_y),
+        }
+    }
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault::BadNumber`] for a number that is negative or not finite.
+    pub fn check(&self) -> Result<(), LocatorFault> {
+        let numbers = self.rms_m.into_iter().chain(self.half_95_m);
+        LocatorFault::check_numbers("held-out error", numbers, |x| x >= 0.0, "a number of at least 0")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_covers_nineteen_in_twenty() {
+        let errors: Vec<[f64; 2]> = (1..=99).map(|i| [f64::from(i) * -1e-3, 0.0]).collect();
+        let spread = HeldOutSpread::of(&errors).unwrap();
+        assert_eq!(spread.half_95_m, [95e-3, 0.0]);
+        // Σ i² = n·(n + 1)·(2n + 1)/6
+        assert!((spread.rms_m[0] - 1e-3 * (100.0 * 199.0 / 6.0_f64).sqrt()).abs() < 1e-12);
+        let uncertainty = spread.uncertainty(Position::along(0.2));
+        assert!((uncertainty.x_95_m.0 - 0.105).abs() < 1e-12 && (uncertainty.x_95_m.1 - 0.295).abs() < 1e-12);
+    }
+
+    #[test]
+    fn too_few_errors_bound_nothing() {
+        assert_eq!(HeldOutSpread::of(&[[1.0, 0.0]; 18]), None);
+        assert_eq!(HeldOutSpread::of(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
+    }
+}

@@ -1,0 +1,257 @@
+//! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
+
+use crate::estimator::{
+    ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
+    TrackerConfig,
+};
+use crate::evaluation::covered;
+use crate::recording::TimedRecording;
+use crate::setup::Bench;
+use crate::simulate::{MovingContacts, SimulateError, simulate_moving};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::surface::Extent;
+
+/// Mean errors over the contacts while they touched, in metres, and how often the 95 % intervals held them. Where there are
+/// several, those that were found are paired with the true ones so that the distances are least.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct TrackErrors {
+    /// Readings while something touched.
+    pub readings: usize,
+    /// Contacts that touched and that the tracker had, over all readings; the track's errors are of these.
+    pub tracked: usize,
+    /// Mean error of a reading by itself.
+    pub single_m: f64,
+    /// Mean error of the track.
+    pub track_m: f64,
+    /// Share of the contacts of readings by themselves whose interval held the true one.
+    pub single_covered: f64,
+    /// Share of the track's intervals that held it.
+    pub track_covered: f64,
+    /// Share of all readings at which the reading by itself shows as many contacts as touch.
+    pub single_number_right: f64,
+    /// Share of all readings at which the tracker has as many.
+    pub track_number_right: f64,
+}
+
+/// Sums over contacts.
+#[derive(Default)]
+struct Sums {
+    contacts: usize,
+    error_m: f64,
+    covered: usize,
+    numbers_right: usize,
+}
+
+impl Sums {
+    /// Adds a reading's contacts, and those that were found.
+    fn add(&mut self, truths: &[Position], found: &[ContactEstimate], extent: Extent) {
+        self.numbers_right += usize::from(truths.len() == found.len());
+        let places: Vec<Position> = found.iter().map(|contact| contact.position).collect();
+        for (truth, mate) in pairs(truths, &places) {
+            let (truth, contact) = (truths[truth], found[mate]);
+            self.contacts += 1;
+            self.error_m += contact.position.distance_m(truth);
+            self.covered += usize::from(covered(&contact, truth, extent) == Some(true));
+        }
+    }
+
+    fn mean(&self, sum: f64) -> f64 {
+        sum / self.contacts.max(1) as f64
+    }
+}
+
+impl TrackErrors {
+    /// Compares tracks with the true contacts of each, whose force is 0 where they do not touch; `None` where nothing ever
+    /// did, or nothing was tracked.
+    pub fn of(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
+        let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
+        for (one, truths) in tracks.iter().zip(truths) {
+            let touching = truths.iter().filter(|truth| truth.force_n > 0.0);
+            let truths: Vec<Position> = touching.map(|truth| truth.position).collect();
+            readings += usize::from(!truths.is_empty());
+            let tracked: Vec<ContactEstimate> = one.contacts.iter().map(Tracked::estimate).collect();
+            track.add(&truths, &tracked, extent);
+            single.add(&truths, &alone(&one.alone, !truths.is_empty()), extent);
+        }
+        let all = tracks.len().min(truths.len()) as f64;
+        (track.contacts > 0).then(|| Self {
+            readings,
+            tracked: track.contacts,
+            single_m: single.mean(single.error_m),
+            track_m: track.mean(track.error_m),
+            single_covered: single.mean(single.covered as f64),
+            track_covered: track.mean(track.covered as f64),
+            single_number_right: single.numbers_right as f64 / all,
+            track_number_right: track.numbers_right as f64 / all,
+        })
+    }
+
+    /// How many times smaller the track's mean error is than that of the readings by themselves.
+    pub fn ratio(&self) -> f64 {
+        self.single_m / self.track_m
+    }
+}
+
+/// The contacts of a reading by itself; while something touches, its best guess at least.
+fn alone(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
+    if !touched && estimate.status == Status::NoContact {
+        return Vec::new();
+    }
+    std::iter::once(&estimate.contact).chain(estimate.further.as_slice()).copied().collect()
+}
+
+/// For each true contact, the tracked one that is it; none for those that do not touch or were not found.
+pub fn tracked_of(track: &Track, truths: &[Contact]) -> Vec<Option<Tracked>> {
+    let touching: Vec<usize> = (0..truths.len()).filter(|i| truths[*i].force_n > 0.0).collect();
+    let places: Vec<Position> = touching.iter().map(|i| truths[*i].position).collect();
+    let found: Vec<Position> = track.contacts.iter().map(|tracked| tracked.estimate().position).collect();
+    let mut tracked = vec![None; truths.len()];
+    for (truth, mate) in pairs(&places, &found) {
+        tracked[touching[truth]] = Some(track.contacts[mate]);
+    }
+    tracked
+}
+
+/// As many pairs of indices as the shorter list has, with the least sum of distances.
+fn pairs(a: &[Position], b: &[Position]) -> Vec<(usize, usize)> {
+    if b.len() < a.len() {
+        return pairs(b, a).into_iter().map(|(i, j)| (j, i)).collect();
+    }
+    let mut best = (f64::INFINITY, Vec::new());
+    choose(a, b, &mut Vec::new(), 0.0, &mut best);
+    best.1.into_iter().enumerate().collect()
+}
+
+/// Goes through every choice of one of `b` for each of `a`, none twice; `chosen` is the choice so far.
+fn choose(a: &[Position], b: &[Position], chosen: &mut Vec<usize>, sum: f64, best: &mut (f64, Vec<usize>)) {
+    if chosen.len() == a.len() {
+        if sum < best.0 {
+            *best = (sum, chosen.clone());
+        }
+        return;
+    }
+    for j in 0..b.len() {
+        if !chosen.contains(&j) {
+            let distance = a[chosen.len()].distance_m(b[j]);
+            chosen.push(j);
+            choose(a, b, chosen, sum + distance, best);
+            chosen.pop();
+        }
+    }
+}
+
+/// A recording followed, by the filter and by the smoother.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// As the readings came.
+    pub filtered: Vec<Track>,
+    /// With all of them.
+    pub smoothed: Vec<Track>,
+}
+
+/// Why a recording cannot be followed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FollowError {
+    /// The locator cannot follow.
+    #[error(transparent)]
+    NotTrackable(#[from] NotTrackable),
+    /// A row is out of order.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+}
+
+/// Follows a recording whose times rise.
+///
+/// # Errors
+/// [`FollowError`] for a locator that has no likelihood, or a time that is not later than the one before.
+pub fn follow(
+    locator: &Locator,
+    config: TrackerConfig,
+    recording: &TimedRecording,
+) -> Result<Followed, FollowError> {
+    let tracking = locator.tracking(&config)?;
+    let mut tracker = SmoothTracker::new(tracking.likelihood(), config);
+    for (row, time_s) in recording.recording.rows.iter().zip(&recording.times_s) {
+        tracker.follow(*time_s, &row.reading)?;
+    }
+    Ok(Followed { smoothed: tracker.smoothed(), filtered: tracker.filtered().to_vec() })
+}
+
+/// The errors at one speed.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct SpeedErrors {
+    /// The speed between the turns over the critical one.
+    pub ratio: f64,
+    /// That speed, in m/s.
+    pub speed_m_per_s: f64,
+    /// Of the filter.
+    pub filtered: TrackErrors,
+    /// Of the smoother.
+    pub smoothed: TrackErrors,
+}
+
+/// Why a sweep over speeds cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SweepError {
+    /// The locator cannot follow.
+    #[error(transparent)]
+    Follow(#[from] FollowError),
+    /// The bench cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The surface does not swing.
+    #[error("a sweep over speeds needs a beam that swings; this surface is in balance at any speed")]
+    NoCriticalSpeed,
+}
+
+/// Speeds of a sweep, over the critical one.
+pub const SPEED_RATIOS: [f64; 8] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.95];
+
+/// The errors at each of [`SPEED_RATIOS`]: the contacts moving at that speed, simulated and followed. A speed at which
+/// nothing is tracked is left out.
+///
+/// # Errors
+/// [`SweepError`] when the surface has no critical speed, or the locator cannot follow.
+pub fn sweep_speeds(
+    locator: &Locator,
+    config: TrackerConfig,
+    bench: &Bench,
+    moving: &MovingContacts,
+    seed: u64,
+) -> Result<Vec<SpeedErrors>, SweepError> {
+    let beam = moving.beam.ok_or(SweepError::NoCriticalSpeed)?;
+    let extent = bench.surface.extent();
+    let mut sweep = Vec::new();
+    for ratio in SPEED_RATIOS {
+        let speed_m_per_s = ratio * beam.critical_speed_m_per_s();
+        let recording = simulate_moving(bench, &moving.at_speed(speed_m_per_s), seed)?;
+        let truths = recording.truths();
+        let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
+        let errors =
+            TrackErrors::of(&filtered, &truths, extent).zip(TrackErrors::of(&smoothed, &truths, extent));
+        sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
+            ratio,
+            speed_m_per_s,
+            filtered,
+            smoothed,
+        }));
+    }
+    Ok(sweep)
+}
+
+#[cfg(test)]
+mod tests {
+    use palpate_mechanics::contact::Position;
+
+    #[test]
+    fn contacts_are_paired_so_that_the_distances_are_least() {
+        let pairs = |a: &[f64], b: &[f64]| {
+            let places = |list: &[f64]| list.iter().copied().map(Position::along).collect::<Vec<_>>();
+            super::pairs(&places(a), &places(b))
+        };
+        assert_eq!(pairs(&[0.1, 0.3], &[0.31, 0.12]), [(0, 1), (1, 0)]);
+        assert_eq!(pairs(&[0.1, 0.3], &[0.25]), [(1, 0)]);
+        assert_eq!(pairs(&[0.1], &[0.5, 0.2, 0.0]), [(0, 1)]);
+        assert_eq!(pairs(&[], &[0.5]), []);
+    }
+}
