@@ -32,8 +32,8 @@ fn every_estimator_is_held_against_the_limit() {
     let folder = noisy();
     // The paper's network takes its time; a short training will do.
     let short = "kind = \"network\"\nmax_epochs = 5_000\n";
-    let (bench, _) = NOISY.split_once("kind = \"influence\"").unwrap();
-    fs::write(folder.path().join("rig.toml"), bench.to_owned() + short).unwrap();
+    let (setup, _) = NOISY.split_once("kind = \"influence\"").unwrap();
+    fs::write(folder.path().join("rig.toml"), setup.to_owned() + short).unwrap();
     let arguments = ["compare", "rig.toml", "--json", "--out", "report", "--calibrations", "2"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
     let estimators = found["estimators"].as_array().unwrap();

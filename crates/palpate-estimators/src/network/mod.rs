@@ -13,10 +13,10 @@ mod topology;
 mod train;
 
 pub use batch::BatchNetwork;
-pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
+pub use config::{BackPropagation, InputScale, Network, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
 pub use levenberg_marquardt::{
-    LevenbergMarquardtConfig, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
+    LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
 };
 pub use locator::{ChannelScaling, NetworkLocator, NetworkParts};
