@@ -6,6 +6,7 @@ mod eigen;
 mod elliptic;
 mod random_order;
 pub mod regression;
+pub mod simd;
 pub mod small;
 mod sparse_cholesky;
 mod statistics;

@@ -5,8 +5,9 @@
 use std::hint::black_box;
 
 use cpu_time::ThreadTime;
-use palpate_estimators::network::{BatchNetwork, InstructionSet, Network, PreparedNetwork, Topology};
+use palpate_estimators::network::{BatchNetwork, Network, PreparedNetwork, Topology};
 use palpate_numerics::median;
+use palpate_numerics::simd::InstructionSet;
 
 const ROUNDS: usize = 15;
 const READINGS: usize = 4096;

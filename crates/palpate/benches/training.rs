@@ -1,12 +1,13 @@
-//! Presentations per second of the paper's 8–10–1 network: each instruction set against the scalar twin, one core, in
-//! CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
+//! Presentations per second of the paper's 8–10–1 network: side by side by each instruction set, against one
+//! after the other; one core, in CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
 
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{
-    BackPropagation, InstructionSet, Network, Patterns, Precision, PresentationOrder, Topology,
-    TrainedNetwork, TrainingQueue, TrainingTask, train_many, train_one,
+    BackPropagation, Network, Patterns, Precision, PresentationOrder, Topology, TrainedNetwork,
+    TrainingQueue, TrainingTask, train_many, train_one,
 };
 use palpate_numerics::median;
+use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::Watch;
 
 const ROUNDS: usize = 9;
@@ -36,7 +37,7 @@ fn price_of_shuffling(precision: Precision) {
                 ..BackPropagation::default()
             };
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
-            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
             let start = ThreadTime::now();
             train_many(set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             start.elapsed().as_secs_f64()
@@ -63,15 +64,15 @@ fn compare(count: usize, precision: Precision) {
         }
         rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
         for (set, rates) in sets.iter().zip(&mut rates[1..]) {
-            let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
+            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
             let start = ThreadTime::now();
             train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
-            let presentations = f64::from(EPOCHS) * (count * 4 * set.lanes(precision)) as f64;
+            let presentations = f64::from(EPOCHS) * (count * 4 * precision.lanes()) as f64;
             rates.push(presentations / start.elapsed().as_secs_f64());
         }
     }
     let medians: Vec<f64> = rates.into_iter().map(|r| median(r).expect("rounds")).collect();
-    println!("{count} patterns, {precision:?}: scalar twin {:.2} M/s", medians[0] / 1e6);
+    println!("{count} patterns, {precision:?}: one after the other {:.2} M/s", medians[0] / 1e6);
     for (set, rate) in sets.iter().zip(&medians[1..]) {
         println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
     }

@@ -5,8 +5,8 @@ use crate::progress::Observer;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate_estimators::evaluation::Spread;
-use palpate_estimators::network::InstructionSet;
 use palpate_mechanics::units::format_count;
+use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::dead_areas::DeadAreas;
@@ -182,7 +182,7 @@ fn facts(
             presentations += tally::presentations(prepared, arm, fit);
         }
     }
-    let (precision, set) = (prepared.study.precision, InstructionSet::best());
+    let precision = prepared.study.precision;
     RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
         study: prepared.study.name.clone(),
@@ -190,7 +190,7 @@ fn facts(
         seeds: options.seeds,
         threads: options.threads,
         precision,
-        arithmetic: format!("{set}, {} lanes", set.lanes(precision)),
+        arithmetic: format!("{}, {} lanes", InstructionSet::best(), precision.lanes()),
         presentations,
         seconds,
         presentations_per_second: presentations as f64 / seconds,

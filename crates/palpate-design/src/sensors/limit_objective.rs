@@ -14,7 +14,6 @@
 //!
 //! which for P ≤ 3 is some twenty multiplications a contact, so that all candidates are judged in one pass over their rows.
 
-mod lanes;
 mod sums;
 
 use std::sync::Arc;
@@ -22,7 +21,7 @@ use std::sync::Arc;
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use crate::sensors::DesignCriterion;
 use palpate_numerics::small::{Ldl, add_outer};
-use sums::{Mean, Shrinking, Sums, Without, Worst};
+use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
@@ -71,9 +70,9 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
         }
     }
 
-    /// See [`lanes::folded`].
+    /// See [`folded`].
     fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
-        lanes::folded::<P, FIRST, S>(&state.values, row, &self.weights, sums)
+        folded::<P, FIRST, S>(Contacts { covariances: &state.values, row, weights: &self.weights }, sums)
     }
 
     /// The sums for a sensor, or for none.

@@ -1,13 +1,13 @@
 //! From minima of the misfit to an estimate that owns up to what it does not know.
 
-use super::batch::Rows;
+use super::batch::{Rows, locate_rows};
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
-use super::lanes::{self, Array, Eight};
 use super::scratch::Scratch;
 use super::search::{Minimum, Search, worst_misfit};
 use super::several::{criterion, explain};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
+use palpate_numerics::simd::{Array, Eight};
 use palpate_numerics::{bisect, normal_distribution, normal_interval_95};
 
 /// Another place with at least this share of the probability is said.
@@ -22,7 +22,7 @@ pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0),
 pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
     let mut estimate = NOTHING;
     let rows = Rows { readings: reading, channels: reading.len() };
-    lanes::locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
+    locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
     estimate
 }
 
@@ -100,7 +100,7 @@ pub(super) fn locate_several(
         return one;
     }
     let square = scratch.whitened.channels(search.live.len()).iter().map(|d| d * d).sum();
-    let single = search.minima::<Array>(square, scratch).0[0];
+    let single = search.minima::<Array<f64, 8, false>>(square, scratch).0[0];
     let mut least = criterion(single.misfit, 1, search.force.unknowns(), search);
     let mut best = None;
     for count in 2..=most {

@@ -12,10 +12,10 @@
 
 use super::answer::{conclude, locate_into};
 use super::coarse::Profile;
-use super::lanes::{Abreast, Eight};
 use super::scratch::{ForEight, Scratch};
 use super::search::{Minimum, NEGLIGIBLE, Search};
 use palpate_core::Estimate;
+use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd};
 
 /// Readings one after the other, of so many channels each.
 #[derive(Clone, Copy)]
@@ -28,13 +28,30 @@ pub(super) struct Rows<'a> {
 const MOST_STEPS: usize = 4;
 
 /// Writes the estimate of one contact for each row.
+pub(super) fn locate_rows(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
+    InstructionSet::best().run(LocateRows { search, rows, scratch, estimates });
+}
+
+/// The work of [`locate_rows`].
+pub(super) struct LocateRows<'a> {
+    pub search: &'a Search,
+    pub rows: Rows<'a>,
+    pub scratch: &'a mut Scratch,
+    pub estimates: &'a mut [Estimate],
+}
+
+impl Kernel for LocateRows<'_> {
+    type Output = ();
+    const FUSED: bool = false;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        locate_each::<S::F64>(self.search, self.rows, self.scratch, self.estimates);
+    }
+}
+
 #[inline(always)]
-pub(super) fn locate_each<V: Eight>(
-    search: &Search,
-    rows: Rows,
-    scratch: &mut Scratch,
-    estimates: &mut [Estimate],
-) {
+fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
     let channels = rows.channels.max(1);
     let count = estimates.len().min(rows.readings.len() / channels);
     let eights = count - count % 8;
@@ -85,8 +102,9 @@ fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, es
 #[inline(always)]
 fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
     let [xx, xf, ff] = minima.covariance;
-    let (xx, xf, ff) = (xx.lanes(), xf.lanes(), ff.lanes());
-    let (x_m, force_n, misfit) = (minima.x_m.lanes(), minima.force_n.lanes(), minima.misfit.lanes());
+    let (xx, xf, ff) = (xx.to_array(), xf.to_array(), ff.to_array());
+    let x_m = minima.x_m.to_array();
+    let (force_n, misfit) = (minima.force_n.to_array(), minima.misfit.to_array());
     let mut each = [Minimum::<f64>::nowhere(); 8];
     for i in 0..8 {
         let covariance = [xx[i], xf[i], ff[i]];

@@ -11,8 +11,8 @@
 //! λ = |½f″·f|/|f|².
 
 use super::belief::ForceBelief;
-use super::lanes::Number;
 use super::table::{Cell, InfluenceTable};
+use palpate_numerics::simd::Number;
 use palpate_numerics::small::add_outer;
 
 /// How the influences bend in a cell of the table.
@@ -63,7 +63,7 @@ pub(super) fn bends(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBe
         .map(|(cell, weights)| {
             let at =
                 |part: usize| bend(table, weights.as_flattened(), force, cell, part as f64 / PARTS as f64);
-            (0..=PARTS).map(at).fold(Bend { kappa_square: 0.0, lambda_square: 0.0 }, |a, b| Bend {
+            (0..=PARTS).map(at).fold(Bend::<f64> { kappa_square: 0.0, lambda_square: 0.0 }, |a, b| Bend {
                 kappa_square: a.kappa_square.max(b.kappa_square),
                 lambda_square: a.lambda_square.max(b.lambda_square),
             })

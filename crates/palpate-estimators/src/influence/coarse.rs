@@ -5,9 +5,9 @@
 //! its chord is known beforehand, so a valley's lowest misfit is bounded from below without going there.
 
 use super::belief::ForceBelief;
-use super::lanes::{Abreast, Eight};
 use super::rays::Rays;
 use super::table::InfluenceTable;
+use palpate_numerics::simd::{Abreast, Eight};
 
 /// The search looks at every so many nodes; misfits between them are smooth.
 pub(super) const STRIDE: usize = 4;
@@ -49,7 +49,8 @@ impl Profile {
             (self.misfits.as_chunks().0, self.misfits[1..].as_chunks().0, self.misfits[2..].as_chunks().0);
         let mut bits = 0u64;
         for b in 0..BLOCKS {
-            let block = V::load(&here[b]).is_minimum(V::load(&left[b]), V::load(&right[b]));
+            let (left, here, right) = (V::load(&left[b]), V::load(&here[b]), V::load(&right[b]));
+            let block = here.at_most(left) & here.below(right);
             bits |= u64::from(block) << (8 * b);
         }
         let (mut lowest, mut count) = ([0; MOST_MINIMA], 0);
@@ -161,7 +162,7 @@ impl Coarse {
         if let ForceBelief::Known(force_n) = self.force {
             let (square, twice) = (V::splat(square), V::splat(2.0 * force_n));
             for b in 0..BLOCKS {
-                (square + (V::load(&self.own[b]) - twice * products[b])).store(&mut misfits[b]);
+                misfits[b] = (square + (V::load(&self.own[b]) - twice * products[b])).to_array();
             }
             return;
         }
@@ -170,8 +171,8 @@ impl Coarse {
         for b in 0..BLOCKS {
             let score = (products[b] + V::splat(mean * precision)).max(V::splat(0.0));
             let explained = score * score * V::load(&self.inverse_norms[b]);
-            (constant - explained + V::load(&self.own[b])).store(&mut misfits[b]);
-            products[b].store(&mut profile.products[b]);
+            misfits[b] = (constant - explained + V::load(&self.own[b])).to_array();
+            profile.products[b] = products[b].to_array();
         }
     }
 

@@ -1,10 +1,9 @@
 //! A fitted influence locator of a surface with a model.
 
 use super::answer::{locate_one, locate_several};
-use super::batch::Rows;
+use super::batch::{Rows, locate_rows};
 use super::belief::ForceBelief;
 use super::channels;
-use super::lanes;
 use super::scratch::Scratch;
 use super::search::Search;
 use super::table::InfluenceTable;
@@ -125,7 +124,7 @@ impl BeamLocator {
         let count = (readings.len() / channels).min(estimates.len());
         let rows = Rows { readings, channels };
         match self.stored.contacts {
-            1 => lanes::locate_rows(&self.search, rows, scratch, estimates),
+            1 => locate_rows(&self.search, rows, scratch, estimates),
             most => {
                 for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
                     *estimate = locate_several(&self.search, most, reading, scratch);

@@ -10,7 +10,6 @@ mod coarse;
 mod config;
 mod fitting;
 mod hyperparameters;
-mod lanes;
 mod learning;
 mod likelihood;
 mod locator;

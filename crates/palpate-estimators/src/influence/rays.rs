@@ -5,7 +5,7 @@
 //! one to the other, and the best force is that of the mixture.
 
 use super::belief::ForceBelief;
-use super::lanes::{Abreast, Number};
+use palpate_numerics::simd::{Abreast, Number};
 
 /// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
 const END: f64 = 1e-2;

@@ -5,9 +5,9 @@
 
 use super::belief::ForceBelief;
 use super::bend::{Bend, Step};
-use super::lanes::{Abreast, Eight, Number};
 use super::search::{Minimum, Search};
 use super::table::Cell;
+use palpate_numerics::simd::{Abreast, Eight, Number};
 
 impl Search {
     /// The minima near `x_m`, by at most so many `steps`, and the bits of those readings that came to theirs.

@@ -13,11 +13,11 @@
 use super::belief::ForceBelief;
 use super::bend::{Bend, bends};
 use super::coarse::{Coarse, MOST_MINIMA, Profile};
-use super::lanes::{Eight, Number};
 use super::scratch::Scratch;
 use super::several::charge;
 use super::table::{InfluenceTable, Spacing};
 use palpate_numerics::chi_squared_bound;
+use palpate_numerics::simd::{Eight, Number};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,7 +141,7 @@ impl Search {
                 None => V::load(&gather(reading, channels)),
             };
             let d = (raw - V::load(offsets)) * V::load(inverse);
-            d.store(group);
+            *group = d.to_array();
             square = square + d * d;
         }
         square.sum()

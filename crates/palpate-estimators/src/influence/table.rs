@@ -1,6 +1,6 @@
 //! Influence functions as a table: values and slopes at evenly spaced nodes, cubic between them.
 
-use super::lanes::Number;
+use palpate_numerics::simd::Number;
 use serde::{Deserialize, Serialize};
 
 /// What every sensor reads per newton, with its uncertainty, as a function of the contact's position along the surface.

@@ -1,14 +1,15 @@
 //! From a recording to training patterns, and from trained weights to a locator.
 
 use super::{
-    InputScale, InstructionSet, Network, NetworkLocator, NetworkParts, OutputCoding, Patterns,
-    Topology, TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
+    InputScale, Network, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
+    TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
 };
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use crate::network::locator::ChannelScaling;
 use crate::recording::Recording;
 use palpate_mechanics::surface::{Extent, Surface};
 use palpate_numerics::mean_and_variance;
+use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::Cancelled;
 
 /// Why a network cannot be fitted to a recording.
@@ -69,33 +70,21 @@ impl Fit for Network {
         Ok(fitting.locator(network))
     }
 
-    /// Trains as many networks side by side as the machine has lanes.
+    /// Trains as many networks side by side as there are lanes.
     fn fit_many(
         &self,
-        task: FitTask,
-        queue: &mut dyn SeedQueue<NetworkLocator>,
-    ) -> Result<(), NetworkFitError> {
-        self.fit_many_by(InstructionSet::best(), task, queue)
-    }
-}
-
-impl Network {
-    /// [`Fit::fit_many`] by an instruction set of the caller's.
-    ///
-    /// # Errors
-    /// [`NetworkFitError`] as for [`Fit::fit_many`].
-    pub fn fit_many_by(
-        &self,
-        set: InstructionSet,
         task: FitTask,
         queue: &mut dyn SeedQueue<NetworkLocator>,
     ) -> Result<(), NetworkFitError> {
         task.check_channels()?;
         let fitting = NetworkFitting::of(self, task)?;
         let mut queue = Coded { fitting: &fitting, task, queue };
+        let set = InstructionSet::best();
         Ok(train_many(set, self.precision, &fitting.task(), &mut queue, task.watch)?)
     }
+}
 
+impl Network {
     /// The locator that an earlier fit gave, from its weights and outcome; `None` when their number is not the network's.
     ///
     /// # Errors

@@ -1,22 +1,20 @@
 //! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
 
+mod batch;
 mod config;
 mod fitting;
-mod forward;
-mod lanes;
 mod levenberg_marquardt;
 mod locator;
+mod logistic;
 mod outcome;
 mod patterns;
 mod prepared;
-mod scalar;
 mod topology;
 mod train;
 
+pub use batch::BatchNetwork;
 pub use config::{BackPropagation, InputScale, Network, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
-pub use forward::BatchNetwork;
-pub use lanes::{InstructionSet, Precision};
 pub use levenberg_marquardt::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
@@ -27,4 +25,4 @@ pub use palpate_core::Activation;
 pub use patterns::Patterns;
 pub use prepared::PreparedNetwork;
 pub use topology::Topology;
-pub use train::{TrainingQueue, TrainingTask, train_many, train_one};
+pub use train::{Precision, TrainingQueue, TrainingTask, train_many, train_one};

@@ -1,6 +1,86 @@
-//! What each criterion sums over the contacts.
+//! Every contact's variance with one sensor more, summed over the contacts eight at a time: what searches spend their time in.
+//!
+//! [`sum_up`] is loops over the lanes of one block, so that compilers make vector instructions of them: two f64 in a register on any x86-64,
+//! four where [`run_loops`] finds AVX2 when the program runs. Both do the same operations lane by lane in the same order, each rounded as
+//! IEEE 754 says and none fused, so their sums are the same to the last bit and searches find the same layouts on every machine. (The
+//! logarithms of D-optimality are the C library's.)
+//!
+//! The bound is one division and one root a contact: with AVX2 2.2 ns of a 2.5 GHz Xeon, whatever their width; AVX-512 gains
+//! nothing, as it divides eight numbers in twice the time of four. Rows that are in no cache cost another 1.2 ns to fetch, so
+//! whoever judges candidates for several states does so while their rows are at hand.
 
-use super::{Block, LANES};
+use super::{Block, LANES, packed};
+use palpate_numerics::simd::{Kernel, Simd, run_loops};
+
+/// The contacts of a layout, and what one sensor more tells of them.
+#[derive(Clone, Copy)]
+pub(super) struct Contacts<'a> {
+    /// [entry of the covariance's lower triangle][block of contacts]
+    pub covariances: &'a [Block],
+    /// [unknown][block]
+    pub row: &'a [Block],
+    /// [block]
+    pub weights: &'a [Block],
+}
+
+/// Folds each contact's variance of the position, and the factor by which a sensor shrinks det C there, into sums.
+pub(super) fn folded<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums: &S) -> [f64; 2] {
+    run_loops(Fold::<P, FIRST, S> { contacts, sums })
+}
+
+struct Fold<'a, const P: usize, const FIRST: usize, S> {
+    contacts: Contacts<'a>,
+    sums: &'a S,
+}
+
+impl<const P: usize, const FIRST: usize, S: Sums> Kernel for Fold<'_, P, FIRST, S> {
+    type Output = [f64; 2];
+    const FUSED: bool = false;
+
+    #[inline(always)]
+    fn run<V: Simd>(self) -> [f64; 2] {
+        sum_up::<P, FIRST, S>(self.contacts, self.sums)
+    }
+}
+
+#[inline(always)]
+fn sum_up<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums: &S) -> [f64; 2] {
+    let Contacts { covariances, row, weights } = contacts;
+    let n = weights.len();
+    let columns: [&[Block]; P] = std::array::from_fn(|k| &row[k * n..][..n]);
+    let covariances: [[&[Block]; P]; P] =
+        std::array::from_fn(|i| std::array::from_fn(|k| &covariances[packed(i, k) * n..][..n]));
+    let (mut first, mut second) = ([0.0; LANES], [0.0; LANES]);
+    for at in 0..n {
+        // shrink = 1 + jᵀ·C·j; gain = |C·j|² of the position; before = tr C of the position.
+        let (mut shrink, mut gain, mut variance) = ([1.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..P {
+            let mut told = [0.0; LANES];
+            for k in 0..P {
+                let (c, j) = (&covariances[i][k][at], &columns[k][at]);
+                for lane in 0..LANES {
+                    told[lane] += c[lane] * j[lane];
+                }
+            }
+            let j = &columns[i][at];
+            for lane in 0..LANES {
+                shrink[lane] += j[lane] * told[lane];
+            }
+            if i >= FIRST {
+                let before = &covariances[i][i][at];
+                for lane in 0..LANES {
+                    gain[lane] += told[lane] * told[lane];
+                    variance[lane] += before[lane];
+                }
+            }
+        }
+        for lane in 0..LANES {
+            variance[lane] = (variance[lane] - gain[lane] / shrink[lane]).max(0.0);
+        }
+        sums.fold(&mut first, &mut second, &weights[at], &variance, &shrink);
+    }
+    [S::join(&first), second.iter().sum()]
+}
 
 /// What is summed, block by block. The second sum is the mean standard deviation, where ties are to be broken.
 pub(super) trait Sums {
@@ -61,3 +141,6 @@ impl Sums for Shrinking {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,12 +5,12 @@ use crate::fit::Locate;
 use crate::fixtures::paper;
 use crate::influence::Influence;
 use crate::influence::answer::NOTHING;
-use crate::influence::batch::Rows;
+use crate::influence::batch::{LocateRows, Rows};
 use crate::influence::belief::ForceBelief;
-use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
+use palpate_numerics::simd::InstructionSet;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -78,12 +78,13 @@ fn every_instruction_set_answers_as_plain_arrays_do() {
             let readings = readings(&setup);
             let flat = readings.concat();
             let rows = Rows { readings: &flat, channels: 8 };
-            let by = |set| {
+            let by = |set: InstructionSet| {
                 let mut estimates = vec![NOTHING; readings.len()];
-                locate_rows_by(set, locator.search(), rows, &mut Scratch::default(), &mut estimates);
+                let (search, scratch) = (locator.search(), &mut Scratch::default());
+                set.run(LocateRows { search, rows, scratch, estimates: &mut estimates });
                 estimates
             };
-            let plain = by(InstructionSet::Portable);
+            let plain = by(InstructionSet::PORTABLE);
             for set in InstructionSet::available() {
                 assert_eq!(by(set), plain, "{set:?}, {:?}", locator.force());
             }

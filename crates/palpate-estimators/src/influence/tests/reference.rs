@@ -4,11 +4,11 @@ use super::{clean, fit, noisy};
 use crate::fixtures::paper;
 use crate::influence::Influence;
 use crate::influence::belief::ForceBelief;
-use crate::influence::lanes::Array;
 use crate::influence::scratch::Scratch;
 use crate::influence::search::{Minimum, Search};
 use crate::influence::table::InfluenceTable;
 use crate::setup::Setup;
+use palpate_numerics::simd::Array;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -86,9 +86,9 @@ fn exhaustive(search: &Search, whitened: &[f64]) -> (f64, f64) {
 /// What the search finds, and the whitened reading.
 fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
     let mut scratch = Scratch::default();
-    let square = search.whiten::<Array>(reading, scratch.whitened.room(search.groups()));
+    let square = search.whiten::<Array<f64, 8, false>>(reading, scratch.whitened.room(search.groups()));
     let whitened = scratch.whitened.channels(search.live.len()).to_vec();
-    (search.minima::<Array>(square, &mut scratch).0[0], whitened)
+    (search.minima::<Array<f64, 8, false>>(square, &mut scratch).0[0], whitened)
 }
 
 #[test]

@@ -3,6 +3,28 @@
 use super::*;
 use crate::network::{Activation, Network, PresentationOrder, TrainingStatus};
 
+mod scalar;
+
+/// One network by the scalar twin, in the arithmetic that the lanes of this machine have.
+struct Twin<'a> {
+    precision: Precision,
+    task: &'a TrainingTask<'a>,
+    seed: u64,
+}
+
+impl Kernel for Twin<'_> {
+    type Output = TrainedNetwork;
+    const FUSED: bool = true;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> TrainedNetwork {
+        match self.precision {
+            Precision::F64 => scalar::train::<S::Array<f64, 1>>(self.task, self.seed),
+            Precision::F32 => scalar::train::<S::Array<f32, 1>>(self.task, self.seed),
+        }
+    }
+}
+
 /// A queue of the seeds 0…n.
 struct Seeds {
     next: u64,
@@ -49,8 +71,10 @@ fn compare_with_twin(config: &Network, patterns: &Patterns, seeds: u64) {
     let topology = Topology::new(config, patterns.inputs, patterns.outputs);
     let task = TrainingTask { topology: &topology, patterns, rule: &config.training };
     for precision in [Precision::F64, Precision::F32] {
-        let twin: Vec<_> =
+        let twin: Vec<_> = (0..seeds).map(|seed| run_loops(Twin { precision, task: &task, seed })).collect();
+        let alone: Vec<_> =
             (0..seeds).filter_map(|seed| train_one(precision, &task, seed, Watch::NONE).ok()).collect();
+        assert_eq!(alone, twin, "one by one, {precision:?}, {config:?}");
         for set in InstructionSet::available() {
             assert_eq!(networks(set, precision, &task, seeds), twin, "{set}, {precision:?}, {config:?}");
         }
@@ -153,7 +177,7 @@ fn one_update_goes_down_the_gradient_of_finite_differences() {
         let (first, second) = (after(1), after(2));
         // The first update has no momentum yet, the second repeats a share of it: Δw₂ = α Δw₁ − η ∂E/∂w.
         let before: Vec<f64> = {
-            let mut stream = crate::network::lanes::Streams::seeded(3);
+            let mut stream = order::Streams::seeded(3);
             (0..topology.weight_count()).map(|_| stream.uniform(config.training.initial_weights)).collect()
         };
         let gradient = |weights: &[f64], k: usize| {

@@ -12,17 +12,14 @@
 //!
 //! `V` is one lane of the arithmetic that the SIMD lanes have, so that both round alike.
 
-use super::lanes::{Lanes, OrderDrawer, Real, Streams, activate, derivative};
-use super::{PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
-use palpate_numerics::watch::{Cancelled, Watch};
+use crate::network::logistic::{activate, derivative};
+use crate::network::train::order::{OrderDrawer, Streams};
+use crate::network::{Activation, PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
+use palpate_numerics::simd::{Real, Vector};
 
-/// Trains the network of one seed; `watch` is told of every epoch.
+/// Trains the network of one seed.
 #[inline(always)]
-pub(super) fn train<V: Lanes<1>>(
-    task: &TrainingTask,
-    seed: u64,
-    watch: Watch,
-) -> Result<TrainedNetwork, Cancelled> {
+pub(super) fn train<V: Vector<1>>(task: &TrainingTask, seed: u64) -> TrainedNetwork {
     let patterns = task.patterns;
     let inputs = inputs_with_bias::<V>(task);
     let targets: Vec<V> = patterns.target_values.iter().map(|&t| value(t)).collect();
@@ -32,7 +29,6 @@ pub(super) fn train<V: Lanes<1>>(
     let mut order: Vec<u32> = (0..patterns.count() as u32).collect();
     let mut epochs = 0;
     loop {
-        watch.round()?;
         if task.rule.order == PresentationOrder::Shuffled {
             drawer.draw_one(&mut stream, &mut order);
         }
@@ -48,22 +44,18 @@ pub(super) fn train<V: Lanes<1>>(
         epochs += 1;
         let [error] = error.to_array();
         if let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), task.rule) {
-            return Ok(TrainedNetwork {
-                topology: task.topology.clone(),
-                weights: network.weights(),
-                outcome,
-            });
+            return TrainedNetwork { topology: task.topology.clone(), weights: network.weights(), outcome };
         }
     }
 }
 
 #[inline(always)]
-fn value<V: Lanes<1>>(x: f64) -> V {
+fn value<V: Vector<1>>(x: f64) -> V {
     V::splat(V::Real::from_f64(x))
 }
 
 /// Every pattern's inputs, each row followed by the 1 that the biases weigh.
-fn inputs_with_bias<V: Lanes<1>>(task: &TrainingTask) -> Vec<V> {
+fn inputs_with_bias<V: Vector<1>>(task: &TrainingTask) -> Vec<V> {
     let bias = task.topology.biases.then_some(1.0);
     let rows = (0..task.patterns.count()).map(|p| task.patterns.input(p));
     rows.flat_map(|row| row.iter().copied().chain(bias)).map(value).collect()
@@ -71,7 +63,7 @@ fn inputs_with_bias<V: Lanes<1>>(task: &TrainingTask) -> Vec<V> {
 
 /// One layer: its rows of weights, and what flows through it.
 struct Layer<V> {
-    activation: super::Activation,
+    activation: Activation,
     row_len: usize,
     /// w, row by row.
     weights: Vec<V>,
@@ -89,7 +81,7 @@ struct Network<V> {
     alpha: V,
 }
 
-impl<V: Lanes<1>> Network<V> {
+impl<V: Vector<1>> Network<V> {
     fn new(task: &TrainingTask, stream: &mut Streams<1>) -> Self {
         let topology = task.topology;
         let mut layer = |k: usize| {
@@ -135,9 +127,9 @@ impl<V: Lanes<1>> Network<V> {
     fn compare(&mut self, targets: &[V], mut error: V) -> V {
         if let Some(layer) = self.layers.last_mut() {
             for ((t, a), delta) in targets.iter().zip(&layer.outputs).zip(&mut layer.deltas) {
-                let difference = t.sub(*a);
+                let difference = *t - *a;
                 error = difference.mul_add(difference, error);
-                *delta = difference.mul(derivative(layer.activation, *a));
+                *delta = difference * derivative(layer.activation, *a);
             }
         }
         error
@@ -156,7 +148,7 @@ impl<V: Lanes<1>> Network<V> {
                 }
             }
             for (delta, a) in below.deltas.iter_mut().zip(&below.outputs) {
-                *delta = delta.mul(derivative(below.activation, *a));
+                *delta = *delta * derivative(below.activation, *a);
             }
         }
     }
@@ -172,9 +164,9 @@ impl<V: Lanes<1>> Network<V> {
             for ((row, before), delta) in
                 rows.zip(layer.before.chunks_exact_mut(layer.row_len)).zip(&layer.deltas)
             {
-                let step = eta.mul(*delta);
+                let step = eta * *delta;
                 for ((w, before), x) in row.iter_mut().zip(before).zip(x) {
-                    let new = step.mul_add(*x, alpha.mul_add(w.sub(*before), *w));
+                    let new = step.mul_add(*x, alpha.mul_add(*w - *before, *w));
                     *before = *w;
                     *w = new;
                 }

@@ -1,6 +1,5 @@
 use super::*;
 use crate::sensors::limit_objective::padded;
-use crate::sensors::limit_objective::sums::{Mean, Shrinking, Without, Worst};
 
 /// Blocks without any pattern; the same for the same seed.
 fn blocks(count: usize, seed: usize) -> Vec<Block> {
@@ -18,8 +17,8 @@ fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [
         diagonal.iter_mut().flatten().for_each(|value| *value = 200.0 + value.abs());
     }
     let weights = blocks(n, seed + 2);
-    let wide = folded::<P, FIRST, S>(&covariances, &row, &weights, sums);
-    let narrow = kernel::<P, FIRST, S>(&covariances, &row, &weights, sums);
+    let contacts = Contacts { covariances: &covariances, row: &row, weights: &weights };
+    let (wide, narrow) = (folded::<P, FIRST, S>(contacts, sums), sum_up::<P, FIRST, S>(contacts, sums));
     assert!(narrow.iter().all(|sum| sum.is_finite()) && narrow[0] != 0.0, "{narrow:?}");
     [wide, narrow].map(|sums| sums.map(f64::to_bits))
 }

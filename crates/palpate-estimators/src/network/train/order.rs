@@ -5,15 +5,15 @@
 //! Fisher and Yates' exchanges would need a scattered store a lane and presentation. With n = 30 the 27 random bits of
 //! two keys coincide once in 300,000 epochs; then the lower number goes first, a bias far below what matters.
 
-use super::column_len;
+use palpate_numerics::simd::LOOK_UP;
 
 /// The generator xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams side by side.
 #[derive(Clone, Debug)]
-pub(crate) struct Streams<const N: usize>([[u32; N]; 4]);
+pub(super) struct Streams<const N: usize>([[u32; N]; 4]);
 
 impl<const N: usize> Streams<N> {
     /// All streams at the seed 0, to be seeded one by one.
-    pub(crate) fn unseeded() -> Self {
+    pub(super) fn unseeded() -> Self {
         let mut streams = Self([[0; N]; 4]);
         for lane in 0..N {
             streams.set(lane, &Streams::<1>::seeded(0));
@@ -22,7 +22,7 @@ impl<const N: usize> Streams<N> {
     }
 
     /// Puts a stream of its own into one lane.
-    pub(crate) fn set(&mut self, lane: usize, stream: &Streams<1>) {
+    pub(super) fn set(&mut self, lane: usize, stream: &Streams<1>) {
         for (words, word) in self.0.iter_mut().zip(&stream.0) {
             words[lane] = word[0];
         }
@@ -30,7 +30,7 @@ impl<const N: usize> Streams<N> {
 
     /// The next 32 random bits of every stream.
     #[inline(always)]
-    pub(crate) fn next(&mut self) -> [u32; N] {
+    pub(super) fn next(&mut self) -> [u32; N] {
         let [s0, s1, s2, s3] = &mut self.0;
         let mut result = [0; N];
         for l in 0..N {
@@ -49,7 +49,7 @@ impl<const N: usize> Streams<N> {
 
 impl Streams<1> {
     /// The stream of a seed; SplitMix64 spreads the seed over the state, as the generator's authors advise.
-    pub(crate) fn seeded(seed: u64) -> Self {
+    pub(super) fn seeded(seed: u64) -> Self {
         let mut state = seed;
         let mut next = || {
             state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -63,7 +63,7 @@ impl Streams<1> {
     }
 
     /// A number uniform in −half_width…half_width.
-    pub(crate) fn uniform(&mut self, half_width: f64) -> f64 {
+    pub(super) fn uniform(&mut self, half_width: f64) -> f64 {
         (f64::from(self.next()[0]) / f64::from(u32::MAX) * 2.0 - 1.0) * half_width
     }
 }
@@ -92,8 +92,13 @@ fn exchanges(n: usize) -> Vec<(u32, u32)> {
     list
 }
 
+/// The length of a column that holds a number of each pattern: a power of two, and no less than vectors look up.
+pub(super) fn column_len(patterns: usize) -> usize {
+    patterns.next_power_of_two().max(LOOK_UP)
+}
+
 /// Draws presentation orders of n patterns for N lanes.
-pub(crate) struct OrderDrawer {
+pub(super) struct OrderDrawer {
     patterns: usize,
     /// Covers the pattern number in a key.
     mask: u32,
@@ -101,15 +106,15 @@ pub(crate) struct OrderDrawer {
 }
 
 impl OrderDrawer {
-    pub(crate) fn new(patterns: usize) -> Self {
+    pub(super) fn new(patterns: usize) -> Self {
         let mask = column_len(patterns) as u32 - 1;
         Self { patterns, mask, exchanges: exchanges(patterns) }
     }
 
     /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The pattern's number
-    /// is a pick's low bits, which is what [`Table`](super::Table)s look at; the bits above it are left as they were drawn.
+    /// is a pick's low bits, which is what the patterns are looked up by; the bits above it are left as they were drawn.
     #[inline(always)]
-    pub(crate) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
+    pub(super) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
         // A copy of its own lets the generator's state stay in registers.
         let mut local = streams.clone();
         for (pattern, row) in order.iter_mut().enumerate() {
@@ -130,7 +135,7 @@ impl OrderDrawer {
     }
 
     /// The same for one stream, by an ordinary sort.
-    pub(crate) fn draw_one(&self, stream: &mut Streams<1>, order: &mut [u32]) {
+    pub(super) fn draw_one(&self, stream: &mut Streams<1>, order: &mut [u32]) {
         for (pattern, key) in order.iter_mut().enumerate() {
             *key = (stream.next()[0] & !self.mask) | pattern as u32;
         }
@@ -140,7 +145,7 @@ impl OrderDrawer {
         }
     }
 
-    pub(crate) fn patterns(&self) -> usize {
+    pub(super) fn patterns(&self) -> usize {
         self.patterns
     }
 }

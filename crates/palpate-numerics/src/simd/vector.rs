@@ -1,0 +1,272 @@
+//! What numbers side by side can do. Every operation is lane by lane and rounds as IEEE 754 says.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// The number in one lane: f64 or f32.
+pub trait Real:
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
+    /// Adding then subtracting it rounds to a whole number n; the sum's low bits are then the exponent of 2ⁿ: 1.5·2^mantissa + bias.
+    const ROUNDER: Self;
+    /// Coefficients of the minimax polynomial of 2^r on |r| ≤ ½ (Remez, relative error), lowest first.
+    const EXP2: &'static [Self];
+    /// The product of two exponentials of numbers up to this is finite.
+    const HALF_OF_EXP: Self;
+    /// Rounds to this precision.
+    fn from_f64(x: f64) -> Self;
+    /// The same number.
+    fn to_f64(self) -> f64;
+    /// `self` · `factor` + `term`, rounded once.
+    fn fused_mul_add(self, factor: Self, term: Self) -> Self;
+    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
+    fn power_of_two(self) -> Self;
+}
+
+macro_rules! real {
+    ($real:ident, ROUNDER: $rounder:literal, HALF_OF_EXP: $half:literal, EXP2: [$($coefficient:literal),*]) => {
+        impl Real for $real {
+            const ROUNDER: Self = $rounder;
+            const EXP2: &'static [Self] = &[$($coefficient),*];
+            const HALF_OF_EXP: Self = $half;
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $real
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline(always)]
+            fn fused_mul_add(self, factor: Self, term: Self) -> Self {
+                self.mul_add(factor, term)
+            }
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                $real::from_bits(self.to_bits() << ($real::MANTISSA_DIGITS - 1))
+            }
+        }
+    };
+}
+
+// Relative error 1.4e-14.
+real!(f64, ROUNDER: 6_755_399_441_056_767.0, HALF_OF_EXP: 350.0, EXP2: [
+    1.000_000_000_000_012_7,
+    0.693_147_180_559_871,
+    0.240_226_506_956_496_53,
+    0.055_504_108_668_685_623,
+    0.009_618_129_192_067_193,
+    0.001_333_355_761_760_242_4,
+    0.000_154_034_349_481_035_28,
+    0.000_015_252_984_839_814_557,
+    1.325_940_560_357_369_6e-6,
+    1.015_033_649_514_861_8e-7
+]);
+
+// Relative error 7.5e-8.
+real!(f32, ROUNDER: 12_583_039.0, HALF_OF_EXP: 43.0, EXP2: [
+    1.000_000_1,
+    0.693_146_94,
+    0.240_221_2,
+    0.055_507_13,
+    0.009_675_541,
+    0.001_327_647_2
+]);
+
+/// A number, or several side by side.
+pub trait Arithmetic:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The number in one lane.
+    type Real: Real;
+    /// The same number in every lane.
+    fn splat(value: Self::Real) -> Self;
+    /// The larger; `other` where they cannot be compared.
+    fn max(self, other: Self) -> Self;
+    /// The smaller; `other` where they cannot be compared.
+    fn min(self, other: Self) -> Self;
+}
+
+/// An f64, or up to eight side by side, with a bit for each lane: what is written against this gives the same bits for one and for eight.
+pub trait Number: Arithmetic<Real = f64> {
+    /// Without what is after the point.
+    fn truncate(self) -> Self;
+    /// Bit i is set where lane i is at most `other`'s.
+    fn at_most(self, other: Self) -> u8;
+    /// `self` where the lane's bit is set, `other` where it is not.
+    fn or(self, bits: u8, other: Self) -> Self;
+}
+
+/// Numbers that [`Vector::look_up`] looks among: as many as two AVX-512 registers of f32 hold.
+pub const LOOK_UP: usize = 32;
+
+/// N numbers side by side.
+pub trait Vector<const N: usize>: Arithmetic {
+    /// The numbers of an array, lane by lane.
+    fn load(values: &[Self::Real; N]) -> Self;
+    /// The lanes.
+    fn to_array(self) -> [Self::Real; N];
+    /// `self` · `factor` + `term`, rounded once where the machine can.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `self` · `factor` − `term`, rounded once where the machine can.
+    fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
+    fn power_of_two(self) -> Self;
+
+    /// The number that each lane picks, of whose pick only the low bits count.
+    #[inline(always)]
+    fn look_up(numbers: &[Self::Real; LOOK_UP], picks: &[u32; N]) -> Self {
+        let mut lanes = [numbers[0]; N];
+        for l in 0..N {
+            lanes[l] = numbers[picks[l] as usize % LOOK_UP];
+        }
+        Self::load(&lanes)
+    }
+
+    /// The columns of N rows of eight numbers.
+    #[inline(always)]
+    fn transpose(rows: &[[Self::Real; 8]; N]) -> [Self; 8] {
+        let mut columns = [Self::splat(rows[0][0]); 8];
+        for (k, column) in columns.iter_mut().enumerate() {
+            let mut lanes = [rows[0][0]; N];
+            for l in 0..N {
+                lanes[l] = rows[l][k];
+            }
+            *column = Self::load(&lanes);
+        }
+        columns
+    }
+}
+
+/// Eight f64 side by side.
+pub trait Eight: Number + Vector<8> {
+    /// Bit i is set where lane i is below `other`'s.
+    fn below(self, other: Self) -> u8;
+
+    /// ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)), by lane.
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let a = self.to_array();
+        ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
+    }
+
+    /// [`Eight::sum`] of each.
+    #[inline(always)]
+    fn sums(eight: &[Self; 8]) -> Self {
+        let mut sums = [0.0; 8];
+        for l in 0..8 {
+            sums[l] = eight[l].sum();
+        }
+        Self::load(&sums)
+    }
+}
+
+impl Arithmetic for f64 {
+    type Real = f64;
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn truncate(self) -> Self {
+        self.trunc()
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u8 {
+        u8::from(self <= other)
+    }
+    #[inline(always)]
+    fn or(self, bits: u8, other: Self) -> Self {
+        if bits & 1 == 1 { self } else { other }
+    }
+}
+
+/// One number each of rows that are worked on side by side, one row or eight, whose own numbers lie in `V`. What is written against this gives
+/// the same bits for one row and for eight.
+pub trait Abreast<V: Copy>: Number {
+    /// How many rows.
+    const COUNT: usize;
+    /// The bits of all of them.
+    const ALL: u8 = (u8::MAX as u32 >> (8 - Self::COUNT)) as u8;
+    /// Something of each row.
+    type Each<T: Copy>: AsRef<[T]> + AsMut<[T]>;
+
+    /// The same for each.
+    fn each<T: Copy>(value: T) -> Self::Each<T>;
+    /// The numbers.
+    fn lanes(self) -> Self::Each<f64>;
+    /// The numbers side by side.
+    fn of(lanes: &Self::Each<f64>) -> Self;
+    /// [`Eight::sum`] of each row's K vectors.
+    fn sums<const K: usize>(vectors: &Self::Each<[V; K]>) -> [Self; K];
+}
+
+impl<V: Eight> Abreast<V> for f64 {
+    const COUNT: usize = 1;
+    type Each<T: Copy> = [T; 1];
+
+    #[inline(always)]
+    fn each<T: Copy>(value: T) -> [T; 1] {
+        [value]
+    }
+    #[inline(always)]
+    fn lanes(self) -> [f64; 1] {
+        [self]
+    }
+    #[inline(always)]
+    fn of(lanes: &[f64; 1]) -> f64 {
+        lanes[0]
+    }
+    #[inline(always)]
+    fn sums<const K: usize>(vectors: &[[V; K]; 1]) -> [f64; K] {
+        let mut sums = [0.0; K];
+        for k in 0..K {
+            sums[k] = vectors[0][k].sum();
+        }
+        sums
+    }
+}
+
+impl<V: Eight> Abreast<V> for V {
+    const COUNT: usize = 8;
+    type Each<T: Copy> = [T; 8];
+
+    #[inline(always)]
+    fn each<T: Copy>(value: T) -> [T; 8] {
+        [value; 8]
+    }
+    #[inline(always)]
+    fn lanes(self) -> [f64; 8] {
+        self.to_array()
+    }
+    #[inline(always)]
+    fn of(lanes: &[f64; 8]) -> Self {
+        V::load(lanes)
+    }
+    #[inline(always)]
+    fn sums<const K: usize>(vectors: &[[V; K]; 8]) -> [V; K] {
+        let [a, b, c, d, e, f, g, h] = vectors;
+        let mut sums = [V::splat(0.0); K];
+        for k in 0..K {
+            sums[k] = V::sums(&[a[k], b[k], c[k], d[k], e[k], f[k], g[k], h[k]]);
+        }
+        sums
+    }
+}
