@@ -23,6 +23,11 @@
 //! assert!(png.starts_with(b"\x89PNG"));
 //! # Ok::<(), palpate::report::PngError>(())
 //! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 mod beam_drawing;
 mod bench_drawing;

@@ -2,6 +2,7 @@
 //!
 //! Safety of every block here: the type is private to the lanes, and [`super::dispatch`] enters the search with it only
 //! after `is_x86_feature_detected!` has found AVX2, so the instructions exist.
+#![expect(unsafe_code, reason = "intrinsics")]
 
 use super::{Eight, Number};
 use std::arch::x86_64::*;

@@ -2,6 +2,7 @@
 //!
 //! Safety of every block here: the types are private to the lanes, and [`super::dispatch`] enters the kernel with
 //! them only after `is_x86_feature_detected!` has found AVX-512 F and DQ, so the instructions exist.
+#![expect(unsafe_code, reason = "intrinsics")]
 
 use super::{Lanes, Table};
 use std::arch::x86_64::*;

@@ -1,4 +1,5 @@
 //! Picks the widest arithmetic that the machine has, when the program runs.
+#![expect(unsafe_code, reason = "calls of functions with target features")]
 
 use super::forward::{self, Batch};
 use super::portable::Array;

@@ -8,6 +8,7 @@
 //! The bound is one division and one root a contact: with AVX2 2.2 ns of a 2.5 GHz Xeon, whatever their width; AVX-512 gains
 //! nothing, as it divides eight numbers in twice the time of four. Rows that are in no cache cost another 1.2 ns to fetch, so
 //! whoever judges candidates for several states does so while their rows are at hand.
+#![expect(unsafe_code, reason = "calls of functions with target features")]
 
 use super::sums::Sums;
 use super::{Block, LANES, packed};
