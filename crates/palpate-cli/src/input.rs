@@ -5,7 +5,7 @@ use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::CsvError;
 use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_rig::{Rig, RigError};
-use palpate_studies::{Study, StudyError, StudyProblem};
+use palpate_studies::Study;
 use std::path::Path;
 
 /// The text of a file.
@@ -43,10 +43,7 @@ pub fn parse_rig(path: &Path, text: &str) -> Result<Rig, Failure> {
 
 /// A study, from its file's text.
 pub fn parse_study(name: &str, text: &str) -> Result<Study, Failure> {
-    Study::from_toml(text).map_err(|StudyError { problem, span }| match problem {
-        StudyProblem::Rig(error) => rig_complaint(error, Path::new(name), text),
-        problem => complaint_at(Complaint::new(problem), name, text, span).into(),
-    })
+    Study::from_toml(text).map_err(|error| rig_complaint(error, Path::new(name), text))
 }
 
 /// A locator, from its file.

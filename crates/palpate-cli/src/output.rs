@@ -1,7 +1,7 @@
 //! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
 
 use crate::failure::{Complaint, Failure};
-use palpate_report::{ReportError, ReportFile};
+use palpate_report::ReportFile;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -53,9 +53,11 @@ pub fn make_folder(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(path).map_err(|error| cannot("make the folder", path, &error))
 }
 
-/// Writes the files of a report into a folder, which is made where it is not there yet.
-pub fn write_report(folder: &Path, report: Result<Vec<ReportFile>, ReportError>) -> Result<(), Failure> {
-    let files = report.map_err(Complaint::new)?;
+/// Writes the files of a report into a folder, which is made where it is not there yet; with the feature `png`, also a copy of every
+/// figure as PNG.
+pub fn write_report(folder: &Path, files: Vec<ReportFile>) -> Result<(), Failure> {
+    #[cfg(feature = "png")]
+    let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
     make_folder(folder)?;
     for file in files {
         write_file(&folder.join(&file.name), &file.bytes)?;

@@ -94,7 +94,7 @@ fn a_report_verifies_what_it_claims() {
     let folder = folder(EXAMPLE);
     let arguments = ["design", "sensors", "rig.toml", "--counts", "2..5", "--out", "deep/report", "--json"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
-    for name in ["report.html", "figure-1.svg", "figure-2.png", "figure-3.png", "figure-4.png"] {
+    for name in ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg", "figure-4.svg"] {
         assert!(folder.path().join("deep/report").join(name).is_file(), "{name}");
     }
     let page = fs::read_to_string(folder.path().join("deep/report/report.html")).unwrap();
@@ -133,7 +133,7 @@ fn a_plate_has_maps() {
     let told =
         said(&run(folder.path(), &["design", "sensors", "rig.toml", "--out", "report", "--verify", "1"]));
     assert!(told.contains("greedy-exchange: deflection (") && told.contains("Report:"), "{told}");
-    for name in ["figure-1.png", "figure-2.png"] {
+    for name in ["figure-1.svg", "figure-2.svg"] {
         assert!(folder.path().join("report").join(name).is_file(), "{name}");
     }
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();

@@ -47,7 +47,7 @@ fn pages() -> [Vec<ReportFile>; 2] {
         presentations_per_second: 1e7,
     };
     let report = StudyReport { study: &study, outcomes: &outcomes, results: &results, run: &run };
-    [paper_report(&report).unwrap(), study_report(&report).unwrap()]
+    [paper_report(&report), study_report(&report)]
 }
 
 /// The page of the limit of the paper's bench.
@@ -66,7 +66,7 @@ fn limit_page() -> Vec<ReportFile> {
         warnings: &limit_warnings(&limit, 3.0, Force::Unknown).unwrap(),
         listed: &known.points.iter().step_by(50).map(|point| point.position).collect::<Vec<_>>(),
     };
-    limit_report(&report).unwrap()
+    limit_report(&report)
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn the_example_s_track_is_closer_than_its_readings() {
     assert!(filter[3] >= 2.5, "{filter:?}");
     assert!(smoother[3] >= 4.0, "{smoother:?}");
     assert!((90.0..99.0).contains(&filter[4]), "{filter:?}");
-    for name in ["report.html", "figure-1.png", "figure-2.png", "figure-3.svg"] {
+    for name in ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg"] {
         assert!(folder.path().join("page").join(name).is_file(), "{name}");
     }
 }
@@ -147,7 +147,7 @@ fn a_contact_is_followed_over_a_plate() {
     assert!(filter[3] >= 2.5, "{filter:?}");
     assert!(smoother[3] >= 4.0, "{smoother:?}");
     assert!((88.0..=100.0).contains(&filter[4]), "{filter:?}");
-    for name in ["report.html", "figure-1.png", "figure-2.png"] {
+    for name in ["report.html", "figure-1.svg", "figure-2.svg"] {
         assert!(folder.path().join("page").join(name).is_file(), "{name}");
     }
 

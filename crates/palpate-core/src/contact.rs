@@ -16,6 +16,11 @@ impl Position {
         Self { x_m, y_m: 0.0 }
     }
 
+    /// The order by x, then by y.
+    pub fn cmp_by_x_then_y(&self, other: &Self) -> core::cmp::Ordering {
+        self.x_m.total_cmp(&other.x_m).then(self.y_m.total_cmp(&other.y_m))
+    }
+
     /// The straight distance to `other`, in metres.
     pub fn distance_m(self, other: Self) -> f64 {
         libm::hypot(self.x_m - other.x_m, self.y_m - other.y_m)

@@ -5,15 +5,15 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use super::sensors::WeightedContacts;
-use palpate_estimators::estimator::{
-    EstimatorConfig, FitError, Fitting, Locator, LocatorQueue, ReadingError,
-};
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, Method, ReadingError};
+use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::ChannelModel;
+use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{mean, median, standard_error};
 
 /// Why a calibration cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,6 +27,9 @@ pub enum CalibrationError {
     /// The locator does not take the readings.
     #[error(transparent)]
     Reading(#[from] ReadingError),
+    /// The calibration was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// How far calibrated locators were off, on average over the contacts of a design.
@@ -86,47 +89,41 @@ pub(super) struct Calibrated {
 
 impl Trial<'_> {
     /// Presses at `positions`, each `repeats` times, once a seed; fits, and asks. A seed has the same noise whatever the
-    /// positions. `None` when `keep_going` says no.
+    /// positions.
     pub fn calibrate(
         &self,
         positions: &[Position],
         repeats: usize,
         seeds: Seeds,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Vec<Calibrated>>, CalibrationError> {
+        watch: Watch,
+    ) -> Result<Vec<Calibrated>, CalibrationError> {
         let training: Vec<Position> =
             positions.iter().flat_map(|at| std::iter::repeat_n(*at, repeats)).collect();
-        if self.is_clean() && matches!(self.estimator, EstimatorConfig::Network(_)) {
-            return self.train_side_by_side(&training, seeds, keep_going);
+        if self.is_clean() {
+            return self.calibrate_side_by_side(&training, seeds, watch);
         }
-        let mut calibrated = Vec::new();
-        for seed in seeds.all() {
+        let calibrated = seeds.all().map(|seed| {
             let (recording, asked) = self.simulate(&training, seed)?;
-            let fitting = Fitting::prepare(&self.used, self.estimator, &recording)?;
-            let Some(locator) = fitting.fit(seed, keep_going)? else { return Ok(None) };
-            calibrated.push(self.ask(&locator, &asked)?);
-        }
-        Ok(Some(calibrated))
+            let task = FitTask { bench: &self.used, recording: &recording, seed, watch };
+            Ok(self.ask(&self.estimator.fit_task(task)?, &asked)?)
+        });
+        calibrated.collect()
     }
 
-    /// Without noise and faults all seeds press alike, and networks train in lanes.
-    fn train_side_by_side(
+    /// Without noise and faults all seeds press alike, and estimators that can are fitted side by side.
+    fn calibrate_side_by_side(
         &self,
         training: &[Position],
         seeds: Seeds,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Vec<Calibrated>>, CalibrationError> {
+        watch: Watch,
+    ) -> Result<Vec<Calibrated>, CalibrationError> {
         let (recording, asked) = self.simulate(training, seeds.first)?;
-        let fitting = Fitting::prepare(&self.used, self.estimator, &recording)?;
-        let mut queue = Queue { seeds: seeds.all().collect(), fitted: Vec::new(), keep_going };
-        fitting.fit_many(InstructionSet::best(), Precision::F64, &mut queue);
+        let task = FitTask { bench: &self.used, recording: &recording, seed: seeds.first, watch };
+        let mut queue = Queue { seeds: seeds.all().collect(), fitted: Vec::new() };
+        self.estimator.fit_many(task, &mut queue)?;
         let mut fitted = queue.fitted;
-        if fitted.len() < seeds.count {
-            return Ok(None);
-        }
         fitted.sort_by_key(|(seed, _)| *seed);
-        let asked = fitted.iter().map(|(_, locator)| self.ask(locator, &asked));
-        Ok(Some(asked.collect::<Result<_, _>>()?))
+        fitted.iter().map(|(_, locator)| Ok(self.ask(locator, &asked)?)).collect()
     }
 
     /// Whether channels tell the truth.
@@ -167,39 +164,30 @@ impl Trial<'_> {
 impl Verification {
     /// Sums up calibrations, at least one.
     pub(super) fn of(calibrated: &[Calibrated], contacts: &WeightedContacts) -> Self {
-        let mut errors: Vec<f64> =
+        let errors: Vec<f64> =
             calibrated.iter().map(|one| contacts.mean(one.errors_m.iter().copied())).collect();
-        let count = errors.len() as f64;
-        let mean_error_m = errors.iter().sum::<f64>() / count;
-        let squares: f64 = errors.iter().map(|error| (error - mean_error_m).powi(2)).sum();
-        errors.sort_by(f64::total_cmp);
         Self {
-            mean_error_m,
-            standard_error_m: (squares / (count - 1.0).max(1.0) / count).sqrt(),
-            median_error_m: 0.5 * (errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]),
-            within_tolerance_percent: 100.0 * calibrated.iter().map(|one| one.within).sum::<f64>() / count,
+            mean_error_m: mean(errors.iter().copied()),
+            standard_error_m: standard_error(&errors),
+            within_tolerance_percent: 100.0 * mean(calibrated.iter().map(|one| one.within)),
             calibrations: errors.len(),
+            median_error_m: median(errors).unwrap_or(f64::NAN),
         }
     }
 }
 
-/// The seeds of one calibration's networks, and what became of them.
-struct Queue<'a> {
+/// The seeds of calibrations, and the locators that they gave.
+struct Queue {
     seeds: VecDeque<u64>,
     fitted: Vec<(u64, Locator)>,
-    keep_going: &'a mut dyn FnMut() -> bool,
 }
 
-impl LocatorQueue for Queue<'_> {
+impl SeedQueue<Method> for Queue {
     fn next_seed(&mut self) -> Option<u64> {
         self.seeds.pop_front()
     }
 
     fn fitted(&mut self, seed: u64, locator: Locator) {
         self.fitted.push((seed, locator));
-    }
-
-    fn keep_going(&mut self) -> bool {
-        (self.keep_going)()
     }
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::fit::LocatorFault;
 use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Position;
+use palpate_numerics::root_mean_square;
 
 /// How far a method was off at positions that it had not seen: an uncertainty for methods without a noise model.
 ///
@@ -31,9 +32,8 @@ impl HeldOutSpread {
         let axis = |axis: usize| {
             let mut sizes: Vec<f64> = errors_m.iter().map(|error| error[axis].abs()).collect();
             sizes.sort_by(f64::total_cmp);
-            let mean_square = sizes.iter().map(|e| e * e).sum::<f64>() / sizes.len() as f64;
             let number = (0.95 * (sizes.len() + 1) as f64).ceil() as usize;
-            (mean_square.sqrt(), sizes[number.min(sizes.len()) - 1])
+            (root_mean_square(&sizes), sizes[number.min(sizes.len()) - 1])
         };
         let ((rms_x, half_x), (rms_y, half_y)) = (axis(0), axis(1));
         Some(Self { rms_m: [rms_x, rms_y], half_95_m: [half_x, half_y] })

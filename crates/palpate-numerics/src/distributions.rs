@@ -3,6 +3,32 @@
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
+/// What a χ² variable of two degrees of freedom exceeds with a probability of 5 %, −2·ln 0.05: the squared size, in standard
+/// deviations, of a normal distribution's 95 % ellipse.
+pub const ELLIPSE_95: f64 = 5.991_464_547_107_979;
+
+/// The ends of the 95 % interval of a normal distribution.
+#[inline]
+pub fn normal_interval_95(mean: f64, sd: f64) -> (f64, f64) {
+    (mean - NORMAL_95 * sd, mean + NORMAL_95 * sd)
+}
+
+/// An interval without what of it is below 0 or above `size`.
+#[inline]
+pub fn held_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
+    (low.max(0.0), high.min(size))
+}
+
+/// Where a rising function reaches a value: the end of what `is_below` holds for, from a range that is halved so many times.
+#[inline]
+pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..halvings {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
 /// The standard normal distribution Φ(z).
 pub fn normal_distribution(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
@@ -10,12 +36,7 @@ pub fn normal_distribution(z: f64) -> f64 {
 
 /// The z with Φ(z) = `share`, for a share between 0 and 1, by bisection to the last bits.
 pub fn normal_quantile(share: f64) -> f64 {
-    let (mut low, mut high) = (-39.0, 39.0);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if normal_distribution(middle) < share { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+    bisect((-39.0, 39.0), 80, |z| normal_distribution(z) < share)
 }
 
 /// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0.
@@ -37,11 +58,7 @@ pub fn chi_squared_bound(tail: f64, freedom: usize) -> f64 {
     while chi_squared_exceeds(high, freedom) > tail {
         (low, high) = (high, 2.0 * high);
     }
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if chi_squared_exceeds(middle, freedom) > tail { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
+    bisect((low, high), 60, |value| chi_squared_exceeds(value, freedom) > tail)
 }
 
 #[cfg(test)]
@@ -52,6 +69,7 @@ mod tests {
     fn tables_are_met() {
         assert!((normal_distribution(NORMAL_95) - 0.975).abs() < 1e-15);
         assert!((normal_quantile(0.975) - NORMAL_95).abs() < 1e-12);
+        assert!((chi_squared_bound(0.05, 2) - ELLIPSE_95).abs() < 1e-12);
         // Tables of χ²: 95 %, 99.99 % and one in a million.
         for (tail, freedom, value) in [
             (0.05, 1, 3.841_459),

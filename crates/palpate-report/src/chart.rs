@@ -24,15 +24,24 @@ pub struct Chart {
 
 impl Default for Chart {
     fn default() -> Self {
-        Chart {
-            title: String::new(),
-            x: Axis::default(),
-            y: Axis::default(),
-            series: Vec::new(),
-            marks: Vec::new(),
-            width_px: 720,
-            height_px: 440,
-        }
+        Chart::new("", Axis::default(), Axis::default(), Vec::new())
+    }
+}
+
+impl Chart {
+    /// A chart of 720 × 440 pixels without marks.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
+        Chart { title: title.into(), x, y, series, marks: Vec::new(), width_px: 720, height_px: 440 }
+    }
+
+    /// The same chart in another height.
+    pub fn with_height(self, height_px: u32) -> Self {
+        Chart { height_px, ..self }
+    }
+
+    /// The same chart with these marks.
+    pub fn with_marks(self, marks: Vec<Mark>) -> Self {
+        Chart { marks, ..self }
     }
 }
 
@@ -124,6 +133,47 @@ pub struct Series {
     pub colour: usize,
     /// Shape and data.
     pub kind: SeriesKind,
+}
+
+impl Series {
+    /// A solid line through `points`.
+    pub fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
+        Series::of(label, colour, SeriesKind::Line { points, stroke: Stroke::Solid })
+    }
+
+    /// A broken line through `points`.
+    pub fn dashes(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
+        Series::of(label, colour, SeriesKind::Line { points, stroke: Stroke::Dashed })
+    }
+
+    /// A translucent area between two curves.
+    pub fn band(label: impl Into<String>, colour: usize, points: Vec<BandPoint>) -> Self {
+        Series::of(label, colour, SeriesKind::Band { points })
+    }
+
+    /// Unconnected markers.
+    pub fn markers(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>, marker: Marker) -> Self {
+        Series::of(label, colour, SeriesKind::Points { points, marker })
+    }
+
+    /// Unconnected markers with a vertical bar.
+    pub fn error_bars(
+        label: impl Into<String>,
+        colour: usize,
+        points: Vec<ErrorPoint>,
+        marker: Marker,
+    ) -> Self {
+        Series::of(label, colour, SeriesKind::ErrorBars { points, marker })
+    }
+
+    /// Whether it is an area between two curves.
+    pub fn is_band(&self) -> bool {
+        matches!(self.kind, SeriesKind::Band { .. })
+    }
+
+    fn of(label: impl Into<String>, colour: usize, kind: SeriesKind) -> Self {
+        Series { label: label.into(), colour, kind }
+    }
 }
 
 /// Shape and data of a series.

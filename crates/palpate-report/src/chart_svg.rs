@@ -1,12 +1,11 @@
 //! A chart as SVG text.
 
-use super::canvas::{self, Canvas, GRID, MINOR_GRID, QUIET_INK, REFERENCE, WHITE};
 use super::chart::{BandPoint, Chart, ErrorPoint, Mark, Marker, Series, SeriesKind, Stroke};
 use super::geometry::{Point, Rect};
 use super::layout::Layout;
 use super::legend::Named;
+use super::svg::{BLACK, Colour, GRID, MINOR_GRID, QUIET_INK, REFERENCE, Svg, WHITE, palette};
 use super::ticks;
-use plotters::style::{Color, RGBColor};
 
 const LINE_WIDTH: f64 = 1.8;
 const REFERENCE_WIDTH: f64 = 1.2;
@@ -25,35 +24,26 @@ const SPAN_OPACITY: f64 = 0.05;
 /// are missing. Texts are set in the reader's sans-serif font.
 pub fn chart_to_svg(chart: &Chart) -> String {
     let layout = Layout::new(chart);
-    canvas::svg(layout.width_px, layout.height_px, |canvas| {
-        let painter = Painter { canvas, layout: &layout };
-        painter.spans(&chart.marks);
-        painter.grid();
-        for series in &chart.series {
-            painter.band(series);
-        }
-        painter.reference_lines(&chart.marks);
-        painter.base_line();
-        for series in &chart.series {
-            painter.line(series);
-        }
-        for series in &chart.series {
-            painter.markers(series);
-        }
-        painter.legend();
-        for label in &layout.labels {
-            canvas.text(label);
-        }
-    })
+    let mut painter = Painter { svg: Svg::new(layout.width_px, layout.height_px), layout: &layout };
+    painter.spans(&chart.marks);
+    painter.grid();
+    chart.series.iter().for_each(|series| painter.band(series));
+    painter.reference_lines(&chart.marks);
+    painter.base_line();
+    chart.series.iter().for_each(|series| painter.line(series));
+    chart.series.iter().for_each(|series| painter.markers(series));
+    painter.legend();
+    layout.labels.iter().for_each(|label| painter.svg.text(label));
+    painter.svg.finish()
 }
 
-struct Painter<'a, 'svg> {
-    canvas: &'a Canvas<'svg>,
+struct Painter<'a> {
+    svg: Svg,
     layout: &'a Layout<'a>,
 }
 
-impl Painter<'_, '_> {
-    fn spans(&self, marks: &[Mark]) {
+impl Painter<'_> {
+    fn spans(&mut self, marks: &[Mark]) {
         let plot = self.layout.plot;
         for mark in marks {
             let Mark::Span { low, high, .. } = mark else { continue };
@@ -64,33 +54,35 @@ impl Painter<'_, '_> {
             };
             let (left, right) = (self.layout.across(start.max(0.0)), self.layout.across(end.min(1.0)));
             if left < right {
-                self.canvas.rectangle(Rect { left, right, ..plot }, canvas::palette(6).mix(SPAN_OPACITY));
+                self.svg.rectangle(Rect { left, right, ..plot }, BLACK.with_opacity(SPAN_OPACITY));
             }
         }
     }
 
-    fn grid(&self) {
+    fn grid(&mut self) {
         let Layout { x, y, x_ticks, y_ticks, plot, .. } = self.layout;
-        let column = |value, colour| {
+        let column = |value| {
             let across = self.layout.across(x.tick_share(value));
-            self.canvas.line(&[(across, plot.top), (across, plot.bottom)], 1.0, colour);
+            [(across, plot.top), (across, plot.bottom)]
         };
-        let row = |value, colour| {
+        let row = |value| {
             let up = self.layout.up(y.tick_share(value));
-            self.canvas.line(&[(plot.left, up), (plot.right, up)], 1.0, colour);
+            [(plot.left, up), (plot.right, up)]
         };
-        ticks::minor(x, x_ticks).into_iter().for_each(|value| column(value, MINOR_GRID));
-        ticks::minor(y, y_ticks).into_iter().for_each(|value| row(value, MINOR_GRID));
-        x_ticks.iter().for_each(|tick| column(tick.value, GRID));
-        y_ticks.iter().for_each(|tick| row(tick.value, GRID));
+        let minor_columns = ticks::minor(x, x_ticks).into_iter().map(column);
+        let minor_rows = ticks::minor(y, y_ticks).into_iter().map(row);
+        let columns = x_ticks.iter().map(|tick| column(tick.value));
+        let rows = y_ticks.iter().map(|tick| row(tick.value));
+        minor_columns.chain(minor_rows).for_each(|line| self.svg.line(&line, 1.0, MINOR_GRID));
+        columns.chain(rows).for_each(|line| self.svg.line(&line, 1.0, GRID));
     }
 
-    fn base_line(&self) {
+    fn base_line(&mut self) {
         let plot = self.layout.plot;
-        self.canvas.line(&[(plot.left, plot.bottom), (plot.right, plot.bottom)], 1.0, QUIET_INK);
+        self.svg.line(&[(plot.left, plot.bottom), (plot.right, plot.bottom)], 1.0, QUIET_INK);
     }
 
-    fn reference_lines(&self, marks: &[Mark]) {
+    fn reference_lines(&mut self, marks: &[Mark]) {
         let plot = self.layout.plot;
         for mark in marks {
             let ends = match *mark {
@@ -109,12 +101,12 @@ impl Painter<'_, '_> {
                 Mark::Span { .. } => None,
             };
             for piece in ends.into_iter().flat_map(|ends| plot.clip_line(&ends)) {
-                self.canvas.dashed_line(&piece, REFERENCE_WIDTH, REFERENCE);
+                self.svg.dashed_line(&piece, REFERENCE_WIDTH, REFERENCE);
             }
         }
     }
 
-    fn band(&self, series: &Series) {
+    fn band(&mut self, series: &Series) {
         let SeriesKind::Band { points } = &series.kind else { return };
         let place = |point: &BandPoint| {
             Some((self.layout.place_edge(point.x, point.low)?, self.layout.place_edge(point.x, point.high)?))
@@ -123,19 +115,19 @@ impl Painter<'_, '_> {
             let low = run.iter().map(|(low, _)| *low);
             let high = run.iter().rev().map(|(_, high)| *high);
             let outline: Vec<Point> = low.chain(high).collect();
-            let colour = canvas::palette(series.colour).mix(BAND_OPACITY);
-            self.canvas.polygon(&self.layout.plot.clip_polygon(&outline), colour);
+            let colour = palette(series.colour).with_opacity(BAND_OPACITY);
+            self.svg.polygon(&self.layout.plot.clip_polygon(&outline), colour);
         }
     }
 
-    fn line(&self, series: &Series) {
+    fn line(&mut self, series: &Series) {
         let SeriesKind::Line { points, stroke } = &series.kind else { return };
-        let colour = canvas::palette(series.colour);
+        let colour = palette(series.colour);
         for run in runs(points.iter().map(|&(x, y)| self.layout.place(x, y))) {
             if let [lone] = run[..]
                 && self.layout.plot.contains(lone)
             {
-                self.canvas.disc(lone, LINE_WIDTH, colour);
+                self.svg.disc(lone, LINE_WIDTH, colour);
             }
             for piece in self.layout.plot.clip_line(&run) {
                 self.stroke(&piece, *stroke, colour);
@@ -143,20 +135,21 @@ impl Painter<'_, '_> {
         }
     }
 
-    fn stroke(&self, points: &[Point], stroke: Stroke, colour: RGBColor) {
+    fn stroke(&mut self, points: &[Point], stroke: Stroke, colour: Colour) {
         match stroke {
-            Stroke::Solid => self.canvas.line(points, LINE_WIDTH, colour),
-            Stroke::Dashed => self.canvas.dashed_line(points, LINE_WIDTH, colour),
+            Stroke::Solid => self.svg.line(points, LINE_WIDTH, colour),
+            Stroke::Dashed => self.svg.dashed_line(points, LINE_WIDTH, colour),
         }
     }
 
-    fn markers(&self, series: &Series) {
-        let colour = canvas::palette(series.colour);
+    fn markers(&mut self, series: &Series) {
+        let layout = self.layout;
+        let colour = palette(series.colour);
         match &series.kind {
             SeriesKind::Points { points, marker } => {
-                for at in points.iter().filter_map(|&(x, y)| self.place_inside(x, y)) {
-                    draw_rim(self.canvas, at, *marker);
-                    draw_marker(self.canvas, at, *marker, colour);
+                for at in points.iter().filter_map(|&(x, y)| layout.place_inside(x, y)) {
+                    draw_rim(&mut self.svg, at, *marker);
+                    draw_marker(&mut self.svg, at, *marker, colour);
                 }
             }
             SeriesKind::ErrorBars { points, marker } => {
@@ -166,66 +159,57 @@ impl Painter<'_, '_> {
         }
     }
 
-    fn error_bar(&self, point: &ErrorPoint, marker: Marker, colour: RGBColor) {
+    fn error_bar(&mut self, point: &ErrorPoint, marker: Marker, colour: Colour) {
         let plot = self.layout.plot;
-        let at = self.place_inside(point.x, point.y);
+        let at = self.layout.place_inside(point.x, point.y);
         if let Some(at) = at {
-            draw_rim(self.canvas, at, marker);
+            draw_rim(&mut self.svg, at, marker);
         }
         let ends = [self.layout.place_edge(point.x, point.low), self.layout.place_edge(point.x, point.high)];
         if let [Some(low), Some(high)] = ends {
             for piece in plot.clip_line(&[low, high]) {
-                self.canvas.line(&piece, ERROR_BAR_WIDTH, colour);
+                self.svg.line(&piece, ERROR_BAR_WIDTH, colour);
             }
             for (x, y) in [low, high].into_iter().filter(|&end| plot.contains(end)) {
-                self.canvas.line(
-                    &[(x - CAP_HALF_WIDTH, y), (x + CAP_HALF_WIDTH, y)],
-                    ERROR_BAR_WIDTH,
-                    colour,
-                );
+                self.svg.line(&[(x - CAP_HALF_WIDTH, y), (x + CAP_HALF_WIDTH, y)], ERROR_BAR_WIDTH, colour);
             }
         }
         if let Some(at) = at {
-            draw_marker(self.canvas, at, marker, colour);
+            draw_marker(&mut self.svg, at, marker, colour);
         }
     }
 
-    /// Where a point of the data lies; `None` outside the plot.
-    fn place_inside(&self, x: f64, y: f64) -> Option<Point> {
-        self.layout.place(x, y).filter(|&at| self.layout.plot.contains(at))
-    }
-
-    fn legend(&self) {
+    fn legend(&mut self) {
         for entry in &self.layout.legend.entries {
             let Rect { left, right, top, bottom } = entry.swatch;
             let middle = top.midpoint(bottom);
             match entry.named {
                 Named::Series(series) => self.swatch(series, entry.swatch),
                 Named::Reference => {
-                    self.canvas.dashed_line(&[(left, middle), (right, middle)], REFERENCE_WIDTH, REFERENCE);
+                    self.svg.dashed_line(&[(left, middle), (right, middle)], REFERENCE_WIDTH, REFERENCE);
                 }
             }
-            self.canvas.text(&entry.label);
+            self.svg.text(&entry.label);
         }
         if let Some(remainder) = &self.layout.legend.remainder {
-            self.canvas.text(remainder);
+            self.svg.text(remainder);
         }
     }
 
     /// A sample of how the series is drawn.
-    fn swatch(&self, series: &Series, area: Rect) {
-        let colour = canvas::palette(series.colour);
+    fn swatch(&mut self, series: &Series, area: Rect) {
+        let colour = palette(series.colour);
         let Rect { left, right, top, bottom } = area;
         let middle = (left.midpoint(right), top.midpoint(bottom));
         match &series.kind {
             SeriesKind::Line { stroke, .. } => {
                 self.stroke(&[(left, middle.1), (right, middle.1)], *stroke, colour);
             }
-            SeriesKind::Band { .. } => self.canvas.rectangle(area, colour.mix(BAND_OPACITY)),
-            SeriesKind::Points { marker, .. } => draw_marker(self.canvas, middle, *marker, colour),
+            SeriesKind::Band { .. } => self.svg.rectangle(area, colour.with_opacity(BAND_OPACITY)),
+            SeriesKind::Points { marker, .. } => draw_marker(&mut self.svg, middle, *marker, colour),
             SeriesKind::ErrorBars { marker, .. } => {
-                self.canvas.line(&[(middle.0, top - 2.0), (middle.0, bottom + 2.0)], ERROR_BAR_WIDTH, colour);
-                draw_marker(self.canvas, middle, *marker, colour);
+                self.svg.line(&[(middle.0, top - 2.0), (middle.0, bottom + 2.0)], ERROR_BAR_WIDTH, colour);
+                draw_marker(&mut self.svg, middle, *marker, colour);
             }
         }
     }
@@ -245,38 +229,23 @@ fn runs<T>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
 }
 
 /// A white ground a little larger than the marker, which keeps it apart from lines of other series.
-fn draw_rim(canvas: &Canvas<'_>, at: Point, marker: Marker) {
-    draw_shape(canvas, at, marker, MARKER_RADIUS + MARKER_RIM, CROSS_WIDTH + MARKER_RIM, WHITE);
+fn draw_rim(svg: &mut Svg, at: Point, marker: Marker) {
+    draw_shape(svg, at, marker, MARKER_RADIUS + MARKER_RIM, CROSS_WIDTH + MARKER_RIM, WHITE);
 }
 
-fn draw_marker(canvas: &Canvas<'_>, at: Point, marker: Marker, colour: RGBColor) {
-    draw_shape(canvas, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
+fn draw_marker(svg: &mut Svg, at: Point, marker: Marker, colour: Colour) {
+    draw_shape(svg, at, marker, MARKER_RADIUS, CROSS_WIDTH, colour);
 }
 
 /// Shapes that look equally large at the same `radius`.
-fn draw_shape(
-    canvas: &Canvas<'_>,
-    at: Point,
-    marker: Marker,
-    radius: f64,
-    cross_width: f64,
-    colour: RGBColor,
-) {
+fn draw_shape(svg: &mut Svg, at: Point, marker: Marker, radius: f64, cross_width: f64, colour: Colour) {
     match marker {
-        Marker::Circle => canvas.disc(at, radius, colour),
-        Marker::Square => canvas.rectangle(square(at, 0.9 * radius), colour.to_rgba()),
-        Marker::Triangle => canvas.polygon(&triangle(at, 1.35 * radius), colour.to_rgba()),
+        Marker::Circle => svg.disc(at, radius, colour),
+        Marker::Square => svg.rectangle(square(at, 0.9 * radius), colour),
+        Marker::Triangle => svg.polygon(&triangle(at, 1.35 * radius), colour),
         Marker::Cross => {
-            canvas.line(
-                &[(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)],
-                cross_width,
-                colour,
-            );
-            canvas.line(
-                &[(at.0 - radius, at.1 + radius), (at.0 + radius, at.1 - radius)],
-                cross_width,
-                colour,
-            );
+            svg.line(&[(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)], cross_width, colour);
+            svg.line(&[(at.0 - radius, at.1 + radius), (at.0 + radius, at.1 - radius)], cross_width, colour);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The least and the greatest of what a figure shows.
 
-use super::{Series, SeriesKind};
+use super::{Axis, Series, SeriesKind};
 
 /// Positive values whose greatest is this many times the least are drawn on a logarithmic axis.
 const LOGARITHMIC_FROM: f64 = 10.0;
@@ -33,6 +33,11 @@ impl Extremes {
     /// Whether only a logarithmic axis shows both ends.
     pub fn are_far_apart(self) -> bool {
         self.least > 0.0 && self.greatest >= LOGARITHMIC_FROM * self.least
+    }
+
+    /// An axis that shows both ends: logarithmic where they are far apart.
+    pub fn axis(self, label: &str) -> Axis {
+        if self.are_far_apart() { Axis::log10(label) } else { Axis::linear(label) }
     }
 }
 

@@ -1,22 +1,19 @@
 //! A quantity over a plane as colours: one map, or several of the same plane and scale beside each other.
 
-use plotters::style::Color;
-
-use super::canvas::{self, Anchor, Canvas, GRID, INK, Label, QUIET_INK, WHITE};
 use super::chart::{Axis, Ticks};
-use super::colour_map::colour_of;
 use super::extremes::Extremes;
 use super::geometry::{Point, Rect};
 use super::scale::AxisScale;
+use super::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, Svg, WHITE};
 use super::text;
-use super::ticks::{self, Tick};
+use super::ticks::{self, TICK_SIZE, Tick, columns_fit, rows_fit, tick_labels};
+use palpate_estimators::estimator::Cells;
 
 const MARGIN: f64 = 12.0;
 const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
 const NAME_LINE: f64 = 22.0;
-const TICK_SIZE: f64 = 11.5;
 /// Room left of a map for the labels of its ticks, and beneath it.
 const GUTTER: f64 = 40.0;
 const FOOT: f64 = 26.0;
@@ -25,9 +22,6 @@ const GAP: f64 = 18.0;
 const BAR_WIDTH: f64 = 16.0;
 /// Room for the labels of the colour bar.
 const BAR_LABELS: f64 = 54.0;
-/// Least distances between the labels of neighbouring ticks.
-const LABEL_GAP: f64 = 12.0;
-const LEAST_PITCH: f64 = 26.0;
 /// Most height of one map.
 const MOST_HEIGHT: f64 = 420.0;
 /// Cells overlap by this much, or a line of background would show between them.
@@ -38,18 +32,12 @@ const OVERLAP: f64 = 0.5;
 pub struct HeatMap {
     /// Heading, in one line.
     pub title: String,
-    /// Length of the plane along x, in millimetres.
-    pub length_mm: f64,
-    /// Its width along y, in millimetres.
-    pub width_mm: f64,
-    /// Equal cells along x.
-    pub columns: usize,
-    /// Equal cells along y.
-    pub rows: usize,
+    /// The plane, parted into cells of one value each.
+    pub cells: Cells,
     /// The maps.
     pub panels: Vec<HeatPanel>,
-    /// Where the sensors are, in millimetres.
-    pub sensors_mm: Vec<(f64, f64)>,
+    /// Where the dots are, such as sensors, in millimetres.
+    pub dots_mm: Vec<(f64, f64)>,
     /// What the colours mean, with its unit: "limit, mm".
     pub label: String,
     /// Larger values have the colour of this one.
@@ -63,8 +51,15 @@ pub struct HeatMap {
 pub struct HeatPanel {
     /// Its name; empty for none.
     pub name: String,
-    /// A value a cell, row by row from the lower left; one that is not finite leaves its cell grey.
+    /// A value a cell; one that is not finite leaves its cell grey.
     pub values: Vec<f64>,
+}
+
+impl HeatPanel {
+    /// A map with its name; the name may be empty.
+    pub fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
+        Self { name: name.into(), values }
+    }
 }
 
 /// Draws the maps as one self-contained SVG document: x to the right, y upward, a millimetre as long both ways, with one
@@ -72,15 +67,21 @@ pub struct HeatPanel {
 pub fn heat_map_to_svg(map: &HeatMap) -> String {
     let width_px = map.width_px.clamp(320, 4000);
     let layout = Layout::new(map, f64::from(width_px));
-    canvas::svg(width_px, layout.height.ceil() as u32, |canvas| {
-        canvas.text(&layout.title(map));
-        for (panel, plot) in map.panels.iter().zip(&layout.plots) {
-            draw_cells(canvas, map, panel, *plot, &layout.colours);
-            draw_sensors(canvas, map, *plot);
-            layout.labels_of(panel, *plot).iter().for_each(|label| canvas.text(label));
-        }
-        layout.draw_bar(canvas, map);
-    })
+    let mut svg = Svg::new(width_px, layout.height.ceil() as u32);
+    svg.text(&layout.title(map));
+    for (panel, plot) in map.panels.iter().zip(&layout.plots) {
+        draw_cells(&mut svg, map, panel, *plot, &layout.colours);
+        draw_dots(&mut svg, map, *plot);
+        layout.labels_of(panel, *plot).iter().for_each(|label| svg.text(label));
+    }
+    layout.draw_bar(&mut svg, map);
+    svg.finish()
+}
+
+/// Length and width of the plane in millimetres.
+fn sides_mm(map: &HeatMap) -> [f64; 2] {
+    let extent = map.cells.extent;
+    [extent.length_m * 1e3, extent.width_m.unwrap_or(extent.length_m) * 1e3]
 }
 
 /// Where everything goes.
@@ -103,7 +104,8 @@ impl Layout {
         };
         let room = width - 2.0 * MARGIN - BAR_LABELS - BAR_WIDTH - GAP;
         let each = room / columns as f64 - GUTTER - GAP;
-        let aspect = map.width_mm / map.length_mm;
+        let [length_mm, width_mm] = sides_mm(map);
+        let aspect = width_mm / length_mm;
         let map_width = each.min(MOST_HEIGHT / aspect).max(20.0);
         let map_height = map_width * aspect;
         let top = MARGIN + TITLE_LINE;
@@ -115,28 +117,22 @@ impl Layout {
             Rect { left, top, right: left + map_width, bottom: top + map_height }
         };
         let plots: Vec<Rect> = (0..count).map(plot).collect();
-        let right = plots.iter().map(|plot| plot.right).fold(0.0, f64::max);
-        let first = plots[0];
-        let bar_height = map_height.max(120.0);
-        let bar = Rect {
-            left: right + GAP,
-            right: right + GAP + BAR_WIDTH,
-            top: first.top,
-            bottom: first.top + bar_height,
-        };
+        let left = plots.iter().map(|plot| plot.right).fold(0.0, f64::max) + GAP;
+        let top_of_bar = plots[0].top;
+        let bottom = top_of_bar + map_height.max(120.0);
+        let bar = Rect { left, right: left + BAR_WIDTH, top: top_of_bar, bottom };
         let rows = count.div_ceil(columns) as f64;
         let height = (top + rows * row_height).max(bar.bottom + FOOT) + NAME_LINE + MARGIN;
         let axis = |size_mm: f64| AxisScale::new(&Axis::linear("").from_to(0.0, size_mm), &[]);
-        let (x, y) = (axis(map.length_mm), axis(map.width_mm));
-        let x_ticks = ticks::choose(&x, &Ticks::Automatic, &|ticks| fit_beside(&x, ticks, map_width));
-        let y_ticks = ticks::choose(&y, &Ticks::Automatic, &|ticks| fit_above(&y, ticks, map_height));
+        let (x, y) = (axis(length_mm), axis(width_mm));
+        let x_ticks = ticks::choose(&x, &Ticks::Automatic, &|ticks| columns_fit(&x, ticks, map_width));
+        let y_ticks = ticks::choose(&y, &Ticks::Automatic, &|ticks| rows_fit(&y, ticks, map_height));
         Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
     }
 
     fn title(&self, map: &HeatMap) -> Label {
         let at = (MARGIN, MARGIN + 0.5 * TITLE_LINE);
-        let room = self.bar.right + BAR_LABELS - MARGIN;
-        let text = text::fit(&map.title, TITLE_SIZE, room);
+        let text = text::fit(&map.title, TITLE_SIZE, self.bar.right + BAR_LABELS - MARGIN);
         Label { text, at, anchor: Anchor::Start, size: TITLE_SIZE, colour: INK }
     }
 
@@ -149,58 +145,42 @@ impl Layout {
             size: TICK_SIZE,
             colour: QUIET_INK,
         };
-        let (x, x_ticks) = &self.x;
-        let (y, y_ticks) = &self.y;
-        let along = x_ticks.iter().map(|tick| {
-            let across = plot.left + x.tick_share(tick.value) * plot.width();
-            label(&tick.label, (across, plot.bottom + 13.0), Anchor::Middle)
-        });
-        let up = y_ticks.iter().map(|tick| {
-            let height = plot.bottom - y.tick_share(tick.value) * plot.height();
-            label(&tick.label, (plot.left - 7.0, height), Anchor::End)
-        });
-        let mut labels: Vec<Label> = along.chain(up).collect();
+        let mut labels = tick_labels(&plot, (&self.x.0, &self.x.1), (&self.y.0, &self.y.1));
         let name = text::fit(&panel.name, NAME_SIZE, plot.width() + GUTTER);
+        let above = plot.top - 11.0;
         labels.push(Label {
             size: NAME_SIZE,
             colour: INK,
-            ..label(&name, (plot.left, plot.top - 11.0), Anchor::Start)
+            ..label(&name, (plot.left, above), Anchor::Start)
         });
         // The lowest map of a column names the axis beneath it.
         if !self.plots.iter().any(|other| other.left == plot.left && other.top > plot.top) {
-            let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 4.0);
+            let at = (plot.left.midpoint(plot.right), plot.bottom + FOOT + 0.5 * NAME_LINE - 1.0);
             labels.push(label("x, mm", at, Anchor::Middle));
         }
-        labels.push(label("y, mm", (plot.left - 7.0, plot.top - 11.0), Anchor::End));
+        labels.push(label("y, mm", (plot.left - 7.0, above), Anchor::End));
         labels
     }
 
-    fn draw_bar(&self, canvas: &Canvas<'_>, map: &HeatMap) {
+    fn draw_bar(&self, svg: &mut Svg, map: &HeatMap) {
         const STEPS: usize = 120;
         let Rect { left, right, top, bottom } = self.bar;
         let step = (bottom - top) / STEPS as f64;
         for i in 0..STEPS {
-            let colour = colour_of((i as f64 + 0.5) / STEPS as f64);
             let low = bottom - i as f64 * step;
             let area = Rect { left, right, top: (low - step - OVERLAP).max(top), bottom: low };
-            canvas.rectangle(area, colour.to_rgba());
+            svg.rectangle(area, colour_of((i as f64 + 0.5) / STEPS as f64));
         }
-        let fits = |ticks: &[Tick]| fit_above(&self.colours, ticks, bottom - top);
-        for tick in ticks::choose(&self.colours, &Ticks::Automatic, &fits) {
-            let y = bottom - self.colours.tick_share(tick.value) * (bottom - top);
-            canvas.line(&[(right, y), (right + 4.0, y)], 1.0, QUIET_INK);
+        let fits = |ticks: &[Tick]| rows_fit(&self.colours, ticks, bottom - top);
+        for Tick { value, label } in ticks::choose(&self.colours, &Ticks::Automatic, &fits) {
+            let y = bottom - self.colours.tick_share(value) * (bottom - top);
+            svg.line(&[(right, y), (right + 4.0, y)], 1.0, QUIET_INK);
             let at = (right + 8.0, y);
-            canvas.text(&Label {
-                text: tick.label,
-                at,
-                anchor: Anchor::Start,
-                size: TICK_SIZE,
-                colour: QUIET_INK,
-            });
+            svg.text(&Label { text: label, at, anchor: Anchor::Start, size: TICK_SIZE, colour: QUIET_INK });
         }
         let at = (left, top - 11.0);
         let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + MARGIN);
-        canvas.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
+        svg.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
     }
 }
 
@@ -210,54 +190,71 @@ fn colours(map: &HeatMap) -> AxisScale {
     let finite = all.filter(|value| value.is_finite());
     let extremes = Extremes::of(finite.map(|value| value.min(map.most)));
     let Extremes { least, greatest } = extremes;
-    let (axis, from) =
-        if extremes.are_far_apart() { (Axis::log10(""), least) } else { (Axis::linear(""), least.min(0.0)) };
-    AxisScale::new(&axis.from_to(from, greatest), &[least, greatest])
+    let from = if extremes.are_far_apart() { least } else { least.min(0.0) };
+    AxisScale::new(&extremes.axis("").from_to(from, greatest), &[least, greatest])
 }
 
-fn draw_cells(canvas: &Canvas<'_>, map: &HeatMap, panel: &HeatPanel, plot: Rect, colours: &AxisScale) {
-    canvas.rectangle(plot, GRID.to_rgba());
-    let (width, height) = (plot.width() / map.columns as f64, plot.height() / map.rows as f64);
-    for (i, value) in panel.values.iter().enumerate() {
-        let Some(share) = Some(*value).filter(|value| value.is_finite()) else { continue };
-        let Some(share) = colours.share_or_low_end(share.min(map.most)) else { continue };
-        let (column, row) = ((i % map.columns) as f64, (i / map.columns) as f64);
+fn draw_cells(svg: &mut Svg, map: &HeatMap, panel: &HeatPanel, plot: Rect, colours: &AxisScale) {
+    svg.rectangle(plot, GRID);
+    let (width, height) = (plot.width() / map.cells.columns as f64, plot.height() / map.cells.rows as f64);
+    for (i, value) in panel.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        let Some(share) = colours.share_or_low_end(value.min(map.most)) else { continue };
+        let (column, row) = ((i % map.cells.columns) as f64, (i / map.cells.columns) as f64);
         let (left, bottom) = (plot.left + column * width, plot.bottom - row * height);
-        let area = Rect {
-            left,
-            right: (left + width + OVERLAP).min(plot.right),
-            top: (bottom - height - OVERLAP).max(plot.top),
-            bottom,
-        };
-        canvas.rectangle(area, colour_of(share).to_rgba());
+        let right = (left + width + OVERLAP).min(plot.right);
+        let top = (bottom - height - OVERLAP).max(plot.top);
+        svg.rectangle(Rect { left, right, top, bottom }, colour_of(share));
     }
 }
 
 /// White rings with a dark middle, which are seen on any colour.
-fn draw_sensors(canvas: &Canvas<'_>, map: &HeatMap, plot: Rect) {
-    let small = plot.width() < 200.0;
-    let (rim, middle) = if small { (3.2, 1.9) } else { (4.8, 3.0) };
-    for &(x_mm, y_mm) in &map.sensors_mm {
-        let at = (
-            plot.left + x_mm / map.length_mm * plot.width(),
-            plot.bottom - y_mm / map.width_mm * plot.height(),
-        );
-        canvas.disc(at, rim, WHITE);
-        canvas.disc(at, middle, INK);
+fn draw_dots(svg: &mut Svg, map: &HeatMap, plot: Rect) {
+    let (rim, middle) = if plot.width() < 200.0 { (3.2, 1.9) } else { (4.8, 3.0) };
+    let [length_mm, width_mm] = sides_mm(map);
+    for &(x_mm, y_mm) in &map.dots_mm {
+        let at = (plot.left + x_mm / length_mm * plot.width(), plot.bottom - y_mm / width_mm * plot.height());
+        svg.disc(at, rim, WHITE);
+        svg.disc(at, middle, INK);
     }
 }
 
-/// Whether labels beside each other leave room between them.
-fn fit_beside(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
-    ticks.windows(2).all(|pair| {
-        let labels: f64 = pair.iter().map(|tick| 0.5 * text::width(&tick.label, TICK_SIZE)).sum();
-        (axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value)) * width >= labels + LABEL_GAP
-    })
+/// Viridis at ten even steps (van der Walt and Smith, 2015; public domain): colours that rise in lightness with a value, so that
+/// readers who see few colours can tell them, and print without any.
+const VIRIDIS: [Colour; 10] = [
+    Colour::opaque(68, 1, 84),
+    Colour::opaque(72, 40, 120),
+    Colour::opaque(62, 74, 137),
+    Colour::opaque(49, 104, 142),
+    Colour::opaque(38, 130, 142),
+    Colour::opaque(31, 158, 137),
+    Colour::opaque(53, 183, 121),
+    Colour::opaque(109, 205, 89),
+    Colour::opaque(180, 222, 44),
+    Colour::opaque(253, 231, 37),
+];
+
+/// The colour of a share of the scale, 0 to 1; beyond it the colour of its end.
+fn colour_of(share: f64) -> Colour {
+    let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
+    let below = (place as usize).min(VIRIDIS.len() - 2);
+    let part = place - below as f64;
+    let (low, high) = (VIRIDIS[below].rgb, VIRIDIS[below + 1].rgb);
+    let mix = |i: usize| (f64::from(low[i]) * (1.0 - part) + f64::from(high[i]) * part).round() as u8;
+    Colour::opaque(mix(0), mix(1), mix(2))
 }
 
-/// Whether labels above each other do.
-fn fit_above(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
-    ticks
-        .windows(2)
-        .all(|pair| (axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value)) * height >= LEAST_PITCH)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_grow_lighter_and_hold_at_the_ends() {
+        let light = |share: f64| {
+            let [r, g, b] = colour_of(share).rgb.map(f64::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let steps: Vec<f64> = (0..=50).map(|i| light(f64::from(i) / 50.0)).collect();
+        assert!(steps.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!((colour_of(-3.0), colour_of(9.0)), (VIRIDIS[0], VIRIDIS[9]));
+    }
 }

@@ -3,20 +3,19 @@
 //! From top to bottom: title, label of the vertical axis, names of vertical marks, plot, tick labels, label of
 //! the horizontal axis, legend. Each has a strip of its own, so no text can lie over data.
 
-use super::canvas::{Anchor, INK, Label, QUIET_INK};
 use super::chart::{Chart, Mark};
 use super::geometry::{Point, Rect};
 use super::legend::{self, Legend};
 use super::scale::{self, AxisScale};
+use super::svg::{Anchor, INK, Label, QUIET_INK};
 use super::text;
-use super::ticks::{self, Tick};
+use super::ticks::{self, LABEL_GAP, TICK_GAP, TICK_SIZE, Tick, columns_fit, rows_fit, tick_labels};
 
 const MARGIN: f64 = 12.0;
 const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 22.0;
 const AXIS_LABEL_SIZE: f64 = 12.5;
 const AXIS_LABEL_LINE: f64 = 20.0;
-const TICK_SIZE: f64 = 11.5;
 const TICK_LINE: f64 = 24.0;
 const MARK_SIZE: f64 = 11.5;
 const MARK_LINE: f64 = 17.0;
@@ -24,16 +23,8 @@ const MARK_LINE: f64 = 17.0;
 const STRIP_GAP: f64 = 8.0;
 /// Most rows of names above the plot.
 const MARK_ROWS: usize = 3;
-/// From the plot to the labels of the vertical axis.
-const TICK_GAP: f64 = 8.0;
-/// From the plot down to the middle of the labels of the horizontal axis.
-const TICK_DROP: f64 = 16.0;
 /// Share of the image's height that the legend leaves to the plot.
 const LEAST_PLOT_SHARE: f64 = 0.25;
-/// Least distances between neighbouring tick labels, and between their middles.
-const LABEL_GAP: f64 = 14.0;
-const LEAST_X_PITCH: f64 = 40.0;
-const LEAST_Y_PITCH: f64 = 26.0;
 /// Least room left of the plot: half of the widest label of a tick.
 const LEAST_GUTTER: f64 = 44.0;
 /// Half of the widest label of a tick, which may stand at the right end of the axis.
@@ -96,6 +87,11 @@ impl<'a> Layout<'a> {
     /// Where a point of the data lies; `None` where an axis cannot show it.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.across(self.x.share(x)?), self.up(self.y.share(y)?)))
+    }
+
+    /// Where a point of the data lies; `None` outside the plot.
+    pub fn place_inside(&self, x: f64, y: f64) -> Option<Point> {
+        self.place(x, y).filter(|&at| self.plot.contains(at))
     }
 
     /// As [`Layout::place`], but a y that is not positive lies on the low end of a logarithmic axis.
@@ -169,7 +165,7 @@ fn vertical_names(chart: &Chart) -> impl Iterator<Item = ((f64, f64), &str)> {
 
 /// Names of the vertical marks between `left` and `right`, the lowest row first, and how many rows they take.
 fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64) -> (usize, Vec<Label>) {
-    let mut rows: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut rows = text::Rows::default();
     let mut placed = Vec::new();
     for ((low, high), name) in vertical_names(chart) {
         let (Some(start), Some(end)) = (x.share(low.min(high)), x.share(low.max(high))) else { continue };
@@ -181,19 +177,12 @@ fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64
         let share = (start.max(0.0) + end.min(1.0)) / 2.0;
         let middle = (left + share * (right - left)).min(right - half).max(left + half);
         let (from, to) = (middle - half - LABEL_GAP / 2.0, middle + half + LABEL_GAP / 2.0);
-        let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| to <= start || end <= from);
-        let row = rows.iter().position(free).unwrap_or(rows.len());
-        if row == MARK_ROWS {
-            continue;
+        if rows.first_free(from, to) < MARK_ROWS {
+            placed.push((name, middle, rows.place(from, to)));
         }
-        if row == rows.len() {
-            rows.push(Vec::new());
-        }
-        rows[row].push((from, to));
-        placed.push((name, middle, row));
     }
     let at =
-        |middle, row: usize| (middle, top + (rows.len() - row) as f64 * MARK_LINE - MARK_LINE / 2.0 - 2.0);
+        |middle, row: usize| (middle, top + (rows.count() - row) as f64 * MARK_LINE - MARK_LINE / 2.0 - 2.0);
     let labels = placed.into_iter().map(|(text, middle, row)| Label {
         text,
         at: at(middle, row),
@@ -201,55 +190,11 @@ fn mark_labels(chart: &Chart, x: &AxisScale, (left, right): (f64, f64), top: f64
         size: MARK_SIZE,
         colour: QUIET_INK,
     });
-    (rows.len(), labels.collect())
-}
-
-fn tick_labels(
-    plot: &Rect,
-    (x, x_ticks): (&AxisScale, &[Tick]),
-    (y, y_ticks): (&AxisScale, &[Tick]),
-) -> Vec<Label> {
-    let label = |tick: &Tick, at, anchor| Label {
-        text: tick.label.clone(),
-        at,
-        anchor,
-        size: TICK_SIZE,
-        colour: QUIET_INK,
-    };
-    let columns = x_ticks.iter().map(|tick| {
-        let at = (plot.left + x.tick_share(tick.value) * plot.width(), plot.bottom + TICK_DROP);
-        label(tick, at, Anchor::Middle)
-    });
-    let rows = y_ticks.iter().map(|tick| {
-        let at = (plot.left - TICK_GAP, plot.bottom - y.tick_share(tick.value) * plot.height());
-        label(tick, at, Anchor::End)
-    });
-    columns.chain(rows).collect()
+    (rows.count(), labels.collect())
 }
 
 fn widest(ticks: &[Tick]) -> f64 {
     ticks.iter().map(|tick| text::width(&tick.label, TICK_SIZE)).fold(0.0, f64::max)
-}
-
-/// Whether labels above each other leave room between them on an axis of that height.
-fn rows_fit(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
-    pairs(axis, ticks).all(|(pitch, _, _)| pitch * height >= LEAST_Y_PITCH)
-}
-
-/// Whether labels beside each other leave room between them on an axis of that width.
-fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
-    pairs(axis, ticks).all(|(pitch, before, after)| {
-        let labels = text::width(&before.label, TICK_SIZE) / 2.0 + text::width(&after.label, TICK_SIZE) / 2.0;
-        pitch * width >= (labels + LABEL_GAP).max(LEAST_X_PITCH)
-    })
-}
-
-/// Neighbouring ticks and how far apart they are as a share of the axis.
-fn pairs<'t>(axis: &AxisScale, ticks: &'t [Tick]) -> impl Iterator<Item = (f64, &'t Tick, &'t Tick)> {
-    ticks.windows(2).map(|pair| {
-        let pitch = axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value);
-        (pitch, &pair[0], &pair[1])
-    })
 }
 
 /// How far the label of the last tick reaches beyond the axis.

@@ -1,8 +1,8 @@
 //! The strip of names beneath the plot.
 
-use super::canvas::{Anchor, INK, Label};
 use super::chart::{Chart, Mark, Series};
 use super::geometry::Rect;
+use super::svg::{Anchor, INK, Label};
 use super::text;
 
 pub(crate) const ROW_HEIGHT: f64 = 20.0;

@@ -1,6 +1,8 @@
 //! Numbers as people read them.
 
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
 
 /// What stands where there is no number.
@@ -53,6 +55,19 @@ pub(crate) fn as_written(value: f64) -> String {
 pub(crate) fn mm(length_m: f64) -> String {
     let text = format!("{:.2}", length_m * 1e3);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// A position in millimetres: "50", or "50, 20" on a plane.
+pub(crate) fn place(position: Position, extent: Extent) -> String {
+    match extent.width_m {
+        Some(_) => format!("{}, {}", mm(position.x_m), mm(position.y_m)),
+        None => mm(position.x_m),
+    }
+}
+
+/// A portion of the surface: "20–380 mm".
+pub(crate) fn stretch(portion: Portion) -> String {
+    format!("{}–{} mm", mm(portion.from_m), mm(portion.to_m))
 }
 
 /// A number as a rig states it, freed of rounding errors: "3", "200", "0.25".

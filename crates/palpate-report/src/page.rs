@@ -1,55 +1,154 @@
-//! The frame of a self-contained HTML page: what it holds is inside it, and a browser asks nobody for anything.
+//! Self-contained HTML pages: what a page holds is inside it, and a browser asks nobody for anything.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::{PngError, ReportError, ReportFile, svg_to_png};
-
-/// Pixels of a PNG for one of its SVG.
-const PNG_SCALE: f32 = 2.0;
+use super::numbers::number;
+use super::{Chart, HeatMap, chart_to_svg, heat_map_to_svg};
 
 const STYLE: &str = include_str!("page.css");
 
-/// A page: title, opening, sections and footer.
+/// A file of a report, for the caller to write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportFile {
+    /// Its name in the report's folder: "report.html", "figure-2.svg".
+    pub name: String,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+}
+
+/// A page. Its figures and its tables are numbered as they come.
 pub(crate) struct Page {
     pub title: String,
-    /// What stands between the title and the list of sections.
-    pub opening: Markup,
+    /// What stands beneath the title; may be empty.
+    pub lead: Markup,
+    /// What was found, as the items of a list.
+    pub summary: Markup,
     pub sections: Vec<Section>,
-    pub footer: Markup,
+    /// What the page was made from, after "Made by palpate 1.2.3".
+    pub made: Markup,
 }
 
 /// A headed part of a page, which links can lead to.
 pub(crate) struct Section {
-    pub id: &'static str,
-    pub heading: &'static str,
-    pub body: Markup,
+    id: &'static str,
+    heading: &'static str,
+    blocks: Vec<Block>,
 }
 
-/// A numbered figure.
+enum Block {
+    Text(Markup),
+    Figure(Option<Figure>),
+    Table(Table),
+}
+
+impl Section {
+    pub fn new(id: &'static str, heading: &'static str) -> Self {
+        Self { id, heading, blocks: Vec::new() }
+    }
+
+    pub fn text(self, text: Markup) -> Self {
+        self.block(Block::Text(text))
+    }
+
+    /// Adds a figure; one that cannot be drawn leaves its number free, so that the others keep theirs.
+    pub fn figure(self, figure: impl Into<Option<Figure>>) -> Self {
+        self.block(Block::Figure(figure.into()))
+    }
+
+    pub fn figures(self, figures: impl IntoIterator<Item = Figure>) -> Self {
+        figures.into_iter().fold(self, Self::figure)
+    }
+
+    /// Adds a table; one without rows is not shown and leaves its number free.
+    pub fn table(self, table: Table) -> Self {
+        self.block(Block::Table(table))
+    }
+
+    fn block(mut self, block: Block) -> Self {
+        self.blocks.push(block);
+        self
+    }
+}
+
+/// A figure with its caption.
 pub(crate) struct Figure {
-    pub number: usize,
     /// What it shows, in a few words, for readers who cannot see it.
-    pub alternative: String,
-    pub svg: String,
-    pub caption: Markup,
+    alternative: String,
+    svg: String,
+    caption: Markup,
 }
 
-/// The figures of a page, by number.
-pub(crate) struct Figures(pub Vec<Figure>);
+impl Figure {
+    pub fn new(alternative: impl Into<String>, svg: String, caption: Markup) -> Self {
+        Self { alternative: alternative.into(), svg, caption }
+    }
 
-/// A numbered table.
+    pub fn chart(chart: &Chart, caption: Markup) -> Self {
+        Self::new(&chart.title, chart_to_svg(chart), caption)
+    }
+
+    pub fn map(map: &HeatMap, caption: Markup) -> Self {
+        Self::new(&map.title, heat_map_to_svg(map), caption)
+    }
+
+    /// The drawing stands in the page as it is: it holds no ids that could meet those of another.
+    fn markup(&self, number: usize) -> Markup {
+        let root = html! { svg role="img" aria-label=(self.alternative) {} }.into_string();
+        let root = root.trim_end_matches("></svg>");
+        let svg = self.svg.replacen("<svg", root, 1);
+        html! {
+            figure id={ "figure-" (number) } {
+                (PreEscaped(svg))
+                figcaption { b { "Figure " (number) ". " } (self.caption) }
+            }
+        }
+    }
+}
+
+/// A table with its caption.
 pub(crate) struct Table {
-    pub number: usize,
-    pub caption: Markup,
-    pub columns: Vec<Column>,
+    caption: Markup,
+    columns: Vec<Column>,
     /// Cells by row, as many as there are columns. The first cell of a row is its heading.
-    pub rows: Vec<Vec<Markup>>,
+    rows: Vec<Vec<Markup>>,
+}
+
+impl Table {
+    pub fn new(
+        columns: impl Into<Vec<Column>>,
+        rows: impl IntoIterator<Item = Vec<Markup>>,
+        caption: Markup,
+    ) -> Self {
+        Self { caption, columns: columns.into(), rows: rows.into_iter().collect() }
+    }
+
+    fn markup(&self, number: usize) -> Markup {
+        html! {
+            div.table id={ "table-" (number) } role="region" tabindex="0" aria-label={ "Table " (number) } {
+                table {
+                    caption { b { "Table " (number) ". " } (self.caption) }
+                    thead { tr { @for column in &self.columns { th.(column.class) scope="col" { (column.heading) } } } }
+                    tbody { @for row in &self.rows { (self.row(row)) } }
+                }
+            }
+        }
+    }
+
+    fn row(&self, cells: &[Markup]) -> Markup {
+        html! {
+            tr {
+                @for (i, (cell, column)) in cells.iter().zip(&self.columns).enumerate() {
+                    @if i == 0 { th.(column.class) scope="row" { (cell) } } @else { td.(column.class) { (cell) } }
+                }
+            }
+        }
+    }
 }
 
 /// A column's heading and the CSS class of its cells.
 pub(crate) struct Column {
-    pub heading: String,
-    pub class: &'static str,
+    heading: String,
+    class: &'static str,
 }
 
 /// A column of words.
@@ -77,6 +176,16 @@ pub(crate) fn text(text: impl AsRef<str>) -> Markup {
     html! { (text.as_ref()) }
 }
 
+/// A number as markup; a dash for none.
+pub(crate) fn value(value: impl Into<Option<f64>>) -> Markup {
+    text(number(value.into().unwrap_or(f64::NAN)))
+}
+
+/// The same of a length in metres, in millimetres.
+pub(crate) fn value_mm(length_m: impl Into<Option<f64>>) -> Markup {
+    value(length_m.into().map(|length_m| length_m * 1e3))
+}
+
 /// A good or bad verdict in words.
 pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     if good {
@@ -88,17 +197,35 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
 
 impl Page {
     /// The page and its figures as files.
-    pub fn into_files(self, figures: Figures) -> Result<Vec<ReportFile>, ReportError> {
-        let mut files = vec![ReportFile { name: "report.html".to_owned(), bytes: self.html().into_bytes() }];
-        for figure in figures.0 {
-            files.extend(
-                figure.files().map_err(|error| ReportError::Picture { number: figure.number, error })?,
-            );
+    pub fn files(self) -> Vec<ReportFile> {
+        let (mut figures, mut tables) = (0, 0);
+        let mut drawings = Vec::new();
+        let mut bodies = Vec::new();
+        for section in &self.sections {
+            let mut body = Vec::new();
+            for block in &section.blocks {
+                figures += usize::from(matches!(block, Block::Figure(_)));
+                tables += usize::from(matches!(block, Block::Table(_)));
+                match block {
+                    Block::Text(text) => body.push(text.clone()),
+                    Block::Figure(Some(figure)) => {
+                        body.push(figure.markup(figures));
+                        let bytes = figure.svg.clone().into_bytes();
+                        drawings.push(ReportFile { name: format!("figure-{figures}.svg"), bytes });
+                    }
+                    Block::Table(table) if !table.rows.is_empty() => body.push(table.markup(tables)),
+                    Block::Figure(None) | Block::Table(_) => {}
+                }
+            }
+            bodies.push(html! {
+                section id=(section.id) { h2 { (section.heading) } @for block in &body { (block) } }
+            });
         }
-        Ok(files)
+        let page = ReportFile { name: "report.html".to_owned(), bytes: self.html(&bodies).into_bytes() };
+        std::iter::once(page).chain(drawings).collect()
     }
 
-    fn html(&self) -> String {
+    fn html(&self, bodies: &[Markup]) -> String {
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -110,71 +237,15 @@ impl Page {
                     style { (PreEscaped(STYLE)) }
                 }
                 body {
-                    header { h1 { (self.title) } (self.opening) }
+                    header { h1 { (self.title) } (self.lead) div.summary { ul { (self.summary) } } }
                     nav aria-label="Contents" {
                         ul { @for section in &self.sections { li { a href={ "#" (section.id) } { (section.heading) } } } }
                     }
-                    main {
-                        @for section in &self.sections {
-                            section id=(section.id) { h2 { (section.heading) } (section.body) }
-                        }
-                    }
-                    footer { (self.footer) }
+                    main { @for body in bodies { (body) } }
+                    footer { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) (self.made) "." } }
                 }
             }
         };
         page.into_string()
-    }
-}
-
-impl Figure {
-    /// The drawing stands in the page as it is: it holds no ids that could meet those of another.
-    fn markup(&self) -> Markup {
-        let root = html! { svg role="img" aria-label=(self.alternative) {} }.into_string();
-        let root = root.trim_end_matches("></svg>");
-        let svg = self.svg.replacen("<svg", root, 1);
-        html! {
-            figure id={ "figure-" (self.number) } {
-                (PreEscaped(svg))
-                figcaption { b { "Figure " (self.number) ". " } (self.caption) }
-            }
-        }
-    }
-
-    fn files(&self) -> Result<[ReportFile; 2], PngError> {
-        let file = |kind: &str, bytes| ReportFile { name: format!("figure-{}.{kind}", self.number), bytes };
-        let png = svg_to_png(&self.svg, PNG_SCALE)?;
-        Ok([file("svg", self.svg.clone().into_bytes()), file("png", png)])
-    }
-}
-
-impl Figures {
-    /// The figure of that number; nothing where there is none.
-    pub fn show(&self, number: usize) -> Markup {
-        html! { @for figure in self.0.iter().filter(|figure| figure.number == number) { (figure.markup()) } }
-    }
-}
-
-impl Table {
-    pub fn markup(&self) -> Markup {
-        html! {
-            div.table id={ "table-" (self.number) } role="region" tabindex="0" aria-label={ "Table " (self.number) } {
-                table {
-                    caption { b { "Table " (self.number) ". " } (self.caption) }
-                    thead { tr { @for column in &self.columns { th.(column.class) scope="col" { (column.heading) } } } }
-                    tbody { @for row in &self.rows { (self.row(row)) } }
-                }
-            }
-        }
-    }
-
-    fn row(&self, cells: &[Markup]) -> Markup {
-        html! {
-            tr {
-                @for (i, (cell, column)) in cells.iter().zip(&self.columns).enumerate() {
-                    @if i == 0 { th.(column.class) scope="row" { (cell) } } @else { td.(column.class) { (cell) } }
-                }
-            }
-        }
     }
 }

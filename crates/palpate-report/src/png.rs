@@ -1,11 +1,16 @@
 //! SVG to PNG with a font of our own, so that a figure is the same on every machine.
 
+use super::ReportFile;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb};
 use std::sync::{Arc, LazyLock};
 
 /// Name of the font that stands for every generic family.
 const FONT_FAMILY: &str = "Noto Sans";
+/// Pixels of a figure's copy for one of its SVG.
+const COPY_SCALE: f32 = 2.0;
+/// Longest side of a PNG in pixels.
+const MAX_SIDE_PX: u32 = 16_384;
 
 /// Why an SVG did not become a PNG.
 #[derive(Debug, thiserror::Error)]
@@ -31,8 +36,22 @@ pub enum PngError {
     Encoding(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Longest side of a PNG in pixels.
-const MAX_SIDE_PX: u32 = 16_384;
+/// The files of a report, each figure followed by a copy of it as PNG.
+///
+/// # Errors
+/// As [`svg_to_png`].
+pub fn with_png_copies(files: Vec<ReportFile>) -> Result<Vec<ReportFile>, PngError> {
+    let mut all = Vec::new();
+    for file in files {
+        let copy = file.name.strip_suffix(".svg").map(|stem| {
+            let svg = String::from_utf8_lossy(&file.bytes);
+            svg_to_png(&svg, COPY_SCALE).map(|bytes| ReportFile { name: format!("{stem}.png"), bytes })
+        });
+        all.push(file);
+        all.extend(copy.transpose()?);
+    }
+    Ok(all)
+}
 
 /// The PNG bytes of an SVG document drawn `scale` times its own size, each side rounded to whole pixels.
 ///

@@ -1,14 +1,13 @@
-//! What the reports of all studies share: the arms' table, the run's facts, errors along the surface, the footer.
+//! What the reports of all studies share: the arms' table, the run's facts, errors along the surface.
 
 use maud::{Markup, html};
 
-use super::limit_line::limit_line_or_assumed;
-use super::numbers::{NOTHING, counted, mm, number, whole};
-use super::page::{Table, numeric, short, text, words};
-use super::{Axis, BandPoint, Chart, Mark, Series, SeriesKind, Stroke, StudyReport};
+use super::error_lines::{banded, limit_line_or_assumed, tolerance_mark};
+use super::numbers::{NOTHING, counted, mm, number, stretch, whole};
+use super::page::{Table, numeric, short, text, value, words};
+use super::{Axis, Chart, Series, StudyReport};
 use palpate_estimators::evaluation::{Located, Portion, Spread};
-use palpate_estimators::setup::Bench;
-use palpate_studies::{Arm, ArmOutcome, ArmResults, TrainedSeed};
+use palpate_studies::{Arm, ArmOutcome, ArmResults};
 
 /// How an arm is drawn and named.
 #[derive(Clone, Copy)]
@@ -22,11 +21,6 @@ impl<'a> StudyReport<'a> {
     /// The outcome of an arm that has at least one fit.
     pub(crate) fn outcome(&self, arm: &str) -> Option<&'a ArmOutcome> {
         self.outcomes.iter().find(|outcome| outcome.name == arm && !outcome.fits.is_empty())
-    }
-
-    /// The bench of an arm.
-    fn bench(&self, arm: &str) -> Option<&'a Bench> {
-        self.arm(arm).map(|arm| &arm.rig.bench)
     }
 
     /// An arm as the study has it.
@@ -82,149 +76,115 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-/// "20–380 mm".
-pub(crate) fn portion_in_words(portion: Portion) -> String {
-    format!("{}–{} mm", mm(portion.from_m), mm(portion.to_m))
-}
-
-/// The median and the range from the 5th to the 95th percentile, over an arm's seeds, of a figure of each contact, the mean of all
-/// readings of a seed at a position: by position in mm.
+/// The spread over an arm's seeds of a figure of each contact: by position in mm.
 pub(crate) fn along(outcome: &ArmOutcome, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Spread)> {
-    let by_position = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
-        let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
-        let mean = |readings: &[Located]| readings.iter().map(&figure).sum::<f64>() / readings.len() as f64;
-        positions.map(|readings| (readings[0].truth.x_m * 1e3, mean(readings))).collect()
-    };
-    let seeds: Vec<Vec<(f64, f64)>> = outcome.fits.iter().map(by_position).collect();
-    let Some(first) = seeds.first() else { return Vec::new() };
-    let at = |i: usize| Spread::of(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
-    first.iter().enumerate().filter_map(|(i, (x_mm, _))| Some((*x_mm, at(i)?))).collect()
+    outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
-/// A band from the 5th to the 95th percentile and a line along the medians. A single seed has no band.
-pub(crate) fn banded(drawn: Drawn<'_>, along: &[(f64, Spread)], seeds: usize) -> Vec<Series> {
-    let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 }).collect();
-    let line = along.iter().map(|&(x, spread)| (x, spread.median)).collect();
-    let series = |label: &str, kind| Series { label: label.to_owned(), colour: drawn.colour, kind };
-    let line = series(drawn.label, SeriesKind::Line { points: line, stroke: Stroke::Solid });
-    if seeds < 2 { vec![line] } else { vec![series("", SeriesKind::Band { points: band }), line] }
+/// The location error of an arm in mm along the surface, with a band over its seeds where there are several; nothing without a fit.
+pub(crate) fn errors(report: &StudyReport, drawn: &Drawn, with_band: bool) -> Vec<Series> {
+    let Some(outcome) = report.outcome(drawn.arm) else { return Vec::new() };
+    let along = along(outcome, |located| located.error_m() * 1e3);
+    banded(drawn.label, drawn.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
 /// Location error along the surface, in mm on a logarithmic axis, against the limit of the first arm; `None` where no arm has a fit.
 pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[Drawn]) -> Option<Chart> {
-    let mut series: Vec<Series> = arms
-        .iter()
-        .filter_map(|drawn| Some((drawn, report.outcome(drawn.arm)?)))
-        .flat_map(|(drawn, outcome)| {
-            banded(*drawn, &along(outcome, |located| located.error_m() * 1e3), outcome.fits.len())
-        })
-        .collect();
-    if !series.is_empty() {
-        series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(report.bench(drawn.arm)?)));
+    let mut series: Vec<Series> = arms.iter().flat_map(|drawn| errors(report, drawn, true)).collect();
+    if series.is_empty() {
+        return None;
     }
-    (!series.is_empty()).then(|| error_chart_of(report, title, series))
+    series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(&report.arm(drawn.arm)?.rig.bench)));
+    Some(error_chart_of(report, title, series))
 }
 
 /// The same of series that are already there.
 pub(crate) fn error_chart_of(report: &StudyReport, title: &str, series: Vec<Series>) -> Chart {
-    let tolerance_m = report.study.judging().tolerance_m;
-    Chart {
-        title: title.to_owned(),
-        x: Axis::linear("load position, mm").from_to(0.0, report.length_m() * 1e3),
-        y: Axis::log10("location error, mm").from_to(LEAST_ERROR_MM, report.length_m() * 1e3),
-        series,
-        marks: vec![Mark::HorizontalLine {
-            y: tolerance_m * 1e3,
-            label: format!("tolerance, {} mm", mm(tolerance_m)),
-        }],
-        ..Chart::default()
-    }
+    let length_mm = report.length_m() * 1e3;
+    let x = Axis::linear("load position, mm").from_to(0.0, length_mm);
+    let y = Axis::log10("location error, mm").from_to(LEAST_ERROR_MM, length_mm);
+    Chart::new(title, x, y, series).with_marks(vec![tolerance_mark(report.study.judging().tolerance_m)])
 }
 
 /// Errors cross zero, which a logarithmic axis cannot show; below this nobody looks.
 const LEAST_ERROR_MM: f64 = 0.05;
 
 /// Every arm with its figures; a column only where some arm fills it.
-pub(crate) fn arms_table(report: &StudyReport, table: usize) -> Markup {
-    let arms = &report.results.arms;
-    let columns: Vec<ArmColumn> = arm_columns(report)
-        .into_iter()
-        .filter(|column| arms.iter().any(|arm| (column.of)(arm).is_some()))
-        .collect();
-    let row = |arm: &ArmResults| {
-        let cells = columns.iter().map(|column| (column.of)(arm).unwrap_or_else(|| text(NOTHING)));
+pub(crate) fn arms_table(report: &StudyReport) -> Table {
+    let mut columns = arm_columns(report);
+    columns.retain(|column| column.cells.iter().any(Option::is_some));
+    let rows = report.results.arms.iter().enumerate().map(|(i, arm)| {
+        let cells = columns.iter().map(|column| column.cells[i].clone().unwrap_or_else(|| text(NOTHING)));
         std::iter::once(text(&arm.name)).chain(cells).collect()
+    });
+    let rows: Vec<Vec<Markup>> = rows.collect();
+    let headings = columns.into_iter().map(|column| numeric(column.heading));
+    let caption = html! {
+        "Every arm: median over the seeds, and beneath it the range from the 5th to the 95th percentile. Errors are in % \
+         of the surface's length."
     };
-    let headings = columns.iter().map(|column| numeric(column.heading.clone()));
-    Table {
-        number: table,
-        caption: html! {
-            "Every arm: median over the seeds, and beneath it the range from the 5th to the 95th percentile. Errors are in % \
-             of the surface's length."
-        },
-        columns: std::iter::once(short("arm")).chain(headings).collect(),
-        rows: arms.iter().map(row).collect(),
-    }
-    .markup()
+    Table::new(std::iter::once(short("arm")).chain(headings).collect::<Vec<_>>(), rows, caption)
 }
 
-/// What a column says of an arm; nothing where it has nothing to say.
-type Cell<'a> = dyn Fn(&ArmResults) -> Option<Markup> + 'a;
-
-/// A column of the arms' table.
-struct ArmColumn<'a> {
+/// A column of the arms' table: what it says of each arm, where it has something to say.
+struct ArmColumn {
     heading: String,
-    of: Box<Cell<'a>>,
+    cells: Vec<Option<Markup>>,
 }
 
-fn arm_columns<'a>(report: &StudyReport) -> Vec<ArmColumn<'a>> {
-    fn column<'a>(
-        heading: impl Into<String>,
-        of: impl Fn(&ArmResults) -> Option<Markup> + 'a,
-    ) -> ArmColumn<'a> {
-        ArmColumn { heading: heading.into(), of: Box::new(of) }
-    }
-    let error = |portion| format!("average error, {}, %", unbroken(&portion_in_words(portion)));
+fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
+    let column = |heading: &str, cell: &dyn Fn(&ArmResults) -> Option<Markup>| ArmColumn {
+        heading: heading.to_owned(),
+        cells: report.results.arms.iter().map(cell).collect(),
+    };
+    let spread = |heading: &str, of: &dyn Fn(&ArmResults) -> Option<Spread>| {
+        column(heading, &|arm| Some(stacked(of(arm)?, number)))
+    };
+    let judging = report.study.judging();
+    let in_words = |portion: &Portion| unbroken(&stretch(*portion));
+    let all = report.judged_portion().map(|portion| in_words(&portion));
+    let portions: Vec<String> = judging.portions.iter().map(in_words).collect();
+
     let mut columns = vec![
-        column("seeds converged", |arm| {
+        column("seeds converged", &|arm| {
             let converged = whole(arm.converged? as f64);
             Some(text(format!("{converged} of {}", whole(arm.seeds as f64))))
         }),
-        column("iterations", |arm| Some(stacked(arm.epochs?, whole))),
+        column("iterations", &|arm| Some(stacked(arm.epochs?, whole))),
     ];
     columns.extend(
-        report.judged_portion().map(|all| column(error(all), |arm| Some(stacked(arm.error_percent, number)))),
+        all.iter().map(|all| spread(&format!("average error, {all}, %"), &|arm| Some(arm.error_percent))),
     );
-    columns.extend(report.study.judging().portions.iter().enumerate().map(|(i, portion)| {
-        column(error(*portion), move |arm| Some(stacked(arm.portions.get(i)?.error_percent, number)))
+    columns.extend(portions.iter().enumerate().map(|(i, portion)| {
+        let heading = format!("average error, {portion}, %");
+        spread(&heading, &|arm| Some(arm.portions.get(i)?.error_percent))
     }));
-    let span = |arm: &ArmResults| arm.training_span.clone();
-    columns.push(column("training positions, mm", move |arm| {
-        Some(text(unbroken(portion_in_words(span(arm)?.training_span).trim_end_matches(" mm"))))
+    columns.extend([
+        column("training positions, mm", &|arm| {
+            let span = stretch(arm.training_span.as_ref()?.training_span);
+            Some(text(unbroken(span.trim_end_matches(" mm"))))
+        }),
+        spread("average error between them, %", &|arm| {
+            arm.training_span.as_ref()?.error_percent_within_training
+        }),
+        spread("beyond them, %", &|arm| arm.training_span.as_ref()?.error_percent_beyond_training),
+        spread("largest error, %", &|arm| Some(arm.max_error_percent)),
+        spread(&format!("effective length, {} mm, %", mm(judging.tolerance_m)), &|arm| {
+            Some(arm.effective_length_percent)
+        }),
+    ]);
+    columns.extend(all.iter().map(|all| {
+        let heading = format!("limit's average error, {all}, %");
+        column(&heading, &|arm| Some(value(arm.limit.as_ref()?.limit_error_percent)))
     }));
-    columns.push(column("average error between them, %", move |arm| {
-        Some(stacked(span(arm)?.error_percent_within_training?, number))
+    columns.extend(portions.iter().enumerate().map(|(i, portion)| {
+        let heading = format!("limit's, {portion}, %");
+        column(&heading, &|arm| Some(value(arm.portions.get(i)?.limit_error_percent?)))
     }));
-    columns.push(column("beyond them, %", move |arm| {
-        Some(stacked(span(arm)?.error_percent_beyond_training?, number))
-    }));
-    columns.push(column("largest error, %", |arm| Some(stacked(arm.max_error_percent, number))));
-    let tolerance = mm(report.study.judging().tolerance_m);
-    columns.push(column(format!("effective length, {tolerance} mm, %"), |arm| {
-        Some(stacked(arm.effective_length_percent, number))
-    }));
-    columns.extend(report.judged_portion().map(|all| {
-        let heading = format!("limit's average error, {}, %", unbroken(&portion_in_words(all)));
-        column(heading, |arm| Some(text(number(arm.limit.as_ref()?.limit_error_percent))))
-    }));
-    columns.extend(report.study.judging().portions.iter().enumerate().map(|(i, portion)| {
-        let heading = format!("limit's, {}, %", unbroken(&portion_in_words(*portion)));
-        column(heading, move |arm| Some(text(number(arm.portions.get(i)?.limit_error_percent?))))
-    }));
-    columns.push(column("error over the limit's", |arm| {
-        Some(stacked(arm.limit.as_ref()?.error_over_limit?, number))
-    }));
-    columns.push(column("95 % intervals that hold, %", |arm| Some(stacked(arm.coverage_percent?, number))));
+    columns.extend([
+        spread("error over the limit's", &|arm| arm.limit.as_ref()?.error_over_limit),
+        spread("95 % intervals that hold, %", &|arm| arm.coverage_percent),
+    ]);
     columns
 }
 
@@ -240,7 +200,7 @@ fn unbroken(text: &str) -> String {
 }
 
 /// How the study was run.
-pub(crate) fn run_table(report: &StudyReport, table: usize) -> Markup {
+pub(crate) fn run_table(report: &StudyReport) -> Table {
     let run = report.run;
     let mut facts = vec![
         ("palpate", run.palpate.to_owned()),
@@ -255,13 +215,10 @@ pub(crate) fn run_table(report: &StudyReport, table: usize) -> Markup {
         facts.push(("patterns presented in this run", whole(run.presentations as f64)));
         facts.push(("patterns presented per second", whole(run.presentations_per_second)));
     }
-    Table {
-        number: table,
-        caption: html! { "The run. Networks that an earlier run had left are not among the patterns presented." },
-        columns: vec![words("fact"), words("value")],
-        rows: facts.iter().map(|(name, value)| vec![text(name), text(value)]).collect(),
-    }
-    .markup()
+    let rows = facts.iter().map(|(name, value)| vec![text(name), text(value)]);
+    let caption =
+        html! { "The run. Networks that an earlier run had left are not among the patterns presented." };
+    Table::new([words("fact"), words("value")], rows, caption)
 }
 
 fn counted_seeds(seeds: u64) -> String {
@@ -271,14 +228,12 @@ fn counted_seeds(seeds: u64) -> String {
     }
 }
 
-/// Which palpate, study and seeds a page is of.
-pub(crate) fn footer(report: &StudyReport) -> Markup {
+/// Which study and seeds a page is of.
+pub(crate) fn made(report: &StudyReport) -> Markup {
     let run = report.run;
     html! {
-        p {
-            "Made by palpate " (run.palpate) " from the study " code { (run.study) } ", SHA-256 "
-            code { (run.study_sha256) } ", " (report.seeds_in_words()) " of each arm, seeds from 0."
-        }
+        " from the study " code { (run.study) } ", SHA-256 " code { (run.study_sha256) } ", " (report.seeds_in_words())
+        " of each arm, seeds from 0"
     }
 }
 

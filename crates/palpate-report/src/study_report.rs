@@ -1,13 +1,23 @@
-//! The report of any study: its arms, and how far off they are along the surface.
+//! The report of any study: its arms side by side, their layouts, and how far off they are along the surface.
 
 use maud::{Markup, html};
 
-use super::numbers::{counted, mm, number};
-use super::page::{Figure, Figures, Page, Section, Table, text, wide};
-use super::study_figures::{along_the_surface, layouts, layouts_figure, overview};
-use super::study_parts::{arms_table, footer, glossary, run_table};
-use super::{ReportError, ReportFile};
-use palpate_studies::{ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
+use super::bench_figures::{row_axis, row_height, sites_chart};
+use super::error_lines::{limit_in_words, limit_line_of_arm};
+use super::numbers::{counted, listed, mm, number, stretch};
+use super::page::{Figure, Page, ReportFile, Section, Table, text, wide};
+use super::study_parts::{Drawn, arms_table, error_chart, error_chart_of, errors, glossary, made, run_table};
+use super::{Axis, Chart, Marker, Series};
+use palpate_estimators::evaluation::Spread;
+use palpate_mechanics::sensing::Layout;
+use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
+
+/// So many arms are told apart in a table; more are also drawn side by side.
+const FEW_ARMS: usize = 3;
+/// So many bands may lie over each other in a figure.
+const MOST_BANDS: usize = 2;
+/// Markers of an arm stand this far beside each other, in rows.
+const BESIDE: f64 = 0.22;
 
 /// What a study's report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -22,52 +32,28 @@ pub struct StudyReport<'a> {
     pub run: &'a RunFacts,
 }
 
-/// Reports any study: `report.html`, one self-contained page, and its figures as SVG and PNG files.
-///
-/// # Errors
-/// [`ReportError`] when a figure does not become a picture.
-pub fn study_report(report: &StudyReport) -> Result<Vec<ReportFile>, ReportError> {
-    let overview = overview(report, 1);
-    let layouts_drawn = layouts_figure(report, 1 + usize::from(overview.is_some()));
-    let before = usize::from(overview.is_some()) + usize::from(layouts_drawn.is_some());
-    let mut figures: Vec<Figure> = overview.into_iter().chain(layouts_drawn).collect();
-    figures.extend(along_the_surface(report, before + 1));
-    let figures = Figures(figures);
-    let section = |id, heading, body| Section { id, heading, body };
-    let has_layouts = layouts(report).len() > 1;
-    let overview_number = if has_layouts { before - 1 } else { before };
+/// Reports any study: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
+    let layouts = layouts(report);
     let mut sections =
-        vec![section("arms", "All arms", html! { (figures.show(overview_number)) (arms_table(report, 1)) })];
-    if has_layouts {
-        let body = html! { (figures.show(before)) (layouts_table(report, 2)) };
-        sections.push(section("layouts", "The layouts", body));
+        vec![Section::new("arms", "All arms").figures(overview(report)).table(arms_table(report))];
+    if layouts.len() > 1 {
+        let section = Section::new("layouts", "The layouts").figure(layouts_figure(report, &layouts));
+        sections.push(section.table(layouts_table(&layouts)));
     }
-    let errors = html! { @for i in before + 1..=figures.0.len() { (figures.show(i)) } };
-    let tables = if has_layouts { 3 } else { 2 };
-    sections.push(section("errors", "Errors along the surface", errors));
-    sections.push(section("words", "What the words mean", glossary(report)));
-    sections.push(section("run", "The run", run_table(report, tables)));
-    let page = Page {
+    sections.extend([
+        Section::new("errors", "Errors along the surface").figures(along_the_surface(report)),
+        Section::new("words", "What the words mean").text(glossary(report)),
+        Section::new("run", "The run").table(run_table(report)),
+    ]);
+    Page {
         title: format!("Study {}", report.run.study),
-        opening: summary(report),
+        lead: Markup::default(),
+        summary: summary(report),
         sections,
-        footer: footer(report),
-    };
-    page.into_files(figures)
-}
-
-/// Which arms have which layout.
-fn layouts_table(report: &StudyReport, table: usize) -> Markup {
-    let rows = layouts(report)
-        .into_iter()
-        .map(|(arms, layout)| vec![text(arms.join(", ")), text(layout.places_in_words(false))]);
-    Table {
-        number: table,
-        caption: html! { "Where the sensors of every arm sit." },
-        columns: vec![wide("arms"), wide("sensors")],
-        rows: rows.collect(),
+        made: made(report),
     }
-    .markup()
+    .files()
 }
 
 fn summary(report: &StudyReport) -> Markup {
@@ -75,18 +61,14 @@ fn summary(report: &StudyReport) -> Markup {
     let positions = report.study.judging().positions.len();
     let [one, many] = report.noun();
     html! {
-        div.summary {
-            ul {
-                li {
-                    (counted(report.networks(), one, many)) (if one == "network" { " trained: " } else { " fitted: " })
-                    (counted(arms, "arm", "arms")) ", " (report.seeds_in_words()) " each. Every " (one) " was asked for "
-                    (counted(positions, "contact position", "contact positions")) "."
-                }
-                @if let Some(sentence) = report.not_converged() { li { (sentence) } }
-                @if let Some(best) = least_error(report) { li { (best) } }
-                @if let Some(best) = longest(report) { li { (best) } }
-            }
+        li {
+            (counted(report.networks(), one, many)) (if one == "network" { " trained: " } else { " fitted: " })
+            (counted(arms, "arm", "arms")) ", " (report.seeds_in_words()) " each. Every " (one) " was asked for "
+            (counted(positions, "contact position", "contact positions")) "."
         }
+        @if let Some(sentence) = report.not_converged() { li { (sentence) } }
+        @if let Some(best) = least_error(report) { li { (best) } }
+        @if let Some(best) = longest(report) { li { (best) } }
     }
 }
 
@@ -111,4 +93,176 @@ pub(super) fn longest(report: &StudyReport) -> Option<Markup> {
         "Largest effective length: " b { (best.name) } ", which is within " (tolerance) " mm on "
         (number(median(&best))) " % of the surface (median)."
     })
+}
+
+/// The average errors of all arms, a row each, where there are more than a few.
+fn overview(report: &StudyReport) -> Option<Figure> {
+    let arms = &report.results.arms;
+    if arms.len() <= FEW_ARMS {
+        return None;
+    }
+    let mut series = Vec::new();
+    for (k, shown) in shown(report).into_iter().enumerate() {
+        let y = |i: usize| row_height(arms.len(), i) + BESIDE * (0.5 - k as f64);
+        let spreads = || arms.iter().enumerate().filter_map(|(i, arm)| Some((i, (shown.error)(arm)?)));
+        // A range over the seeds is a line of its own, without an entry in the legend.
+        series.extend(
+            spreads().map(|(i, spread)| Series::line("", k, vec![(spread.p05, y(i)), (spread.p95, y(i))])),
+        );
+        let medians = spreads().map(|(i, spread)| (spread.median, y(i))).collect();
+        let marker = [Marker::Circle, Marker::Square][k % 2];
+        series.push(Series::markers(&shown.label, k, medians, marker));
+        let limits: Vec<(f64, f64)> =
+            arms.iter().enumerate().filter_map(|(i, arm)| Some(((shown.limit)(arm)?, y(i)))).collect();
+        if !limits.is_empty() {
+            series.push(Series::markers(format!("limit, {}", shown.label), k, limits, Marker::Cross));
+        }
+    }
+    let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
+    let x = Axis::log10("average error, % of the length");
+    let chart = Chart::new("Average errors of all arms", x, row_axis(&names), series)
+        .with_height((170 + 30 * arms.len()) as u32);
+    let limited = arms.iter().any(|arm| arm.limit.is_some());
+    let caption = html! {
+        "The average error of every arm: median over the seeds, and the range from the 5th to the 95th percentile as a bar."
+        @if limited { " Crosses: the same of an estimator at the limit." }
+    };
+    Some(Figure::chart(&chart, caption))
+}
+
+/// One of the figures that arms are compared by.
+struct Shown {
+    label: String,
+    error: fn(&ArmResults) -> Option<Spread>,
+    limit: fn(&ArmResults) -> Option<f64>,
+}
+
+/// The error over all positions and in the first portion; or, where a study tells them apart, between training positions and
+/// beyond them.
+fn shown(report: &StudyReport) -> Vec<Shown> {
+    if report.study.judging().training_span {
+        let span = |label: &str, error: fn(&ArmResults) -> Option<Spread>| Shown {
+            label: label.to_owned(),
+            error,
+            limit: |_| None,
+        };
+        return vec![
+            span("between the training positions", |arm| {
+                arm.training_span.as_ref()?.error_percent_within_training
+            }),
+            span("beyond them", |arm| arm.training_span.as_ref()?.error_percent_beyond_training),
+        ];
+    }
+    let all = report.judged_portion().map(|portion| Shown {
+        label: stretch(portion),
+        error: |arm| Some(arm.error_percent),
+        limit: |arm| Some(arm.limit.as_ref()?.limit_error_percent),
+    });
+    let first = report.study.judging().portions.first().map(|portion| Shown {
+        label: stretch(*portion),
+        error: |arm| Some(arm.portions.first()?.error_percent),
+        limit: |arm| arm.portions.first()?.limit_error_percent,
+    });
+    all.into_iter().chain(first).collect()
+}
+
+/// The layouts of all arms, each once, with the arms that have it.
+fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
+    let mut layouts: Vec<(Vec<&str>, &Layout)> = Vec::new();
+    let places = |layout: &Layout| -> Vec<_> {
+        layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
+    };
+    for arm in &report.study.study.arms {
+        let layout = &arm.rig.bench.layout;
+        match layouts.iter_mut().find(|(_, other)| places(other) == places(layout)) {
+            Some((arms, _)) => arms.push(&arm.name),
+            None => layouts.push((vec![&arm.name], layout)),
+        }
+    }
+    layouts
+}
+
+/// Where the layouts have their sensors.
+fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Figure {
+    let row = |arms: &[&str]| match arms {
+        [] => String::new(),
+        [only] => (*only).to_owned(),
+        [first, others @ ..] => format!("{first} + {}", others.len()),
+    };
+    let rows: Vec<(String, &Layout)> = layouts.iter().map(|(arms, layout)| (row(arms), *layout)).collect();
+    let caption = html! { "The sensors of every layout, a row each; “+ 2” are two more arms with the same." };
+    Figure::chart(&sites_chart(&rows, report.length_m(), Vec::new()), caption)
+}
+
+/// Which arms have which layout.
+fn layouts_table(layouts: &[(Vec<&str>, &Layout)]) -> Table {
+    let rows =
+        layouts.iter().map(|(arms, layout)| vec![text(arms.join(", ")), text(layout.places_in_words(false))]);
+    Table::new([wide("arms"), wide("sensors")], rows, html! { "Where the sensors of every arm sit." })
+}
+
+/// Errors along the surface: a figure for the arms that share a title, and one for each that has none.
+fn along_the_surface(report: &StudyReport) -> Vec<Figure> {
+    let mut groups: Vec<(Option<&str>, Vec<&Arm>)> = Vec::new();
+    let run = report.results.arms.iter().filter_map(|arm| report.arm(&arm.name));
+    for arm in run {
+        let title = arm.figure.as_deref();
+        match groups.iter_mut().find(|(other, _)| title.is_some() && *other == title) {
+            Some((_, arms)) => arms.push(arm),
+            None => groups.push((title, vec![arm])),
+        }
+    }
+    let drawn = groups.iter().enumerate().filter_map(|(colour, (title, arms))| match (title, &arms[..]) {
+        (None, [arm]) => single(report, arm, colour),
+        (title, arms) => shared(report, title.unwrap_or_default(), arms),
+    });
+    drawn.collect()
+}
+
+fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
+    let seeds = report.outcome(&arm.name)?.fits.len();
+    let title = format!("Location error of {}", arm.name);
+    let label = if seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
+    let drawn = Drawn { arm: &arm.name, label, colour };
+    let (chart, limit) = if arm.rig.bench.force_n.is_some() {
+        let chart = error_chart(report, &title, &[drawn])?;
+        let words = limit_in_words(&chart);
+        (chart, words)
+    } else {
+        let limit = limit_of(arm, 6, "limit: what physics allows");
+        let words = limit.as_ref().map_or("", |_| " Black dashes: the limit for a force that is not known.");
+        let series = errors(report, &drawn, true).into_iter().chain(limit).collect();
+        (error_chart_of(report, &title, series), words.to_owned())
+    };
+    let caption = html! {
+        "Location error of " b { (arm.name) } " by load position, over " (counted(seeds, "seed", "seeds")) "." (limit)
+    };
+    Some(Figure::chart(&chart, caption))
+}
+
+fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
+    let bands = arms.len() <= MOST_BANDS;
+    let drawn = |(colour, arm): (usize, &&Arm)| {
+        errors(report, &Drawn { arm: &arm.name, label: &arm.name, colour }, bands)
+    };
+    let mut series: Vec<Series> = arms.iter().enumerate().flat_map(drawn).collect();
+    let errors = series.len();
+    series.extend(arms.iter().enumerate().filter_map(|(colour, arm)| limit_of(arm, colour, "")));
+    if series.is_empty() {
+        return None;
+    }
+    let limited = series.len() > errors;
+    let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
+    let caption = html! {
+        "Location error by load position of " (listed(&names)) ": medians over the seeds"
+        @if bands { ", and the range from the 5th to the 95th percentile" }
+        "."
+        @if limited { " Dashes: the limit of each." }
+    };
+    Some(Figure::chart(&error_chart_of(report, title, series).with_height(480), caption))
+}
+
+fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {
+    let bench = &arm.rig.bench;
+    limit_line_of_arm(bench, bench.force_n.or(arm.rig.pressed_bench().force_n)?, colour, label)
 }

@@ -54,3 +54,29 @@ pub(crate) fn wrap(text: &str, size: f64, room: f64, lines: usize) -> Vec<String
     }
     wrapped.iter().map(|line| fit(line, size, room)).collect()
 }
+
+/// Rows of texts that do not touch each other.
+#[derive(Default)]
+pub(crate) struct Rows(Vec<Vec<(f64, f64)>>);
+
+impl Rows {
+    /// The first row in which nothing lies between `left` and `right`; a new one where all are taken there.
+    pub fn first_free(&self, left: f64, right: f64) -> usize {
+        let free = |row: &Vec<(f64, f64)>| row.iter().all(|&(start, end)| right <= start || end <= left);
+        self.0.iter().position(free).unwrap_or(self.0.len())
+    }
+
+    /// Takes the room between `left` and `right` in the first free row, which is returned.
+    pub fn place(&mut self, left: f64, right: f64) -> usize {
+        let row = self.first_free(left, right);
+        if row == self.0.len() {
+            self.0.push(Vec::new());
+        }
+        self.0[row].push((left, right));
+        row
+    }
+
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+}

@@ -1,12 +1,25 @@
-//! Round numbers along an axis, and how they are written.
+//! Round numbers along an axis, how they are written, and where their labels stand.
 
 use super::chart::{Scale, Ticks};
+use super::geometry::Rect;
 use super::scale::{AxisScale, round_step_above};
+use super::svg::{Anchor, Label, QUIET_INK};
+use super::text;
 
 /// Most ticks on one axis.
 const MOST: usize = 11;
 /// Multiples of a power of ten, from fine to coarse, for a logarithmic axis of few decades.
 const LOG_MULTIPLES: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
+
+pub(crate) const TICK_SIZE: f64 = 11.5;
+/// From the plot to the labels of the vertical axis.
+pub(crate) const TICK_GAP: f64 = 8.0;
+/// From the plot down to the middle of the labels of the horizontal axis.
+const TICK_DROP: f64 = 16.0;
+/// Least distances between neighbouring labels, and between their middles.
+pub(crate) const LABEL_GAP: f64 = 14.0;
+const LEAST_X_PITCH: f64 = 40.0;
+const LEAST_Y_PITCH: f64 = 26.0;
 
 /// A value with a line of the grid and a label.
 #[derive(Debug, Clone, PartialEq)]
@@ -170,4 +183,49 @@ fn grouped(number: &str) -> String {
         text.push(digit);
     }
     text
+}
+
+/// The labels of both axes of a plot.
+pub(crate) fn tick_labels(
+    plot: &Rect,
+    (x, x_ticks): (&AxisScale, &[Tick]),
+    (y, y_ticks): (&AxisScale, &[Tick]),
+) -> Vec<Label> {
+    let label = |tick: &Tick, at, anchor| Label {
+        text: tick.label.clone(),
+        at,
+        anchor,
+        size: TICK_SIZE,
+        colour: QUIET_INK,
+    };
+    let columns = x_ticks.iter().map(|tick| {
+        let at = (plot.left + x.tick_share(tick.value) * plot.width(), plot.bottom + TICK_DROP);
+        label(tick, at, Anchor::Middle)
+    });
+    let rows = y_ticks.iter().map(|tick| {
+        let at = (plot.left - TICK_GAP, plot.bottom - y.tick_share(tick.value) * plot.height());
+        label(tick, at, Anchor::End)
+    });
+    columns.chain(rows).collect()
+}
+
+/// Whether labels above each other leave room between them on an axis of that height.
+pub(crate) fn rows_fit(axis: &AxisScale, ticks: &[Tick], height: f64) -> bool {
+    pairs(axis, ticks).all(|(pitch, _, _)| pitch * height >= LEAST_Y_PITCH)
+}
+
+/// Whether labels beside each other leave room between them on an axis of that width.
+pub(crate) fn columns_fit(axis: &AxisScale, ticks: &[Tick], width: f64) -> bool {
+    pairs(axis, ticks).all(|(pitch, before, after)| {
+        let labels = text::width(&before.label, TICK_SIZE) / 2.0 + text::width(&after.label, TICK_SIZE) / 2.0;
+        pitch * width >= (labels + LABEL_GAP).max(LEAST_X_PITCH)
+    })
+}
+
+/// Neighbouring ticks and how far apart they are as a share of the axis.
+fn pairs<'t>(axis: &AxisScale, ticks: &'t [Tick]) -> impl Iterator<Item = (f64, &'t Tick, &'t Tick)> {
+    ticks.windows(2).map(|pair| {
+        let pitch = axis.tick_share(pair[1].value) - axis.tick_share(pair[0].value);
+        (pitch, &pair[0], &pair[1])
+    })
 }

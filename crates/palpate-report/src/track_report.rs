@@ -2,15 +2,22 @@
 
 use maud::{Markup, html};
 
+use super::maps::in_mm;
 use super::numbers::{counted, number, stated, whole};
-use super::page::{Figure, Figures, Page, Section, Table, numeric, short, text};
-use super::{
-    Axis, BandPoint, Chart, Marker, ReportError, ReportFile, Series, SeriesKind, Stroke, chart_to_svg,
-};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::{Axis, BandPoint, Chart, Marker, Series};
 use palpate_estimators::estimator::Track;
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
+
+/// More points than this hide the track, so that of single estimates only every so many is drawn.
+const MOST_POINTS: usize = 60;
+/// More points of a line than this cannot be told apart.
+const MOST_OF_LINE: usize = 2000;
+/// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
+const PLOT_WIDTH_PX: f64 = 630.0;
+const AROUND_PLOT_PX: f64 = 130.0;
 
 /// What a track's report is made from.
 #[derive(Clone, Copy, Debug)]
@@ -33,55 +40,36 @@ pub struct TrackReport<'a> {
     pub sweep: &'a [SpeedErrors],
 }
 
-/// More points than this hide the track, so that of single estimates only every so many is drawn.
-const MOST_POINTS: usize = 60;
-/// More points of a line than this cannot be told apart.
-const MOST_OF_LINE: usize = 2000;
-/// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
-const PLOT_WIDTH_PX: f64 = 630.0;
-const AROUND_PLOT_PX: f64 = 130.0;
-
-/// Reports a track: `report.html`, one self-contained page, and its figures as SVG and PNG files.
-///
-/// # Errors
-/// [`ReportError`] when a figure does not become a picture.
-pub fn track_report(report: &TrackReport) -> Result<Vec<ReportFile>, ReportError> {
+/// Reports a track: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
     let track = if report.extent.is_plane() { report.path_figure() } else { report.track_figure() };
-    let mut figures = vec![track, report.errors_figure()];
+    let mut sections = vec![
+        Section::new("track", "The track").figure(track),
+        Section::new("errors", "Errors").figure(report.errors_figure()).table(report.errors_table()),
+    ];
     if !report.sweep.is_empty() {
-        figures.push(report.sweep_figure());
+        let section = Section::new("speed", "Errors against the speed").figure(report.sweep_figure());
+        sections.push(section.table(report.sweep_table()));
     }
-    let figures = Figures(figures);
-    let section = |id, heading, body| Section { id, heading, body };
-    let mut sections = vec![section("track", "The track", figures.show(1))];
-    let errors = html! { (figures.show(2)) @if !report.errors.is_empty() { (report.errors_table()) } };
-    sections.push(section("errors", "Errors", errors));
-    if !report.sweep.is_empty() {
-        let body = html! { (figures.show(3)) (report.sweep_table()) };
-        sections.push(section("speed", "Errors against the speed", body));
-    }
-    let page = Page {
+    Page {
         title: report.title.to_owned(),
-        opening: report.summary(),
+        lead: Markup::default(),
+        summary: report.summary(),
         sections,
-        footer: html! { p { "Made by palpate " (env!("CARGO_PKG_VERSION")) " from " (report.source) "." } },
-    };
-    page.into_files(figures)
+        made: html! { " from " (report.source) },
+    }
+    .files()
 }
 
 impl TrackReport<'_> {
     fn summary(&self) -> Markup {
         html! {
-            div.summary {
-                ul {
-                    li { (counted(self.tracks.len(), "reading", "readings")) " of " b { (self.source) } ", followed by the " (self.how) "." }
-                    @for (name, errors) in self.errors {
-                        li {
-                            "The " (name) ": average error " b { (number(errors.track_m * 1e3)) " mm" } ", "
-                            (number(errors.ratio())) " times smaller than that of the readings one by one, "
-                            (number(errors.single_m * 1e3)) " mm."
-                        }
-                    }
+            li { (counted(self.tracks.len(), "reading", "readings")) " of " b { (self.source) } ", followed by the " (self.how) "." }
+            @for (name, errors) in self.errors {
+                li {
+                    "The " (name) ": average error " b { (number(errors.track_m * 1e3)) " mm" } ", "
+                    (number(errors.ratio())) " times smaller than that of the readings one by one, "
+                    (number(errors.single_m * 1e3)) " mm."
                 }
             }
         }
@@ -94,123 +82,84 @@ impl TrackReport<'_> {
             let place = |track: &Track| {
                 (track.time_s, track.contacts.get(k).map_or(f64::NAN, |tracked| tracked.x_m * 1e3))
             };
-            let points = self.tracks.iter().map(place).collect();
-            series.push(line(format!("track{}, {}", of_two(k, self), self.how), k, Stroke::Solid, points));
+            let label = format!("track{}, {}", of_two(k, self), self.how);
+            series.push(Series::line(label, k, self.tracks.iter().map(place).collect()));
         }
         for k in 0..self.truths.iter().map(Vec::len).max().unwrap_or(0) {
             let truth = |(track, truths): (&Track, &Vec<Contact>)| {
-                let touching = truths.get(k).filter(|truth| truth.force_n > 0.0);
-                (track.time_s, touching.map_or(f64::NAN, |truth| truth.position.x_m * 1e3))
+                (track.time_s, touching(truths.get(k)).map_or(f64::NAN, |at| at.x_m * 1e3))
             };
             let points = self.tracks.iter().zip(self.truths).map(truth).collect();
             let label = if k == 0 { "true position" } else { "true position of the second" };
-            series.push(line(label.to_owned(), 6 + k, Stroke::Dashed, points));
+            series.push(Series::dashes(label, 6 + k, points));
         }
-        let chart = Chart {
-            title: "The contact over time".to_owned(),
-            x: Axis::linear("time, s"),
-            y: Axis::linear("position, mm").from_to(0.0, self.extent.length_m * 1e3),
-            series,
-            height_px: 520,
-            ..Chart::default()
-        };
+        let y = Axis::linear("position, mm").from_to(0.0, self.extent.length_m * 1e3);
+        let chart = Chart::new("The contact over time", Axis::linear("time, s"), y, series).with_height(520);
         let caption = html! { "Where the contact was, where readings by themselves see it, and the track." };
-        Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+        Figure::chart(&chart, caption)
     }
 
     /// The way over a plane, drawn to scale.
     fn path_figure(&self) -> Figure {
-        let mm = |position: Position| (position.x_m * 1e3, position.y_m * 1e3);
-        let mut series = vec![self.single_readings(|track: &Track| mm(track.alone.contact.position))];
-        let place = |track: &Track| {
-            let tracked = track.contacts.first();
-            tracked.map_or((f64::NAN, f64::NAN), |tracked| mm(tracked.estimate().position))
+        let path = |places: &mut dyn Iterator<Item = Option<Position>>| -> Vec<(f64, f64)> {
+            places.map(|place| place.map_or((f64::NAN, f64::NAN), in_mm)).collect()
         };
-        let path = self.tracks.iter().map(place).collect();
-        series.push(line(format!("track, {}", self.how), 0, Stroke::Solid, path));
-        let truth = |truths: &Vec<Contact>| {
-            let touching = truths.first().filter(|truth| truth.force_n > 0.0);
-            touching.map_or((f64::NAN, f64::NAN), |truth| mm(truth.position))
-        };
+        let mut series = vec![self.single_readings(|track: &Track| in_mm(track.alone.contact.position))];
+        let mut tracked = self.tracks.iter().map(|track| Some(track.contacts.first()?.estimate().position));
+        series.push(Series::line(format!("track, {}", self.how), 0, path(&mut tracked)));
         if !self.truths.is_empty() {
-            let path = self.truths.iter().map(truth).collect();
-            series.push(line("true position".to_owned(), 6, Stroke::Dashed, path));
+            let mut truths = self.truths.iter().map(|truths| touching(truths.first()));
+            series.push(Series::dashes("true position", 6, path(&mut truths)));
         }
-        let [length_mm, width_mm] =
-            [self.extent.length_m, self.extent.width_m.unwrap_or_default()].map(|side_m| side_m * 1e3);
-        let chart = Chart {
-            title: "The contact on the plane".to_owned(),
-            x: Axis::linear("x, mm").from_to(0.0, length_mm),
-            y: Axis::linear("y, mm").from_to(0.0, width_mm),
-            series,
-            height_px: (PLOT_WIDTH_PX * width_mm / length_mm + AROUND_PLOT_PX) as u32,
-            ..Chart::default()
-        };
+        let sides_m = [self.extent.length_m, self.extent.width_m.unwrap_or_default()];
+        let [length_mm, width_mm] = sides_m.map(|side_m| side_m * 1e3);
+        let x = Axis::linear("x, mm").from_to(0.0, length_mm);
+        let y = Axis::linear("y, mm").from_to(0.0, width_mm);
+        let height_px = PLOT_WIDTH_PX * width_mm / length_mm + AROUND_PLOT_PX;
+        let chart = Chart::new("The contact on the plane", x, y, series).with_height(height_px as u32);
         let caption =
             html! { "The contact's way over the plane, where readings by themselves see it, and the track." };
-        Figure { number: 1, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+        Figure::chart(&chart, caption)
     }
 
     /// Some of the estimates by single readings.
     fn single_readings(&self, alone: impl Fn(&Track) -> (f64, f64)) -> Series {
         let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
-        Series {
-            label: if stride > 1 {
-                format!("single readings, every {stride}th")
-            } else {
-                "single readings".to_owned()
-            },
-            colour: 4,
-            kind: SeriesKind::Points {
-                points: self.tracks.iter().step_by(stride).map(alone).collect(),
-                marker: Marker::Cross,
-            },
-        }
+        let every = if stride > 1 { format!(", every {stride}th") } else { String::new() };
+        let points = self.tracks.iter().step_by(stride).map(alone).collect();
+        Series::markers(format!("single readings{every}"), 4, points, Marker::Cross)
     }
 
     /// The track less the true position, with its 95 % band; where the truth is not known, the band alone, about the track.
     fn errors_figure(&self) -> Figure {
         let stride = self.tracks.len().div_ceil(MOST_OF_LINE).max(1);
-        let known = !self.truths.is_empty();
         let mut series = Vec::new();
         for (colour, coordinate) in self.coordinates().into_iter().enumerate() {
-            let off = |i: usize| {
-                let time_s = self.tracks[i].time_s;
-                match self.off_mm(i, &coordinate) {
-                    Some([off, low, high]) => (time_s, off, low, high),
-                    None => (time_s, f64::NAN, f64::NAN, f64::NAN),
-                }
+            let point = |i: usize| {
+                let [off, low, high] = self.off_mm(i, &coordinate).unwrap_or([f64::NAN; 3]);
+                (off, BandPoint { x: self.tracks[i].time_s, low, high })
             };
-            let points: Vec<_> = (0..self.tracks.len()).step_by(stride).map(off).collect();
-            let band = points.iter().map(|(x, _, low, high)| BandPoint { x: *x, low: *low, high: *high });
-            let kind = SeriesKind::Band { points: band.collect() };
-            series.push(Series { label: format!("its 95 %{}", coordinate.name), colour, kind });
-            let off = points.iter().map(|(x, off, ..)| (*x, *off)).collect();
-            series.push(line(format!("track{}", coordinate.name), colour, Stroke::Solid, off));
+            let points: Vec<(f64, BandPoint)> = (0..self.tracks.len()).step_by(stride).map(point).collect();
+            let band = points.iter().map(|(_, band)| *band).collect();
+            series.push(Series::band(format!("its 95 %{}", coordinate.name), colour, band));
+            let off = points.iter().map(|(off, band)| (band.x, *off)).collect();
+            series.push(Series::line(format!("track{}", coordinate.name), colour, off));
         }
-        let (title, y, caption) = if known {
-            (
-                "How far the track is off",
-                "position less the true one, mm",
-                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
-            )
-        } else {
+        let (title, y, caption) = if self.truths.is_empty() {
             (
                 "How sure the track is",
                 "ends of the 95 % interval less the position, mm",
                 "The 95 % interval about the track over time.",
             )
+        } else {
+            (
+                "How far the track is off",
+                "position less the true one, mm",
+                "The track's error over time and its 95 % interval, while something touched: the interval should hold 0.",
+            )
         };
-        let chart = Chart {
-            title: title.to_owned(),
-            x: Axis::linear("time, s"),
-            y: Axis::linear(y),
-            series,
-            height_px: 480,
-            ..Chart::default()
-        };
-        let caption = html! { (caption) };
-        Figure { number: 2, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+        let chart = Chart::new(title, Axis::linear("time, s"), Axis::linear(y), series).with_height(480);
+        Figure::chart(&chart, html! { (caption) })
     }
 
     /// What the figure of errors has a line for: each contact, or both coordinates of a plane.
@@ -249,94 +198,76 @@ impl TrackReport<'_> {
     }
 
     fn sweep_figure(&self) -> Figure {
-        let line = |label: &str, colour, error: fn(&SpeedErrors) -> f64| {
-            let points = self.sweep.iter().map(|speed| (speed.ratio, error(speed) * 1e3)).collect();
-            Series {
-                label: label.to_owned(),
-                colour,
-                kind: SeriesKind::Line { points, stroke: Stroke::Solid },
-            }
+        let line = |label, colour, error_m: fn(&SpeedErrors) -> f64| {
+            let points = self.sweep.iter().map(|speed| (speed.ratio, error_m(speed) * 1e3)).collect();
+            Series::line(label, colour, points)
         };
-        let chart = Chart {
-            title: "Errors against the contact's speed".to_owned(),
-            x: Axis::log10("speed over the critical speed"),
-            y: Axis::log10("average error, mm"),
-            series: vec![
-                line("single readings", 4, |speed| speed.filtered.single_m),
-                line("track, filter", 0, |speed| speed.filtered.track_m),
-                line("track, smoother", 2, |speed| speed.smoothed.track_m),
-            ],
-            ..Chart::default()
-        };
+        let series = vec![
+            line("single readings", 4, |speed| speed.filtered.single_m),
+            line("track, filter", 0, |speed| speed.filtered.track_m),
+            line("track, smoother", 2, |speed| speed.smoothed.track_m),
+        ];
+        let (x, y) = (Axis::log10("speed over the critical speed"), Axis::log10("average error, mm"));
         let caption = html! {
             "The same motion at other speeds, simulated with the beam's inertia and damping. The influence functions are those of a \
              beam in balance: the faster the contact, the less that holds."
         };
-        Figure { number: 3, alternative: chart.title.clone(), svg: chart_to_svg(&chart), caption }
+        Figure::chart(&Chart::new("Errors against the contact's speed", x, y, series), caption)
     }
 
-    fn errors_table(&self) -> Markup {
-        let row = |(name, errors): &(&'static str, TrackErrors)| {
-            let percent = |share: f64| text(number(share * 100.0));
+    fn errors_table(&self) -> Table {
+        let rows = self.errors.iter().map(|(name, errors)| {
             vec![
                 text(name),
                 text(whole(errors.tracked as f64)),
-                text(number(errors.track_m * 1e3)),
-                text(number(errors.single_m * 1e3)),
-                text(number(errors.ratio())),
-                percent(errors.track_covered),
-                percent(errors.single_covered),
-                percent(errors.track_number_right),
+                value_mm(errors.track_m),
+                value_mm(errors.single_m),
+                value(errors.ratio()),
+                value(errors.track_covered * 100.0),
+                value(errors.single_covered * 100.0),
+                value(errors.track_number_right * 100.0),
             ]
-        };
+        });
         let columns = [
-            "contacts",
-            "average error, mm",
-            "of single readings, mm",
-            "ratio",
-            "covered, %",
-            "of single readings, %",
-            "number right, %",
+            short("track"),
+            numeric("contacts"),
+            numeric("average error, mm"),
+            numeric("of single readings, mm"),
+            numeric("ratio"),
+            numeric("covered, %"),
+            numeric("of single readings, %"),
+            numeric("number right, %"),
         ];
-        Table {
-            number: 1,
-            caption: html! { "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as many contacts were found as touched." },
-            columns: std::iter::once(short("track")).chain(columns.map(numeric)).collect(),
-            rows: self.errors.iter().map(row).collect(),
-        }
-        .markup()
+        let caption = html! {
+            "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as \
+             many contacts were found as touched."
+        };
+        Table::new(columns, rows, caption)
     }
 
-    fn sweep_table(&self) -> Markup {
-        let row = |speed: &SpeedErrors| {
+    fn sweep_table(&self) -> Table {
+        let rows = self.sweep.iter().map(|speed| {
             let SpeedErrors { ratio, speed_m_per_s, filtered, smoothed } = speed;
-            let mm = |error_m: f64| text(number(error_m * 1e3));
-            let percent = |share: f64| text(number(share * 100.0));
             vec![
                 text(stated(*ratio)),
-                text(number(*speed_m_per_s)),
-                mm(filtered.single_m),
-                mm(filtered.track_m),
-                mm(smoothed.track_m),
-                percent(filtered.track_covered),
-                percent(smoothed.track_covered),
+                value(*speed_m_per_s),
+                value_mm(filtered.single_m),
+                value_mm(filtered.track_m),
+                value_mm(smoothed.track_m),
+                value(filtered.track_covered * 100.0),
+                value(smoothed.track_covered * 100.0),
             ]
-        };
+        });
         let columns = [
-            "speed, m/s",
-            "single, mm",
-            "filter, mm",
-            "smoother, mm",
-            "filter covers, %",
-            "smoother covers, %",
+            numeric("ratio"),
+            numeric("speed, m/s"),
+            numeric("single, mm"),
+            numeric("filter, mm"),
+            numeric("smoother, mm"),
+            numeric("filter covers, %"),
+            numeric("smoother covers, %"),
         ];
-        Table {
-            number: 2,
-            caption: html! { "Average errors against the speed over the critical speed." },
-            columns: std::iter::once(numeric("ratio")).chain(columns.map(numeric)).collect(),
-            rows: self.sweep.iter().map(row).collect(),
-        }
-        .markup()
+        Table::new(columns, rows, html! { "Average errors against the speed over the critical speed." })
     }
 }
 
@@ -348,8 +279,9 @@ struct Coordinate {
     across: bool,
 }
 
-fn line(label: String, colour: usize, stroke: Stroke, points: Vec<(f64, f64)>) -> Series {
-    Series { label, colour, kind: SeriesKind::Line { points, stroke } }
+/// Where a contact is; nothing where it does not touch.
+fn touching(contact: Option<&Contact>) -> Option<Position> {
+    contact.filter(|contact| contact.force_n > 0.0).map(|contact| contact.position)
 }
 
 /// Which of two contacts is meant; nothing where there is but one.

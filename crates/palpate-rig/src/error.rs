@@ -1,5 +1,6 @@
-//! What can be wrong with a rig file, where, and what would help.
+//! What can be wrong with a rig or study file, where, and what would help.
 
+use std::fmt::Display;
 use std::ops::Range;
 
 use palpate_estimators::arrangement::ArrangementError;
@@ -9,9 +10,11 @@ use palpate_mechanics::surface::modal::ModalBeamError;
 use palpate_mechanics::surface::{
     BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError,
 };
-use palpate_mechanics::units::UnitError;
+use serde::de::{Expected, Unexpected};
 
-/// A rig file, or a section of one in a study, that cannot be used.
+use crate::document::Place;
+
+/// A rig or study file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RigError {
@@ -21,69 +24,71 @@ pub struct RigError {
     pub span: Option<Range<usize>>,
 }
 
-/// What is wrong with a rig file.
+/// What is wrong with a rig or study file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigProblem {
-    /// The text is not TOML, or a value has the wrong type.
+    /// The text is not TOML.
     #[error("{}", .0.message())]
     Toml(toml::de::Error),
-    /// A key that no section has, or not this one.
-    #[error("unknown key `{key}`{}", suggestion(key, known.iter().map(String::as_str)))]
+    /// A section is missing.
+    #[error("there is no section {section}")]
+    MissingSection {
+        /// Its name in brackets.
+        section: &'static str,
+    },
+    /// A section lacks a key.
+    #[error("{} has no `{key}`", if section.is_empty() { "the file".to_owned() } else { format!("[{section}]") })]
+    MissingKey {
+        /// The section and those around it, as in `surface.supports`; empty for the file itself.
+        section: String,
+        /// The key.
+        key: String,
+    },
+    /// A key that the section does not have.
+    #[error("{}", unknown_key(key, known, with.as_deref()))]
     UnknownKey {
         /// The key.
         key: String,
         /// The keys that can stand there.
-        known: Vec<String>,
+        known: Vec<&'static str>,
+        /// What leaves the section with these keys, where it can have others: `kind = "beam"`.
+        with: Option<String>,
     },
-    /// A section is missing.
-    #[error("there is no section [{section}]")]
-    MissingSection {
-        /// Its name.
-        section: &'static str,
-    },
-    /// A section lacks a key.
-    #[error("[{section}] has no `{key}`")]
-    MissingKey {
-        /// The section.
-        section: &'static str,
-        /// The key.
-        key: &'static str,
-    },
-    /// A key that means nothing beside another one.
+    /// A key that means nothing beside what else is written.
     #[error("`{key}` does not go with {with}")]
     UnusedKey {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What it does not go with.
-        with: &'static str,
+        with: String,
     },
     /// A word that the key cannot be.
-    #[error("`{key}` is `{word}`{}", suggestion(word, known.iter().copied()))]
+    #[error("`{key}` is `{word}`{}", suggestion(word, known))]
     UnknownWord {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What it is.
         word: String,
         /// What it can be.
         known: Vec<&'static str>,
     },
-    /// A text that is not the quantity which the key wants.
-    #[error("`{key}`: {error}")]
-    Unit {
+    /// A text that is not what the key wants, such as a quantity in another unit.
+    #[error("`{key}`: {reason}")]
+    Invalid {
         /// The key.
-        key: &'static str,
+        key: String,
         /// What is wrong with it.
-        error: UnitError,
+        reason: String,
     },
-    /// A number outside its bound.
+    /// A value outside its bound.
     #[error("`{key}` is {value}; it must be {bound}")]
     OutOfRange {
         /// The key.
-        key: &'static str,
+        key: String,
         /// Its value, as written.
         value: String,
         /// What it must be.
-        bound: &'static str,
+        bound: String,
     },
     /// A beam that cannot be computed.
     #[error(transparent)]
@@ -94,6 +99,15 @@ pub enum RigProblem {
     /// A plate that cannot be computed.
     #[error(transparent)]
     Plate(PlateError),
+    /// A digit that cannot be computed.
+    #[error(transparent)]
+    Digit(DigitError),
+    /// A beam whose motion cannot be computed.
+    #[error(transparent)]
+    ModalBeam(ModalBeamError),
+    /// Training positions that cannot be laid out.
+    #[error(transparent)]
+    Arrangement(ArrangementError),
     /// A sensor that reads nothing, wherever the surface is touched.
     #[error(
         "{kind} sensor {number} is at {} and would read nothing: {reason}",
@@ -111,55 +125,6 @@ pub enum RigProblem {
         /// Why.
         reason: NothingToRead,
     },
-    /// A beam whose motion cannot be computed.
-    #[error(transparent)]
-    ModalBeam(ModalBeamError),
-    /// A moving contact that is read too often to be held.
-    #[error("the motion takes {readings} readings; at most {most} can be held")]
-    TooManyReadings {
-        /// Its duration times the rate.
-        readings: f64,
-        /// The most it can be.
-        most: f64,
-    },
-    /// A digit that cannot be computed.
-    #[error(transparent)]
-    Digit(DigitError),
-    /// A sensor on a digit that is no strain gauge.
-    #[error("a digit is read by strain gauges; `measure` is `{kind}`")]
-    NotAGauge {
-        /// What it measures.
-        kind: palpate_mechanics::sensing::SensorKind,
-    },
-    /// A force that bends a digit further than its model goes.
-    #[error(
-        "`force` is {value}; with a contact at the tip this digit bears at most {:.3} N, a load F·l²/(E·I) of {}",
-        most_n,
-        palpate_mechanics::surface::Digit::MOST_LOAD
-    )]
-    TooMuchForce {
-        /// The force, as written.
-        value: String,
-        /// The largest, in newtons.
-        most_n: f64,
-    },
-    /// Training positions that cannot be laid out.
-    #[error(transparent)]
-    Arrangement(ArrangementError),
-    /// A sensor beside the surface.
-    #[error(
-        "sensor {number} is at {}, off the surface; it must be within {}",
-        extent.place_in_words(*position),
-        extent.bounds_in_words()
-    )]
-    SensorOffSurface {
-        /// Which sensor of its section, from 1.
-        number: usize,
-        /// Where it is.
-        position: Position,
-        /// The surface.
-        extent: Extent,
-    },
     /// A reaction sensor where nothing supports the surface.
     #[error(
         "reaction sensor {number} is at {}, where no support takes up force; {}",
@@ -176,176 +141,116 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
     },
-    /// A position with one coordinate on a plane, or with more than one on a line.
-    #[error(
-        "`{key}` has {found} where {} is expected",
-        if *plane { "a pair of lengths, along and across," } else { "one length along the surface" }
-    )]
-    Coordinates {
-        /// Where it stands.
-        key: &'static str,
-        /// What is there.
-        found: &'static str,
-        /// Whether the surface has a width.
-        plane: bool,
-    },
-    /// A place that is not on the surface.
-    #[error(
-        "`{key}` is at {}, off the surface; it must be within {}",
-        extent.place_in_words(*position),
-        extent.bounds_in_words()
-    )]
-    PlaceOffSurface {
-        /// The key.
-        key: &'static str,
-        /// Where it is.
-        position: Position,
-        /// The surface.
-        extent: Extent,
-    },
-    /// A stretch or rectangle that ends before it begins.
-    #[error(
-        "`to` is {}; it must lie beyond `from`, {}",
-        extent.place_in_words(*to),
-        extent.place_in_words(*from)
-    )]
-    EndsBeforeItBegins {
-        /// Where it begins.
-        from: Position,
-        /// Where it ends.
-        to: Position,
-        /// The surface.
-        extent: Extent,
-    },
-    /// A sensor that a layout must have, of a kind that cannot be had.
-    #[error("`must_have` asks for a {kind} sensor, which is none of the kinds to choose from")]
-    NotOffered {
-        /// What it measures.
-        kind: SensorKind,
-    },
-    /// A number of candidate sites, on a plane, where it does not say where they are.
-    #[error("a number of `sites` does not say where on a plane they are")]
-    CountOfSitesOnPlane,
-    /// A number of places, on a plane, where it does not say where they are.
-    #[error("[{section}] `count` alone does not say where on a plane they are")]
-    CountOnPlane {
-        /// The section.
-        section: &'static str,
-    },
-    /// A raw channel on a surface with a model.
-    #[error("a raw channel has no model; only a measured surface has raw channels")]
-    RawOnModel,
-    /// A dead sensor that does not exist.
-    #[error("`dead` names sensor {number}; this section has sensors 1 to {count}")]
-    DeadNumber {
-        /// The number.
-        number: i64,
-        /// How many sensors the section has.
-        count: usize,
-    },
     /// The rig is to be simulated, but its force is unknown.
     #[error(
         "the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`"
     )]
     NoForce,
-    /// The training positions, their repeats and the sensors make a recording too large to hold.
-    #[error("training positions × repeats × sensors make {values} values; at most {most} can be held")]
-    TooManyValues {
-        /// The product.
-        values: usize,
-        /// The most it can be.
-        most: usize,
-    },
-    /// The columns that hold channels are not as many as the sensors.
-    #[error("`{key}` lists {listed}, but there are {sensors} sensors; they must be as many")]
-    ChannelCount {
-        /// The key.
-        key: &'static str,
-        /// How many it lists.
-        listed: usize,
-        /// How many sensors there are.
-        sensors: usize,
-    },
-    /// Two channels are the same column.
-    #[error("channels {first} and {second} are the same column")]
-    SameColumn {
-        /// The first one's number, from 1.
-        first: usize,
-        /// The second one's number, from 1.
-        second: usize,
-    },
-    /// One reading is to scale sensors that measure different things.
-    #[error("one reading cannot scale both {first} and {second} sensors")]
-    MixedKinds {
-        /// What some measure.
-        first: SensorKind,
-        /// What others measure.
-        second: SensorKind,
-    },
-    /// A column is given by name in a file without a header.
-    #[error(
-        "column `{name}` is given by name, but `header = false`; a file without a header has column numbers only"
-    )]
-    NameWithoutHeader {
-        /// The name.
-        name: String,
-    },
 }
 
 impl RigError {
     /// What would help, where more can be said than the message does.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
-            RigProblem::UnknownKey { key, known } => closest(key, known.iter().map(String::as_str))
-                .map(|_| format!("known keys: {}", known.join(", "))),
-            RigProblem::UnknownWord { word, known, .. } => {
-                closest(word, known.iter().copied()).map(|_| format!("it can be: {}", known.join(", ")))
+            RigProblem::UnknownKey { key, known, .. } => {
+                closest(key, known).map(|_| format!("known keys: {}", known.join(", ")))
             }
-            RigProblem::MissingSection { section } => Some(format!("add a section [{section}]")),
+            RigProblem::UnknownWord { word, known, .. } => {
+                closest(word, known).map(|_| format!("it can be: {}", known.join(", ")))
+            }
+            RigProblem::MissingSection { section } => Some(format!("add a section {section}")),
             RigProblem::MissingKey { key, .. } => Some(format!("add `{key} = …`")),
             RigProblem::NoForce => {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
-            RigProblem::CountOnPlane { .. } => {
-                Some("say `grid = [3, 3]`, columns and rows, or list pairs in `positions`".to_owned())
-            }
-            RigProblem::CountOfSitesOnPlane => {
-                Some("say how far apart they are, as in `sites = \"10 mm\"`, or list pairs".to_owned())
-            }
-            RigProblem::Coordinates { plane: true, .. } => {
-                Some("on a plane a position is written [\"75 mm\", \"40 mm\"]".to_owned())
-            }
-            RigProblem::NotAGauge { .. } => Some("`measure = \"strain\"`".to_owned()),
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
             RigProblem::NothingToRead { .. } => Some("move it off the support, or leave it out".to_owned()),
-            RigProblem::NotOffered { kind } => {
-                Some(format!("add {{ measure = \"{kind}\", noise = … }} to `kinds`"))
-            }
             RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
             _ => None,
         }
     }
 
-    /// The error for a document that is not even a set of sections.
-    pub fn from_toml(error: toml::de::Error) -> Self {
-        let span = error.span();
-        let problem = match unknown_key(error.message()) {
-            Some((key, known)) => RigProblem::UnknownKey { key, known },
-            None => RigProblem::Toml(error),
-        };
-        Self { problem: Box::new(problem), span }
+    /// Names the value that a type has refused, unless a value within it has been named already.
+    pub(crate) fn within(mut self, place: &Place) -> Self {
+        if self.span.is_some() {
+            return self;
+        }
+        match &mut *self.problem {
+            RigProblem::OutOfRange { key, value, .. } => {
+                place.key().clone_into(key);
+                place.written.clone_into(value);
+            }
+            RigProblem::UnknownWord { key, .. } | RigProblem::Invalid { key, .. } => {
+                place.key().clone_into(key);
+            }
+            RigProblem::MissingKey { section, .. } => place.path.clone_into(section),
+            _ => {}
+        }
+        // What the file itself lacks is nowhere.
+        self.span = (!place.path.is_empty()).then(|| place.span.clone());
+        self
+    }
+
+    /// Names the place of a key that a table has refused, and what tells the table's keys.
+    pub(crate) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
+        if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
+            known.insert(0, key);
+            *with = Some(format!("{key} = \"{word}\""));
+        }
+        self.span = Some(span);
+        self
     }
 }
 
 impl RigProblem {
     /// This problem, at a place of the document.
-    pub fn at(self, span: Range<usize>) -> RigError {
-        RigError { problem: Box::new(self), span: Some(span) }
+    pub(crate) fn at(self, place: &Place) -> RigError {
+        RigError { problem: Box::new(self), span: Some(place.span.clone()) }
     }
 
     /// This problem, of something that is not there.
-    pub fn nowhere(self) -> RigError {
+    pub(crate) fn nowhere(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
+    }
+}
+
+/// What types refuse; [`RigError::within`] says where.
+impl serde::de::Error for RigError {
+    fn custom<T: Display>(reason: T) -> Self {
+        RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.nowhere()
+    }
+
+    fn invalid_type(_: Unexpected, expected: &dyn Expected) -> Self {
+        let expected = expected.to_string();
+        let bound = match expected.as_str() {
+            "a sequence" => "a list",
+            "a boolean" => "true or false",
+            "a string" => "a text",
+            "i64" => "a whole number",
+            words if words.starts_with("struct ") || words.starts_with("enum ") => "a table",
+            words => words,
+        };
+        RigProblem::OutOfRange { key: String::new(), value: String::new(), bound: bound.to_owned() }.nowhere()
+    }
+
+    fn invalid_value(unexpected: Unexpected, expected: &dyn Expected) -> Self {
+        Self::invalid_type(unexpected, expected)
+    }
+
+    fn invalid_length(_: usize, expected: &dyn Expected) -> Self {
+        Self::invalid_type(Unexpected::Seq, expected)
+    }
+
+    fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownWord { key: String::new(), word: word.to_owned(), known: known.to_vec() }.nowhere()
+    }
+
+    fn unknown_field(key: &str, known: &'static [&'static str]) -> Self {
+        RigProblem::UnknownKey { key: key.to_owned(), known: known.to_vec(), with: None }.nowhere()
+    }
+
+    fn missing_field(key: &'static str) -> Self {
+        RigProblem::MissingKey { section: String::new(), key: key.to_owned() }.nowhere()
     }
 }
 
@@ -359,24 +264,26 @@ fn force_takers(extent: Extent, supports: &[Position]) -> String {
     }
 }
 
-/// The key and the known keys, from serde's words "unknown field `a`, expected one of `b`, `c`".
-fn unknown_key(message: &str) -> Option<(String, Vec<String>)> {
-    let rest = message.strip_prefix("unknown field `")?;
-    let (key, known) = rest.split_once("`, expected ")?;
-    let known = known.split('`').skip(1).step_by(2).map(str::to_owned).collect();
-    Some((key.to_owned(), known))
+fn unknown_key(key: &str, known: &[&'static str], with: Option<&str>) -> String {
+    match with {
+        Some(with) if closest(key, known).is_none() => {
+            format!("`{key}` does not go with {with}; known are {}", known.join(", "))
+        }
+        _ => format!("unknown key `{key}`{}", suggestion(key, known)),
+    }
 }
 
 /// ", did you mean `x`?" for the known word closest to `word`, or what is known where none is close.
-fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    match closest(word, known.clone()) {
+fn suggestion(word: &str, known: &[&'static str]) -> String {
+    match closest(word, known) {
         Some(other) => format!(", did you mean `{other}`?"),
-        None => format!("; known are {}", known.collect::<Vec<_>>().join(", ")),
+        None => format!("; known are {}", known.join(", ")),
     }
 }
 
 /// The known word that is a slip of the pen away: one edit, and one more for every four letters.
-fn closest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let (distance, other) = known.map(|other| (strsim::damerau_levenshtein(word, other), other)).min()?;
+fn closest(word: &str, known: &[&'static str]) -> Option<&'static str> {
+    let (distance, other) =
+        known.iter().map(|other| (strsim::damerau_levenshtein(word, other), *other)).min()?;
     (distance <= 1 + word.chars().count() / 4).then_some(other)
 }

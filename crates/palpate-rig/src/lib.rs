@@ -1,22 +1,25 @@
-//! The rig file: one TOML document that says what is on the bench.
+//! The rig file, one TOML document that says what is on the bench, and the study file, which varies one.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
     deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
 )]
 
+mod design;
+mod document;
 mod error;
-mod sections;
-mod validate;
-mod value;
+mod estimator;
+mod file;
+mod motion;
+mod recording;
+mod sensors;
+mod study;
+mod surface;
+mod training;
+mod values;
 
 pub use error::{RigError, RigProblem};
-pub use sections::{
-    ContactSection, DesignSection, EstimatorSection, RigSections, SensorsSections, SurfaceSection,
-    TrainingSection,
-};
-pub use validate::validate;
-pub use value::{RawQuantity, choice, count, positive};
+pub use study::{Arm, AskedLayout, Judging, Study};
 
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
@@ -81,14 +84,6 @@ impl Rig {
     pub fn simulate_moving(&self, seed: u64) -> Result<TimedRecording, RigSimulationError> {
         let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
         Ok(simulate_moving(&self.pressed_bench(), moving, seed)?)
-    }
-
-    /// Reads a rig file.
-    ///
-    /// # Errors
-    /// [`RigError`], with the place in `text`, the value and its bound.
-    pub fn from_toml(text: &str) -> Result<Self, RigError> {
-        validate(&toml::from_str(text).map_err(RigError::from_toml)?)
     }
 }
 

@@ -293,51 +293,6 @@ fn every_key_can_be_said() {
     insta::assert_debug_snapshot!(Rig::from_toml(text).unwrap());
 }
 
-/// A document that holds a rig's sections among others.
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    name: String,
-    surface: Option<toml::Spanned<SurfaceSection>>,
-    sensors: Option<toml::Spanned<SensorsSections>>,
-    contact: Option<toml::Spanned<ContactSection>>,
-    arm: Vec<Arm>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Arm {
-    training: Option<toml::Spanned<TrainingSection>>,
-    estimator: Option<toml::Spanned<EstimatorSection>>,
-}
-
-#[test]
-fn a_larger_document_can_embed_sections_and_keep_their_places() {
-    let base = BENCH.split("[training]").next().unwrap();
-    let arms = "[[arm]]\ntraining = { count = 10 }\n[[arm]]\nestimator = { momentum = 2 }\ntraining = { count = 20 }\n";
-    let text = format!("name = \"two arms\"\n{base}{arms}");
-    let document: Document = toml::from_str(&text).unwrap();
-    let rigs = document.arm.iter().map(|arm| {
-        validate(&RigSections {
-            surface: document.surface.clone(),
-            sensors: document.sensors.clone(),
-            contact: document.contact.clone(),
-            training: arm.training.clone(),
-            estimator: arm.estimator.clone(),
-            recording: None,
-            motion: None,
-            load: None,
-            design: None,
-        })
-    });
-    let rigs: Vec<Result<Rig, RigError>> = rigs.collect();
-    assert_eq!(document.name, "two arms");
-    assert_eq!(rigs[0].as_ref().unwrap().training.as_ref().unwrap().count, 10);
-    let error = rigs[1].as_ref().unwrap_err();
-    assert_eq!(&text[error.span.clone().unwrap()], "2");
-    assert_eq!(error.to_string(), "`momentum` is 2; it must be at least 0 and below 1");
-}
-
 #[test]
 fn an_input_scale_is_a_reading_of_the_sensors() {
     let text = BENCH.replace("kind = \"network\"", "kind = \"network\"\ninput_scale = \"5 mm\"");

@@ -3,6 +3,7 @@
 use super::results::percent;
 use super::{PreparedStudy, Study, Trained};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
+use palpate_estimators::recording::csv_row;
 
 /// Writes and reads the rows of one study.
 #[derive(Clone, Debug)]
@@ -56,7 +57,7 @@ impl<'a> NetworksCsv<'a> {
         let mut columns: Vec<String> = OUTCOME_COLUMNS.map(str::to_owned).into();
         columns.extend(self.metrics(None).into_iter().map(|(name, _)| name));
         columns.push("weights".to_owned());
-        format!("# palpate {version}, study {name}, sha256 {digest}, {precision}\n{}\n", columns.join(","))
+        format!("# palpate {version}, study {name}, sha256 {digest}, {precision}\n{}", csv_row(columns))
     }
 
     /// The row of a fit.
@@ -72,7 +73,7 @@ impl<'a> NetworksCsv<'a> {
         ];
         cells.extend(self.metrics(Some(trained)).into_iter().map(|(_, value)| format!("{value:.6}")));
         cells.push(weights.join(" "));
-        cells.join(",") + "\n"
+        csv_row(cells)
     }
 
     /// The names of the metrics, with their values for a fit.

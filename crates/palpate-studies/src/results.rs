@@ -251,7 +251,7 @@ fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
 fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
     let inside = |at: Position| portion.is_none_or(|portion| portion.contains(at));
     let inner: Vec<f64> = figures.iter().filter(|(at, _)| inside(*at)).map(|(_, figure)| *figure).collect();
-    (!inner.is_empty()).then(|| inner.iter().sum::<f64>() / inner.len() as f64)
+    (!inner.is_empty()).then(|| palpate_numerics::mean(inner))
 }
 
 fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults> {

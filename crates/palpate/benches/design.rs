@@ -8,6 +8,7 @@ use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const SITES: usize = 100_000;
@@ -31,7 +32,7 @@ fn main() {
 /// The median CPU time of some rounds, and what the last of them gives.
 fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
     let mut last = None;
-    let mut times: Vec<f64> = (0..ROUNDS)
+    let times: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             // What the round before gave is let go untimed.
             last = None;
@@ -40,8 +41,7 @@ fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
             start.elapsed().as_secs_f64()
         })
         .collect();
-    times.sort_by(f64::total_cmp);
-    (times[ROUNDS / 2], last.expect("there is a round"))
+    (median(times).expect("rounds"), last.expect("there is a round"))
 }
 
 fn by_limit(bench: &Bench, design: &SensorDesign) {

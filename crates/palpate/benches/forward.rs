@@ -6,6 +6,7 @@ use std::hint::black_box;
 
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{BatchNetwork, InstructionSet, NetworkConfig, PreparedNetwork, Topology};
+use palpate_numerics::median;
 
 const ROUNDS: usize = 15;
 const READINGS: usize = 4096;
@@ -32,7 +33,7 @@ fn main() {
             }));
         }
     }
-    let medians: Vec<f64> = times.iter_mut().map(|t| median(t)).collect();
+    let medians: Vec<f64> = times.into_iter().map(|t| median(t).expect("rounds")).collect();
     println!("8-10-1");
     let names = ["one reading, f64, core".into(), "one reading, f64, prepared".into()];
     let names = names.into_iter().chain(sets.iter().map(|set| format!("batch, f32, {set}")));
@@ -75,9 +76,4 @@ fn seconds_a_reading(pass: &mut dyn FnMut()) -> f64 {
         pass();
     }
     start.elapsed().as_secs_f64() / (REPEATS * READINGS) as f64
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -3,8 +3,8 @@
 
 use cpu_time::ThreadTime;
 use ndarray::Array2;
-use palpate_numerics::Cholesky;
 use palpate_numerics::regression::{Regression, Samples};
+use palpate_numerics::{Cholesky, median};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -22,22 +22,22 @@ fn main() {
         let fit = || regression.fit(samples, &mut || true).expect("the presses suit").expect("it goes on");
         let process = fit();
         let found = process.hyperparameters().clone();
-        let fit_s = median(|| drop(std::hint::black_box(fit())));
-        let factor_s = median(|| drop(std::hint::black_box(regression.condition(samples, &found))));
+        let fit_s = seconds(|| drop(std::hint::black_box(fit())));
+        let factor_s = seconds(|| drop(std::hint::black_box(regression.condition(samples, &found))));
         println!("{rows} presses: fitted in {fit_s:.2} s, of which {factor_s:.2} s with all rows");
 
         let mut scratch = process.scratch();
         let (mut mean, mut variance, mut gradient) = ([0.0], [0.0], [0.0; 8]);
         let points: Vec<Vec<f64>> = presses(100).0.outer_iter().map(|row| row.to_vec()).collect();
-        let mean_s = median(|| {
+        let mean_s = seconds(|| {
             points.iter().for_each(|at| process.mean_into(at, &mut mean, &mut scratch));
         });
-        let gradient_s = median(|| {
+        let gradient_s = seconds(|| {
             points.iter().for_each(|at| {
                 process.mean_and_gradient_into(at, &mut mean, &mut gradient, &mut scratch);
             });
         });
-        let variance_s = median(|| {
+        let variance_s = seconds(|| {
             points.iter().for_each(|at| process.predict_into(at, &mut mean, &mut variance, &mut scratch));
         });
         let [mean_us, gradient_us, variance_us] = [mean_s, gradient_s, variance_s].map(|s| s * 1e4);
@@ -47,23 +47,22 @@ fn main() {
     }
     for size in [500, 3000] {
         let matrix = Array2::from_shape_fn((size, size), |(i, j)| (-(i as f64 - j as f64).abs()).exp());
-        let seconds = median(|| drop(std::hint::black_box(Cholesky::factor(matrix.clone()))));
+        let seconds = seconds(|| drop(std::hint::black_box(Cholesky::factor(matrix.clone()))));
         let rate = (size as f64).powi(3) / 3.0 / seconds / 1e9;
         println!("Cholesky of {size}: {:.1} ms, {rate:.1} Gflop/s", seconds * 1e3);
     }
 }
 
 /// Median of the CPU seconds of some rounds.
-fn median(mut work: impl FnMut()) -> f64 {
-    let mut seconds: Vec<f64> = (0..ROUNDS)
+fn seconds(mut work: impl FnMut()) -> f64 {
+    let seconds = (0..ROUNDS)
         .map(|_| {
             let start = ThreadTime::now();
             work();
             start.elapsed().as_secs_f64()
         })
         .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[ROUNDS / 2]
+    median(seconds).expect("rounds")
 }
 
 /// Noisy deflections of a beam at 8 sensors, over the largest, and the position of the load over the length.

@@ -10,6 +10,7 @@ use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 201;
@@ -21,14 +22,14 @@ fn main() {
     let recording = rig.simulate(0).expect("the paper's rig can be simulated");
     for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
         let config = InfluenceConfig { from, ..InfluenceConfig::default() };
-        let mut times: Vec<f64> = (0..21)
+        let times: Vec<f64> = (0..21)
             .map(|_| {
                 let start = ThreadTime::now();
                 std::hint::black_box(fit(config, &rig.bench, &recording));
                 start.elapsed().as_secs_f64()
             })
             .collect();
-        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(&mut times) * 1e3);
+        println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
     }
     for force_n in [Some(3.0), None] {
         let bench = Bench { force_n, ..rig.bench.clone() };
@@ -79,10 +80,5 @@ fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
         std::hint::black_box(&mut estimates);
         batch.push(start.elapsed().as_nanos() as f64 / READINGS as f64);
     }
-    Times { single: median(&mut single), batch: median(&mut batch) }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    Times { single: median(single).expect("rounds"), batch: median(batch).expect("rounds") }
 }

@@ -10,6 +10,7 @@ use palpate_estimators::setup::Bench;
 use palpate_estimators::simulate::{CleanSensors, simulate};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 51;
@@ -17,14 +18,14 @@ const ROUNDS: usize = 51;
 fn main() {
     let rig = Rig::from_toml(include_str!("../../../examples/plate.toml")).expect("the rig is sound");
     let recording = rig.simulate(0).expect("the rig can be simulated");
-    let mut times: Vec<f64> = (0..5)
+    let times: Vec<f64> = (0..5)
         .map(|_| {
             let start = ThreadTime::now();
             std::hint::black_box(fit(&rig.bench, &recording));
             start.elapsed().as_secs_f64()
         })
         .collect();
-    println!("fit of 36 × 5 presses: {:.0} ms", median(&mut times) * 1e3);
+    println!("fit of 36 × 5 presses: {:.0} ms", median(times).expect("rounds") * 1e3);
     let all =
         every(Extent { length_m: 0.3, width_m: Some(0.3) }, 0.01).expect("a centimetre is a fair spacing");
     let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
@@ -52,7 +53,7 @@ fn microseconds(locator: &PlaneLocator, rig: &Rig, positions: &[Position]) -> f6
     let readings: Vec<Vec<f64>> =
         positions.iter().map(|&position| sensors.reading(Contact { position, force_n: 5.0 })).collect();
     let mut scratch = PlaneScratch::default();
-    let mut times: Vec<f64> = (0..ROUNDS)
+    let times: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             let start = ThreadTime::now();
             for reading in &readings {
@@ -61,10 +62,5 @@ fn microseconds(locator: &PlaneLocator, rig: &Rig, positions: &[Position]) -> f6
             start.elapsed().as_secs_f64() * 1e6 / readings.len() as f64
         })
         .collect();
-    median(&mut times)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    median(times).expect("rounds")
 }

@@ -6,6 +6,7 @@ use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, Tra
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
+use palpate_numerics::median;
 use palpate_rig::Rig;
 
 const ROUNDS: usize = 7;
@@ -85,7 +86,7 @@ fn measure(locator: &Locator, rig: &Rig) {
 fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecording) -> f64 {
     let tracking = locator.tracking(&config).expect("an influence locator");
     let rows = &timed.recording.rows;
-    let mut rates: Vec<f64> = (0..ROUNDS)
+    let rates: Vec<f64> = (0..ROUNDS)
         .map(|_| {
             let mut tracker = Tracker::new(tracking.likelihood(), config);
             let start = ThreadTime::now();
@@ -95,6 +96,5 @@ fn readings_per_s(locator: &Locator, config: TrackerConfig, timed: &TimedRecordi
             rows.len() as f64 / start.elapsed().as_secs_f64()
         })
         .collect();
-    rates.sort_by(f64::total_cmp);
-    rates[ROUNDS / 2]
+    median(rates).expect("rounds")
 }

@@ -6,6 +6,7 @@ use palpate_estimators::network::{
     BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, SeedQueue,
     Topology, TrainedNetwork, TrainingTask, train_many, train_one,
 };
+use palpate_numerics::median;
 
 const ROUNDS: usize = 9;
 const EPOCHS: u32 = 400;
@@ -41,7 +42,10 @@ fn price_of_shuffling(precision: Precision) {
         });
         shares.push(100.0 * (seconds[0] - seconds[1]) / seconds[0]);
     }
-    println!("30 patterns, {precision:?}, {set}: shuffling takes {:.1} % of the time", median(&mut shares));
+    println!(
+        "30 patterns, {precision:?}, {set}: shuffling takes {:.1} % of the time",
+        median(shares).expect("rounds")
+    );
 }
 
 fn compare(count: usize, precision: Precision) {
@@ -65,16 +69,11 @@ fn compare(count: usize, precision: Precision) {
             rates.push(presentations / start.elapsed().as_secs_f64());
         }
     }
-    let medians: Vec<f64> = rates.iter_mut().map(|r| median(r)).collect();
+    let medians: Vec<f64> = rates.into_iter().map(|r| median(r).expect("rounds")).collect();
     println!("{count} patterns, {precision:?}: scalar twin {:.2} M/s", medians[0] / 1e6);
     for (set, rate) in sets.iter().zip(&medians[1..]) {
         println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 struct Seeds {

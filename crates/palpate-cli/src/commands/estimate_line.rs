@@ -3,6 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::digit::DigitShape;
 use palpate_estimators::estimator::{ContactEstimate, Estimate};
+use palpate_estimators::recording::csv_row;
 
 /// The columns of [`csv`]. What a locator does not estimate stays empty.
 pub fn heading(plane: bool) -> &'static str {
@@ -28,7 +29,7 @@ pub fn csv(estimate: &Estimate, plane: bool) -> String {
         cells.extend([mm(ends.map(|(_, y)| y.0)), mm(ends.map(|(_, y)| y.1))]);
     }
     cells.push(estimate.status.name().to_owned());
-    cells.join(",") + "\n"
+    csv_row(cells)
 }
 
 /// An estimate as JSON.

@@ -186,8 +186,8 @@ impl Printer<'_> {
             resolution: resolution.as_ref(),
             truth: self.truth,
         };
-        let files = profile_report(&report).map_err(Complaint::new)?;
         // The page holds its figures; the others are copies of them.
+        let files = profile_report(&report);
         let page = files.iter().find(|file| file.name.ends_with(".html"));
         page.map_or(Ok(()), |page| output::write_file(path, &page.bytes))
     }

@@ -208,11 +208,11 @@ impl Stream<'_> {
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
         let line = if self.arguments.json {
-            track_line::json(track, line, self.extent.is_plane())?
+            track_line::json(track, line, self.extent.is_plane())? + "\n"
         } else {
             self.columns.csv(track)
         };
-        output::print(out, (line + "\n").as_bytes())
+        output::print(out, line.as_bytes())
     }
 
     fn skip(&mut self, error: &CsvError) {

@@ -3,10 +3,14 @@
 use crate::calibration::CalibrationError;
 use palpate_estimators::arrangement::ArrangementError;
 use palpate_numerics::regression::RegressionError;
+use palpate_numerics::watch::Cancelled;
 
 /// A rig, a budget or a recording that no training positions can be designed for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PositionError {
+    /// The design was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
     /// Nothing to simulate.
     #[error("a measured surface has no model to simulate calibrations with")]
     NoModel,
@@ -65,6 +69,7 @@ impl PositionError {
     /// What to do about it.
     pub const fn help(&self) -> &'static str {
         match self {
+            Self::Cancelled(_) => "start it again",
             Self::NoModel => {
                 "give a surface with a model, such as `kind = \"beam\"`; or --data with a recording begun, for the next press"
             }

@@ -11,7 +11,9 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::mean;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Samples};
+use palpate_numerics::watch::Watch;
 
 /// Positions at which a model is asked, along a line and along each side of a plane.
 const ASKED: usize = 60;
@@ -38,12 +40,8 @@ struct Whitened {
 }
 
 impl Forward {
-    /// Of a bench with a model, from its clean readings. `None` when `keep_going` says no.
-    pub fn of_model(
-        bench: &Bench,
-        force: Force,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Self>, PositionError> {
+    /// Of a bench with a model, from its clean readings.
+    pub fn of_model(bench: &Bench, force: Force, watch: Watch) -> Result<Self, PositionError> {
         let surface = bench.surface.model().ok_or(PositionError::NoModel)?;
         let force_n = bench.force_n.ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
@@ -66,7 +64,7 @@ impl Forward {
             }),
         };
         // The model is exact: regressions take as much noise as rounding leaves.
-        Self::fit(&whitened, &vec![0.0; positions.len()], extent, force, keep_going)
+        Self::fit(&whitened, &vec![0.0; positions.len()], extent, force, watch)
     }
 
     /// Of a recording begun, whose noise its repeats tell, or else the layout.
@@ -75,8 +73,8 @@ impl Forward {
         layout: &Layout,
         extent: Extent,
         force: Force,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Self>, PositionError> {
+        watch: Watch,
+    ) -> Result<Self, PositionError> {
         if recording.channels.len() != layout.len() {
             return Err(PositionError::Channels { needed: layout.len(), found: recording.channels.len() });
         }
@@ -99,7 +97,7 @@ impl Forward {
                 scaled[row][alive[j]] / sds[j]
             }),
         };
-        Self::fit(&whitened, &vec![1.0; positions.len()], extent, force, keep_going)
+        Self::fit(&whitened, &vec![1.0; positions.len()], extent, force, watch)
     }
 
     fn fit(
@@ -107,17 +105,17 @@ impl Forward {
         noise: &[f64],
         extent: Extent,
         force: Force,
-        keep_going: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Self>, PositionError> {
+        watch: Watch,
+    ) -> Result<Self, PositionError> {
         let samples = Samples {
             coordinates: rows.coordinates.view(),
             outputs: rows.readings.view(),
             noise_variance: Some(noise),
         };
-        let Some(process) = Regression::default().fit(samples, keep_going)? else { return Ok(None) };
+        let process = Regression::default().fit(samples, watch)?;
         let outputs = process.outputs();
-        let signal_variance = (0..outputs).map(|j| process.signal_variance(j)).sum::<f64>() / outputs as f64;
-        Ok(Some(Self { process, signal_variance, extent, force }))
+        let signal_variance = mean((0..outputs).map(|j| process.signal_variance(j)));
+        Ok(Self { process, signal_variance, extent, force })
     }
 
     /// The covariance of a whitened reading's function at two positions before any press.
@@ -174,7 +172,7 @@ fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
 fn at_one_force(recording: &Recording) -> Vec<Vec<f64>> {
     let forces: Option<Vec<f64>> =
         recording.rows.iter().map(|row| row.force_n.filter(|force_n| *force_n > 0.0)).collect();
-    let mean = forces.as_ref().map(|forces| forces.iter().sum::<f64>() / forces.len() as f64);
+    let mean = forces.as_ref().map(|forces| mean(forces.iter().copied()));
     let scaled = |(i, row): (usize, &palpate_estimators::recording::Row)| {
         let factor = forces.as_ref().zip(mean).map_or(1.0, |(forces, mean)| mean / forces[i]);
         row.reading.iter().map(|value| factor * value).collect()
@@ -193,7 +191,7 @@ fn scatter(recording: &Recording, readings: &[Vec<f64>], channel: usize) -> Opti
             .filter(|(row, _)| row.position == position)
             .map(|(_, reading)| reading[channel])
             .collect();
-        let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
+        let mean = mean(repeats.iter().copied());
         squares += repeats.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         freedom += repeats.len() - 1;
     }

@@ -27,6 +27,8 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::Watch;
+use palpate_numerics::mean;
 use search::{PatternSearch, evaluate};
 
 /// Readings that a calibration is judged by, about: while searching, and when verifying.
@@ -60,9 +62,6 @@ impl Stage {
         }
     }
 }
-
-/// Is told the stage and the share of it that is done, from several threads, and says whether to go on.
-pub type Watch<'a> = dyn Fn(Stage, f64) -> bool + Sync + 'a;
 
 /// How training positions came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -203,27 +202,22 @@ impl<'a> PositionProblem<'a> {
         self.extent.is_plane()
     }
 
-    /// Every arrangement, by rule and by search, each verified. `None` when `watch` says no.
+    /// Every arrangement, by rule and by search, each verified.
     ///
     /// # Errors
     /// [`PositionError`] when the estimator cannot be fitted to such presses.
-    pub fn all(&self, watch: &Watch) -> Result<Option<Vec<Placed>>, PositionError> {
+    pub fn all(&self, watch: Watch) -> Result<Vec<Placed>, PositionError> {
         let mut arrangements = self.by_rule()?;
-        let Some(least) = self.variance_optimal(watch)? else { return Ok(None) };
-        arrangements.push((Placement::VarianceOptimal, least));
+        arrangements.push((Placement::VarianceOptimal, self.variance_optimal(watch)?));
         let by_rule = arrangements.iter().map(|(_, positions)| positions.clone());
         let starts: Vec<_> = by_rule.chain(self.densities()).collect();
-        let Some(found) = self.search(&starts, watch)? else { return Ok(None) };
-        arrangements.push((Placement::Optimal, found));
+        arrangements.push((Placement::Optimal, self.search(&starts, watch)?));
         let of = arrangements.len() as f64;
         let mut placed = Vec::new();
         for (done, (placement, positions)) in arrangements.into_iter().enumerate() {
-            let Some(one) = self.verified(placement, positions, done as f64 / of, watch)? else {
-                return Ok(None);
-            };
-            placed.push(one);
+            placed.push(self.verified(placement, positions, done as f64 / of, watch)?);
         }
-        Ok(Some(placed))
+        Ok(placed)
     }
 
     /// The arrangements that rules give, the even one first.
@@ -262,29 +256,23 @@ impl<'a> PositionProblem<'a> {
         })
     }
 
-    fn variance_optimal(&self, watch: &Watch) -> Result<Option<Vec<Position>>, PositionError> {
-        let keep_going = &mut || watch(Stage::Variance, f64::NAN);
-        let Some(forward) = Forward::of_model(&self.pressed(), self.force, keep_going)? else {
-            return Ok(None);
-        };
-        Ok(variance::least(&forward, &self.contacts, self.extent, &self.budget, keep_going))
+    fn variance_optimal(&self, watch: Watch) -> Result<Vec<Position>, PositionError> {
+        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
+        let forward = Forward::of_model(&self.pressed(), self.force, watch)?;
+        Ok(variance::least(&forward, &self.contacts, self.extent, &self.budget, watch)?)
     }
 
     /// The best of some arrangements by simulated calibrations, and then with its positions moved about.
-    fn search(
-        &self,
-        starts: &[Vec<Position>],
-        watch: &Watch,
-    ) -> Result<Option<Vec<Position>>, PositionError> {
+    fn search(&self, starts: &[Vec<Position>], watch: Watch) -> Result<Vec<Position>, PositionError> {
         let trial = self.trial(READINGS_IN_SEARCH);
         let seeds =
             Seeds { first: self.budget.seed.wrapping_add(SEARCH_SEEDS), count: self.budget.calibrations };
-        let score = |positions: &[Position], share: f64| -> Result<Option<f64>, PositionError> {
-            let keep_going = &mut || watch(Stage::Search, share);
-            let calibrated = trial.calibrate(positions, self.budget.repeats, seeds, keep_going)?;
-            Ok(calibrated.map(|all| Verification::of(&all, &self.contacts).mean_error_m))
+        let score = |positions: &[Position], share: f64| -> Result<f64, PositionError> {
+            watch.stage(Stage::Search.in_words(), share)?;
+            let calibrated = trial.calibrate(positions, self.budget.repeats, seeds, watch)?;
+            Ok(Verification::of(&calibrated, &self.contacts).mean_error_m)
         };
-        let Some(scores) = evaluate(&score, starts, 0.0)? else { return Ok(None) };
+        let scores = evaluate(&score, starts, 0.0)?;
         let best = (0..starts.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
         let search = PatternSearch {
             extent: self.extent,
@@ -307,22 +295,19 @@ impl<'a> PositionProblem<'a> {
         placement: Placement,
         positions: Vec<Position>,
         share: f64,
-        watch: &Watch,
-    ) -> Result<Option<Placed>, PositionError> {
+        watch: Watch,
+    ) -> Result<Placed, PositionError> {
         let trial = self.trial(READINGS);
         let seeds = Seeds { first: self.budget.seed, count: self.budget.verifications };
-        let keep_going = &mut || watch(Stage::Verification, share);
-        let Some(all) = trial.calibrate(&positions, self.budget.repeats, seeds, keep_going)? else {
-            return Ok(None);
-        };
-        let mean =
-            |contact: usize| all.iter().map(|one| one.errors_m[contact]).sum::<f64>() / all.len() as f64;
-        Ok(Some(Placed {
+        watch.stage(Stage::Verification.in_words(), share)?;
+        let all = trial.calibrate(&positions, self.budget.repeats, seeds, watch)?;
+        let mean_error_m = |contact: usize| mean(all.iter().map(|one| one.errors_m[contact]));
+        Ok(Placed {
             placement,
             positions,
             verification: Verification::of(&all, &self.contacts),
-            errors_m: (0..self.contacts.len()).map(mean).collect(),
-        }))
+            errors_m: (0..self.contacts.len()).map(mean_error_m).collect(),
+        })
     }
 
     /// The bench with the force of the presses.

@@ -10,6 +10,7 @@ use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
+use palpate_numerics::watch::Watch;
 
 /// Presses that are looked ahead, at most.
 const MOST_AHEAD: usize = 200;
@@ -70,7 +71,7 @@ impl Advice {
     }
 }
 
-/// Where to press next. `None` when `keep_going` says no.
+/// Where to press next.
 ///
 /// Influence functions are Gaussian processes whose smoothness and noise the recording tells; the contacts are those of
 /// `contacts`, or come from all over the surface.
@@ -82,15 +83,13 @@ pub fn next_press(
     contacts: Option<&ContactPrior>,
     recording: &Recording,
     stop_percent: f64,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Result<Option<Advice>, PositionError> {
+    watch: Watch,
+) -> Result<Advice, PositionError> {
     let extent = bench.surface.extent();
     let prior = contacts.cloned().unwrap_or_else(|| ContactPrior::all_over(extent));
     let contacts = WeightedContacts::of(&prior, extent);
     let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let Some(forward) = Forward::of_recording(recording, &bench.layout, extent, force, keep_going)? else {
-        return Ok(None);
-    };
+    let forward = Forward::of_recording(recording, &bench.layout, extent, force, watch)?;
     let mut expectation = Expectation::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
     let first = expectation.places.len();
@@ -109,15 +108,13 @@ pub fn next_press(
         stop_percent,
     };
     if advice.is_enough() {
-        return Ok(Some(advice));
+        return Ok(advice);
     }
     while advice.next.len() < MOST_AHEAD && !advice.gets_there() {
-        if !keep_going() {
-            return Ok(None);
-        }
+        watch.round()?;
         let (site, error_m) = expectation.best(&knowledge, 1.0);
         knowledge.press(site, 1.0);
         advice.next.push(NextPress { position: expectation.places[site], error_m });
     }
-    Ok(Some(advice))
+    Ok(advice)
 }

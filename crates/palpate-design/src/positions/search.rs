@@ -13,16 +13,15 @@ const FINEST_STEP: f64 = 1e-3;
 /// Positions stay this share of the length apart from the edges.
 const EDGE: f64 = 1e-3;
 
-/// The score of an arrangement, the smaller the better; is told the share of the search that is done. `None` when it was
-/// interrupted.
-pub(super) type Score<'a> = dyn Fn(&[Position], f64) -> Result<Option<f64>, PositionError> + Sync + 'a;
+/// The score of an arrangement, the smaller the better; is told the share of the search that is done.
+pub(super) type Score<'a> = dyn Fn(&[Position], f64) -> Result<f64, PositionError> + Sync + 'a;
 
-/// The scores of some arrangements, found side by side; `None` when one was interrupted.
+/// The scores of some arrangements, found side by side.
 pub(super) fn evaluate(
     score: &Score,
     arrangements: &[Vec<Position>],
     share: f64,
-) -> Result<Option<Vec<f64>>, PositionError> {
+) -> Result<Vec<f64>, PositionError> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut scores = Vec::with_capacity(arrangements.len());
     for batch in arrangements.chunks(threads) {
@@ -33,13 +32,10 @@ pub(super) fn evaluate(
         });
         for one in found {
             // A panic of a thread goes on in this one.
-            match one.unwrap_or_else(|panic| std::panic::resume_unwind(panic))? {
-                Some(score) => scores.push(score),
-                None => return Ok(None),
-            }
+            scores.push(one.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
         }
     }
-    Ok(Some(scores))
+    Ok(scores)
 }
 
 /// Steps of one position at a time, or of one and its mirror image, ever smaller (pattern search: Hooke and Jeeves 1961).
@@ -52,13 +48,13 @@ pub(super) struct PatternSearch {
 }
 
 impl PatternSearch {
-    /// The best arrangement found from `start` with its score; `None` when a score was interrupted.
+    /// The best arrangement found from `start` with its score.
     pub fn run(
         &self,
         score: &Score,
         start: Vec<Position>,
         start_score: f64,
-    ) -> Result<Option<Vec<Position>>, PositionError> {
+    ) -> Result<Vec<Position>, PositionError> {
         let (mut best, mut best_score) = (start, start_score);
         let groups = self.groups(&best);
         let length_m = self.extent.length_m;
@@ -70,11 +66,11 @@ impl PatternSearch {
             for group in &groups {
                 let moved = self.moves(&best, group, step_m);
                 if trials + moved.len() > self.most_trials {
-                    return Ok(Some(best));
+                    return Ok(best);
                 }
                 trials += moved.len();
                 let share = trials as f64 / self.most_trials as f64;
-                let Some(scores) = evaluate(score, &moved, share)? else { return Ok(None) };
+                let scores = evaluate(score, &moved, share)?;
                 let least = (0..moved.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b]));
                 if let Some(least) = least.filter(|least| scores[*least] < best_score * (1.0 - LEAST_GAIN)) {
                     best.clone_from(&moved[least]);
@@ -86,7 +82,7 @@ impl PatternSearch {
                 step_m *= 0.5;
             }
         }
-        Ok(Some(best))
+        Ok(best)
     }
 
     /// Positions that are moved together, by their places in the list: pairs where all of them mirror each other.

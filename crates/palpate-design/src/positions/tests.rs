@@ -5,6 +5,7 @@ use super::*;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::PlateSpec;
+use palpate_numerics::watch::{Cancelled, Progress};
 
 use crate::fixtures::{Example, noisy, paper, plate};
 
@@ -17,9 +18,9 @@ fn problem(example: &Example, budget: Budget) -> Result<PositionProblem<'_>, Pos
 }
 
 /// The score of a layout of positions by themselves: how far each is from where it should be.
-fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<Option<f64>, PositionError> + Sync {
+fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<f64, PositionError> + Sync {
     move |positions, _| {
-        Ok(Some(positions.iter().zip(wanted_m).map(|(at, wanted_m)| (at.x_m - wanted_m).powi(2)).sum()))
+        Ok(positions.iter().zip(wanted_m).map(|(at, wanted_m)| (at.x_m - wanted_m).powi(2)).sum())
     }
 }
 
@@ -30,7 +31,7 @@ fn positions_move_to_where_the_score_is_least() {
     let wanted_m = [0.01, 0.08, 0.23, 0.39];
     let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 10_000 };
     let score = off(&wanted_m);
-    let found = search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap().unwrap();
+    let found = search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap();
     for (at, wanted_m) in found.iter().zip(wanted_m) {
         assert!((at.x_m - wanted_m).abs() < 2e-3, "{found:?}");
     }
@@ -40,7 +41,7 @@ fn positions_move_to_where_the_score_is_least() {
 fn mirrored_positions_stay_mirrored() {
     let search = PatternSearch { extent: BEAM, mirrored: true, most_trials: 10_000 };
     let score = off(&[0.03, 0.1, 0.2, 0.3, 0.35]);
-    let found = search.run(&score, cells(BEAM, 5, 1), f64::INFINITY).unwrap().unwrap();
+    let found = search.run(&score, cells(BEAM, 5, 1), f64::INFINITY).unwrap();
     for (a, b) in found.iter().zip(found.iter().rev()) {
         assert!((a.x_m + b.x_m - 0.4).abs() < 1e-12, "{found:?}");
     }
@@ -56,7 +57,7 @@ fn a_search_keeps_to_its_trials() {
         off(&[0.0; 4])(positions, 0.0)
     };
     let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 7 };
-    search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap().unwrap();
+    search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap();
     assert!(asked.into_inner() <= 7);
 }
 
@@ -71,7 +72,7 @@ fn a_bench_is_mirrored_or_not() {
 }
 
 fn forward(bench: &Bench) -> Forward {
-    Forward::of_model(bench, Force::Known, &mut || true).unwrap().unwrap()
+    Forward::of_model(bench, Force::Known, Watch::NONE).unwrap()
 }
 
 #[test]
@@ -113,7 +114,7 @@ fn the_least_variance_is_less_than_the_even_positions() {
         let forward = forward(&bench);
         let extent = bench.surface.extent();
         let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent);
-        let found = variance::least(&forward, &contacts, extent, &budget(count), &mut || true).unwrap();
+        let found = variance::least(&forward, &contacts, extent, &budget(count), Watch::NONE).unwrap();
         let error_m = |positions: &[Position]| {
             let mut expectation = Expectation::new(&forward, &contacts, extent);
             let first = expectation.places.len();
@@ -133,29 +134,33 @@ fn the_papers_network_is_better_calibrated_near_the_ends() {
     let problem = problem(&rig, budget(10)).unwrap();
     let error = |placement: Placement| {
         let (_, positions) = problem.by_rule().unwrap().into_iter().find(|(of, _)| *of == placement).unwrap();
-        let placed = problem.verified(placement, positions, 0.0, &|_, _| true).unwrap().unwrap();
+        let placed = problem.verified(placement, positions, 0.0, Watch::NONE).unwrap();
         placed.verification.mean_error_m
     };
     assert!(error(Placement::Chebyshev) < 0.7 * error(Placement::Even));
 }
 
 #[test]
-fn an_interrupted_design_is_none() {
-    let rig = noisy();
-    let problem = problem(&rig, budget(4)).unwrap();
-    assert_eq!(problem.all(&|stage, _| stage == Stage::Variance), Ok(None));
-    assert_eq!(problem.all(&|_, _| false), Ok(None));
+fn an_interrupted_design_is_cancelled() {
+    let example = noisy();
+    let problem = problem(&example, budget(4)).unwrap();
+    let is_searching =
+        |progress| matches!(progress, Progress::Stage { name, .. } if name == Stage::Search.in_words());
+    for watch in [Watch::new(&|progress| !is_searching(progress)), Watch::new(&|_| false)] {
+        let stopped = problem.all(watch).unwrap_err();
+        assert!(Cancelled::caused(&stopped), "{stopped}");
+    }
 }
 
 #[test]
 fn a_design_has_every_arrangement_once_and_is_the_same_again() {
     let rig = noisy();
     let problem = problem(&rig, budget(6)).unwrap();
-    let placed = problem.all(&|_, _| true).unwrap().unwrap();
+    let placed = problem.all(Watch::NONE).unwrap();
     let names: Vec<&str> = placed.iter().map(|placed| placed.placement.name()).collect();
     assert_eq!(names, ["even", "edge-dense", "chebyshev", "variance-optimal", "optimal"]);
     assert!(placed.iter().all(|placed| placed.positions.len() == 6));
-    assert_eq!(problem.all(&|_, _| true).unwrap().unwrap(), placed);
+    assert_eq!(problem.all(Watch::NONE).unwrap(), placed);
 }
 
 #[test]
@@ -183,7 +188,7 @@ fn begun(positions_m: &[f64], repeats: usize) -> (Bench, palpate_estimators::rec
 
 fn advised(positions_m: &[f64], repeats: usize) -> Advice {
     let (bench, recording) = begun(positions_m, repeats);
-    next_press(&bench, None, &recording, 5.0, &mut || true).unwrap().unwrap()
+    next_press(&bench, None, &recording, 5.0, Watch::NONE).unwrap()
 }
 
 #[test]
@@ -209,7 +214,7 @@ fn enough_is_said_when_little_is_left_to_gain() {
 fn a_recording_that_tells_too_little_is_refused() {
     let (bench, recording) = begun(&[0.1, 0.2, 0.3], 2);
     let refused = |bench: &Bench, recording: &palpate_estimators::recording::Recording| {
-        next_press(bench, None, recording, 5.0, &mut || true).unwrap_err().to_string()
+        next_press(bench, None, recording, 5.0, Watch::NONE).unwrap_err().to_string()
     };
     assert!(refused(&bench, &recording).contains("3 distinct positions; at least 4"));
     let (mut bench, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);

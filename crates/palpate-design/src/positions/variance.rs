@@ -4,13 +4,14 @@
 //! limit times that. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal
 //! of Machine Learning Research* 9, 2008, choose sensors of fields so).
 
-use super::Budget;
 use super::forward::Forward;
 use super::knowledge::Knowledge;
+use super::{Budget, Stage};
 use crate::sensors::WeightedContacts;
 use palpate_estimators::arrangement::cells;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Where could be pressed, along a line and along each side of a plane.
 const SITES: usize = 200;
@@ -67,14 +68,14 @@ impl Expectation {
     }
 }
 
-/// The positions; `None` when `keep_going` says no.
+/// The positions;
 pub(super) fn least(
     forward: &Forward,
     contacts: &WeightedContacts,
     extent: Extent,
     budget: &Budget,
-    keep_going: &mut dyn FnMut() -> bool,
-) -> Option<Vec<Position>> {
+    watch: Watch,
+) -> Result<Vec<Position>, Cancelled> {
     let expectation = Expectation::new(forward, contacts, extent);
     let before = Knowledge::before(forward, &expectation.places);
     let noise = 1.0 / budget.repeats as f64;
@@ -86,9 +87,7 @@ pub(super) fn least(
     let (mut chosen, mut knowledge) = (Vec::new(), before.clone());
     let mut error_m = f64::INFINITY;
     while chosen.len() < budget.count {
-        if !keep_going() {
-            return None;
-        }
+        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
         let (site, left_m) = expectation.best(&knowledge, noise);
         knowledge.press(site, noise);
         chosen.push(site);
@@ -99,9 +98,7 @@ pub(super) fn least(
         if unchanged == budget.count {
             break;
         }
-        if !keep_going() {
-            return None;
-        }
+        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
         let slot = step % budget.count;
         let mut others = chosen.clone();
         let leaving = others.remove(slot);
@@ -113,5 +110,5 @@ pub(super) fn least(
         unchanged = if improves { 0 } else { unchanged + 1 };
     }
     chosen.sort_unstable();
-    Some(chosen.into_iter().map(|site| expectation.places[site]).collect())
+    Ok(chosen.into_iter().map(|site| expectation.places[site]).collect())
 }

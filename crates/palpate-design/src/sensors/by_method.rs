@@ -1,54 +1,46 @@
 //! One layout, by the method that is asked for.
 
 use crate::sensors::DesignCriterion;
+use palpate_numerics::watch::{Cancelled, Watch};
 
-use super::{DesignError, Designed, KeepGoing, Method, SensorProblem, exhaustive, genetic, refine};
+use super::{DesignError, Designed, Method, SensorProblem, exhaustive, genetic, refine};
 
 impl SensorProblem<'_> {
-    /// The layout by one method; a refined one starts from the better of exchange and genetic search. `None` when `keep_going` says no.
+    /// The layout by one method; a refined one starts from the better of exchange and genetic search.
     ///
     /// # Errors
     /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] where the method has none: even layouts of reaction sensors, QR
     /// layouts that constraints leave no room for.
-    pub fn by_method(
-        &self,
-        method: Method,
-        seed: u64,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Designed>, DesignError> {
+    pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
         let none = || DesignError::NoLayout { method: method.name() };
         let found = match method {
-            Method::Even => return self.even()?.ok_or_else(none).map(Some),
-            Method::Rig => return self.own(None),
-            Method::GreedyExchange => return self.greedy_exchange(seed, keep_going),
+            Method::Even => return self.even()?.ok_or_else(none),
+            Method::Rig => return self.own(None)?.ok_or_else(none),
+            Method::GreedyExchange => return self.greedy_exchange(seed, watch),
             // Then it is what the criterion asks for.
             Method::DOptimal if self.pool.design.criterion == DesignCriterion::DOptimality => {
-                self.exchanged(&*self.objective, seed, keep_going)
+                self.exchanged(&*self.objective, seed, watch)?
             }
             Method::DOptimal | Method::PrincipalComponents | Method::QrPivoting => {
-                let Some(others) = self.historical(seed, keep_going)? else { return Ok(None) };
+                let others = self.historical(seed, watch)?;
                 let asked = others.into_iter().find(|designed| designed.method == method);
-                return asked.ok_or_else(none).map(Some);
+                return asked.ok_or_else(none);
             }
             Method::Exhaustive => {
                 let slots = self.packed.len() - self.pool.fixed.len();
-                exhaustive::search(&self.pool, &*self.objective, slots, keep_going)
+                exhaustive::search(&self.pool, &*self.objective, slots, watch)?.ok_or_else(none)?
             }
-            Method::Genetic => self.bred(seed, keep_going),
+            Method::Genetic => self.bred(seed, watch)?,
             Method::Refined => {
-                let Some(exchanged) = self.exchanged(&*self.objective, seed, keep_going) else {
-                    return Ok(None);
-                };
-                let Some(bred) = self.bred(seed, keep_going) else { return Ok(None) };
-                let best = exchanged.or_better(Some(bred));
-                let refined = refine::refine(self, &best.selection, keep_going);
-                return refined.map(|sensors| self.judged(method, sensors)).transpose();
+                let exchanged = self.exchanged(&*self.objective, seed, watch)?;
+                let best = exchanged.or_better(Some(self.bred(seed, watch)?));
+                return self.judged(method, refine::refine(self, &best.selection, watch)?);
             }
         };
-        found.map(|found| self.designed(method, &found.selection)).transpose()
+        self.designed(method, &found.selection)
     }
 
-    fn bred(&self, seed: u64, keep_going: &mut KeepGoing) -> Option<super::Found> {
-        genetic::search(&self.pool, &*self.objective, &self.packed, seed, keep_going)
+    fn bred(&self, seed: u64, watch: Watch) -> Result<super::Found, Cancelled> {
+        genetic::search(&self.pool, &*self.objective, &self.packed, seed, watch)
     }
 }

@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Assessment, DesignError, KeepGoing, SensorProblem};
+use super::{Assessment, DesignError, SensorProblem};
+use palpate_numerics::watch::Watch;
 
 /// The score of so many sensors is good enough when it lies within this share of the score of the most.
 const ENOUGH: f64 = 0.1;
@@ -19,7 +20,7 @@ pub struct CountPoint {
 }
 
 impl SensorProblem<'_> {
-    /// Even and designed layouts for each number of sensors. `None` when `keep_going` says no.
+    /// Even and designed layouts for each number of sensors.
     ///
     /// # Errors
     /// [`DesignError`] for the largest number or else the first that no layout can have.
@@ -27,8 +28,8 @@ impl SensorProblem<'_> {
         &self,
         range: RangeInclusive<usize>,
         seed: u64,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Vec<CountPoint>>, DesignError> {
+        watch: Watch,
+    ) -> Result<Vec<CountPoint>, DesignError> {
         // What no layout can have is told before the work, not in its midst.
         if !range.is_empty() {
             self.with_count(*range.end())?;
@@ -37,10 +38,10 @@ impl SensorProblem<'_> {
         for count in range {
             let problem = self.with_count(count)?;
             let even = problem.even()?.map(|even| even.assessment);
-            let Some(designed) = problem.greedy_exchange(seed, keep_going)? else { return Ok(None) };
+            let designed = problem.greedy_exchange(seed, watch)?;
             points.push(CountPoint { count, even, designed: designed.assessment });
         }
-        Ok(Some(points))
+        Ok(points)
     }
 }
 

@@ -4,6 +4,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitError;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::units::format_length_mm;
+use palpate_numerics::watch::Cancelled;
 
 /// A constraint that cannot be met, or a bench that nothing can be designed for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,6 +12,9 @@ pub enum DesignError {
     /// There is no limit to design by.
     #[error(transparent)]
     Limit(#[from] LimitError),
+    /// The design was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
     /// A kind without noise.
     #[error(
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
@@ -183,6 +187,7 @@ impl DesignError {
                 "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
             }
             Self::Limit(LimitError::Noise(error)) => error.help(),
+            Self::Cancelled(_) => "start it again",
             Self::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
             Self::SingularNoise { .. } => {
                 "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"

@@ -12,7 +12,8 @@
 use super::objective::{ForceBelief, Objective, State, score_of, state_of};
 use super::pool::Pool;
 use super::starts;
-use crate::sensors::{KeepGoing, Stage};
+use crate::sensors::Stage;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// With more units than this, searches begin in samples of them: coarse ones from every start, of this size from the best.
 const SAMPLE: usize = 2000;
@@ -51,23 +52,23 @@ impl Found {
     }
 }
 
-/// The best layout of several starts; `packed` is one that keeps all constraints. `None` when `keep_going` says no.
+/// The best layout of several starts; `packed` is one that keeps all constraints.
 pub(super) fn search(
     pool: &Pool,
     objective: &dyn Objective,
     packed: &[usize],
     seed: u64,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Found, Cancelled> {
     if pool.units.len() <= SAMPLE {
         let all: Vec<usize> = (0..pool.units.len()).collect();
-        return from_starts(pool, objective, &all, packed, seed, keep_going);
+        return from_starts(pool, objective, &all, packed, seed, watch);
     }
     let coarse = sample(pool, COARSE_SAMPLE, packed);
-    let found = from_starts(pool, objective, &coarse, packed, seed, keep_going)?;
+    let found = from_starts(pool, objective, &coarse, packed, seed, watch)?;
     let fine = sample(pool, SAMPLE, &found.selection);
-    let found = exchange(pool, objective, &fine, found.selection, keep_going)?;
-    exchange_among_many(pool, objective, found, keep_going)
+    let found = exchange(pool, objective, &fine, found.selection, watch)?;
+    exchange_among_many(pool, objective, found, watch)
 }
 
 /// The best layout of several starts.
@@ -77,20 +78,18 @@ fn from_starts(
     among: &[usize],
     packed: &[usize],
     seed: u64,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Found, Cancelled> {
     let starts = [greedy(pool, objective, among), starts::spread(pool, among), Some(packed.to_vec())];
     let random = (0..RANDOM_STARTS).map(|k| starts::random(pool, among, seed.wrapping_add(k)));
     let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
-    let mut best: Option<Found> = None;
+    let mut best = Found::of(pool, objective, packed.to_vec());
     for (done, start) in starts.iter().enumerate() {
-        if !keep_going(Stage::Exchange, done as f64 / starts.len() as f64) {
-            return None;
-        }
-        let found = exchange(pool, objective, among, start.clone(), keep_going)?;
-        best = Some(found.or_better(best));
+        watch.stage(Stage::Exchange.in_words(), done as f64 / starts.len() as f64)?;
+        let found = exchange(pool, objective, among, start.clone(), watch)?;
+        best = found.or_better(Some(best));
     }
-    best
+    Ok(best)
 }
 
 /// Exchanges units for neighbours until nothing improves and then for any others, until none of these gains enough.
@@ -98,17 +97,17 @@ fn exchange_among_many(
     pool: &Pool,
     objective: &dyn Objective,
     mut found: Found,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Found, Cancelled> {
     for _ in 0..MOST_ROUNDS {
         for _ in 0..MOST_ROUNDS {
             let before = found.score;
-            found = exchange(pool, objective, &nearby(pool, &found.selection), found.selection, keep_going)?;
+            found = exchange(pool, objective, &nearby(pool, &found.selection), found.selection, watch)?;
             if found.score == before {
                 break;
             }
         }
-        let bests = best_of_each_slot(pool, objective, &found, keep_going)?;
+        let bests = best_of_each_slot(pool, objective, &found, watch)?;
         let mut improved = false;
         for (slot, unit) in bests {
             improved |= exchange_one(pool, objective, &[unit], &mut found, slot, LEAST_GAIN_OF_MANY);
@@ -117,26 +116,24 @@ fn exchange_among_many(
             break;
         }
     }
-    Some(found)
+    Ok(found)
 }
 
 /// For each slot that may change the unit that it is best exchanged for, the slot that gains most first. One pass over all
-/// units serves all slots, since fetching so many rows takes about as long as judging one. `None` when `keep_going` says no.
+/// units serves all slots, since fetching so many rows takes about as long as judging one.
 fn best_of_each_slot(
     pool: &Pool,
     objective: &dyn Objective,
     found: &Found,
-    keep_going: &mut KeepGoing,
-) -> Option<Vec<(usize, usize)>> {
+    watch: Watch,
+) -> Result<Vec<(usize, usize)>, Cancelled> {
     let slots: Vec<usize> = (pool.fixed.len()..found.selection.len()).collect();
     let without: Vec<Without> =
         slots.iter().map(|slot| Without::slot(pool, objective, found, *slot)).collect();
     let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
     let all: Vec<usize> = (0..pool.units.len()).collect();
     for chunk in all.chunks(CHUNK) {
-        if !keep_going(Stage::Exchange, f64::NAN) {
-            return None;
-        }
+        watch.stage(Stage::Exchange.in_words(), f64::NAN)?;
         for (best, without) in bests.iter_mut().zip(&without) {
             let better = without.best(pool, objective, chunk);
             if better.is_some_and(|(_, score)| best.is_none_or(|(_, least)| score < least)) {
@@ -147,7 +144,7 @@ fn best_of_each_slot(
     let mut bests: Vec<(usize, (usize, f64))> =
         slots.into_iter().zip(bests).filter_map(|(slot, best)| Some((slot, best?))).collect();
     bests.sort_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b));
-    Some(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
+    Ok(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
 }
 
 /// The units between a layout's own and the next ones of the sample.
@@ -185,14 +182,14 @@ pub(super) fn greedy(pool: &Pool, objective: &dyn Objective, among: &[usize]) ->
     Some(selection)
 }
 
-/// Exchanges one unit after the other for the best, until nothing improves. `None` when `keep_going` says no.
+/// Exchanges one unit after the other for the best, until nothing improves.
 pub(super) fn exchange(
     pool: &Pool,
     objective: &dyn Objective,
     among: &[usize],
     selection: Vec<usize>,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Found, Cancelled> {
     let mut found = Found::of(pool, objective, selection);
     let fixed = pool.fixed.len();
     let mut unchanged = 0;
@@ -201,14 +198,12 @@ pub(super) fn exchange(
         if unchanged == slots {
             break;
         }
-        if !keep_going(Stage::Exchange, f64::NAN) {
-            return None;
-        }
+        watch.stage(Stage::Exchange.in_words(), f64::NAN)?;
         let slot = fixed + step % slots;
         let improved = exchange_one(pool, objective, among, &mut found, slot, LEAST_GAIN);
         unchanged = if improved { 0 } else { unchanged + 1 };
     }
-    Some(found)
+    Ok(found)
 }
 
 /// Exchanges the unit in one slot for the best of its size, if that improves the score by more than this share of it.

@@ -1,9 +1,10 @@
 //! Every layout there is, where they are few.
 
+use super::Stage;
 use super::exchange::{Found, score_with};
 use super::objective::{ForceBelief, Objective, state_of};
 use super::pool::Pool;
-use super::{KeepGoing, Stage};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// More layouts than this are not gone through.
 pub(super) const MOST_LAYOUTS: f64 = 300_000.0;
@@ -14,18 +15,19 @@ pub(super) fn layouts(pool: &Pool, slots: usize) -> f64 {
     (0..slots).map(|i| (free as f64 - i as f64) / (i as f64 + 1.0)).product::<f64>().max(0.0)
 }
 
-/// The best of all layouts of so many free units; `None` when there is none, or `keep_going` says no.
+/// The best of all layouts of so many free units; `None` when there is none.
 pub(super) fn search(
     pool: &Pool,
     objective: &dyn Objective,
     slots: usize,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Option<Found>, Cancelled> {
     let mut search = Search { pool, objective, slots, selection: pool.fixed.clone(), best: None };
     if slots == 0 {
-        return Some(Found::of(pool, objective, pool.fixed.clone()));
+        return Ok(Some(Found::of(pool, objective, pool.fixed.clone())));
     }
-    search.from(0, keep_going).then_some(search.best).flatten()
+    search.from(0, watch)?;
+    Ok(search.best)
 }
 
 struct Search<'a> {
@@ -37,28 +39,25 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Goes through the units from `first` on for the next slot; false when told to stop.
-    fn from(&mut self, first: usize, keep_going: &mut KeepGoing) -> bool {
+    /// Goes through the units from `first` on for the next slot.
+    fn from(&mut self, first: usize, watch: Watch) -> Result<(), Cancelled> {
         let chosen = self.selection.len() - self.pool.fixed.len();
         let count = self.pool.units.len();
         let among: Vec<usize> = (first..count).collect();
         let joinable = self.pool.joinable(&self.selection, &among, None);
         if chosen + 1 == self.slots {
             self.judge(&joinable);
-            return true;
+            return Ok(());
         }
         for unit in joinable {
-            if chosen == 0 && !keep_going(Stage::Exhaustive, unit as f64 / count as f64) {
-                return false;
+            if chosen == 0 {
+                watch.stage(Stage::Exhaustive.in_words(), unit as f64 / count as f64)?;
             }
             self.selection.push(unit);
-            let went_on = self.from(unit + 1, keep_going);
+            self.from(unit + 1, watch)?;
             self.selection.pop();
-            if !went_on {
-                return false;
-            }
         }
-        true
+        Ok(())
     }
 
     /// The last slot: every unit that fills the layout.

@@ -10,7 +10,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::exchange::Found;
 use super::objective::Objective;
 use super::pool::Pool;
-use super::{KeepGoing, Stage, starts};
+use super::{Stage, starts};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 const POPULATION: usize = 60;
 const GENERATIONS: usize = 120;
@@ -21,14 +22,14 @@ const TOURNAMENT: usize = 3;
 /// How likely a child loses one of its units for any other.
 const MUTATION: f64 = 0.4;
 
-/// The best layout after so many generations; `packed` is one that keeps all constraints. `None` when `keep_going` says no.
+/// The best layout after so many generations; `packed` is one that keeps all constraints.
 pub(super) fn search(
     pool: &Pool,
     objective: &dyn Objective,
     packed: &[usize],
     seed: u64,
-    keep_going: &mut KeepGoing,
-) -> Option<Found> {
+    watch: Watch,
+) -> Result<Found, Cancelled> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let all: Vec<usize> = (0..pool.units.len()).collect();
     let mut population: Vec<Found> = (0..POPULATION)
@@ -38,9 +39,7 @@ pub(super) fn search(
         })
         .collect();
     for generation in 0..GENERATIONS {
-        if !keep_going(Stage::Genetic, generation as f64 / GENERATIONS as f64) {
-            return None;
-        }
+        watch.stage(Stage::Genetic.in_words(), generation as f64 / GENERATIONS as f64)?;
         population.sort_by(|a, b| a.score.total_cmp(&b.score));
         let mut next: Vec<Found> = population[..ELITE].to_vec();
         while next.len() < POPULATION {
@@ -51,7 +50,8 @@ pub(super) fn search(
         }
         population = next;
     }
-    population.into_iter().min_by(|a, b| a.score.total_cmp(&b.score))
+    population.sort_by(|a, b| a.score.total_cmp(&b.score));
+    Ok(population.swap_remove(0))
 }
 
 fn parent<'a>(population: &'a [Found], rng: &mut impl Rng) -> &'a Found {

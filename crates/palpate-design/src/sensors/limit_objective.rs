@@ -21,6 +21,7 @@ use std::sync::Arc;
 
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use crate::sensors::DesignCriterion;
+use palpate_numerics::small::{Ldl, add_outer};
 use sums::{Mean, Shrinking, Sums, Without, Worst};
 
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
@@ -123,20 +124,17 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
                     information[k][k] = *prior;
                 }
                 for row in rows {
-                    let j: [f64; P] = std::array::from_fn(|k| row[k * n + at][lane]);
-                    for (i, line) in information.iter_mut().enumerate() {
-                        for (k, entry) in line.iter_mut().enumerate() {
-                            *entry += j[i] * j[k];
-                        }
-                    }
+                    add_outer(&mut information, 1.0, &std::array::from_fn(|k| row[k * n + at][lane]));
                 }
-                let (covariance, determinant) = inverse(&information);
+                // The prior makes it positive definite.
+                let factors = Ldl::regularised(&information);
+                let covariance = factors.inverse();
                 for i in 0..P {
                     for k in 0..=i {
                         values[packed(i, k) * n + at][lane] = covariance[i][k];
                     }
                 }
-                constant -= 0.5 * self.weights[at][lane] * determinant.ln();
+                constant -= 0.5 * self.weights[at][lane] * factors.log_determinant();
             }
         }
         // Padding counts for nothing, also where only the largest variance counts.
@@ -194,38 +192,6 @@ const fn packed(i: usize, k: usize) -> usize {
 pub(super) fn padded(values: &[f64]) -> Vec<Block> {
     let block = |values: &[f64]| std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0));
     values.chunks(LANES).map(block).collect()
-}
-
-/// The inverse of a symmetric positive definite matrix and its determinant, by Cholesky factors.
-#[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
-fn inverse<const P: usize>(matrix: &[[f64; P]; P]) -> ([[f64; P]; P], f64) {
-    let mut lower = [[0.0; P]; P];
-    let mut determinant = 1.0;
-    for i in 0..P {
-        for k in 0..=i {
-            let known: f64 = (0..k).map(|m| lower[i][m] * lower[k][m]).sum();
-            let rest = matrix[i][k] - known;
-            if i == k {
-                // What rounding leaves of a pivot is never below what it takes away.
-                let pivot = rest.max(f64::EPSILON * matrix[i][i]);
-                determinant *= pivot;
-                lower[i][i] = pivot.sqrt();
-            } else {
-                lower[i][k] = rest / lower[k][k];
-            }
-        }
-    }
-    // Columns of L⁻¹.
-    let mut undone = [[0.0; P]; P];
-    for column in 0..P {
-        for i in column..P {
-            let unit = if i == column { 1.0 } else { 0.0 };
-            let known: f64 = (column..i).map(|m| lower[i][m] * undone[m][column]).sum();
-            undone[i][column] = (unit - known) / lower[i][i];
-        }
-    }
-    let entry = |i: usize, k: usize| (0..P).map(|m| undone[m][i] * undone[m][k]).sum();
-    (std::array::from_fn(|i| std::array::from_fn(|k| entry(i, k))), determinant)
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub use pivoting::{condition_number, pivoted_columns};
 pub use sensor_design::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
-pub use stage::{KeepGoing, Stage};
+pub use stage::Stage;
 
 use std::sync::Arc;
 
@@ -55,6 +55,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitError};
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
 use pool::Pool;
 use principal::{PrincipalComponents, Reconstruction};
 use rows::Touches;
@@ -83,15 +84,11 @@ pub struct SensorProblem<'a> {
 }
 
 impl<'a> SensorProblem<'a> {
-    /// Makes a design for a bench ready; of the bench's own layout nothing is used. `None` when `keep_going` says no.
+    /// Makes a design for a bench ready; of the bench's own layout nothing is used.
     ///
     /// # Errors
     /// [`DesignError`], with the constraint that no layout can keep.
-    pub fn new(
-        bench: &'a Bench,
-        design: &SensorDesign,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Self>, DesignError> {
+    pub fn new(bench: &'a Bench, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
         let surface = bench.surface.model().ok_or(LimitError::NoModel)?;
         let force_n = bench.force_n.ok_or(LimitError::NoForce)?;
         let silent = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
@@ -103,8 +100,8 @@ impl<'a> SensorProblem<'a> {
         let contacts = WeightedContacts::of(&design.contacts, surface.extent());
         let touches = Touches { surface, contacts, force_n, force };
         let candidates = Candidates::of(surface, design)?;
-        let Some(table) = touches.table(&candidates.sensors, design, keep_going)? else { return Ok(None) };
-        Self::with_table(bench, touches, candidates, Arc::new(table), design).map(Some)
+        let table = touches.table(&candidates.sensors, design, watch)?;
+        Self::with_table(bench, touches, candidates, Arc::new(table), design)
     }
 
     /// The same for another number of sensors.
@@ -193,75 +190,63 @@ impl<'a> SensorProblem<'a> {
         Ok(Some(Designed { method: Method::Rig, layout: layout.clone(), assessment }))
     }
 
-    /// The layout by greedy choice and exchange. `None` when `keep_going` says no.
+    /// The layout by greedy choice and exchange.
     ///
     /// # Errors
     /// As [`SensorProblem::assess`].
-    pub fn greedy_exchange(
-        &self,
-        seed: u64,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Designed>, DesignError> {
-        let found = self.exchanged(&*self.objective, seed, keep_going);
-        found.map(|found| self.designed(Method::GreedyExchange, &found.selection)).transpose()
+    pub fn greedy_exchange(&self, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
+        let found = self.exchanged(&*self.objective, seed, watch)?;
+        self.designed(Method::GreedyExchange, &found.selection)
     }
 
-    fn exchanged(&self, objective: &dyn Objective, seed: u64, keep_going: &mut KeepGoing) -> Option<Found> {
-        exchange::search(&self.pool, objective, &self.packed, seed, keep_going)
+    fn exchanged(&self, objective: &dyn Objective, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
+        exchange::search(&self.pool, objective, &self.packed, seed, watch)
     }
 
-    /// Every layout: even, the rig's own, by all searches that suit, by the historical methods. `None` when `keep_going` says
-    /// no.
+    /// Every layout: even, the rig's own, by all searches that suit, by the historical methods.
     ///
     /// # Errors
     /// As [`SensorProblem::assess`].
-    pub fn all(&self, seed: u64, keep_going: &mut KeepGoing) -> Result<Option<Vec<Designed>>, DesignError> {
+    pub fn all(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
         let even = self.even()?;
         let own = self.own(even.as_ref())?;
         let mut designed: Vec<Designed> = even.into_iter().chain(own).collect();
-        let Some(mut best) = self.exchanged(&*self.objective, seed, keep_going) else { return Ok(None) };
+        let mut best = self.exchanged(&*self.objective, seed, watch)?;
         designed.push(self.designed(Method::GreedyExchange, &best.selection)?);
         let slots = self.packed.len() - self.pool.fixed.len();
         if exhaustive::layouts(&self.pool, slots) <= exhaustive::MOST_LAYOUTS {
-            let found = exhaustive::search(&self.pool, &*self.objective, slots, keep_going);
-            let Some(found) = found else { return Ok(None) };
-            designed.push(self.designed(Method::Exhaustive, &found.selection)?);
-            best = best.or_better(Some(found));
+            if let Some(found) = exhaustive::search(&self.pool, &*self.objective, slots, watch)? {
+                designed.push(self.designed(Method::Exhaustive, &found.selection)?);
+                best = best.or_better(Some(found));
+            }
         }
-        let found = genetic::search(&self.pool, &*self.objective, &self.packed, seed, keep_going);
-        let Some(found) = found else { return Ok(None) };
+        let found = genetic::search(&self.pool, &*self.objective, &self.packed, seed, watch)?;
         designed.push(self.designed(Method::Genetic, &found.selection)?);
         best = best.or_better(Some(found));
-        let Some(refined) = refine::refine(self, &best.selection, keep_going) else { return Ok(None) };
-        designed.push(self.judged(Method::Refined, refined)?);
-        let Some(others) = self.historical(seed, keep_going)? else { return Ok(None) };
-        designed.extend(others);
-        Ok(Some(designed))
+        designed.push(self.judged(Method::Refined, refine::refine(self, &best.selection, watch)?)?);
+        designed.extend(self.historical(seed, watch)?);
+        Ok(designed)
     }
 
     /// Layouts by other people's criteria.
-    fn historical(
-        &self,
-        seed: u64,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Vec<Designed>>, DesignError> {
+    fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
         let mut designed = Vec::new();
         if self.pool.design.criterion != DesignCriterion::DOptimality {
             let table = Arc::clone(&self.table);
             let tolerance_m = self.pool.design.tolerance_m;
             let objective = self.touches.objective(table, DesignCriterion::DOptimality, tolerance_m);
-            let Some(found) = self.exchanged(&*objective, seed, keep_going) else { return Ok(None) };
+            let found = self.exchanged(&*objective, seed, watch)?;
             designed.push(self.designed(Method::DOptimal, &found.selection)?);
         }
         let readings = self.touches.readings(&self.pool.sensors, &self.pool.design);
         let components = PrincipalComponents::of(&readings);
         let reconstruction = Reconstruction::new(&components);
-        let Some(found) = self.exchanged(&reconstruction, seed, keep_going) else { return Ok(None) };
+        let found = self.exchanged(&reconstruction, seed, watch)?;
         designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);
         if let Some(selection) = pivoting::search(&self.pool, &components.modes) {
             designed.push(self.designed(Method::QrPivoting, &selection)?);
         }
-        Ok(Some(designed))
+        Ok(designed)
     }
 
     fn designed(&self, method: Method, selection: &[usize]) -> Result<Designed, DesignError> {

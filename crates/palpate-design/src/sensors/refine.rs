@@ -3,10 +3,11 @@
 use super::candidates::{PlacedSensor, mirrored, reads_something};
 use super::objective::{Block, ForceBelief, State};
 use super::pool::exclusion;
-use super::{KeepGoing, SensorProblem, Stage};
+use super::{SensorProblem, Stage};
 use crate::sensors::Sites;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Steps begin at the distance of sites and are halved as often; on a plane, where each is a solution, less often.
 const HALVINGS: usize = 9;
@@ -16,27 +17,24 @@ const MOST_ROUNDS: usize = 20;
 
 /// A compass search: each sensor in turn goes a step along each direction if that improves the score; when none does, the step
 /// is halved (Kolda, Lewis and Torczon, *SIAM Review* 45, 2003). Sensors that mirror each other go together, and those of a
-/// kind stay as far apart as sites are. `None` when
-/// `keep_going` says no.
+/// kind stay as far apart as sites are.
 pub(super) fn refine(
     problem: &SensorProblem,
     selection: &[usize],
-    keep_going: &mut KeepGoing,
-) -> Option<Vec<PlacedSensor>> {
+    watch: Watch,
+) -> Result<Vec<PlacedSensor>, Cancelled> {
     let pool = &problem.pool;
     let mut groups: Vec<Vec<PlacedSensor>> = selection
         .iter()
         .map(|unit| pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect())
         .collect();
     let Some(mut step_m) = site_distance(&pool.design.sites, pool.extent.length_m) else {
-        return Some(groups.concat());
+        return Ok(groups.concat());
     };
     let halvings = if pool.extent.is_plane() { HALVINGS_ON_A_PLANE } else { HALVINGS };
     for halving in 0..halvings {
         for _ in 0..MOST_ROUNDS {
-            if !keep_going(Stage::Refinement, halving as f64 / halvings as f64) {
-                return None;
-            }
+            watch.stage(Stage::Refinement.in_words(), halving as f64 / halvings as f64)?;
             let mut moved = false;
             for group in pool.fixed.len()..groups.len() {
                 moved |= improve(problem, &mut groups, group, step_m);
@@ -47,7 +45,7 @@ pub(super) fn refine(
         }
         step_m *= 0.5;
     }
-    Some(groups.concat())
+    Ok(groups.concat())
 }
 
 /// `None` where the sites are those listed and no others.

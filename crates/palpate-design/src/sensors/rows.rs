@@ -4,17 +4,18 @@ use std::sync::Arc;
 
 use ndarray::Array2;
 
+use super::Stage;
 use super::candidates::PlacedSensor;
 use super::contacts::WeightedContacts;
 use super::error::DesignError;
 use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
-use super::{KeepGoing, Stage};
 use crate::sensors::{DesignCriterion, SensorDesign};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
 use palpate_mechanics::surface::{Extent, ResponseGradient, Surface};
+use palpate_numerics::watch::Watch;
 
 /// More bytes than the rows of all candidates may take.
 const MOST_BYTES: f64 = 4e9;
@@ -77,13 +78,13 @@ impl Touches<'_> {
         }
     }
 
-    /// The rows of all candidates, one after the other; `None` when `keep_going` says no.
+    /// The rows of all candidates, one after the other;
     pub fn table(
         &self,
         sensors: &[PlacedSensor],
         design: &SensorDesign,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Vec<Block>>, DesignError> {
+        watch: Watch,
+    ) -> Result<Vec<Block>, DesignError> {
         let (sites, contacts) = (sensors.len(), self.contacts.len());
         let size = self.row_size();
         let bytes = (sites * size * LANES * 8) as f64;
@@ -92,13 +93,13 @@ impl Touches<'_> {
         }
         let mut table = vec![[0.0; LANES]; sites * size];
         for (done, (sensor, row)) in sensors.iter().zip(table.chunks_exact_mut(size.max(1))).enumerate() {
-            if done.is_multiple_of(ASK_EVERY) && !keep_going(Stage::Candidates, done as f64 / sites as f64) {
-                return Ok(None);
+            if done.is_multiple_of(ASK_EVERY) {
+                watch.stage(Stage::Candidates.in_words(), done as f64 / sites as f64)?;
             }
             let offer = &design.offers[sensor.offer];
             self.fill(row, offer.kind, sensor.position, &offer.channel);
         }
-        Ok(Some(table))
+        Ok(table)
     }
 
     /// A criterion on such rows.

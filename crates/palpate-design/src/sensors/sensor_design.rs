@@ -107,7 +107,8 @@ pub struct MustHave {
 }
 
 /// What makes a layout good.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum DesignCriterion {
     /// A small mean limit.
     MeanLimit,
@@ -144,7 +145,8 @@ impl DesignCriterion {
 }
 
 /// Whether a layout is its own image in the mirror across the middle of the length.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Symmetry {
     /// It may be, or not.
     Any,

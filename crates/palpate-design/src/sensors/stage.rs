@@ -30,6 +30,3 @@ impl Stage {
         }
     }
 }
-
-/// Is told the stage and the share of it that is done (NaN where that is not known), and says whether to go on.
-pub type KeepGoing<'a> = dyn FnMut(Stage, f64) -> bool + 'a;

@@ -13,11 +13,7 @@ pub(super) fn packed(pool: &Pool, among: &[usize]) -> Result<Vec<usize>, DesignE
     let mut order = among.to_vec();
     let cost = |unit: &usize| pool.cost(&[*unit]) / pool.units[*unit].size() as f64;
     let place = |unit: &usize| pool.sensors[pool.units[*unit].first].position;
-    order.sort_by(|a, b| {
-        let (at, other) = (place(a), place(b));
-        let by_cost = cost(a).total_cmp(&cost(b));
-        by_cost.then(at.x_m.total_cmp(&other.x_m)).then(at.y_m.total_cmp(&other.y_m))
-    });
+    order.sort_by(|a, b| cost(a).total_cmp(&cost(b)).then(place(a).cmp_by_x_then_y(&place(b))));
     let selection = joined(pool, &order);
     let (most, count) = (pool.size(&selection), pool.design.count);
     if most == count {

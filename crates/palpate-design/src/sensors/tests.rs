@@ -2,19 +2,20 @@ use super::*;
 use crate::fixtures::{plate, sensor_design};
 use crate::sensors::{ContactPrior, KeepOut, MustHave, SensorOffer, Sites, Symmetry};
 use palpate_mechanics::contact::Position;
+use palpate_numerics::watch::Progress;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 fn problem<'a>(bench: &'a Bench, design: &SensorDesign) -> SensorProblem<'a> {
-    SensorProblem::new(bench, design, &mut |_, _| true).unwrap().unwrap()
+    SensorProblem::new(bench, design, Watch::NONE).unwrap()
 }
 
 fn refusal(bench: &Bench, design: &SensorDesign) -> DesignError {
-    SensorProblem::new(bench, design, &mut |_, _| true).map(|_| ()).unwrap_err()
+    SensorProblem::new(bench, design, Watch::NONE).map(|_| ()).unwrap_err()
 }
 
 fn exchanged(problem: &SensorProblem) -> Designed {
-    problem.greedy_exchange(0, &mut |_, _| true).unwrap().unwrap()
+    problem.greedy_exchange(0, Watch::NONE).unwrap()
 }
 
 fn offer(kind: SensorKind, noise_sd: f64, cost: f64) -> SensorOffer {
@@ -111,8 +112,8 @@ fn greedy_and_exchange_find_the_optimum_of_small_problems() {
         let design = random_problem(&bench, &design, &mut rng);
         let problem = problem(&bench, &design);
         assert_eq!((problem.candidates(), problem.packed.len()), (20, 4));
-        let all = exhaustive::search(&problem.pool, &*problem.objective, 4, &mut |_, _| true).unwrap();
-        let ours = problem.exchanged(&*problem.objective, 0, &mut |_, _| true).unwrap();
+        let all = exhaustive::search(&problem.pool, &*problem.objective, 4, Watch::NONE).unwrap().unwrap();
+        let ours = problem.exchanged(&*problem.objective, 0, Watch::NONE).unwrap();
         assert!(ours.score >= all.score - 1e-9 * all.score.abs());
         found += usize::from(ours.score <= all.score + 1e-9 * all.score.abs());
     }
@@ -131,7 +132,7 @@ fn every_search_keeps_every_constraint() {
     for (symmetry, count) in [(Symmetry::Any, 6), (Symmetry::Wanted, 7), (Symmetry::Forbidden, 6)] {
         let design = SensorDesign { symmetry, count, ..design.clone() };
         let problem = problem(&bench, &design);
-        let all = problem.all(3, &mut |_, _| true).unwrap().unwrap();
+        let all = problem.all(3, Watch::NONE).unwrap();
         assert!(all.iter().filter(|designed| designed.method.is_search()).count() >= 3);
         for designed in &all {
             let own = matches!(designed.method, Method::Even | Method::Rig);
@@ -249,7 +250,7 @@ fn no_exchange_for_one_of_very_many_matters() {
         let problem = problem(&bench, &design);
         let (pool, objective) = (&problem.pool, &*problem.objective);
         assert!(pool.units.len() > 2000, "{}", pool.units.len());
-        let found = problem.exchanged(objective, 0, &mut |_, _| true).unwrap();
+        let found = problem.exchanged(objective, 0, Watch::NONE).unwrap();
         assert_eq!(pool.size(&found.selection), 4);
         for slot in 0..found.selection.len() {
             let mut others = found.selection.clone();
@@ -271,11 +272,11 @@ fn no_exchange_for_one_of_very_many_matters() {
 #[test]
 fn more_sensors_never_tell_less() {
     let (bench, design) = sensor_design();
-    let points = problem(&bench, &design).counts(2..=6, 0, &mut |_, _| true).unwrap().unwrap();
+    let points = problem(&bench, &design).counts(2..=6, 0, Watch::NONE).unwrap();
     assert!(points.windows(2).all(|pair| pair[1].designed.score < pair[0].designed.score));
     assert_eq!(points.iter().map(|point| point.count).collect::<Vec<_>>(), [2, 3, 4, 5, 6]);
     assert!(enough(&points).is_some_and(|count| count > 2));
-    let beyond = problem(&bench, &design).counts(2..=80, 0, &mut |_, _| panic!("nothing is searched"));
+    let beyond = problem(&bench, &design).counts(2..=80, 0, Watch::new(&|_| panic!("nothing is searched")));
     assert_eq!(beyond.unwrap_err(), DesignError::TooFewSites { count: 80, sites: 79 });
 }
 
@@ -305,9 +306,8 @@ fn a_layout_does_what_its_score_promises() {
     design.contacts.every_m = 0.02;
     let problem = problem(&bench, &design);
     let estimator = palpate_estimators::estimator::EstimatorConfig::Influence(Default::default());
-    let verify = |layout: &Layout| {
-        problem.verify(layout, &estimator, 2, 1, &mut |_, _| true).unwrap().unwrap().mean_error_m
-    };
+    let verify =
+        |layout: &Layout| problem.verify(layout, &estimator, 2, 1, Watch::NONE).unwrap().mean_error_m;
     let (even, designed) = (problem.even().unwrap().unwrap(), exchanged(&problem));
     let (before, after) = (verify(&even.layout), verify(&designed.layout));
     assert!(after < 0.9 * before, "{before} {after}");
@@ -320,8 +320,12 @@ fn a_layout_does_what_its_score_promises() {
 #[test]
 fn a_search_can_be_stopped() {
     let (bench, design) = sensor_design();
-    assert!(SensorProblem::new(&bench, &design, &mut |_, _| false).unwrap().is_none());
-    assert_eq!(problem(&bench, &design).all(0, &mut |stage, _| stage != Stage::Genetic).unwrap(), None);
+    let stopped = SensorProblem::new(&bench, &design, Watch::new(&|_| false)).map(|_| ());
+    assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
+    let breeds =
+        |progress| matches!(progress, Progress::Stage { name, .. } if name == Stage::Genetic.in_words());
+    let stopped = problem(&bench, &design).all(0, Watch::new(&|progress| !breeds(progress)));
+    assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
 }
 
 /// One method alone has the layout that it has among all.
@@ -330,9 +334,9 @@ fn a_method_that_is_asked_for_gives_its_own_layout() {
     let (bench, mut design) = sensor_design();
     design.sites = Sites::Every(0.02);
     let problem = problem(&bench, &design);
-    let all = problem.all(0, &mut |_, _| true).unwrap().unwrap();
+    let all = problem.all(0, Watch::NONE).unwrap();
     for method in Method::NAMED {
-        let asked = problem.by_method(method, 0, &mut |_, _| true).unwrap().unwrap();
+        let asked = problem.by_method(method, 0, Watch::NONE).unwrap();
         let among = all.iter().find(|designed| designed.method == method).unwrap();
         if method == Method::Refined {
             // Where there are few sites, the refined one of all starts from the exhaustive search.
@@ -342,12 +346,12 @@ fn a_method_that_is_asked_for_gives_its_own_layout() {
         }
     }
     design.criterion = DesignCriterion::DOptimality;
-    let informed = SensorProblem::new(&bench, &design, &mut |_, _| true).unwrap().unwrap();
-    let asked = informed.by_method(Method::DOptimal, 0, &mut |_, _| true).unwrap().unwrap();
+    let informed = SensorProblem::new(&bench, &design, Watch::NONE).unwrap();
+    let asked = informed.by_method(Method::DOptimal, 0, Watch::NONE).unwrap();
     assert_eq!(asked.layout, all.iter().find(|d| d.method == Method::DOptimal).unwrap().layout);
     design.offers = vec![offer(SensorKind::Reaction, 5e-3, 1.0)];
     design.count = 2;
-    let reactions = SensorProblem::new(&bench, &design, &mut |_, _| true).unwrap().unwrap();
-    let refused = reactions.by_method(Method::Even, 0, &mut |_, _| true).map(|_| ()).unwrap_err();
+    let reactions = SensorProblem::new(&bench, &design, Watch::NONE).unwrap();
+    let refused = reactions.by_method(Method::Even, 0, Watch::NONE).map(|_| ()).unwrap_err();
     assert_eq!(refused, DesignError::NoLayout { method: "even" });
 }

@@ -1,7 +1,7 @@
 //! What a layout's locator achieves: calibrated, asked and measured, in simulation with noise.
 
 use super::SensorProblem;
-use super::{KeepGoing, Stage};
+use super::Stage;
 use crate::calibration::{CalibrationError, Seeds, Trial, Verification};
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::estimator::EstimatorConfig;
@@ -9,6 +9,7 @@ use palpate_estimators::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
+use palpate_numerics::watch::Watch;
 
 /// Training positions along a line, and along each side of a plane; each is pressed as often.
 const TRAINING: usize = 30;
@@ -20,7 +21,7 @@ const READINGS: usize = 4000;
 impl SensorProblem<'_> {
     /// Calibrates the layout at even training positions with the design's force, `calibrations` times with fresh noise, and
     /// locates readings of the design's contacts, whose force the locator knows or does not as the design says. The estimator is
-    /// the rig's where that inverts influence functions, else the best guess for the surface. `None` when `keep_going` says no.
+    /// the rig's where that inverts influence functions, else the best guess for the surface.
     ///
     /// # Errors
     /// [`CalibrationError`] when the locator cannot be fitted.
@@ -30,8 +31,8 @@ impl SensorProblem<'_> {
         estimator: &EstimatorConfig,
         calibrations: usize,
         seed: u64,
-        keep_going: &mut KeepGoing,
-    ) -> Result<Option<Verification>, CalibrationError> {
+        watch: Watch,
+    ) -> Result<Verification, CalibrationError> {
         let force_n = self.touches.force_n;
         let touched = Bench {
             surface: self.bench.surface.clone(),
@@ -59,15 +60,11 @@ impl SensorProblem<'_> {
         let training = self.training();
         let mut calibrated = Vec::new();
         for k in 0..calibrations as u64 {
-            if !keep_going(Stage::Verification, k as f64 / calibrations as f64) {
-                return Ok(None);
-            }
+            watch.stage(Stage::Verification.in_words(), k as f64 / calibrations as f64)?;
             let seeds = Seeds { first: seed.wrapping_add(k), count: 1 };
-            let go_on = &mut || keep_going(Stage::Verification, f64::NAN);
-            let Some(one) = trial.calibrate(&training, PRESSES, seeds, go_on)? else { return Ok(None) };
-            calibrated.extend(one);
+            calibrated.extend(trial.calibrate(&training, PRESSES, seeds, watch)?);
         }
-        Ok(Some(Verification::of(&calibrated, contacts)))
+        Ok(Verification::of(&calibrated, contacts))
     }
 
     /// Where to press.

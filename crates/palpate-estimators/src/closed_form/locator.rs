@@ -11,7 +11,7 @@ use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Surface};
-use palpate_numerics::chi_squared_bound;
+use palpate_numerics::{chi_squared_bound, normal_interval_95};
 
 /// A closed form that locates; see [`ClosedFormConfig`](super::ClosedFormConfig).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -96,10 +96,9 @@ impl ClosedFormLocator {
         } else {
             (Status::OutsideSurface, balanced.position_m)
         };
-        let half_m = 1.96 * sd_m;
         let uncertainty = (noise == Noise::Known).then_some(Uncertainty {
             covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: (balanced.position_m - half_m, balanced.position_m + half_m),
+            x_95_m: normal_interval_95(balanced.position_m, sd_m),
             y_95_m: (0.0, 0.0),
         });
         let position = Position::along(position_m);

@@ -4,7 +4,8 @@ use super::locator::Noise;
 use super::segment::Segment;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::chi_squared_bound;
+use palpate_numerics::small::Ldl;
+use palpate_numerics::{NORMAL_95, chi_squared_bound, held_interval};
 
 /// Modes whose probabilities sum to less than this are not spoken of.
 const NEGLIGIBLE: f64 = 0.05;
@@ -130,16 +131,14 @@ impl Posterior<'_> {
         if self.force_n.is_some() {
             return [most.min(1.0 / xx), 0.0, 0.0];
         }
-        let determinant = xx * ff - xf * xf;
-        if determinant > 1e-14 * xx * ff {
-            let of_position = ff / determinant;
-            let shrink = (most / of_position).min(1.0);
-            let slope = -xf / ff;
-            // cov(a, W) = slope·var a and var W = 1/ff + slope²·var a, whatever var a is.
-            let variance = shrink * of_position;
-            [variance, slope * variance, 1.0 / ff + slope * slope * variance]
-        } else {
-            [most, 0.0, if ff > 0.0 { 1.0 / ff } else { 0.0 }]
+        match Ldl::new(&[[ff, xf], [xf, xx]]) {
+            Some(factors) => {
+                let [_, [_, of_position]] = factors.inverse();
+                let (variance, slope) = (most.min(of_position), -xf / ff);
+                // cov(a, W) = slope·var a and var W = 1/ff + slope²·var a, whatever var a is.
+                [variance, slope * variance, 1.0 / ff + slope * slope * variance]
+            }
+            None => [most, 0.0, if ff > 0.0 { 1.0 / ff } else { 0.0 }],
         }
     }
 
@@ -167,11 +166,10 @@ impl Posterior<'_> {
 
     fn contact(&self, explanation: &Explanation) -> ContactEstimate {
         let Explanation { from_m, to_m, position_m, covariance: [xx, xf, ff], .. } = *explanation;
-        let half_m = 1.96 * xx.sqrt();
-        let length_m = self.length_m();
+        let half_m = NORMAL_95 * xx.sqrt();
         let uncertainty = Uncertainty {
             covariance: [xx.max((to_m - from_m).powi(2) / 12.0), 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: ((from_m - half_m).max(0.0), (to_m + half_m).min(length_m)),
+            x_95_m: held_interval((from_m - half_m, to_m + half_m), self.length_m()),
             y_95_m: (0.0, 0.0),
         };
         ContactEstimate {

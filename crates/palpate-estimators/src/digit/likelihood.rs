@@ -4,6 +4,7 @@ use super::fitting::DigitTheory;
 use super::gauges::{Gauge, Stretch};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Digit;
+use palpate_numerics::small::{Ldl, Matrix, add_outer};
 
 /// A reading of a digit, to be explained.
 #[derive(Clone, Copy)]
@@ -29,8 +30,8 @@ pub(super) struct Sums {
     pub chi_squared: f64,
     /// Jᵀ·r.
     pub score: [f64; 2],
-    /// JᵀJ, the Fisher information: xx, xf, ff.
-    pub information: [f64; 3],
+    /// JᵀJ, the Fisher information.
+    pub information: Matrix<2>,
 }
 
 impl Likelihood<'_> {
@@ -68,7 +69,7 @@ impl Likelihood<'_> {
         }
         if self.force_n.is_some() {
             sums.score[1] = 0.0;
-            sums.information[1..].fill(0.0);
+            sums.information = [[sums.information[0][0], 0.0], [0.0, 0.0]];
         }
         sums
     }
@@ -91,32 +92,23 @@ impl Sums {
         self.chi_squared += residual * residual;
         self.score[0] += by_position * residual;
         self.score[1] += by_force * residual;
-        self.information[0] += by_position * by_position;
-        self.information[1] += by_position * by_force;
-        self.information[2] += by_force * by_force;
+        add_outer(&mut self.information, 1.0, &[by_position, by_force]);
     }
 
-    /// Covariance of position and force, (JᵀJ)⁻¹: xx, xf, ff; without the force where it is known. `None` where the reading
-    /// does not tell them.
-    pub fn covariance(&self, force_known: bool) -> Option<[f64; 3]> {
-        let [xx, xf, ff] = self.information;
-        if force_known {
-            return (xx > 0.0).then(|| [1.0 / xx, 0.0, 0.0]);
-        }
-        let determinant = xx * ff - xf * xf;
-        // What is left of the product after rounding tells nothing.
-        (determinant > 1e-13 * xx * ff).then(|| [ff / determinant, -xf / determinant, xx / determinant])
+    /// The factors of JᵀJ, whose inverse is the covariance of position and force; without the force where it is known.
+    /// `None` where the reading does not tell them.
+    pub fn factors(&self, force_known: bool) -> Option<Ldl<2>> {
+        Ldl::of_free(&self.information, [true, !force_known])
     }
 
     /// The Gauss–Newton step (JᵀJ)⁻¹·Jᵀr of position and force.
     pub fn step(&self, force_known: bool) -> Option<[f64; 2]> {
-        let [xx, xf, ff] = self.covariance(force_known)?;
-        let [x, f] = self.score;
-        Some([xx * x + xf * f, xf * x + ff * f])
+        Some(self.factors(force_known)?.solve(self.score))
     }
 
     /// The step of the force alone.
     pub fn force_step(&self) -> f64 {
-        if self.information[2] > 0.0 { self.score[1] / self.information[2] } else { 0.0 }
+        let [_, [_, ff]] = self.information;
+        if ff > 0.0 { self.score[1] / ff } else { 0.0 }
     }
 }

@@ -13,7 +13,7 @@ use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Digit, Surface};
-use palpate_numerics::chi_squared_bound;
+use palpate_numerics::{chi_squared_bound, held_interval, normal_interval_95};
 
 /// A reading that noise gives as rarely as this has another cause.
 const RARE: f64 = 1e-3;
@@ -74,7 +74,8 @@ impl DigitLocator {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
         let length_m = self.digit.length_m;
-        let ends = [0.025, 0.975].map(|share| posterior.quantile_m(share, length_m));
+        let quantile_m = |share: f64| posterior.quantile_m(share, length_m);
+        let ends = (quantile_m(0.025), quantile_m(0.975));
         let mut estimate = Estimate::of_contact(contact(best, ends), Status::Located);
         if !explained {
             estimate.status = Status::OutsideModel;
@@ -83,12 +84,11 @@ impl DigitLocator {
         let others: Vec<&Piece> =
             posterior.pieces[1..].iter().filter(|piece| are_apart(best, piece)).collect();
         let elsewhere: f64 = others.iter().map(|piece| piece.probability).sum();
-        if elsewhere > NEGLIGIBLE || (best.is_curve() && ends[1] - ends[0] > WIDE * length_m) {
+        if elsewhere > NEGLIGIBLE || (best.is_curve() && ends.1 - ends.0 > WIDE * length_m) {
             estimate.status = Status::Ambiguous;
             for other in others.into_iter().filter(|other| other.probability > 0.1 * NEGLIGIBLE) {
-                let half_m = 1.96 * other.covariance[0].sqrt();
-                let ends =
-                    [-half_m, half_m].map(|off_m| (other.best.position_m + off_m).max(0.0).min(length_m));
+                let sd_m = other.covariance[0].sqrt();
+                let ends = held_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
                 if !estimate
                     .modes
                     .push(Mode { contact: contact(other, ends), probability: other.probability })
@@ -107,10 +107,9 @@ fn are_apart(a: &Piece, b: &Piece) -> bool {
     (a.best.position_m - b.best.position_m).abs() > reach_m
 }
 
-fn contact(piece: &Piece, [low_m, high_m]: [f64; 2]) -> ContactEstimate {
+fn contact(piece: &Piece, x_95_m: (f64, f64)) -> ContactEstimate {
     let [xx, xf, ff] = piece.covariance;
-    let uncertainty =
-        Uncertainty { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m: (low_m, high_m), y_95_m: (0.0, 0.0) };
+    let uncertainty = Uncertainty { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
     ContactEstimate {
         position: Position::along(piece.best.position_m),
         force_n: Some(piece.best.force_n),

@@ -11,12 +11,14 @@
 mod fitting;
 mod gauges;
 mod likelihood;
+mod linear_theory;
 mod locator;
 mod posterior;
 mod refine;
 mod shape;
 
 pub use fitting::{DigitConfig, DigitFitError, DigitTheory};
+pub use linear_theory::LinearTheory;
 pub use locator::DigitLocator;
 pub use shape::{DigitShape, ShapePoint};
 

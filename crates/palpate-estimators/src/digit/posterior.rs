@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::gauges::{Stretch, stretches};
 use super::likelihood::{Guess, Likelihood};
 use super::refine::{refine_force, search};
-use palpate_numerics::normal_distribution;
+use palpate_numerics::{bisect, normal_distribution};
 
 /// Pieces whose |r|² is larger than the least by this have no weight: e⁻³⁰.
 const HOPELESS: f64 = 60.0;
@@ -89,13 +89,9 @@ impl Posterior {
 
     /// The position below which the contact lies with probability `share`, by bisection.
     pub fn quantile_m(&self, share: f64, length_m: f64) -> f64 {
-        let (mut low, mut high) = (0.0, length_m);
-        while high - low > 1e-9 * length_m {
-            let middle = 0.5 * (low + high);
-            let below: f64 = self.pieces.iter().map(|piece| piece.probability * piece.below(middle)).sum();
-            if below < share { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
+        let below =
+            |at_m: f64| self.pieces.iter().map(|piece| piece.probability * piece.below(at_m)).sum::<f64>();
+        bisect((0.0, length_m), 30, |at_m| below(at_m) < share)
     }
 }
 
@@ -140,16 +136,16 @@ fn normal_mass(low: f64, high: f64) -> f64 {
 fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     let known = likelihood.force_n.is_some();
     let (best, sums) = search(likelihood, stretch);
-    let covariance = sums.covariance(known)?;
-    let [along_m, harder_n] = sums.step(known)?;
-    let [xx, xf, ff] = covariance;
+    let factors = sums.factors(known)?;
+    let [along_m, _] = factors.solve(sums.score);
+    let [[xx, xf], [_, ff]] = factors.inverse();
     let (centre_m, sd_m) = (best.position_m + along_m, xx.sqrt());
     let mass = normal_mass((stretch.from_m - centre_m) / sd_m, (stretch.to_m - centre_m) / sd_m);
     let volume = match likelihood.force_n {
         Some(_) => (TAU * xx).sqrt(),
-        None => TAU * (xx * ff - xf * xf).max(0.0).sqrt() / best.force_n,
+        None => TAU / factors.determinant().sqrt() / best.force_n,
     };
-    let gained = sums.score[0] * along_m + sums.score[1] * harder_n;
+    let gained = factors.quadratic(sums.score);
     let (log_weight, spread) = if mass > 0.0 {
         let spread = Spread::Normal { centre_m, sd_m, from_m: stretch.from_m, to_m: stretch.to_m };
         (-0.5 * (sums.chi_squared - gained) + (volume * mass).ln(), spread)
@@ -159,7 +155,7 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
     log_weight.is_finite().then_some(Piece {
         best,
         chi_squared: sums.chi_squared,
-        covariance,
+        covariance: [xx, xf, ff],
         probability: 0.0,
         log_weight,
         spread,
@@ -223,7 +219,7 @@ fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
         let start_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
         let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: start_n });
         force_n = guess.force_n;
-        let force_variance = 1.0 / sums.information[2];
+        let force_variance = 1.0 / sums.information[1][1];
         let volume = (TAU * force_variance).sqrt() / guess.force_n * step_m;
         let log_weight = -0.5 * sums.chi_squared + volume.ln();
         CurvePoint { guess, chi_squared: sums.chi_squared, force_variance, log_weight }

@@ -2,6 +2,7 @@
 
 mod choice;
 mod config;
+mod error;
 mod fitting;
 mod load_sensors;
 mod locator;
@@ -12,13 +13,13 @@ mod tracking;
 pub use crate::fit::LocatorProvenance;
 pub use crate::fit::ReadingError;
 pub use crate::load_profile::{
-    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, Resolution,
-    patch_limits,
+    Cells, CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler,
+    Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use choice::{CHOICE_FOLDS, Choice, Comparison, choose, contenders};
 pub use config::EstimatorConfig;
-pub use fitting::FitError;
+pub use error::FitError;
 pub use load_sensors::bench_load_sensors;
 pub use locator::{LeaveOutError, Locator, Method};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};

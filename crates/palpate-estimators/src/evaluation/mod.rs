@@ -1,20 +1,22 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
-mod cross_validation;
 mod limit_ratio;
 mod statistics;
 mod trial;
 
-pub use cross_validation::{CrossValidationError, cross_validate};
 pub use limit_ratio::limit_ratio;
-pub use statistics::{Spread, percentile};
-pub use trial::{Trial, Tried, try_estimator};
+pub use palpate_numerics::{median, percentile};
+pub use statistics::Spread;
+pub use trial::{CrossValidationError, Trial, Tried, cross_validate, try_estimator};
 
 use crate::fit::{Fitted, Locate, ReadingError};
+use crate::load_profile::Cells;
 use crate::recording::Recording;
 use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::small::Ldl;
+use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
 
 /// One reading whose contact was known, and where the locator saw it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +91,7 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
 }
 
 /// Whether the 95 % region of an estimated contact holds `truth`: on a line the interval, on a plane the ellipse
-/// (e − t)ᵀ·C⁻¹·(e − t) ≤ 5.991, the 95th percentile of χ² with two degrees of freedom.
+/// (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
 pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
     if extent.width_m.is_none() {
@@ -98,8 +100,8 @@ pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent
     }
     let [xx, xy, _, yy, ..] = uncertainty.covariance;
     let (dx, dy) = (contact.position.x_m - truth.x_m, contact.position.y_m - truth.y_m);
-    let determinant = xx * yy - xy * xy;
-    Some((dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) <= 5.991 * determinant)
+    let factors = Ldl::new(&[[xx, xy], [xy, yy]]);
+    Some(factors.is_some_and(|factors| factors.quadratic([dx, dy]) <= ELLIPSE_95))
 }
 
 impl Evaluation {
@@ -126,14 +128,13 @@ impl Evaluation {
         let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
         let mut errors: Vec<f64> = self.located.iter().filter(inside).map(Located::error_m).collect();
         errors.sort_by(f64::total_cmp);
-        let count = errors.len();
         Some(ErrorSummary {
-            count,
-            average_m: errors.iter().sum::<f64>() / count as f64,
+            count: errors.len(),
+            average_m: mean(errors.iter().copied()),
             median_m: percentile(&errors, 50.0)?,
             p95_m: percentile(&errors, 95.0)?,
             largest_m: *errors.last()?,
-            rmse_m: (errors.iter().map(|e| e * e).sum::<f64>() / count as f64).sqrt(),
+            rmse_m: root_mean_square(&errors),
         })
     }
 
@@ -151,16 +152,43 @@ impl Evaluation {
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
     }
 
+    /// The median error of the contacts in each cell, in metres; NaN where there is none.
+    pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
+        let mut errors: Vec<Vec<f64>> = vec![Vec::new(); cells.len()];
+        for located in &self.located {
+            errors[cells.cell_of(located.truth)].push(located.error_m());
+        }
+        errors.into_iter().map(|errors| median(errors).unwrap_or(f64::NAN)).collect()
+    }
+
+    /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
+    /// for a stretch without contacts.
+    pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
+        let extent = Extent { length_m: self.length_m, width_m: None };
+        let cells = Cells { extent, columns: count, rows: 1 };
+        let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
+        for located in &self.located {
+            stretches[cells.cell_of(located.truth)].push(located);
+        }
+        let point = |stretch: &Vec<&Located>| {
+            let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
+            Some((mean_m, median(stretch.iter().map(|located| located.error_m()).collect())?))
+        };
+        stretches.iter().filter_map(point).collect()
+    }
+
+    /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
+    pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
+        let mut errors: Vec<f64> = self.located.iter().map(Located::error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
+    }
+
     /// Errors of each distinct position, by x and then y.
     pub fn by_position(&self) -> Vec<(Position, ErrorSummary)> {
-        let key = |p: &Position| (p.x_m, p.y_m);
-        let order = |a: &Position, b: &Position| {
-            let ((ax, ay), (bx, by)) = (key(a), key(b));
-            ax.total_cmp(&bx).then(ay.total_cmp(&by))
-        };
         let mut sorted = self.located.clone();
-        sorted.sort_by(|a, b| order(&a.truth, &b.truth));
-        let groups = sorted.chunk_by(|a, b| key(&a.truth) == key(&b.truth));
+        sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
+        let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
         let summaries = groups.filter_map(|group| {
             let part = Self { length_m: self.length_m, located: group.to_vec() };
             Some((group[0].truth, part.summary(None)?))

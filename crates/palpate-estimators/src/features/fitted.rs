@@ -3,6 +3,7 @@
 use super::{FeatureKind, NoFeatures};
 use crate::fit::LocatorFault;
 use crate::recording::Recording;
+use palpate_numerics::mean_and_variance;
 
 /// From a reading to standardized features: (source − centre)/spread, so that each has mean 0 and variance 1 over the
 /// recording. Channels and features that never change over it are left out.
@@ -143,9 +144,8 @@ impl Features {
     fn standardized(&self, source: FeatureSource, recording: &Recording) -> Option<Feature> {
         let raw = |reading: &[f64]| self.raw(source, reading, self.norm(reading).max(self.least_norm));
         let values: Vec<f64> = recording.rows.iter().map(|row| raw(&row.reading)).collect();
-        let count = values.len() as f64;
-        let centre = values.iter().sum::<f64>() / count;
-        let spread = (values.iter().map(|value| (value - centre).powi(2)).sum::<f64>() / count).sqrt();
+        let (centre, variance) = mean_and_variance(values.iter().copied());
+        let spread = variance.sqrt();
         let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         (spread > ROUNDING * largest && spread.is_finite()).then_some(Feature { source, centre, spread })
     }

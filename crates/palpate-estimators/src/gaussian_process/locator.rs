@@ -7,7 +7,7 @@ use crate::fit::{Locate, LocatorFault};
 use crate::setup::Bench;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::NORMAL_95;
+use palpate_numerics::normal_interval_95;
 use palpate_numerics::regression::GaussianProcess;
 
 /// A Gaussian process that locates.
@@ -35,14 +35,10 @@ impl Locate for GaussianProcessLocator {
         };
         let (x_m, x_m2) = coordinate(0).unwrap_or_default();
         let (y_m, y_m2) = if self.process.outputs() > 1 { coordinate(1) } else { None }.unwrap_or_default();
-        let interval = |mean_m: f64, variance_m2: f64| {
-            let half_m = NORMAL_95 * variance_m2.sqrt();
-            (mean_m - half_m, mean_m + half_m)
-        };
         let uncertainty = Uncertainty {
             covariance: [x_m2, 0.0, 0.0, y_m2, 0.0, 0.0],
-            x_95_m: interval(x_m, x_m2),
-            y_95_m: interval(y_m, y_m2),
+            x_95_m: normal_interval_95(x_m, x_m2.sqrt()),
+            y_95_m: normal_interval_95(y_m, y_m2.sqrt()),
         };
         let position = Position { x_m, y_m };
         let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };

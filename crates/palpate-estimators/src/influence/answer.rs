@@ -8,7 +8,7 @@ use super::search::{Minimum, Search, worst_misfit};
 use super::several::{criterion, explain};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::{NORMAL_95, normal_distribution};
+use palpate_numerics::{bisect, normal_distribution, normal_interval_95};
 
 /// Another place with at least this share of the probability is said.
 const MODE_THAT_MATTERS: f64 = 0.01;
@@ -61,8 +61,7 @@ pub(super) fn conclude(
     let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
     let narrow = sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite();
     if minima.len() == 1 && clear && narrow {
-        let half_m = NORMAL_95 * sd_m;
-        estimate.contact = contact(search, best, (best.x_m - half_m, best.x_m + half_m));
+        estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
     } else {
         weigh(search, minima, profile.misfits(), estimate);
@@ -116,13 +115,12 @@ pub(super) fn locate_several(
         }
     }
     let Some(together) = best else { return one };
-    let mut contacts = together.contacts(search.table.length_m).into_iter();
-    let Some(strongest) = contacts.next() else { return one };
-    let mut estimate = Estimate::of_contact(strongest, Status::Located);
-    for contact in contacts {
-        estimate.further.push(contact);
+    let Some((strongest, further)) = together.contacts.split_first() else { return one };
+    let mut estimate = Estimate::of_contact(*strongest, Status::Located);
+    for contact in further {
+        estimate.further.push(*contact);
     }
-    let freedom = search.live.len() - 2 * (1 + estimate.further.as_slice().len());
+    let freedom = search.live.len() - 2 * together.contacts.len();
     if together.misfit > worst_misfit(freedom) {
         estimate.status = Status::OutsideModel;
     }
@@ -189,7 +187,8 @@ fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64;
         });
         parts.sum::<f64>()
     };
-    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+    let quantile = |share: f64| bisect((0.0, length_m), 60, |x_m| cumulative(x_m) < share);
+    (quantile(0.025), quantile(0.975))
 }
 
 /// The 95 % interval of one minimum, held to the surface.
@@ -197,11 +196,12 @@ fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
     let sd_m = minimum.covariance[0].sqrt();
     let (left, right) = (minimum.x_m / sd_m, (length_m - minimum.x_m) / sd_m);
     if left > 4.0 && right > 4.0 {
-        return (minimum.x_m - NORMAL_95 * sd_m, minimum.x_m + NORMAL_95 * sd_m);
+        return normal_interval_95(minimum.x_m, sd_m);
     }
     let (low, high) = (normal_distribution(-left), normal_distribution(right));
     let cumulative = |x_m: f64| (normal_distribution((x_m - minimum.x_m) / sd_m) - low) / (high - low);
-    (bisect(length_m, 0.025, &cumulative), bisect(length_m, 0.975, &cumulative))
+    let quantile = |share: f64| bisect((0.0, length_m), 60, |x_m| cumulative(x_m) < share);
+    (quantile(0.025), quantile(0.975))
 }
 
 /// The 95 % interval where the misfit is far from a parabola: by the trapezoidal rule over the nodes, with a prior that
@@ -229,14 +229,4 @@ fn interval_of_profile(misfits: &[f64; COARSE], length_m: f64) -> (f64, f64) {
         (after as f64 - 1.0 + part) * length_m / (COARSE - 1) as f64
     };
     (quantile(0.025), quantile(0.975))
-}
-
-/// Where a rising function of the position reaches `share`.
-fn bisect(length_m: f64, share: f64, cumulative: &dyn Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (0.0, length_m);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if cumulative(middle) < share { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }

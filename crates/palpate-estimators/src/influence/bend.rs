@@ -13,6 +13,7 @@
 use super::belief::ForceBelief;
 use super::lanes::Number;
 use super::table::{Cell, InfluenceTable};
+use palpate_numerics::small::add_outer;
 
 /// How the influences bend in a cell of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,10 +81,7 @@ fn bend(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize
         let rise = (table.at_node(cell + 1)[s] - table.at_node(cell)[s]) / h_m;
         let [left, right] = [cell, cell + 1].map(|node| table.slopes[node * table.sensors + s]);
         let bent = ((6.0 - 12.0 * t) * rise + (6.0 * t - 4.0) * left + (6.0 * t - 2.0) * right) / h_m;
-        let derivatives = [f, slope, bent];
-        for (row, a) in products.iter_mut().zip(derivatives) {
-            row.iter_mut().zip(derivatives).for_each(|(product, b)| *product += weights[s] * a * b);
-        }
+        add_outer(&mut products, weights[s], &[f, slope, bent]);
     });
     let [[ff, fs, fb], [_, ss, sb], [.., bb]] = products;
     // What of f′ and of f″ is along f, per f.

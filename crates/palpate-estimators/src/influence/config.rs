@@ -12,7 +12,8 @@ pub struct InfluenceConfig {
 }
 
 /// Where influence functions come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum InfluenceSource {
     /// From the recording alone, by splines that the supports hold.
     Recording,

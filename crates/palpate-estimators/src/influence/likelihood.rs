@@ -9,16 +9,14 @@
 
 use std::f64::consts::PI;
 
-use super::belief::ForceBelief;
 use super::locator::BeamLocator;
 use super::table::InfluenceTable;
 use crate::fit::Locate;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
-use ndarray::Array2;
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::Cholesky;
+use palpate_numerics::small::{Ldl, add_outer, form};
 
 /// The likelihood of a [`BeamLocator`], ready to be asked often.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,38 +52,60 @@ impl BeamLikelihood {
         contacts: [Contact; C],
         mode_n: Option<f64>,
     ) -> ContactFit<K> {
-        let at = contacts.map(|contact| {
-            let x_m = contact.position.x_m;
-            (contact.force_n, self.table.cell(x_m), self.table.variances_near(x_m), self.scale(contact))
-        });
-        let shapes = contacts.map(|contact| self.first_mode(contact.position.x_m));
-        let balance_n: f64 =
-            contacts.iter().zip(shapes).map(|(contact, [shape, _])| contact.force_n * shape).sum();
-        let departure_n = mode_n.map_or(0.0, |mode_n| mode_n - balance_n);
-        let mut fit = ContactFit::NOTHING;
-        for (s, (d, g)) in whitened.iter().zip(&self.first_mode).enumerate() {
-            let g = if mode_n.is_some() { *g } else { 0.0 };
-            let mut residual = d - departure_n * g;
-            let mut variance = 1.0;
-            let mut derivatives = [0.0; K];
-            derivatives[0] = g;
-            for k in 0..C {
-                let (force_n, cell, variances, scale) = &at[k];
-                let (f, slope) = self.table.value_and_slope(cell, s);
-                residual -= force_n * f;
-                variance += scale * variances[s];
-                derivatives[1 + 2 * k] = force_n * (slope - shapes[k][1] * g);
-                derivatives[2 + 2 * k] = f - shapes[k][0] * g;
-            }
-            fit.add(residual, &derivatives, 1.0 / variance);
-        }
-        fit.mirrored()
+        let mode = mode_n.map(|mode_n| (mode_n, self.first_mode.as_slice()));
+        contact_fit(&self.table, whitened, contacts, |contact| self.scale(contact), mode)
     }
 
     /// By what v is multiplied; a force that is hardly there was not calibrated better for that.
     fn scale(&self, contact: Contact) -> f64 {
         contact.force_n.max(self.locator.reference_force_n()).powi(2)
     }
+}
+
+/// How well contacts explain a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
+/// is u with each sensor's g. Of the K = 1 + 2C unknowns the first is u, which is told by nothing without `mode`; place and
+/// force of each contact follow.
+#[inline]
+pub(super) fn contact_fit<const C: usize, const K: usize>(
+    table: &InfluenceTable,
+    whitened: &[f64],
+    contacts: [Contact; C],
+    scale: impl Fn(Contact) -> f64,
+    mode: Option<(f64, &[f64])>,
+) -> ContactFit<K> {
+    let at = contacts.map(|contact| {
+        let x_m = contact.position.x_m;
+        (contact.force_n, table.cell(x_m), table.variances_near(x_m), scale(contact))
+    });
+    let shapes = contacts.map(|contact| first_mode(table.length_m, contact.position.x_m));
+    let balance_n: f64 =
+        contacts.iter().zip(shapes).map(|(contact, [shape, _])| contact.force_n * shape).sum();
+    let departure_n = mode.map_or(0.0, |(mode_n, _)| mode_n - balance_n);
+    let mut fit = ContactFit::NOTHING;
+    for (s, d) in whitened.iter().enumerate() {
+        let g = mode.map_or(0.0, |(_, g)| g[s]);
+        let mut residual = d - departure_n * g;
+        let mut variance = 1.0;
+        let mut derivatives = [0.0; K];
+        derivatives[0] = g;
+        for k in 0..C {
+            let (force_n, cell, variances, scale) = &at[k];
+            let (f, slope) = table.value_and_slope(cell, s);
+            residual -= force_n * f;
+            variance += scale * variances[s];
+            derivatives[1 + 2 * k] = force_n * (slope - shapes[k][1] * g);
+            derivatives[2 + 2 * k] = f - shapes[k][0] * g;
+        }
+        fit.add(residual, &derivatives, 1.0 / variance);
+    }
+    fit.mirrored()
+}
+
+/// The first mode's shape at a place, and its slope per metre.
+fn first_mode(length_m: f64, x_m: f64) -> [f64; 2] {
+    let wave = PI / length_m;
+    let (sin, cos) = (wave * x_m).sin_cos();
+    [sin, wave * cos]
 }
 
 /// g of one sensor, by Simpson's rule over the nodes, whose number is odd.
@@ -112,9 +132,7 @@ impl LineLikelihood for BeamLikelihood {
     }
 
     fn first_mode(&self, x_m: f64) -> [f64; 2] {
-        let wave = PI / self.table.length_m;
-        let (sin, cos) = (wave * x_m).sin_cos();
-        [sin, wave * cos]
+        first_mode(self.table.length_m, x_m)
     }
 }
 
@@ -142,36 +160,28 @@ impl Likelihood for BeamLikelihood {
     /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
     /// and var = Σ W²·v.
     fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
-        let free = if self.known_force_n().is_some() { 1 } else { 2 };
-        let unknowns = free * contacts.len();
+        let force_is_free = self.known_force_n().is_none();
         let cells: Vec<_> = contacts.iter().map(|contact| self.table.cell(contact.position.x_m)).collect();
-        let (mut a, mut b) = (Array2::zeros((unknowns, unknowns)), Array2::zeros((unknowns, unknowns)));
+        let (mut a, mut b) = ([[0.0; 4]; 4], [[0.0; 4]; 4]);
         let mut j = [0.0; 4];
         for s in 0..self.table.sensors {
             let mut variance = 0.0;
             for (k, (contact, cell)) in contacts.iter().zip(&cells).enumerate() {
                 let (f, slope) = self.table.value_and_slope(cell, s);
-                j[free * k] = contact.force_n * slope;
-                if free == 2 {
-                    j[free * k + 1] = f;
-                }
+                (j[2 * k], j[2 * k + 1]) = (contact.force_n * slope, f);
                 variance += self.scale(*contact) * self.table.variances_near(contact.position.x_m)[s];
             }
             let weight = 1.0 / (1.0 + variance);
-            for p in 0..unknowns {
-                for q in 0..unknowns {
-                    a[[p, q]] += weight * j[p] * j[q];
-                    b[[p, q]] += weight * weight * variance * j[p] * j[q];
-                }
-            }
+            add_outer(&mut a, weight, &j);
+            add_outer(&mut b, weight * weight * variance, &j);
         }
         let mut left = [[0.0; 3]; 2];
-        if let Ok(cholesky) = Cholesky::factor(a) {
-            let inverse = cholesky.inverse();
-            let spread = inverse.dot(&b).dot(&inverse);
-            left.iter_mut()
-                .zip(0..contacts.len())
-                .for_each(|(left, k)| left[0] = spread[[free * k, free * k]]);
+        let free = std::array::from_fn(|i| i / 2 < contacts.len() && (i % 2 == 0 || force_is_free));
+        if let Some(factors) = Ldl::of_free(&a, free) {
+            let inverse = factors.inverse();
+            for (left, place) in left.iter_mut().zip([0, 2]) {
+                left[0] = form(&inverse[place], &b, &inverse[place]);
+            }
         }
         left
     }
@@ -185,10 +195,7 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn known_force_n(&self) -> Option<f64> {
-        match self.locator.force() {
-            ForceBelief::Known(force_n) => Some(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
-        }
+        self.locator.force().known_n()
     }
 
     fn most_contacts(&self) -> usize {

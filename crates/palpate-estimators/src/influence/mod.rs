@@ -15,6 +15,7 @@ mod learning;
 mod likelihood;
 mod locator;
 pub mod measured;
+mod moments;
 mod plane;
 mod posterior;
 mod presses;

@@ -4,6 +4,7 @@ use super::InfluenceFitError;
 use crate::recording::Recording;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
+use palpate_numerics::mean;
 
 /// Presses at one position with one force.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +43,7 @@ impl Presses {
             let force_n = force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?;
             rows.push((row.position, force_n, &row.reading));
         }
-        let place = |a: &Position, b: &Position| a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m));
-        rows.sort_by(|a, b| place(&a.0, &b.0).then(a.1.total_cmp(&b.1)));
+        rows.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0).then(a.1.total_cmp(&b.1)));
         let mut presses = Vec::new();
         let (mut scatter, mut freedom) = (vec![0.0; sensors], 0.0);
         for group in rows.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
@@ -66,7 +66,7 @@ impl Presses {
 
     /// The mean force, in newtons.
     pub fn mean_force_n(&self) -> f64 {
-        self.presses.iter().map(|press| press.force_n).sum::<f64>() / self.presses.len() as f64
+        mean(self.presses.iter().map(|press| press.force_n))
     }
 
     /// The variance of a sensor's noise from its repeats and the noise that its rig states, or `None` where neither

@@ -86,11 +86,7 @@ impl Search {
         let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
         let table = table.whitened(&live, &inverse_sd);
         let offsets: Vec<f64> = live.iter().map(|s| offsets[*s]).collect();
-        let weight_force_n = match force {
-            ForceBelief::Known(force_n) => force_n.max(reference_force_n),
-            _ => reference_force_n,
-        };
-        let weights = weights(&table, weight_force_n);
+        let weights = weights(&table, force.weights_force_n(reference_force_n));
         Self {
             from_first: live.iter().enumerate().all(|(i, s)| i == *s),
             scaling: pair(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),

@@ -6,54 +6,30 @@
 //! 2008), which also charges for the number of places that a contact could have been at.
 
 use super::coarse::{COARSE, STRIDE};
+use super::likelihood::contact_fit;
 use super::scratch::Scratch;
 use super::search::Search;
-use ndarray::{Array1, Array2};
+use crate::likelihood::ContactFit;
+use ndarray::Array2;
 use palpate_core::{ContactEstimate, Uncertainty};
-use palpate_mechanics::contact::Position;
-use palpate_numerics::{Cholesky, NORMAL_95};
-
-/// The most contacts that are told apart.
-pub(super) const MOST_CONTACTS: usize = 3;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::small::{Ldl, dot};
+use palpate_numerics::{held_interval, normal_interval_95};
 
 /// Contacts that explain a reading together.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Together {
-    /// Place and force of each.
-    places: Vec<(f64, f64)>,
+    /// The contacts, strongest first; without uncertainty where the reading does not tell them.
+    pub contacts: Vec<ContactEstimate>,
     /// χ² that is left.
     pub misfit: f64,
-    /// Covariance of all places, then all forces; `None` where the reading does not tell them.
-    covariance: Option<Array2<f64>>,
 }
 
 impl Together {
     /// What it costs by the extended Bayesian information criterion: χ² + 2K·ln S + 2K·ln P, for S channels and P
     /// places that can be told apart.
     pub fn criterion(&self, search: &Search) -> f64 {
-        criterion(self.misfit, self.places.len(), 2, search)
-    }
-
-    /// The contacts, strongest first, held to the surface.
-    pub fn contacts(&self, length_m: f64) -> Vec<ContactEstimate> {
-        let count = self.places.len();
-        let contact = |k: usize| {
-            let (x_m, force_n) = self.places[k];
-            let uncertainty = self.covariance.as_ref().map(|covariance| {
-                let (xx, xf, ff) =
-                    (covariance[[k, k]], covariance[[k, count + k]], covariance[[count + k, count + k]]);
-                let half_m = NORMAL_95 * xx.sqrt();
-                Uncertainty {
-                    covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
-                    x_95_m: ((x_m - half_m).max(0.0), (x_m + half_m).min(length_m)),
-                    y_95_m: (0.0, 0.0),
-                }
-            });
-            ContactEstimate { position: Position::along(x_m), force_n: Some(force_n), uncertainty }
-        };
-        let mut contacts: Vec<ContactEstimate> = (0..count).map(contact).collect();
-        contacts.sort_by(|a, b| b.force_n.unwrap_or(0.0).total_cmp(&a.force_n.unwrap_or(0.0)));
-        contacts
+        criterion(self.misfit, self.contacts.len(), 2, search)
     }
 }
 
@@ -73,83 +49,79 @@ pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Optio
         return None;
     }
     let whitened = scratch.whitened.channels(search.live.len());
-    let start = best_nodes(search, whitened, count)?;
-    let spacing_m = STRIDE as f64 * search.table.spacing_m();
-    refine(search, whitened, start.into_iter().map(|node| node as f64 * spacing_m).collect())
+    match count {
+        2 => refine::<2, 5>(search, whitened, best_nodes(search, whitened, pairs())?),
+        _ => refine::<3, 7>(search, whitened, best_nodes(search, whitened, triples())?),
+    }
 }
 
-/// The nodes whose influences explain the most, with every force at least 0.
-fn best_nodes(search: &Search, whitened: &[f64], count: usize) -> Option<Vec<usize>> {
-    let nodes = COARSE;
+/// Those of the `choices` of nodes whose influences explain the most, with every force greater than 0.
+fn best_nodes<const K: usize>(
+    search: &Search,
+    whitened: &[f64],
+    choices: impl Iterator<Item = [usize; K]>,
+) -> Option<[usize; K]> {
     let column = |node: usize| search.table.at_node(STRIDE * node);
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let gram = Array2::from_shape_fn((nodes, nodes), |(i, j)| dot(column(i), column(j)));
-    let pull: Vec<f64> = (0..nodes).map(|node| dot(column(node), whitened)).collect();
-    let mut best: Option<(f64, Vec<usize>)> = None;
-    let mut consider = |chosen: &[usize]| {
-        if let Some(gain) = gain(&gram, &pull, chosen)
-            && best.as_ref().is_none_or(|(most, _)| gain > *most)
-        {
-            best = Some((gain, chosen.to_vec()));
-        }
-    };
-    for i in 0..nodes {
-        for j in i + 1..nodes {
-            match count {
-                2 => consider(&[i, j]),
-                _ => (j + 1..nodes).for_each(|k| consider(&[i, j, k])),
-            }
-        }
-    }
+    let gram = Array2::from_shape_fn((COARSE, COARSE), |(i, j)| dot(column(i), column(j)));
+    let pull: Vec<f64> = (0..COARSE).map(|node| dot(column(node), whitened)).collect();
+    let gains = choices.filter_map(|chosen| Some((gain(&gram, &pull, chosen)?, chosen)));
+    let best = gains.reduce(|best, next| if next.0 > best.0 { next } else { best });
     best.map(|(_, chosen)| chosen)
 }
 
-/// How much the chosen nodes lower |d|², pᵀG⁻¹p by Gaussian elimination; `None` where a force would be negative or the
-/// nodes cannot be told apart.
-fn gain(gram: &Array2<f64>, pull: &[f64], chosen: &[usize]) -> Option<f64> {
-    let n = chosen.len();
-    let mut a = [[0.0; MOST_CONTACTS + 1]; MOST_CONTACTS];
-    for r in 0..n {
-        for c in 0..n {
-            a[r][c] = gram[[chosen[r], chosen[c]]];
-        }
-        a[r][n] = pull[chosen[r]];
-    }
-    for p in 0..n {
-        if a[p][p] <= 1e-10 * gram[[chosen[p], chosen[p]]] {
-            return None;
-        }
-        for r in p + 1..n {
-            let factor = a[r][p] / a[p][p];
-            let pivot = a[p];
-            a[r][p..=n].iter_mut().zip(&pivot[p..=n]).for_each(|(value, above)| *value -= factor * above);
-        }
-    }
-    let mut force = [0.0; MOST_CONTACTS];
-    for r in (0..n).rev() {
-        let known: f64 = (r + 1..n).map(|c| a[r][c] * force[c]).sum();
-        force[r] = (a[r][n] - known) / a[r][r];
-    }
-    force[..n].iter().all(|force| *force > 0.0).then(|| (0..n).map(|r| force[r] * pull[chosen[r]]).sum())
+fn pairs() -> impl Iterator<Item = [usize; 2]> {
+    (0..COARSE).flat_map(|i| (i + 1..COARSE).map(move |j| [i, j]))
 }
 
-/// Gauss–Newton on all places and forces, with steps halved until the misfit falls.
-fn refine(search: &Search, whitened: &[f64], places: Vec<f64>) -> Option<Together> {
+fn triples() -> impl Iterator<Item = [usize; 3]> {
+    pairs().flat_map(|[i, j]| (j + 1..COARSE).map(move |k| [i, j, k]))
+}
+
+/// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
+#[inline]
+fn gain<const K: usize>(gram: &Array2<f64>, pull: &[f64], chosen: [usize; K]) -> Option<f64> {
+    let pull = chosen.map(|node| pull[node]);
+    let force = Ldl::new(&chosen.map(|i| chosen.map(|j| gram[[i, j]])))?.solve(pull);
+    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &pull))
+}
+
+/// Gauss–Newton on the places and forces of K contacts from the best forces at `nodes`, with steps halved until the misfit
+/// falls. There are N = 1 + 2K unknowns, the first of which, the force of a surface's first mode, is held.
+fn refine<const K: usize, const N: usize>(
+    search: &Search,
+    whitened: &[f64],
+    nodes: [usize; K],
+) -> Option<Together> {
     const MOST_STEPS: usize = 40;
-    let count = places.len();
-    let length_m = search.table.length_m;
-    let mut x: Array1<f64> = places.into_iter().chain(std::iter::repeat_n(0.0, count)).collect();
-    let start = Equations::at(search, whitened, &x);
-    let forces = start.forces(count)?;
-    x.slice_mut(ndarray::s![count..]).assign(&forces);
-    let mut here = Equations::at(search, whitened, &x);
+    let table = &search.table;
+    let fit = |contacts: [Contact; K]| -> ContactFit<N> {
+        contact_fit(table, whitened, contacts, |contact| search.variance_scale(contact.force_n), None)
+    };
+    let moved = |contacts: [Contact; K], step: [f64; N], share: f64| {
+        std::array::from_fn(|k| {
+            let Contact { position, force_n } = contacts[k];
+            let x_m = (position.x_m + share * step[1 + 2 * k]).clamp(0.0, table.length_m);
+            Contact { position: Position::along(x_m), force_n: force_n + share * step[2 + 2 * k] }
+        })
+    };
+    let spacing_m = STRIDE as f64 * table.spacing_m();
+    let pressed_by_nothing =
+        nodes.map(|node| Contact { position: Position::along(node as f64 * spacing_m), force_n: 0.0 });
+    let start = fit(pressed_by_nothing);
+    let forces = std::array::from_fn(|i| i > 0 && i % 2 == 0);
+    let step = Ldl::of_free(&start.information, forces)?.solve(start.pull);
+    let mut contacts = moved(pressed_by_nothing, step, 1.0);
+    let mut here = fit(contacts);
+    let free = std::array::from_fn(|i| i > 0);
     for _ in 0..MOST_STEPS {
-        let step = here.step()?;
+        // Damped, where places and forces cannot be told apart.
+        let mut damped = here.information;
+        (0..N).for_each(|i| damped[i][i] *= 1.0 + 1e-9);
+        let step = Ldl::of_free(&damped, free)?.solve(here.pull);
         let mut share = 1.0;
         let next = loop {
-            let mut candidate = &x + &(&step * share);
-            candidate.slice_mut(ndarray::s![..count]).mapv_inplace(|x_m| x_m.clamp(0.0, length_m));
-            let next = Equations::at(search, whitened, &candidate);
+            let candidate = moved(contacts, step, share);
+            let next = fit(candidate);
             if next.misfit <= here.misfit || share < 1e-3 {
                 break (candidate, next);
             }
@@ -159,82 +131,26 @@ fn refine(search: &Search, whitened: &[f64], places: Vec<f64>) -> Option<Togethe
         if fell < 0.0 {
             break;
         }
-        (x, here) = next;
+        (contacts, here) = next;
         if fell < 1e-6 {
             break;
         }
     }
-    let places: Vec<(f64, f64)> = (0..count).map(|k| (x[k], x[count + k])).collect();
-    if places.iter().any(|(_, force_n)| *force_n <= 0.0) {
+    if contacts.iter().any(|contact| contact.force_n <= 0.0) {
         return None;
     }
-    Some(Together { places, misfit: here.misfit, covariance: here.covariance() })
-}
-
-/// The normal equations of K places and K forces.
-struct Equations {
-    misfit: f64,
-    /// JᵀJ and Jᵀe, places first, with e = d − Σ W·f the residual and J its derivative with the sign changed.
-    normal: Array2<f64>,
-    right: Array1<f64>,
-}
-
-impl Equations {
-    fn at(search: &Search, whitened: &[f64], x: &Array1<f64>) -> Self {
-        let (count, channels) = (x.len() / 2, whitened.len());
-        let mut jacobian = Array2::zeros((channels, 2 * count));
-        let mut residual = Array1::from(whitened.to_vec());
-        let mut variance = Array1::<f64>::ones(channels);
-        for k in 0..count {
-            let (x_m, force_n) = (x[k], x[count + k]);
-            let near = search.table.variances_near(x_m);
-            let scale = search.variance_scale(force_n);
-            search.table.for_each(search.table.cell(x_m), |s, f, slope| {
-                residual[s] -= force_n * f;
-                jacobian[[s, k]] = force_n * slope;
-                jacobian[[s, count + k]] = f;
-                variance[s] += scale * near[s];
-            });
-        }
-        let weight = variance.mapv(|v| v.sqrt().recip());
-        residual *= &weight;
-        jacobian *= &weight.insert_axis(ndarray::Axis(1));
-        Self {
-            misfit: residual.dot(&residual),
-            normal: jacobian.t().dot(&jacobian),
-            right: jacobian.t().dot(&residual),
-        }
-    }
-
-    /// The best forces at these places, from equations in which all forces are 0.
-    fn forces(&self, count: usize) -> Option<Array1<f64>> {
-        let normal = self.normal.slice(ndarray::s![count.., count..]).to_owned();
-        let right = self.right.slice(ndarray::s![count..]).to_owned();
-        Cholesky::factor(normal).ok().map(|cholesky| cholesky.solve(&right))
-    }
-
-    /// The Gauss–Newton step, scaled so that places and forces weigh alike, and damped where they cannot be told apart.
-    fn step(&self) -> Option<Array1<f64>> {
-        let (scaled, scale) = self.scaled()?;
-        let damped = scaled + Array2::<f64>::eye(scale.len()) * 1e-9;
-        Some(Cholesky::factor(damped).ok()?.solve(&(&self.right / &scale)) / &scale)
-    }
-
-    fn covariance(&self) -> Option<Array2<f64>> {
-        let (scaled, scale) = self.scaled()?;
-        let inverse = Cholesky::factor(scaled).ok()?.inverse();
-        Some(Array2::from_shape_fn(inverse.dim(), |(i, j)| inverse[[i, j]] / (scale[i] * scale[j])))
-    }
-
-    /// JᵀJ with a diagonal of ones, and the roots of its diagonal.
-    fn scaled(&self) -> Option<(Array2<f64>, Array1<f64>)> {
-        let scale = self.normal.diag().mapv(f64::sqrt);
-        let usable = scale.iter().all(|root| *root > 0.0 && root.is_finite());
-        usable.then(|| {
-            let scaled = Array2::from_shape_fn(self.normal.dim(), |(i, j)| {
-                self.normal[[i, j]] / (scale[i] * scale[j])
-            });
-            (scaled, scale)
-        })
-    }
+    let covariance = Ldl::of_free(&here.information, free).map(|factors| factors.inverse());
+    let estimate = |k: usize| {
+        let Contact { position, force_n } = contacts[k];
+        let (x, w) = (1 + 2 * k, 2 + 2 * k);
+        let uncertainty = covariance.map(|covariance| Uncertainty {
+            covariance: [covariance[x][x], 0.0, covariance[x][w], 0.0, 0.0, covariance[w][w]],
+            x_95_m: held_interval(normal_interval_95(position.x_m, covariance[x][x].sqrt()), table.length_m),
+            y_95_m: (0.0, 0.0),
+        });
+        ContactEstimate { position, force_n: Some(force_n), uncertainty }
+    };
+    let mut contacts: Vec<ContactEstimate> = (0..K).map(estimate).collect();
+    contacts.sort_by(|a, b| b.force_n.unwrap_or(0.0).total_cmp(&a.force_n.unwrap_or(0.0)));
+    Some(Together { contacts, misfit: here.misfit })
 }

@@ -1,9 +1,11 @@
 //! The cells of a surface, each of which carries a part of the load.
 
+use std::ops::RangeInclusive;
+
 use ndarray::Array2;
 
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, midpoints};
+use palpate_mechanics::surface::{Extent, UniformLoad, midpoints};
 
 /// Cells along a line.
 const ON_A_LINE: usize = 80;
@@ -36,6 +38,13 @@ impl Cells {
         Self { extent, columns: count(extent.length_m), rows: count(width_m) }
     }
 
+    /// About `count` cells of a plane, as square as they come, with a number along each side within `sides`.
+    pub fn about(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
+        let aspect = extent.width_m.unwrap_or(extent.length_m) / extent.length_m;
+        let side = |ratio: f64| ((count * ratio).sqrt().round() as usize).clamp(*sides.start(), *sides.end());
+        Self { extent, columns: side(1.0 / aspect), rows: side(aspect) }
+    }
+
     /// How many there are.
     #[expect(clippy::len_without_is_empty, reason = "there is at least one")]
     pub fn len(&self) -> usize {
@@ -52,6 +61,38 @@ impl Cells {
     pub fn measure(&self) -> f64 {
         let [along, across] = self.sides_m();
         if self.extent.width_m.is_some() { along * across } else { along }
+    }
+
+    /// The middles of all cells.
+    pub fn centres(&self) -> impl Iterator<Item = Position> {
+        (0..self.len()).map(|cell| self.centre(cell))
+    }
+
+    /// The cell that holds a position; the nearest one of a position off the surface.
+    pub fn cell_of(&self, position: Position) -> usize {
+        let number = |at_m: f64, size_m: f64, count: usize| {
+            ((at_m / size_m * count as f64).max(0.0) as usize).min(count - 1)
+        };
+        let column = number(position.x_m, self.extent.length_m, self.columns);
+        let row = self.extent.width_m.map_or(0, |width_m| number(position.y_m, width_m, self.rows));
+        row * self.columns + column
+    }
+
+    /// The mean density of some loads over each cell: N/m on a line, N/m² on a plane.
+    pub fn mean_density(&self, loads: &[UniformLoad]) -> Vec<f64> {
+        let shared = |a: f64, b: f64, from: f64, to: f64| {
+            if b > a { (b.min(to) - a.max(from)).max(0.0) / (b - a) } else { 1.0 }
+        };
+        let density = |cell| {
+            let (from, to) = self.corners(cell);
+            let force_n = |load: &UniformLoad| {
+                load.force_n
+                    * shared(load.from.x_m, load.to.x_m, from.x_m, to.x_m)
+                    * shared(load.from.y_m, load.to.y_m, from.y_m, to.y_m)
+            };
+            loads.iter().map(force_n).sum::<f64>() / self.measure()
+        };
+        (0..self.len()).map(density).collect()
     }
 
     /// The middle of a cell.
@@ -149,6 +190,28 @@ mod tests {
         let at = |i: isize| usize::try_from(i).ok().and_then(|i| x.get(i)).copied().unwrap_or(0.0);
         let direct: f64 = (-1..=7).map(|i| (at(i - 1) - 2.0 * at(i) + at(i + 1)).powi(2)).sum();
         assert!((x.dot(&cells.roughness().dot(&x)) - direct).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_cell_holds_its_middle() {
+        let plane = Extent { length_m: 0.3, width_m: Some(0.15) };
+        let cells = Cells::about(plane, 200.0, 5..=60);
+        assert_eq!((cells.columns, cells.rows), (20, 10));
+        assert!(cells.centres().enumerate().all(|(cell, centre)| cells.cell_of(centre) == cell));
+        assert_eq!(cells.cell_of(Position { x_m: 9.0, y_m: -9.0 }), 19);
+        assert_eq!(line(7).cell_of(Position::along(0.4)), 6);
+    }
+
+    #[test]
+    fn the_density_of_a_load_sums_up_to_its_force() {
+        let at = |x_m, y_m| Position { x_m, y_m };
+        let on_line = UniformLoad { from: at(0.05, 0.0), to: at(0.17, 0.0), force_n: 3.0 };
+        let on_plane = UniformLoad { from: at(0.05, 0.02), to: at(0.17, 0.09), force_n: 3.0 };
+        let plane = Cells::over(Extent { length_m: 0.3, width_m: Some(0.15) });
+        for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
+            let density = cells.mean_density(&[load, load]);
+            assert!((density.iter().sum::<f64>() * cells.measure() - 6.0).abs() < 1e-12);
+        }
     }
 
     #[test]

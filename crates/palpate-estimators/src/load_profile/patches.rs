@@ -4,10 +4,10 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use super::Cells;
-use super::profile::{CentreOfPressure, centre_of, interval_95, sd_of_sum};
+use super::profile::{CentreOfPressure, centre_of, sd_of_sum};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::{Extent, UniformLoad};
-use palpate_numerics::normal_quantile;
+use palpate_numerics::{normal_interval_95, normal_quantile};
 
 /// A patch is where the load is above this share of its highest density.
 pub const PATCH_SHARE: f64 = 0.1;
@@ -34,7 +34,7 @@ pub struct Patch {
 impl Patch {
     /// The ends of the force's 95 % interval, in newtons.
     pub fn force_95_n(&self) -> (f64, f64) {
-        let (low, high) = interval_95(self.force_n, self.force_sd_n);
+        let (low, high) = normal_interval_95(self.force_n, self.force_sd_n);
         (low.max(0.0), high)
     }
 

@@ -10,7 +10,7 @@ use super::smoothness::{Mixture, Problem};
 use super::{Cells, LoadSensors};
 use crate::fit::ReadingError;
 use palpate_mechanics::contact::Position;
-use palpate_numerics::{NORMAL_95, chi_squared_bound};
+use palpate_numerics::{chi_squared_bound, normal_interval_95};
 
 /// Readings that noise alone makes this rarely are a contact; those that a load and noise make this rarely are not of the
 /// model.
@@ -187,13 +187,18 @@ impl LoadProfile {
     pub fn density(&self, cell: usize) -> (f64, (f64, f64)) {
         let measure = self.cells.measure();
         let (force, sd) = (self.forces_n[cell], self.covariance_n2[[cell, cell]].sqrt());
-        let (low, high) = interval_95(force, sd);
+        let (low, high) = normal_interval_95(force, sd);
         (force / measure, (low.max(0.0) / measure, high / measure))
+    }
+
+    /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
+    pub fn density_sd(&self, cell: usize) -> f64 {
+        self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
     }
 
     /// The ends of the total force's 95 % interval, in newtons.
     pub fn total_95_n(&self) -> (f64, f64) {
-        let (low, high) = interval_95(self.total_n, self.total_sd_n);
+        let (low, high) = normal_interval_95(self.total_n, self.total_sd_n);
         (low.max(0.0), high)
     }
 }
@@ -201,18 +206,13 @@ impl LoadProfile {
 impl CentreOfPressure {
     /// The ends of the 95 % interval along x, in metres.
     pub fn x_95_m(&self) -> (f64, f64) {
-        interval_95(self.position.x_m, self.sd_x_m)
+        normal_interval_95(self.position.x_m, self.sd_x_m)
     }
 
     /// The ends of the 95 % interval along y, in metres.
     pub fn y_95_m(&self) -> (f64, f64) {
-        interval_95(self.position.y_m, self.sd_y_m)
+        normal_interval_95(self.position.y_m, self.sd_y_m)
     }
-}
-
-/// The ends of a normal 95 % interval.
-pub(super) fn interval_95(value: f64, sd: f64) -> (f64, f64) {
-    (value - NORMAL_95 * sd, value + NORMAL_95 * sd)
 }
 
 /// The mean position of the force of some cells, with its standard deviation to first order; `None` where they have none.

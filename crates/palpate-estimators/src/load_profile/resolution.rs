@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::Cells;
 use super::smoothness::Problem;
-use palpate_numerics::Cholesky;
+use palpate_numerics::{Cholesky, median};
 
 /// Averaging kernels of the linearised inverse: without the bound at 0, the force told of cell i is Σ_k R_ik times the force
 /// of cell k, with R = (AᵀA + λ·P)⁻¹·AᵀA (Backus and Gilbert, *The Resolving Power of Gross Earth Data*, Geophys. J. R. astr.
@@ -35,9 +35,7 @@ impl Resolution {
 impl Resolution {
     /// The median of the kernels' widths, in metres.
     pub fn median_width_m(&self) -> f64 {
-        let mut widths = self.widths_m.clone();
-        widths.sort_by(f64::total_cmp);
-        widths.get(widths.len() / 2).copied().unwrap_or(0.0)
+        median(self.widths_m.clone()).unwrap_or(0.0)
     }
 }
 

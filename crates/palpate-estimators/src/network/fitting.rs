@@ -8,6 +8,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use crate::network::locator::ChannelScaling;
 use crate::recording::Recording;
 use palpate_mechanics::surface::{Extent, Surface};
+use palpate_numerics::mean_and_variance;
 use palpate_numerics::watch::Cancelled;
 
 /// Why a network cannot be fitted to a recording.
@@ -220,9 +221,7 @@ fn channel_scaling(
             }
             (InputScale::FullScale, None) => (0.0, largest(), "largest reading"),
             (InputScale::Standardized, _) => {
-                let count = recording.rows.len() as f64;
-                let mean = column(c).sum::<f64>() / count;
-                let variance = column(c).map(|r| (r - mean).powi(2)).sum::<f64>() / count;
+                let (mean, variance) = mean_and_variance(column(c));
                 (mean, variance.sqrt(), "standard deviation")
             }
         };

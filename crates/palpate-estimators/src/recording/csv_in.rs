@@ -2,14 +2,12 @@
 
 use std::io::Read;
 
-use sha2::{Digest, Sha256};
-
 use super::cells::Cells;
 use super::columns::{Columns, Frame, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem, Place};
 use super::lines::{is_passed_over, without_mark};
 use super::reading_parser::ChannelFields;
-use super::{Provenance, Recording, Row};
+use super::{Provenance, Recording, Row, sha256_hex};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
@@ -109,7 +107,7 @@ impl<'s> File<'s> {
     fn read(source: &'s str, mut bytes: impl Read) -> Result<Self, CsvError> {
         let mut content = Vec::new();
         bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).of_file(source))?;
-        let digest = Sha256::digest(&content).iter().map(|byte| format!("{byte:02x}")).collect();
+        let digest = sha256_hex(&content);
         let text = String::from_utf8(content).map_err(|error| not_utf8(source, &error))?;
         Ok(Self { source, text, digest })
     }

@@ -17,12 +17,32 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, mut out: impl
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
     writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(header(&columns))?;
+    out.write_all(csv_row(header(&columns)).as_bytes())?;
     for row in &recording.rows {
-        csv.write_record(record(row, &columns))?;
+        out.write_all(csv_row(record(row, &columns)).as_bytes())?;
     }
-    csv.flush()
+    out.flush()
+}
+
+/// A line of CSV with its end: the fields with commas between them, and quotes around one that holds a comma, a quote or the end of a
+/// line (RFC 4180).
+pub fn csv_row(fields: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let mut line = String::new();
+    for (i, field) in fields.into_iter().enumerate() {
+        if i > 0 {
+            line.push(',');
+        }
+        let field = field.as_ref();
+        if field.contains([',', '"', '\r', '\n']) {
+            line.push('"');
+            line += &field.replace('"', "\"\"");
+            line.push('"');
+        } else {
+            line += field;
+        }
+    }
+    line.push('\n');
+    line
 }
 
 pub(super) fn header(columns: &Columns) -> Vec<String> {
@@ -52,4 +72,20 @@ pub(super) fn record(row: &Row, columns: &Columns) -> Vec<String> {
         columns.channels.iter().zip(&row.reading).map(|(channel, value)| channel.unit.format_si(*value)),
     );
     record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::csv_row;
+    use crate::recording::fields::split;
+
+    #[test]
+    fn a_field_is_quoted_where_it_must_be() {
+        let fields = ["plain", "with, comma", "with \"quotes\"", "", "5 µm", " spaced "];
+        let line = csv_row(fields);
+        assert_eq!(line, "plain,\"with, comma\",\"with \"\"quotes\"\"\",,5 µm, spaced \n");
+        let read: Vec<_> = split(line.trim_end_matches('\n')).unwrap().into_iter().map(|f| f.value).collect();
+        assert_eq!(read, fields.map(str::trim));
+        assert_eq!(csv_row(["two\nlines", "b"]), "\"two\nlines\",b\n");
+    }
 }

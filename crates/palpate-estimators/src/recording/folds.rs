@@ -26,8 +26,8 @@ impl Recording {
     /// Every position that occurs, once, sorted by x and then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
         let mut positions: Vec<Position> = self.rows.iter().map(|row| row.position).collect();
-        positions.sort_by(order);
-        positions.dedup_by(|a, b| order(a, b).is_eq());
+        positions.sort_by(Position::cmp_by_x_then_y);
+        positions.dedup_by(|a, b| a.cmp_by_x_then_y(b).is_eq());
         positions
     }
 
@@ -52,7 +52,7 @@ impl Recording {
         let positions = self.distinct_positions();
         let mut folds = vec![Fold { training: Vec::new(), held_out: Vec::new() }; count];
         for (i, row) in self.rows.iter().enumerate() {
-            let index = positions.partition_point(|position| order(position, &row.position).is_lt());
+            let index = positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
             for (k, fold) in folds.iter_mut().enumerate() {
                 if index % count == k { fold.held_out.push(i) } else { fold.training.push(i) }
             }
@@ -66,8 +66,4 @@ impl Recording {
         let provenance = Provenance { rows: rows.len(), ..self.provenance.clone() };
         Self { channels: self.channels.clone(), kinds: self.kinds.clone(), rows, provenance }
     }
-}
-
-fn order(a: &Position, b: &Position) -> std::cmp::Ordering {
-    a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m))
 }

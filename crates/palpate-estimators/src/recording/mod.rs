@@ -13,11 +13,12 @@ mod timed;
 mod warnings;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{Schema, read, read_pair};
-pub use csv_out::write;
+pub use csv_out::{csv_row, write};
 pub use folds::{Fold, TooFewPositions};
 pub use reading_parser::ReadingParser;
 pub use timed::{TimedParser, TimedReading, TimedRecording, write_timed};
@@ -60,6 +61,11 @@ impl Row {
     }
 }
 
+/// The SHA-256 of a file's content in hexadecimal, by which provenance names it.
+pub fn sha256_hex(content: &[u8]) -> String {
+    Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Where a recording comes from, so that whatever is fitted to it can say so.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
@@ -67,7 +73,7 @@ pub struct Provenance {
     pub source: String,
     /// How many rows there are.
     pub rows: usize,
-    /// SHA-256 of the bytes that were read, in hexadecimal, one for each file; empty for a simulation.
+    /// The [`sha256_hex`] of each file that was read; empty for a simulation.
     pub digests: Vec<String>,
     /// The seed of a simulation.
     pub seed: Option<u64>,

@@ -9,7 +9,7 @@ use super::cells::Cells;
 use super::columns::{Column, Columns, Header};
 use super::csv_error::CsvError;
 use super::csv_in::{ContactFields, Schema};
-use super::csv_out::{header, record};
+use super::csv_out::{csv_row, header, record};
 use super::lines::Lines;
 use super::reading_parser::ChannelFields;
 use palpate_mechanics::contact::{Contact, Position};
@@ -61,15 +61,16 @@ pub fn write_timed(
         std::iter::once(time).chain(second).chain(rest)
     };
     writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(timed_record(TIME.to_owned(), SECOND.map(str::to_owned), header(&columns)))?;
+    let heading = timed_record(TIME.to_owned(), SECOND.map(str::to_owned), header(&columns));
+    out.write_all(csv_row(heading).as_bytes())?;
     for (i, (row, time_s)) in timed.recording.rows.iter().zip(&timed.times_s).enumerate() {
         let second = timed.second.get(i).map_or_else(Default::default, |contact| {
             [columns.position_unit.format_si(contact.position.x_m), Unit::NONE.format_si(contact.force_n)]
         });
-        csv.write_record(timed_record(Unit::NONE.format_si(*time_s), second, record(row, &columns)))?;
+        let line = timed_record(Unit::NONE.format_si(*time_s), second, record(row, &columns));
+        out.write_all(csv_row(line).as_bytes())?;
     }
-    csv.flush()
+    out.flush()
 }
 
 /// One line of readings in time.

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::{Recording, Row};
 use palpate_mechanics::units::Quantity;
+use palpate_numerics::median;
 
 /// Something about a channel that the bench's owner should look at.
 #[derive(Clone, Debug, PartialEq)]
@@ -188,14 +189,6 @@ impl<'a> Channel<'a> {
             .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
         Quantity { value, dimension }
     }
-}
-
-/// The middle value, or the mean of the two middle ones; `None` of nothing.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    let upper = values.get(half)?;
-    if values.len() % 2 == 1 { Some(*upper) } else { Some(0.5 * (values[half - 1] + upper)) }
 }
 
 impl fmt::Display for Warning {

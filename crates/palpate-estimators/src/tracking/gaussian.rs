@@ -1,11 +1,10 @@
 //! A Gaussian in the state of a surface and its contacts, moved by time and by readings.
 //!
 //! Symbols: m mean and P covariance of the state; s the unknowns of a [`ContactFit`], which are entries of the state; g and A pull
-//! and information of the fit; A = L·Lᵀ.
+//! and information of the fit.
 
 use crate::likelihood::ContactFit;
-
-pub(super) type Matrix<const N: usize> = [[f64; N]; N];
+use palpate_numerics::small::{Ldl, Matrix, dot};
 
 /// A belief about N numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,8 +66,8 @@ impl<const N: usize> Gaussian<N> {
     /// After a reading whose misfit in the entries `seen` is expanded about `about`; and the logarithm of how probable the
     /// reading was.
     ///
-    /// P⁺ = P − Y·Yᵀ with Y = P_s·L·R⁻ᵀ and R·Rᵀ = 1 + Lᵀ·P_ss·L; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of what is
-    /// believed from `about`; the evidence is −½·(ln det R·Rᵀ + χ² less what the move explains).
+    /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of what
+    /// is believed from `about`; the evidence is −½·(ln det G + χ² less what the move explains).
     pub fn updated<const K: usize>(
         &self,
         fit: &ContactFit<K>,
@@ -78,7 +77,7 @@ impl<const N: usize> Gaussian<N> {
         let delta: [f64; K] = std::array::from_fn(|k| self.mean[seen[k]] - about[k]);
         let pull: [f64; K] = std::array::from_fn(|k| fit.pull[k] - dot(&fit.information[k], &delta));
         let misfit = fit.misfit - (0..K).map(|k| delta[k] * (fit.pull[k] + pull[k])).sum::<f64>();
-        let root = square_root(&fit.information);
+        let root = Ldl::semidefinite(&fit.information).root();
         let mut y: [[f64; K]; N] = std::array::from_fn(|i| {
             std::array::from_fn(|c| (c..K).map(|k| self.covariance[i][seen[k]] * root[k][c]).sum())
         });
@@ -86,16 +85,13 @@ impl<const N: usize> Gaussian<N> {
             std::array::from_fn(|c| (r..K).map(|k| root[k][r] * y[seen[k]][c]).sum())
         });
         (0..K).for_each(|k| grown[k][k] += 1.0);
-        let grown = square_root(&grown);
-        for row in &mut y {
-            for c in 0..K {
-                row[c] = (row[c] - (0..c).map(|k| grown[c][k] * row[k]).sum::<f64>()) / grown[c][c];
-            }
-        }
+        let grown = Ldl::semidefinite(&grown);
         let mut after = *self;
         for i in 0..N {
-            for j in 0..=i {
-                after.covariance[i][j] -= dot(&y[i], &y[j]);
+            y[i] = grown.solve_lower(y[i]);
+            let scaled: [f64; K] = std::array::from_fn(|c| y[i][c] * grown.inverse_pivots()[c]);
+            for (j, other) in y.iter().enumerate().take(i + 1) {
+                after.covariance[i][j] -= dot(&scaled, other);
                 after.covariance[j][i] = after.covariance[i][j];
             }
         }
@@ -103,8 +99,7 @@ impl<const N: usize> Gaussian<N> {
             std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][seen[k]] * pull[k]).sum());
         after.mean.iter_mut().zip(&moved).for_each(|(mean, moved)| *mean += moved);
         let explained: f64 = (0..K).map(|k| pull[k] * moved[seen[k]]).sum();
-        let log_determinant: f64 = (0..K).map(|k| 2.0 * grown[k][k].ln()).sum();
-        (after, -0.5 * (log_determinant + misfit - explained))
+        (after, -0.5 * (grown.log_determinant() + misfit - explained))
     }
 
     /// The Gaussian with the mean and covariance of a mixture; shares add up to 1.
@@ -125,12 +120,12 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// What it was before a step, given that it was `later` after it (Rauch, Tung and Striebel 1965):
-    /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, by elimination on what is not known exactly.
+    /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where what is known exactly is held.
     pub fn smoothed(&self, change: &Change<N>, later: &Self) -> Self {
         let expected = self.predicted(change);
         let carried = change.carried(&self.covariance);
-        let gain: Matrix<N> =
-            std::array::from_fn(|i| solve(&expected.covariance, std::array::from_fn(|j| carried[j][i])));
+        let factors = Ldl::semidefinite(&expected.covariance);
+        let gain: Matrix<N> = std::array::from_fn(|i| factors.solve(std::array::from_fn(|j| carried[j][i])));
         let mut before = *self;
         let news: [f64; N] = std::array::from_fn(|k| later.mean[k] - expected.mean[k]);
         let difference: Matrix<N> = std::array::from_fn(|k| {
@@ -149,71 +144,14 @@ impl<const N: usize> Gaussian<N> {
 
     /// What it knows beyond another belief that it grew from, as the fit of the readings that made the difference, and about
     /// where that is expanded: their precision is P⁻¹ less the other's, and at m they pull with the other's P⁻¹·(m − m₀).
+    /// What has no variance has no precision either.
     pub fn less(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
-        let (own, before) = (inverse(&self.covariance), inverse(&other.covariance));
+        let [own, before] = [self, other].map(|belief| Ldl::semidefinite(&belief.covariance).inverse());
         let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
         let information = std::array::from_fn(|i| std::array::from_fn(|j| own[i][j] - before[i][j]));
         let pull = std::array::from_fn(|i| dot(&before[i], &moved));
         (ContactFit { misfit: 0.0, pull, information }, self.mean)
     }
-}
-
-/// P⁻¹, with zeros for what has no variance.
-fn inverse<const N: usize>(p: &Matrix<N>) -> Matrix<N> {
-    let column = |i: usize| {
-        let mut unit = [0.0; N];
-        unit[i] = 1.0;
-        solve(p, unit)
-    };
-    std::array::from_fn(column)
-}
-
-fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// L of A = L·Lᵀ by Cholesky's rule; a column of zeros for what A, to rounding, says nothing of.
-fn square_root<const K: usize>(a: &Matrix<K>) -> Matrix<K> {
-    let mut root = [[0.0; K]; K];
-    for c in 0..K {
-        let left = a[c][c] - (0..c).map(|k| root[c][k] * root[c][k]).sum::<f64>();
-        if left <= 1e-14 * a[c][c] {
-            continue;
-        }
-        root[c][c] = left.sqrt();
-        for r in c + 1..K {
-            let known: f64 = (0..c).map(|k| root[r][k] * root[c][k]).sum();
-            root[r][c] = (a[r][c] - known) / root[c][c];
-        }
-    }
-    root
-}
-
-/// P⁻¹·b by Gauss's elimination, scaled to a diagonal of ones; 0 for what has no variance, as a known force.
-fn solve<const N: usize>(p: &Matrix<N>, b: [f64; N]) -> [f64; N] {
-    let scale: [f64; N] = std::array::from_fn(|i| p[i][i].max(0.0).sqrt());
-    let over = |value: f64, scale: f64| if scale > 0.0 { value / scale } else { 0.0 };
-    let mut a: Matrix<N> =
-        std::array::from_fn(|i| std::array::from_fn(|j| over(over(p[i][j], scale[i]), scale[j])));
-    let mut y: [f64; N] = std::array::from_fn(|i| over(b[i], scale[i]));
-    for i in 0..N {
-        if a[i][i] <= 1e-14 {
-            a[i] = [0.0; N];
-            a.iter_mut().for_each(|row| row[i] = 0.0);
-            (a[i][i], y[i]) = (1.0, 0.0);
-        }
-        let (pivot, right) = (a[i], y[i]);
-        for (row, y) in a.iter_mut().zip(&mut y).skip(i + 1) {
-            let factor = row[i] / pivot[i];
-            row.iter_mut().zip(&pivot).skip(i).for_each(|(value, above)| *value -= factor * above);
-            *y -= factor * right;
-        }
-    }
-    for i in (0..N).rev() {
-        let known: f64 = (i + 1..N).map(|c| a[i][c] * y[c]).sum();
-        y[i] = (y[i] - known) / a[i][i];
-    }
-    std::array::from_fn(|i| over(y[i], scale[i]))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::NORMAL_95;
+use palpate_numerics::small::{principal_direction, principal_variances};
 
 /// Numbers of a state.
 pub(super) const NUMBERS: usize = 7;
@@ -124,9 +125,9 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
         let [xx, xy, _, yy, ..] = uncertainty.covariance;
         let sides_m = sides_m(self.seen.likelihood.extent());
         let longest_m = sides_m[0].max(sides_m[1]);
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        let reach_m = NORMAL_95 * (mean + half.hypot(xy)).sqrt();
-        let (sin, cos) = (0.5 * xy.atan2(half)).sin_cos();
+        let [longest, _] = principal_variances([xx, xy, yy]);
+        let reach_m = NORMAL_95 * longest.sqrt();
+        let [cos, sin] = principal_direction([xx, xy, yy]);
         let count = (2.0 * reach_m / (WIDEST * longest_m)).ceil().clamp(1.0, MOST_PARTS);
         let anywhere = sides_m.map(|side_m| side_m.powi(2) / 12.0);
         if count == 1.0 {

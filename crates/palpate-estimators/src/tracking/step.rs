@@ -6,9 +6,10 @@
 
 use super::bank::{Dynamics, SeenNumbers};
 use super::config::TrackerConfig;
-use super::gaussian::{Change, Gaussian, Matrix};
+use super::gaussian::{Change, Gaussian};
 use crate::likelihood::LineLikelihood;
 use palpate_mechanics::surface::modal::Oscillator;
+use palpate_numerics::small::Matrix;
 use std::f64::consts::PI;
 
 /// Force of the first mode, and how fast it changes.

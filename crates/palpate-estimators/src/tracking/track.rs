@@ -5,7 +5,7 @@ use crate::likelihood::Likelihood;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::{NORMAL_95, normal_distribution};
+use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
 
 /// Below this share of the probability, one hypothesis does not speak for all.
 const SURE: f64 = 0.98;
@@ -126,21 +126,15 @@ impl Tracked {
                     y_m,
                     speed_m_per_s: speed_across,
                     sd,
-                    y_95_m: about(y_m, sd[0], width_m),
+                    y_95_m: held_interval(normal_interval_95(y_m, sd[0]), width_m),
                     covariance_m2: moments.covariance_m2 + xy,
                 }
             };
-            let x_95_m = about(x_m, sd[0], length_m);
+            let x_95_m = held_interval(normal_interval_95(x_m, sd[0]), length_m);
             Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: width_m.map(across) }
         };
         belief.iter().zip(floors_m2).map(tracked).collect()
     }
-}
-
-/// The 95 % interval of a normal distribution, held to the surface.
-fn about(place_m: f64, sd_m: f64, size_m: f64) -> (f64, f64) {
-    let half_m = NORMAL_95 * sd_m;
-    ((place_m - half_m).max(0.0), (place_m + half_m).min(size_m))
 }
 
 /// The most probable contact of a plane, with the covariance about it of all that are held possible.
@@ -161,13 +155,6 @@ fn interval(parts: &[(f64, f64, f64)], length_m: f64) -> (f64, f64) {
     let below = |x_m: f64| -> f64 {
         parts.iter().map(|(share, mean, sd)| share * normal_distribution((x_m - mean) / sd)).sum()
     };
-    let quantile = |share: f64| {
-        let (mut low, mut high) = (0.0, length_m);
-        for _ in 0..24 {
-            let middle = 0.5 * (low + high);
-            if below(middle) < share { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
-    };
+    let quantile = |share: f64| bisect((0.0, length_m), 24, |x_m| below(x_m) < share);
     (quantile(0.025), quantile(0.975))
 }

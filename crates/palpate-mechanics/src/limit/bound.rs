@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_2_PI;
 use serde::Serialize;
 
 use super::information::inverse_information;
+use palpate_numerics::small::principal_variances;
 
 /// The Cramér–Rao bound at one contact: what no unbiased estimator can beat there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -45,9 +46,7 @@ impl Bound {
     /// elliptic integral of the second kind. On a one-dimensional surface s₂ = 0, E = 1, and it is σ·√(2/π).
     pub fn mean_error_m(&self) -> f64 {
         let (xx, yy) = (self.sd_x_m * self.sd_x_m, self.sd_y_m * self.sd_y_m);
-        let radius = (0.5 * (xx - yy)).hypot(self.covariance_xy_m2);
-        let larger = 0.5 * (xx + yy) + radius;
-        let smaller = (0.5 * (xx + yy) - radius).max(0.0);
+        let [larger, smaller] = principal_variances([xx, self.covariance_xy_m2, yy]);
         if larger <= 0.0 {
             return 0.0;
         }

@@ -4,6 +4,7 @@ use super::grid::Grid;
 use super::{Bound, Force, Limit, LimitError};
 use crate::contact::{Contact, Position};
 use crate::surface::Extent;
+use palpate_numerics::{mean, percentile};
 
 /// The limit at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,20 +78,29 @@ impl LimitCurve {
         })
     }
 
+    /// A figure of the bound by x in metres, from left to right; on a plane its mean across the width. NaN where there is no bound.
+    pub fn by_x(&self, figure: impl Fn(&Bound) -> f64) -> Vec<(f64, f64)> {
+        let mut points: Vec<&LimitPoint> = self.points.iter().collect();
+        points.sort_by(|a, b| a.position.x_m.total_cmp(&b.position.x_m));
+        let columns = points.chunk_by(|a, b| a.position.x_m == b.position.x_m);
+        let mean = |column: &[&LimitPoint]| {
+            let figures = column.iter().map(|point| point.bound.as_ref().map_or(f64::NAN, &figure));
+            figures.sum::<f64>() / column.len() as f64
+        };
+        columns.map(|column| (column[0].position.x_m, mean(column))).collect()
+    }
+
     /// The curve in short; `None` where no position has a bound.
     pub fn summary(&self) -> Option<LimitSummary> {
         let mut bounds: Vec<(Position, Bound)> =
             self.points.iter().filter_map(|point| Some((point.position, point.bound?))).collect();
         bounds.sort_by(|(_, a), (_, b)| a.sd_position_m.total_cmp(&b.sd_position_m));
         let limit = |&(position, bound): &(Position, Bound)| (position, bound.sd_position_m);
-        let count = bounds.len() as f64;
-        let mean = |of: fn(&Bound) -> f64| bounds.iter().map(|(_, bound)| of(bound)).sum::<f64>() / count;
-        let middle = bounds.len() / 2;
-        let (_, below) = bounds.get(middle.saturating_sub(1 - bounds.len() % 2)).map(limit)?;
-        let (_, above) = bounds.get(middle).map(limit)?;
+        let mean = |of: fn(&Bound) -> f64| mean(bounds.iter().map(|(_, bound)| of(bound)));
+        let sds_m: Vec<f64> = bounds.iter().map(|(_, bound)| bound.sd_position_m).collect();
         Some(LimitSummary {
             mean_m: mean(|bound| bound.sd_position_m),
-            median_m: below.midpoint(above),
+            median_m: percentile(&sds_m, 50.0)?,
             mean_error_m: mean(Bound::mean_error_m),
             best: bounds.first().map(limit)?,
             worst: bounds.last().map(limit)?,

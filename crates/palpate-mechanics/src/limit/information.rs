@@ -3,27 +3,23 @@
 //! Readings with independent Gaussian noise, each divided by the standard deviation of its noise, have the Fisher
 //! information F = JᵀJ, where J holds the derivative of every reading (rows) with respect to every parameter (columns).
 //! No unbiased estimator has a covariance below F⁻¹ (Kay, *Fundamentals of Statistical Signal Processing: Estimation
-//! Theory*, 1993, section 3.9). F itself is never formed: with J = Q·R its inverse is R⁻¹·R⁻ᵀ, and R keeps the digits that
+//! Theory*, 1993, section 3.9). F itself is never formed: with J = Q·R it is Rᵀ·R, and R keeps the digits that
 //! squaring loses where two columns are nearly parallel, as those of force and position are near a support.
+
+use palpate_numerics::small::{Ldl, Matrix, dot};
 
 /// A column that the columns before it explain to within this share of its length says nothing of its own: derivatives
 /// taken by differences are precise to 10⁻¹⁰, so what is left is rounding.
 const EXPLAINED: f64 = 1e-9;
 
 /// F⁻¹ for the columns of J, P by P, in their order; `None` where F is singular to rounding.
-pub(super) fn inverse_information<const P: usize>(mut columns: [Vec<f64>; P]) -> Option<[[f64; P]; P]> {
-    let inverse = inverse(&orthogonalise(&mut columns)?);
-    let mut covariance = [[0.0; P]; P];
-    for (i, row) in covariance.iter_mut().enumerate() {
-        for (j, entry) in row.iter_mut().enumerate() {
-            *entry = inverse.iter().map(|column| column[i] * column[j]).sum();
-        }
-    }
+pub(super) fn inverse_information<const P: usize>(mut columns: [Vec<f64>; P]) -> Option<Matrix<P>> {
+    let covariance = Ldl::of_root(&orthogonalise(&mut columns)?).inverse();
     covariance.iter().flatten().all(|entry| entry.is_finite()).then_some(covariance)
 }
 
-/// Modified Gram–Schmidt: the columns of J become those of Q, and the columns of R are returned.
-fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<[[f64; P]; P]> {
+/// Modified Gram–Schmidt: the columns of J become those of Q, and Rᵀ is returned.
+fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<Matrix<P>> {
     let mut triangle = [[0.0; P]; P];
     for (j, shares) in triangle.iter_mut().enumerate() {
         let (before, rest) = columns.split_at_mut(j);
@@ -41,23 +37,6 @@ fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<[[f64; P
         shares[j] = left;
     }
     Some(triangle)
-}
-
-/// The columns of R⁻¹ from those of R, by back-substitution.
-fn inverse<const P: usize>(triangle: &[[f64; P]; P]) -> [[f64; P]; P] {
-    let mut inverse = [[0.0; P]; P];
-    for (j, solved) in inverse.iter_mut().enumerate() {
-        for row in (0..=j).rev() {
-            let unit = if row == j { 1.0 } else { 0.0 };
-            let known: f64 = (row + 1..=j).map(|k| triangle[k][row] * solved[k]).sum();
-            solved[row] = (unit - known) / triangle[row][row];
-        }
-    }
-    inverse
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 pub(super) fn norm(a: &[f64]) -> f64 {

@@ -8,6 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::*;
 use crate::contact::Position;
 use crate::surface::{Beam, Extent, InfluenceFunction};
+use palpate_numerics::small::dot;
 
 /// The founding paper's beam.
 const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
@@ -159,7 +160,7 @@ fn most_likely(limit: &Limit, reading: &[f64], near_m: f64, step_m: f64, force: 
         let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
         let scale = match force {
             Force::Known => 1.0,
-            Force::Unknown => information::dot(&shape, reading) / information::dot(&shape, &shape),
+            Force::Unknown => dot(&shape, reading) / dot(&shape, &shape),
         };
         shape.iter().zip(reading).map(|(s, r)| (r - scale * s).powi(2)).sum::<f64>()
     };

@@ -1,9 +1,10 @@
 //! Contacts far apart whose readings are alike.
 
 use super::grid::Grid;
-use super::information::{dot, norm};
+use super::information::norm;
 use super::{Force, Limit};
 use crate::contact::{Contact, Position};
+use palpate_numerics::small::dot;
 
 /// Points of the straight way between two contacts at which their difference is looked at.
 const WAY_POINTS: u32 = 48;

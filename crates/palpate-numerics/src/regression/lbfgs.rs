@@ -3,6 +3,8 @@
 
 use std::collections::VecDeque;
 
+use crate::small::dot;
+
 /// Pairs of steps and gradient changes that are remembered.
 const MEMORY: usize = 12;
 /// No step changes a variable by more than this; the variables are logarithms, so that is a factor of 7.
@@ -114,10 +116,6 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
 fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
     let curvature = next_value - value - slope;
     if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn add(to: &mut [f64], factor: f64, other: &[f64]) {

@@ -1,12 +1,12 @@
 //! The paper's figures 2 to 6 redrawn over our seeds, and two of our own.
 
-use maud::{Markup, html};
+use maud::html;
 
 use super::Paper;
-use crate::limit_line::limit_in_words;
+use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
-use crate::study_parts::{Drawn, along, banded, error_chart};
-use crate::{Axis, Chart, ErrorPoint, Marker, ReportError, Series, SeriesKind, Stroke, chart_to_svg};
+use crate::study_parts::{Drawn, along, error_chart};
+use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
 use palpate_estimators::evaluation::Spread;
 use palpate_studies::ArmResults;
 use palpate_studies::paper::COUNTS;
@@ -46,60 +46,32 @@ const PITCH: f64 = 1.3;
 const BESIDE: f64 = 0.5;
 
 impl Paper<'_> {
-    /// Those whose arms were run.
-    pub(super) fn figures(&self) -> Result<Vec<Figure>, ReportError> {
-        let figures = [
-            self.bench_figure()?,
-            self.predicted_against_actual(),
-            self.iterations_by_coding(),
-            self.error_by_coding(),
-            self.error_by_arrangement(),
-            self.effective_length_by_arrangement(),
-            self.errors_of_codings(),
-            self.errors_of_arrangements(),
-        ];
-        Ok(figures.into_iter().flatten().collect())
-    }
-
-    fn predicted_against_actual(&self) -> Option<Figure> {
+    pub(super) fn predicted_against_actual(&self) -> Option<Figure> {
         let outcome = self.report.outcome("position-10")?;
         let length_mm = self.report.length_m() * 1e3;
         let predicted = along(outcome, |located| located.estimate.x_m * 1e3);
-        let drawn = Drawn { arm: "position-10", label: "predicted, median of the seeds", colour: 1 };
-        let mut series = vec![Series {
-            label: "predicted = actual".to_owned(),
-            colour: 6,
-            kind: SeriesKind::Line {
-                points: vec![(0.0, 0.0), (length_mm, length_mm)],
-                stroke: Stroke::Dashed,
-            },
-        }];
-        series.extend(banded(drawn, &predicted, outcome.fits.len()));
+        let ends = vec![(0.0, 0.0), (length_mm, length_mm)];
+        let mut series = vec![Series::dashes("predicted = actual", 6, ends)];
+        series.extend(banded("predicted, median of the seeds", 1, &predicted, outcome.fits.len() > 1));
         series.extend(self.training_points());
-        let chart = Chart {
-            title: "Predicted against actual load position".to_owned(),
-            x: Axis::linear("actual load position, mm").from_to(0.0, length_mm),
-            y: Axis::linear("predicted load position, mm"),
-            series,
-            height_px: 560,
-            ..Chart::default()
-        };
+        let x = Axis::linear("actual load position, mm").from_to(0.0, length_mm);
+        let y = Axis::linear("predicted load position, mm");
+        let chart = Chart::new("Predicted against actual load position", x, y, series).with_height(560);
         let caption = html! {
             "Position output, ten equally spaced training positions: where the networks see the load, against where it is. "
-            (self.band_in_words()) " Where the line leaves the dashes, the estimate is off."
+            (self.seeds_in_words("Lines", "bands")) " Where the line leaves the dashes, the estimate is off."
         };
-        Some(figure(2, &chart, caption))
+        Some(Figure::chart(&chart, caption))
     }
 
     fn training_points(&self) -> Option<Series> {
-        let rig = &self.report.study.study.arms.iter().find(|arm| arm.name == "position-10")?.rig;
+        let rig = &self.report.arm("position-10")?.rig;
         let positions = rig.training.as_ref()?.positions(rig.bench.surface.extent()).ok()?;
         let points = positions.iter().map(|position| (position.x_m * 1e3, position.x_m * 1e3)).collect();
-        let kind = SeriesKind::Points { points, marker: Marker::Circle };
-        Some(Series { label: "training positions".to_owned(), colour: 6, kind })
+        Some(Series::markers("training positions", 6, points, Marker::Circle))
     }
 
-    fn iterations_by_coding(&self) -> Option<Figure> {
+    pub(super) fn iterations_by_coding(&self) -> Option<Figure> {
         let measure = Measure {
             title: "Iterations until training stops",
             axis: Axis::log10("iterations (epochs)"),
@@ -108,28 +80,28 @@ impl Paper<'_> {
         };
         let caption = html! {
             "Iterations against the number of training positions, for the two codings of the output. "
-            (self.bars_in_words()) " The paper prints one number of iterations; the cross shows it."
+            (self.seeds_in_words("Markers", "bars")) " The paper prints one number of iterations; the cross shows it."
         };
-        Some(figure(3, &self.against_count(&measure, &[POSITION, NORMALIZED])?, caption))
+        Some(Figure::chart(&self.against_count(&measure, &[POSITION, NORMALIZED])?, caption))
     }
 
-    fn error_by_coding(&self) -> Option<Figure> {
+    pub(super) fn error_by_coding(&self) -> Option<Figure> {
         let caption = html! {
             "Average error over the whole beam against the number of training positions, for the two codings of the output. "
-            (self.bars_in_words()) (CROSSES)
+            (self.seeds_in_words("Markers", "bars")) (CROSSES)
         };
-        Some(figure(4, &self.against_count(&average_error(), &[POSITION, NORMALIZED])?, caption))
+        Some(Figure::chart(&self.against_count(&average_error(), &[POSITION, NORMALIZED])?, caption))
     }
 
-    fn error_by_arrangement(&self) -> Option<Figure> {
+    pub(super) fn error_by_arrangement(&self) -> Option<Figure> {
         let caption = html! {
             "Average error over the whole beam against the number of training positions, for the three arrangements, all with \
-             the normalized output. " (self.bars_in_words()) (CROSSES)
+             the normalized output. " (self.seeds_in_words("Markers", "bars")) (CROSSES)
         };
-        Some(figure(5, &self.against_count(&average_error(), &[EVEN, MIDDLE_6, MIDDLE_4])?, caption))
+        Some(Figure::chart(&self.against_count(&average_error(), &[EVEN, MIDDLE_6, MIDDLE_4])?, caption))
     }
 
-    fn effective_length_by_arrangement(&self) -> Option<Figure> {
+    pub(super) fn effective_length_by_arrangement(&self) -> Option<Figure> {
         let measure = Measure {
             title: "Effective length",
             axis: Axis::linear("effective length, % of the beam"),
@@ -138,29 +110,29 @@ impl Paper<'_> {
         };
         let caption = html! {
             "Share of the beam that is located within the tolerance, for the three arrangements, all with the normalized \
-             output. " (self.bars_in_words()) (CROSSES)
+             output. " (self.seeds_in_words("Markers", "bars")) (CROSSES)
         };
-        Some(figure(6, &self.against_count(&measure, &[EVEN, MIDDLE_6, MIDDLE_4])?, caption))
+        Some(Figure::chart(&self.against_count(&measure, &[EVEN, MIDDLE_6, MIDDLE_4])?, caption))
     }
 
-    fn errors_of_codings(&self) -> Option<Figure> {
+    pub(super) fn errors_of_codings(&self) -> Option<Figure> {
         let chart =
             self.errors_of("Location error of the two codings, 10 positions", &[POSITION, NORMALIZED])?;
         let caption = html! {
             "Location error by load position with ten equally spaced training positions, for the two codings of the output. "
-            (self.band_in_words()) (limit_in_words(&chart))
+            (self.seeds_in_words("Lines", "bands")) (limit_in_words(&chart))
         };
-        Some(figure(7, &chart, caption))
+        Some(Figure::chart(&chart, caption))
     }
 
-    fn errors_of_arrangements(&self) -> Option<Figure> {
+    pub(super) fn errors_of_arrangements(&self) -> Option<Figure> {
         let families = [EVEN, MIDDLE_6, MIDDLE_4];
         let chart = self.errors_of("Location error of the three arrangements, 10 positions", &families)?;
         let caption = html! {
             "Location error by load position with ten training positions in the three arrangements, all with the normalized \
-             output. " (self.band_in_words()) (limit_in_words(&chart))
+             output. " (self.seeds_in_words("Lines", "bands")) (limit_in_words(&chart))
         };
-        Some(figure(8, &chart, caption))
+        Some(Figure::chart(&chart, caption))
     }
 
     fn errors_of(&self, title: &str, families: &[Family]) -> Option<Chart> {
@@ -185,15 +157,9 @@ impl Paper<'_> {
         if let Some(first) = series.iter_mut().find(crosses) {
             first.label = "published, in the colour of its kind".to_owned();
         }
-        (!series.is_empty()).then(|| Chart {
-            title: measure.title.to_owned(),
-            x: Axis::linear("number of training positions")
-                .from_to(6.0, 34.0)
-                .ticks_at(COUNTS.map(f64::from)),
-            y: measure.axis.clone(),
-            series,
-            ..Chart::default()
-        })
+        let counts = COUNTS.map(f64::from);
+        let x = Axis::linear("number of training positions").from_to(6.0, 34.0).ticks_at(counts);
+        (!series.is_empty()).then(|| Chart::new(measure.title, x, measure.axis.clone(), series))
     }
 
     /// A thin line through a family's medians and their bars.
@@ -210,10 +176,9 @@ impl Paper<'_> {
             return Vec::new();
         }
         let line = points.iter().map(|point| (point.x, point.y)).collect();
-        let series = |label: &str, kind| Series { label: label.to_owned(), colour: family.colour, kind };
         vec![
-            series("", SeriesKind::Line { points: line, stroke: Stroke::Dashed }),
-            series(family.label, SeriesKind::ErrorBars { points, marker: family.marker }),
+            Series::dashes("", family.colour, line),
+            Series::error_bars(family.label, family.colour, points, family.marker),
         ]
     }
 
@@ -225,24 +190,15 @@ impl Paper<'_> {
                 Some((f64::from(count) + shift + BESIDE, figure.published))
             })
             .collect();
-        (!points.is_empty()).then(|| Series {
-            label: String::new(),
-            colour: family.colour,
-            kind: SeriesKind::Points { points, marker: Marker::Cross },
-        })
+        (!points.is_empty()).then(|| Series::markers("", family.colour, points, Marker::Cross))
     }
 
-    fn band_in_words(&self) -> String {
+    fn seeds_in_words(&self, medians: &str, ranges: &str) -> String {
         match self.report.run.seeds {
             1 => "One seed.".to_owned(),
-            _ => format!("Lines: median over {}; bands: 5–95 % of them.", self.report.seeds_in_words()),
-        }
-    }
-
-    fn bars_in_words(&self) -> String {
-        match self.report.run.seeds {
-            1 => "One seed.".to_owned(),
-            _ => format!("Markers: median over {}; bars: 5–95 % of them.", self.report.seeds_in_words()),
+            _ => {
+                format!("{medians}: median over {}; {ranges}: 5–95 % of them.", self.report.seeds_in_words())
+            }
         }
     }
 }
@@ -256,8 +212,4 @@ fn average_error() -> Measure {
         of: |arm| Some(arm.error_percent),
         key: "error_percent",
     }
-}
-
-fn figure(number: usize, chart: &Chart, caption: Markup) -> Figure {
-    Figure { number, alternative: chart.title.clone(), svg: chart_to_svg(chart), caption }
 }

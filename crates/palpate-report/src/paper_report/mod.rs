@@ -8,36 +8,36 @@ mod verdicts;
 
 use maud::{Markup, html};
 
+use set_up::{arrangements, training};
+
+use super::StudyReport;
+use super::bench_figures::bench_figure;
 use super::numbers::{counted, listed};
-use super::page::{Figures, Page, Section};
-use super::study_parts::{arms_table, footer, glossary, run_table};
+use super::page::{Page, ReportFile, Section};
+use super::study_parts::{arms_table, glossary, made, run_table};
 use super::study_report::{least_error, longest};
-use super::{ReportError, ReportFile, StudyReport};
 use palpate_estimators::evaluation::Spread;
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, claims, published_figures};
 
 const DOI: &str = "https://doi.org/10.5772/53567";
 
-/// Reports the paper's study: `report.html`, one self-contained page, and its figures as SVG and PNG files.
+/// Reports the paper's study: `report.html`, one self-contained page, and its figures as SVG files.
 ///
 /// Figures 2 to 6 and tables 1 to 3 have the paper's numbers. Arms that were not run leave out what needs them.
-///
-/// # Errors
-/// [`ReportError`] when the bench cannot be drawn or a figure does not become a picture.
-pub fn paper_report(report: &StudyReport) -> Result<Vec<ReportFile>, ReportError> {
+pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
     let paper = Paper {
         report,
         published: published_figures(report.results),
         claims: claims(report.outcomes, report.study.judging()),
     };
-    let figures = Figures(paper.figures()?);
-    let page = Page {
+    Page {
         title: "A distributive tactile sensor, replicated".to_owned(),
-        opening: paper.summary(),
-        sections: paper.sections(&figures),
-        footer: footer(report),
-    };
-    page.into_files(figures)
+        lead: lead(),
+        summary: paper.summary(),
+        sections: paper.sections(),
+        made: made(report),
+    }
+    .files()
 }
 
 /// The study with its verdicts.
@@ -48,61 +48,54 @@ struct Paper<'a> {
 }
 
 impl Paper<'_> {
-    fn sections(&self, figures: &Figures) -> Vec<Section> {
-        let section = |id, heading, body| Section { id, heading, body };
+    fn sections(&self) -> Vec<Section> {
+        let bench = self.bench().and_then(|(rig, _, force_n)| {
+            bench_figure("The bench", &rig.bench.surface, &rig.bench.layout, force_n)
+        });
         vec![
-            section("sensor", "The sensor", self.sensor(figures)),
-            section(
-                "training",
-                "How it learns",
-                html! { (self.training()) (self.even_table(1)) (glossary(self.report)) },
-            ),
-            section(
-                "position-output",
-                "The starting point: ten positions",
-                html! { (self.starting_point()) (figures.show(2)) (self.portions_table(2)) },
-            ),
-            section(
-                "output-coding",
-                "Two codings of the output",
-                html! { (figures.show(3)) (figures.show(4)) },
-            ),
-            section(
-                "arrangements",
-                "Where to press: three arrangements",
-                html! { (self.arrangements()) (self.edge_dense_table(3)) (figures.show(5)) (figures.show(6)) },
-            ),
-            section("errors", "Errors along the beam", html! { (figures.show(7)) (figures.show(8)) }),
-            section("published", "Published against replicated", self.published_section(4)),
-            section("claims", "The paper's claims", self.claims_section(5)),
-            section("not-replicated", "What does not replicate", self.not_replicated()),
-            section("open", "What the paper leaves open", self.open_section(6)),
-            section("arms", "All arms", arms_table(self.report, 7)),
-            section("run", "The run", run_table(self.report, 8)),
+            Section::new("sensor", "The sensor").text(self.sensor()).figure(bench),
+            Section::new("training", "How it learns")
+                .text(training())
+                .table(self.even_table())
+                .text(glossary(self.report)),
+            Section::new("position-output", "The starting point: ten positions")
+                .text(self.starting_point())
+                .figure(self.predicted_against_actual())
+                .table(self.portions_table()),
+            Section::new("output-coding", "Two codings of the output")
+                .figure(self.iterations_by_coding())
+                .figure(self.error_by_coding()),
+            Section::new("arrangements", "Where to press: three arrangements")
+                .text(arrangements())
+                .table(self.edge_dense_table())
+                .figure(self.error_by_arrangement())
+                .figure(self.effective_length_by_arrangement()),
+            Section::new("errors", "Errors along the beam")
+                .figure(self.errors_of_codings())
+                .figure(self.errors_of_arrangements()),
+            Section::new("published", "Published against replicated")
+                .text(self.about_published())
+                .table(self.published_table()),
+            Section::new("claims", "The paper's claims").text(self.about_claims()).table(self.claims_table()),
+            Section::new("not-replicated", "What does not replicate").text(self.not_replicated()),
+            Section::new("open", "What the paper leaves open")
+                .text(self.about_open())
+                .table(self.open_table()),
+            Section::new("arms", "All arms").table(arms_table(self.report)),
+            Section::new("run", "The run").table(run_table(self.report)),
         ]
     }
 
     fn summary(&self) -> Markup {
         html! {
-            p.lead {
-                "A bent beam can tell where it is touched. This page repeats, in simulation, the study with which P. \
-                 Tongpadungrod showed how to train a small neural network to do so, and sets every figure that the paper \
-                 prints beside the same figure found here: "
-                cite { "Neural network training techniques for improving the performance of a distributive tactile sensor" }
-                ", International Journal of Advanced Robotic Systems, " a href=(DOI) { "doi:10.5772/53567" } "."
+            li { (self.what_was_done()) }
+            li { (self.agreement()) }
+            li { (self.claims_in_short()) }
+            @if let Some(sentence) = self.report.not_converged() { li { (sentence) } }
+            @if let Some(best) = least_error(self.report) {
+                li { (best) @if let Some(pitch) = self.sensor_pitch_mm() { " The sensors stand " (pitch) " mm apart." } }
             }
-            div.summary {
-                ul {
-                    li { (self.what_was_done()) }
-                    li { (self.agreement()) }
-                    li { (self.claims_in_short()) }
-                    @if let Some(sentence) = self.report.not_converged() { li { (sentence) } }
-                    @if let Some(best) = least_error(self.report) {
-                        li { (best) @if let Some(pitch) = self.sensor_pitch_mm() { " The sensors stand " (pitch) " mm apart." } }
-                    }
-                    @if let Some(best) = longest(self.report) { li { (best) } }
-                }
-            }
+            @if let Some(best) = longest(self.report) { li { (best) } }
         }
     }
 
@@ -157,6 +150,18 @@ impl Paper<'_> {
     fn published(&self, arm: &str, key: &str) -> Option<&PublishedFigure> {
         let id = format!("{arm}.{key}");
         self.published.iter().find(|figure| figure.id == id)
+    }
+}
+
+fn lead() -> Markup {
+    html! {
+        p.lead {
+            "A bent beam can tell where it is touched. This page repeats, in simulation, the study with which P. \
+             Tongpadungrod showed how to train a small neural network to do so, and sets every figure that the paper \
+             prints beside the same figure found here: "
+            cite { "Neural network training techniques for improving the performance of a distributive tactile sensor" }
+            ", International Journal of Advanced Robotic Systems, " a href=(DOI) { "doi:10.5772/53567" } "."
+        }
     }
 }
 

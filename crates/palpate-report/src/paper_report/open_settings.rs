@@ -31,7 +31,17 @@ const OF_THE_NETWORK: [(&str, &str); 13] = [
 ];
 
 impl Paper<'_> {
-    pub(super) fn open_section(&self, table: usize) -> Markup {
+    pub(super) fn about_open(&self) -> Markup {
+        html! {
+            p {
+                "The paper does not say everything that a replication has to know. Where it is silent, the study's file decides; \
+                 the table lists its decisions as they were in this run."
+            }
+            (self.why_not_the_printed_modulus())
+        }
+    }
+
+    pub(super) fn open_table(&self) -> Table {
         let mut rows: Vec<Vec<Markup>> = Vec::new();
         if let Some((rig, beam, force_n)) = self.bench() {
             rows.push(modulus_row(beam));
@@ -41,20 +51,8 @@ impl Paper<'_> {
         rows.extend(OF_THE_NETWORK.iter().filter_map(|(key, paper)| self.network_row(key, paper)));
         rows.push(cells("iteration", "undefined", "one epoch: every training position shown once"));
         rows.push(cells("networks of each kind", "one", &self.report.seeds_in_words()));
-        let table = Table {
-            number: table,
-            caption: html! { "Settings of this study, beside what the paper says of them." },
-            columns: vec![words("setting"), words("the paper"), words("this study")],
-            rows,
-        };
-        html! {
-            p {
-                "The paper does not say everything that a replication has to know. Where it is silent, the study's file decides; \
-                 the table lists its decisions as they were in this run."
-            }
-            (self.why_not_the_printed_modulus())
-            (table.markup())
-        }
+        let columns = [words("setting"), words("the paper"), words("this study")];
+        Table::new(columns, rows, html! { "Settings of this study, beside what the paper says of them." })
     }
 
     /// What the beam would do with the modulus as printed, unless the study uses it.

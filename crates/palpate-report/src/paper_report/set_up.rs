@@ -3,10 +3,7 @@
 use maud::{Markup, html};
 
 use super::Paper;
-use crate::ReportError;
-use crate::beam_drawing::beam_drawing;
 use crate::numbers::{counted, mm, number, stated};
-use crate::page::{Figure, Figures};
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_rig::Rig;
@@ -28,23 +25,7 @@ impl Paper<'_> {
         pitches.iter().all(|pitch| (pitch - first).abs() < 1e-6).then(|| number(first * 1e3))
     }
 
-    /// Figure 1.
-    pub(super) fn bench_figure(&self) -> Result<Option<Figure>, ReportError> {
-        let Some((rig, beam, force_n)) = self.bench() else { return Ok(None) };
-        let (svg, load) = beam_drawing(&beam, &rig.bench.layout, force_n)?;
-        let caption = html! {
-            "The bench: a beam on two wedges, " (counted(rig.bench.layout.len(), "sensor", "sensors")) " beneath it and a load of "
-            (stated(force_n)) " N, here at " (mm(load.x_m)) " mm. Blue: the bent beam, in closed form."
-        };
-        Ok(Some(Figure {
-            number: 1,
-            alternative: "The bench: beam, supports, sensors and load".to_owned(),
-            svg,
-            caption,
-        }))
-    }
-
-    pub(super) fn sensor(&self, figures: &Figures) -> Markup {
+    pub(super) fn sensor(&self) -> Markup {
         html! {
             p {
                 "A distributive tactile sensor has few sensors and they all stand under one elastic surface. Wherever the \
@@ -54,30 +35,6 @@ impl Paper<'_> {
                  two of them."
             }
             @if let Some((rig, beam, force_n)) = self.bench() { (bench_in_words(rig, beam, force_n)) }
-            (figures.show(1))
-        }
-    }
-
-    pub(super) fn training(&self) -> Markup {
-        html! {
-            p {
-                "The interpreter is a small feed-forward network. Its inputs are the sensors' readings; its single output \
-                 stands for the position of the load. It is trained by back-propagation: a load is put at a few known "
-                b { "training positions" } ", the network is shown the readings again and again, and each time its weights \
-                 move so that its output comes nearer to the known position. After that it has to locate loads at places \
-                 that it never saw."
-            }
-            p {
-                "The paper asks three things. What should the output stand for: the plain position in metres, or the \
-                 position divided by the beam's length, which uses the whole range of the output? How many training \
-                 positions are enough? And does it help to crowd them towards the supports?"
-            }
-            p {
-                "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
-                 training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
-                 and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
-                code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
-            }
         }
     }
 
@@ -89,14 +46,37 @@ impl Paper<'_> {
             }
         }
     }
+}
 
-    pub(super) fn arrangements(&self) -> Markup {
-        html! {
-            p {
-                "Equally spaced training positions leave the network to guess beyond the first and the last of them. So the \
-                 paper tries arrangements with the same number of positions, but fewer of them in the middle portion and \
-                 more near the supports. All networks of these arrangements have the normalized output."
-            }
+pub(super) fn training() -> Markup {
+    html! {
+        p {
+            "The interpreter is a small feed-forward network. Its inputs are the sensors' readings; its single output \
+             stands for the position of the load. It is trained by back-propagation: a load is put at a few known "
+            b { "training positions" } ", the network is shown the readings again and again, and each time its weights \
+             move so that its output comes nearer to the known position. After that it has to locate loads at places \
+             that it never saw."
+        }
+        p {
+            "The paper asks three things. What should the output stand for: the plain position in metres, or the \
+             position divided by the beam's length, which uses the whole range of the output? How many training \
+             positions are enough? And does it help to crowd them towards the supports?"
+        }
+        p {
+            "Each way to train is an " b { "arm" } " of the study, named after what the output stands for or where the \
+             training positions are, and after their number: " code { "position-10" } " has the plain position as its output \
+             and ten training positions, " code { "normalized-20" } " the position divided by the length and twenty, "
+            code { "middle4-30" } " thirty, four of which lie in the middle portion, and again a normalized output."
+        }
+    }
+}
+
+pub(super) fn arrangements() -> Markup {
+    html! {
+        p {
+            "Equally spaced training positions leave the network to guess beyond the first and the last of them. So the \
+             paper tries arrangements with the same number of positions, but fewer of them in the middle portion and \
+             more near the supports. All networks of these arrangements have the normalized output."
         }
     }
 }

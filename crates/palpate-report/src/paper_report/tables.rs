@@ -3,13 +3,12 @@
 use maud::{Markup, html};
 
 use super::{Paper, ours};
-use crate::numbers::{NOTHING, listed, mm, number, spread};
+use crate::numbers::{NOTHING, listed, mm, number, spread, stretch};
 use crate::page::{Table, numeric, short, text, wide};
-use crate::study_parts::portion_in_words;
-use palpate_estimators::arrangement::Arrangement;
-use palpate_estimators::arrangement::Training;
+use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::evaluation::{Portion, Spread};
 use palpate_mechanics::contact::Position;
+use palpate_studies::PortionResults;
 
 /// Arms with the same training positions.
 struct Set<'a> {
@@ -38,120 +37,90 @@ impl Paper<'_> {
         sets
     }
 
-    pub(super) fn even_table(&self, table: usize) -> Markup {
+    pub(super) fn even_table(&self) -> Table {
         let sets = self.sets(|arrangement| *arrangement == Arrangement::Even);
         let rows = sets.iter().enumerate().map(|(i, set)| {
             vec![
                 text((i + 1).to_string()),
                 text(set.positions.len().to_string()),
-                html! { (end(set.positions.first())) },
-                html! { (even_pitch(&set.positions)) },
-                html! { (end(set.positions.last())) },
-                html! { (listed(&set.arms)) },
+                text(end(set.positions.first())),
+                text(even_pitch(&set.positions)),
+                text(end(set.positions.last())),
+                text(listed(&set.arms)),
             ]
         });
-        shown(&Table {
-            number: table,
-            caption: html! { "Equally spaced sets of training positions, computed from their rule." },
-            columns: vec![
-                short("set"),
-                numeric("positions"),
-                numeric("first, mm"),
-                numeric("pitch, mm"),
-                numeric("last, mm"),
-                short("arms"),
-            ],
-            rows: rows.collect(),
-        })
+        let columns = [
+            short("set"),
+            numeric("positions"),
+            numeric("first, mm"),
+            numeric("pitch, mm"),
+            numeric("last, mm"),
+            short("arms"),
+        ];
+        let caption = html! { "Equally spaced sets of training positions, computed from their rule." };
+        Table::new(columns, rows, caption)
     }
 
-    pub(super) fn edge_dense_table(&self, table: usize) -> Markup {
-        let sets = self.sets(|arrangement| matches!(arrangement, Arrangement::EdgeDense { .. }));
-        shown(&Table {
-            number: table,
-            caption: html! {
-                "Sets with few training positions in the middle portion and the others near the supports, computed from their \
-                 rule. The middle portion" (middle_in_words(&sets, self.report.length_m())) " begins and ends with a training position; dots \
-                 part it from the edges."
-            },
-            columns: vec![
-                short("set"),
-                numeric("positions"),
-                numeric("in the middle"),
-                numeric("in each edge"),
-                numeric("start, mm"),
-                numeric("pitch in the edges, mm"),
-                numeric("pitch in the middle, mm"),
-                wide("positions, mm"),
-                short("arm"),
-            ],
-            rows: sets.iter().filter_map(|set| edge_dense_row(set, self.report.length_m())).collect(),
-        })
-    }
-
-    pub(super) fn portions_table(&self, table: usize) -> Markup {
-        let Some(arm) = self.report.results.arm("position-10") else { return Markup::default() };
+    pub(super) fn edge_dense_table(&self) -> Table {
         let length_m = self.report.length_m();
-        let mut rows = Vec::new();
-        if let Some(portion) = self.report.judged_portion() {
-            rows.push(self.portion_row("average", portion, "error_percent", arm.error_percent, length_m));
-        }
-        for results in &arm.portions {
-            let key = format!("error_percent_{}", results.portion.key());
-            rows.push(self.portion_row("average", results.portion, &key, results.error_percent, length_m));
-        }
-        for results in &arm.portions {
-            let key = format!("max_error_percent_{}", results.portion.key());
-            rows.push(self.portion_row(
-                "largest",
-                results.portion,
-                &key,
-                results.max_error_percent,
-                length_m,
-            ));
-        }
-        shown(&Table {
-            number: table,
-            caption: html! {
-                "Percentage errors of the plain position output with ten training positions, by portion of the beam: what the \
-                 paper prints, and the median found here (5–95 % of the seeds)."
-            },
-            columns: vec![
-                short("portion"),
-                short("error"),
-                numeric("published, %"),
-                numeric("found, %"),
-                numeric("found, mm"),
-            ],
-            rows,
-        })
+        let sets = self.sets(|arrangement| matches!(arrangement, Arrangement::EdgeDense { .. }));
+        let columns = [
+            short("set"),
+            numeric("positions"),
+            numeric("in the middle"),
+            numeric("in each edge"),
+            numeric("start, mm"),
+            numeric("pitch in the edges, mm"),
+            numeric("pitch in the middle, mm"),
+            wide("positions, mm"),
+            short("arm"),
+        ];
+        let caption = html! {
+            "Sets with few training positions in the middle portion and the others near the supports, computed from their \
+             rule. The middle portion" (middle_in_words(&sets, length_m)) " begins and ends with a training position; dots \
+             part it from the edges."
+        };
+        Table::new(columns, sets.iter().filter_map(|set| edge_dense_row(set, length_m)), caption)
     }
 
-    fn portion_row(
-        &self,
-        kind: &str,
-        portion: Portion,
-        key: &str,
-        found: Spread,
-        length_m: f64,
-    ) -> Vec<Markup> {
-        let mm_of_percent = length_m * 1e3 / 100.0;
-        let Spread { median, p05, p95 } = found;
-        let found_mm =
-            Spread { median: median * mm_of_percent, p05: p05 * mm_of_percent, p95: p95 * mm_of_percent };
+    pub(super) fn portions_table(&self) -> Table {
+        let mut rows = Vec::new();
+        if let Some(arm) = self.report.results.arm("position-10") {
+            let all = self.report.judged_portion();
+            rows.extend(all.map(|all| self.portion_row("average", all, "error_percent", arm.error_percent)));
+            rows.extend(arm.portions.iter().map(|PortionResults { portion, error_percent, .. }| {
+                let key = format!("error_percent_{}", portion.key());
+                self.portion_row("average", *portion, &key, *error_percent)
+            }));
+            rows.extend(arm.portions.iter().map(|PortionResults { portion, max_error_percent, .. }| {
+                let key = format!("max_error_percent_{}", portion.key());
+                self.portion_row("largest", *portion, &key, *max_error_percent)
+            }));
+        }
+        let columns = [
+            short("portion"),
+            short("error"),
+            numeric("published, %"),
+            numeric("found, %"),
+            numeric("found, mm"),
+        ];
+        let caption = html! {
+            "Percentage errors of the plain position output with ten training positions, by portion of the beam: what the \
+             paper prints, and the median found here (5–95 % of the seeds)."
+        };
+        Table::new(columns, rows, caption)
+    }
+
+    fn portion_row(&self, kind: &str, portion: Portion, key: &str, found: Spread) -> Vec<Markup> {
         let published = self.published("position-10", key);
         vec![
-            text(portion_in_words(portion)),
+            text(stretch(portion)),
             text(kind),
-            html! { (published.map_or(NOTHING.to_owned(), super::verdicts::printed)) },
+            text(published.map_or(NOTHING.to_owned(), super::verdicts::printed)),
             text(spread(published.map_or(found, ours), number)),
-            text(spread(found_mm, number)),
+            text(spread(found.scaled(self.report.length_m() * 1e3 / 100.0), number)),
         ]
     }
-}
-
-fn shown(table: &Table) -> Markup {
-    if table.rows.is_empty() { Markup::default() } else { table.markup() }
 }
 
 fn end(position: Option<&Position>) -> String {
@@ -203,7 +172,7 @@ fn middle_in_words(sets: &[Set], length_m: f64) -> String {
         .filter_map(|set| {
             let Arrangement::EdgeDense { portion, .. } = &set.training.arrangement else { return None };
             let (from_m, to_m) = (portion.0 * length_m, portion.1 * length_m);
-            Some(portion_in_words(Portion { from_m, to_m }))
+            Some(stretch(Portion { from_m, to_m }))
         })
         .collect();
     portions.dedup();

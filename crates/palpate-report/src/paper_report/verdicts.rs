@@ -11,10 +11,19 @@ use palpate_studies::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
 const MOST_SEEDS: f64 = 0.5;
 
 impl Paper<'_> {
-    pub(super) fn published_section(&self, table: usize) -> Markup {
+    pub(super) fn about_published(&self) -> Markup {
         if self.published.is_empty() {
             return html! { p { "No arm with a published figure was run." } };
         }
+        html! {
+            p {
+                "Each published figure comes from one network that the author trained; another random start would have given \
+                 another figure. How far ours may be off to count as agreeing was fixed beforehand."
+            }
+        }
+    }
+
+    pub(super) fn published_table(&self) -> Table {
         let rows = self.published.iter().map(|figure| {
             vec![
                 text(figure.arm),
@@ -25,35 +34,28 @@ impl Paper<'_> {
                 verdict(figure.agrees, "agrees", "differs"),
             ]
         });
-        let table = Table {
-            number: table,
-            caption: html! {
-                "Every figure that the paper prints and that belongs to an arm here, beside the median found here (5–95 % of \
-                 the seeds)."
-            },
-            columns: vec![
-                short("arm"),
-                short("figure"),
-                numeric("published"),
-                numeric("found"),
-                short("agrees if within"),
-                short("verdict"),
-            ],
-            rows: rows.collect(),
+        let columns = [
+            short("arm"),
+            short("figure"),
+            numeric("published"),
+            numeric("found"),
+            short("agrees if within"),
+            short("verdict"),
+        ];
+        let caption = html! {
+            "Every figure that the paper prints and that belongs to an arm here, beside the median found here (5–95 % of \
+             the seeds)."
         };
+        Table::new(columns, rows, caption)
+    }
+
+    pub(super) fn about_claims(&self) -> Markup {
         html! {
-            p {
-                "Each published figure comes from one network that the author trained; another random start would have given \
-                 another figure. How far ours may be off to count as agreeing was fixed beforehand."
-            }
-            (table.markup())
+            @if self.claims.is_empty() { p { "The arms that the paper's claims are about were not all run." } }
         }
     }
 
-    pub(super) fn claims_section(&self, table: usize) -> Markup {
-        if self.claims.is_empty() {
-            return html! { p { "The arms that the paper's claims are about were not all run." } };
-        }
+    pub(super) fn claims_table(&self) -> Table {
         let rows = self.claims.iter().map(|claim| {
             vec![
                 text(claim.id),
@@ -65,23 +67,15 @@ impl Paper<'_> {
                 text(share(claim.share_of_seeds)),
             ]
         });
-        let table = Table {
-            number: table,
-            caption: html! {
-                "The paper's claims in our words, each parted into what a program can check. A claim holds when every part of \
-                 it holds in the medians. ✓ and ✗ say whether a part does; beside them is the share of the seeds for which it \
-                 holds, each seed of one arm beside the same seed of another, and in the last column the share of those for \
-                 which every part holds."
-            },
-            columns: vec![
-                short("claim"),
-                wide("in words, and its parts"),
-                short("verdict"),
-                numeric("share of seeds"),
-            ],
-            rows: rows.collect(),
+        let columns =
+            [short("claim"), wide("in words, and its parts"), short("verdict"), numeric("share of seeds")];
+        let caption = html! {
+            "The paper's claims in our words, each parted into what a program can check. A claim holds when every part of \
+             it holds in the medians. ✓ and ✗ say whether a part does; beside them is the share of the seeds for which it \
+             holds, each seed of one arm beside the same seed of another, and in the last column the share of those for \
+             which every part holds."
         };
-        html! { (table.markup()) }
+        Table::new(columns, rows, caption)
     }
 
     pub(super) fn not_replicated(&self) -> Markup {

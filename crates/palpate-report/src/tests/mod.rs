@@ -1,20 +1,21 @@
-//! Properties of the drawings, read back from the SVG by the same parser that makes the PNG.
+//! Properties of the drawings, read back from the SVG by a parser of XML.
 
-mod bench;
+mod beams;
 mod charts;
 mod dead_areas;
 mod elliott;
 mod pages;
 mod parts;
+#[cfg(feature = "png")]
+mod pictures;
 
 use super::geometry::Rect;
-use super::png;
-use resvg::usvg;
+use super::text;
 
 /// A drawing read back.
 struct Seen {
     image: Rect,
-    /// Every text and the box of its font's line.
+    /// Every text and the box of its line, as wide as it is estimated to be.
     texts: Vec<(String, Rect)>,
     /// The box of every line and shape, with its stroke.
     shapes: Vec<(Paint, Rect)>,
@@ -28,49 +29,65 @@ struct Paint {
 }
 
 fn see(svg: &str) -> Seen {
-    let tree = png::parse(svg).expect("well-formed SVG");
-    let image =
-        Rect { left: 0.0, top: 0.0, right: tree.size().width().into(), bottom: tree.size().height().into() };
+    let document = roxmltree::Document::parse(svg).expect("well-formed SVG");
+    let root = document.root_element();
+    let image = Rect { left: 0.0, top: 0.0, right: number(root, "width"), bottom: number(root, "height") };
     let mut seen = Seen { image, texts: Vec::new(), shapes: Vec::new() };
-    walk(tree.root(), &mut seen);
+    for element in root.children().filter(roxmltree::Node::is_element) {
+        if element.tag_name().name() == "text" {
+            seen.texts.push((element.text().unwrap_or_default().trim().to_owned(), text_box(element)));
+        } else {
+            let paint = |name| element.attribute(name).filter(|paint| *paint != "none").map(str::to_owned);
+            seen.shapes.push((Paint { stroke: paint("stroke"), fill: paint("fill") }, shape_box(element)));
+        }
+    }
     seen
 }
 
-fn walk(group: &usvg::Group, seen: &mut Seen) {
-    for node in group.children() {
-        match node {
-            usvg::Node::Group(group) => walk(group, seen),
-            usvg::Node::Path(path) => {
-                let paint = Paint {
-                    stroke: path.stroke().map(|stroke| hex(stroke.paint())),
-                    fill: path.fill().map(|fill| hex(fill.paint())),
-                };
-                seen.shapes.push((paint, rect(path.abs_stroke_bounding_box())));
-            }
-            usvg::Node::Text(text) => {
-                let characters =
-                    text.chunks().iter().map(|chunk| chunk.text().trim()).collect::<Vec<_>>().join(" ");
-                seen.texts.push((characters, rect(text.abs_bounding_box())));
-            }
-            usvg::Node::Image(_) => panic!("no drawing holds an image"),
+fn number(element: roxmltree::Node, name: &str) -> f64 {
+    let text = element.attribute(name).unwrap_or_else(|| panic!("{element:?} has no {name}"));
+    text.parse().unwrap_or_else(|_| panic!("{name} of {element:?} is no number"))
+}
+
+fn text_box(element: roxmltree::Node) -> Rect {
+    let [x, y, size] = ["x", "y", "font-size"].map(|name| number(element, name));
+    let width = text::width(element.text().unwrap_or_default().trim(), size);
+    let left = match element.attribute("text-anchor") {
+        Some("start") => x,
+        Some("middle") => x - 0.5 * width,
+        Some("end") => x - width,
+        other => panic!("a text is anchored at its {other:?}"),
+    };
+    // Ascent and descent of Noto Sans, above and below the baseline.
+    Rect { left, right: left + width, top: y - 1.07 * size, bottom: y + 0.29 * size }
+}
+
+fn shape_box(element: roxmltree::Node) -> Rect {
+    let of = |name| number(element, name);
+    match element.tag_name().name() {
+        "rect" => {
+            Rect { left: of("x"), top: of("y"), right: of("x") + of("width"), bottom: of("y") + of("height") }
         }
+        "circle" => around(&[(of("cx"), of("cy"))], of("r")),
+        "polygon" => around(&points(element), 0.0),
+        "polyline" => around(&points(element), 0.5 * of("stroke-width")),
+        other => panic!("no drawing holds a {other}"),
     }
 }
 
-fn hex(paint: &usvg::Paint) -> String {
-    match paint {
-        usvg::Paint::Color(colour) => format!("#{:02x}{:02x}{:02x}", colour.red, colour.green, colour.blue),
-        _ => panic!("no drawing is painted with patterns"),
-    }
+fn points(element: roxmltree::Node) -> Vec<(f64, f64)> {
+    let point = |point: &str| {
+        let (x, y) = point.split_once(',').expect("two coordinates");
+        (x.parse().expect("a number"), y.parse().expect("a number"))
+    };
+    element.attribute("points").expect("points").split(' ').map(point).collect()
 }
 
-fn rect(bounds: usvg::Rect) -> Rect {
-    Rect {
-        left: bounds.left().into(),
-        top: bounds.top().into(),
-        right: bounds.right().into(),
-        bottom: bounds.bottom().into(),
-    }
+/// The box of some points, and `margin` around it.
+fn around(points: &[(f64, f64)], margin: f64) -> Rect {
+    let least = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min) - margin;
+    let most = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::NEG_INFINITY, f64::max) + margin;
+    Rect { left: least(|at| at.0), right: most(|at| at.0), top: least(|at| at.1), bottom: most(|at| at.1) }
 }
 
 /// Whether two boxes share more than a tenth of a pixel in both directions.

@@ -4,8 +4,7 @@ use super::super::chart::{Axis, Ticks};
 use super::super::geometry::Rect;
 use super::super::scale::AxisScale;
 use super::super::ticks::{self, Tick};
-use super::super::{PngError, canvas, png, svg_to_png, text};
-use super::see;
+use super::super::{svg, text};
 use proptest::prelude::*;
 
 fn labels(ticks: &[Tick]) -> Vec<&str> {
@@ -126,45 +125,6 @@ fn a_clipped_polygon_keeps_the_common_area() {
 }
 
 #[test]
-fn estimated_widths_are_not_below_those_of_the_built_in_font() {
-    let texts = [
-        "load position, mm",
-        "WWW MMM www mmm %%% @@",
-        "illicit fjord (tr) [!]",
-        "0123456789,.",
-        "≤ ± × − µ ° é Ä ß",
-    ];
-    for content in
-        texts.into_iter().chain(["normalized output, n = 30", "EFFECTIVE LENGTH, QUEUE", "a<b>c&d~#+="])
-    {
-        let label = canvas::Label {
-            text: content.into(),
-            at: (10.0, 50.0),
-            anchor: canvas::Anchor::Start,
-            size: 20.0,
-            colour: canvas::INK,
-        };
-        let seen = see(&canvas::svg(900, 100, |canvas| canvas.text(&label)));
-        let (real, estimated) = (seen.texts[0].1.width(), text::width(content, 20.0));
-        assert!(real <= estimated && estimated < 1.7 * real, "{content:?}: {real} against {estimated}");
-    }
-}
-
-#[test]
-fn the_built_in_font_has_the_signs_that_figures_use() {
-    for sign in "…−×±≤≥µ°–ÄÖÜäöüßéσλ".chars() {
-        let glyph = |text: String| {
-            svg_to_png(&format!(
-            "<svg xmlns='http://www.w3.org/2000/svg' width='40' height='40'><text x='5' y='30' font-size='24' \
-             font-family='sans-serif'>{text}</text></svg>"
-        ), 1.0).unwrap()
-        };
-        assert_ne!(glyph(sign.to_string()), glyph("\u{10ffff}".into()), "{sign} is missing");
-        assert_ne!(glyph(sign.to_string()), glyph(" ".into()), "{sign} is blank");
-    }
-}
-
-#[test]
 fn a_fitted_text_is_no_wider_than_its_room() {
     let long = "effective length, % of the length of the beam";
     assert_eq!(text::fit(long, 12.0, 1000.0), long);
@@ -183,17 +143,7 @@ fn a_fitted_text_is_no_wider_than_its_room() {
 #[test]
 fn colours_of_the_palette_differ_and_start_over() {
     for index in 0..7 {
-        assert!((0..index).all(|other| canvas::palette(other) != canvas::palette(index)));
-        assert_eq!(canvas::palette(index), canvas::palette(index + 7));
+        assert!((0..index).all(|other| svg::palette(other) != svg::palette(index)));
+        assert_eq!(svg::palette(index), svg::palette(index + 7));
     }
-}
-
-#[test]
-fn what_is_no_drawing_gives_an_error() {
-    assert!(matches!(svg_to_png("no drawing", 1.0), Err(PngError::Svg(_))));
-    let svg = canvas::svg(320, 240, |_| {});
-    for scale in [0.0, -1.0, 0.001, 1e6, f32::NAN, f32::INFINITY] {
-        assert!(matches!(svg_to_png(&svg, scale), Err(PngError::Size { .. })), "{scale}");
-    }
-    assert_eq!(png::parse(&svg).unwrap().size().width(), 320.0);
 }

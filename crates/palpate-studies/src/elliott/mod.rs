@@ -75,6 +75,18 @@ pub enum Chain {
     Smoother,
 }
 
+impl std::fmt::Display for Chain {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Chain::Components(count) => return write!(out, "network on {count} components"),
+            Chain::Readings => "network on all readings",
+            Chain::Influence => "influence locator",
+            Chain::Filter => "influence locator, filter",
+            Chain::Smoother => "influence locator, smoother",
+        })
+    }
+}
+
 /// How one chain did, over the calibrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainRow {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::COUNTS;
 use crate::{ArmOutcome, Judging, TrainedSeed};
-use palpate_estimators::evaluation::{Portion, percentile};
+use palpate_estimators::evaluation::Portion;
 
 /// A claim and its verdict.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -232,9 +232,8 @@ impl Table<'_> {
         let seeds = self.outcomes.iter().map(|outcome| outcome.fits.len()).min().unwrap_or(0);
         let asked = std::cell::Cell::new(true);
         let median = |name: &str, figure: Figure| {
-            let mut values: Vec<f64> = self.fits(name).iter().map(|fit| self.figure(fit, figure)).collect();
-            values.sort_by(f64::total_cmp);
-            percentile(&values, 50.0).unwrap_or_else(|| {
+            let values = self.fits(name).iter().map(|fit| self.figure(fit, figure)).collect();
+            palpate_numerics::median(values).unwrap_or_else(|| {
                 asked.set(false);
                 f64::NAN
             })

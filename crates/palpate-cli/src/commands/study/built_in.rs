@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::Observer;
 use palpate_numerics::watch::Watch;
-use palpate_report::{ReportError, ReportFile};
+use palpate_report::ReportFile;
 use std::path::Path;
 
 /// What sets one such study apart from another.
@@ -24,7 +24,7 @@ pub trait BuiltIn {
     /// What it finds.
     fn run(&self, watch: Watch) -> Result<Self::Findings, Self::Error>;
 
-    fn report(&self, findings: &Self::Findings) -> Result<Vec<ReportFile>, ReportError>;
+    fn report(&self, findings: &Self::Findings) -> Vec<ReportFile>;
 
     /// The findings for people.
     fn tell(findings: &Self::Findings) -> String;

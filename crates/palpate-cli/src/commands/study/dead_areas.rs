@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
 use palpate_numerics::watch::Watch;
-use palpate_report::{ReportError, ReportFile, dead_areas_report};
+use palpate_report::{ReportFile, dead_areas_report};
 use palpate_studies::dead_areas::{COUNTS, DeadAreaFindings, DeadAreas, DeadAreasError, RIG_TOML};
 use std::path::Path;
 
@@ -43,7 +43,7 @@ impl BuiltIn for DeadAreas {
         self.run(watch)
     }
 
-    fn report(&self, findings: &DeadAreaFindings) -> Result<Vec<ReportFile>, ReportError> {
+    fn report(&self, findings: &DeadAreaFindings) -> Vec<ReportFile> {
         dead_areas_report(self, findings)
     }
 

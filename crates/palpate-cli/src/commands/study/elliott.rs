@@ -7,7 +7,7 @@ use crate::input;
 use crate::table::table;
 use palpate_estimators::evaluation::Spread;
 use palpate_numerics::watch::Watch;
-use palpate_report::{ReportError, ReportFile, chain_in_words, elliott_report};
+use palpate_report::{ReportFile, elliott_report};
 use palpate_studies::elliott::{COMPONENTS, Elliott, ElliottError, ElliottFindings, PRESENTATIONS, RIG_TOML};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ impl BuiltIn for Elliott {
         self.run(watch)
     }
 
-    fn report(&self, findings: &ElliottFindings) -> Result<Vec<ReportFile>, ReportError> {
+    fn report(&self, findings: &ElliottFindings) -> Vec<ReportFile> {
         elliott_report(self, findings)
     }
 
@@ -53,7 +53,7 @@ impl BuiltIn for Elliott {
         let rows = findings.rows.iter().map(|row| {
             let mm = |spread: Spread| format!("{:.3}", spread.median * 1e3);
             vec![
-                chain_in_words(row.chain),
+                row.chain.to_string(),
                 row.error_m.map_or_else(String::new, mm),
                 row.limit_m.map_or_else(String::new, |limit_m| format!("{:.3}", limit_m * 1e3)),
                 row.effective_percent.map_or_else(String::new, |percent| format!("{:.1}", percent.median)),

@@ -2,6 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::estimator::{Across, Track, Tracked};
+use palpate_estimators::recording::csv_row;
 
 /// What a line of CSV has room for; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]
@@ -25,30 +26,32 @@ impl Columns {
         }
     }
 
+    /// A line of CSV.
     pub fn csv(self, track: &Track) -> String {
         let (first, second) = (track.contacts.first(), track.contacts.get(1));
-        let contact = match self {
-            Self::One | Self::Two => csv_on_line(first),
-            Self::Plane => csv_on_plane(first),
-        };
-        let one = format!("{},{contact},{:.4}", track.time_s, track.touching());
-        match self {
-            Self::One | Self::Plane => one,
-            Self::Two => format!("{one},{},{:.4}", csv_on_line(second), track.numbers[2]),
+        let mut cells = vec![track.time_s.to_string()];
+        cells.extend(match self {
+            Self::One | Self::Two => cells_on_line(first),
+            Self::Plane => cells_on_plane(first),
+        });
+        cells.push(cell(track.touching()));
+        if let Self::Two = self {
+            cells.extend(cells_on_line(second));
+            cells.push(cell(track.numbers[2]));
         }
+        csv_row(cells)
     }
 }
 
-fn csv_on_line(contact: Option<&Tracked>) -> String {
-    let Some(tracked) = contact else { return cells(&[None; 5]) };
+fn cells_on_line(contact: Option<&Tracked>) -> Vec<String> {
+    let Some(tracked) = contact else { return vec![String::new(); 5] };
     let (low_m, high_m) = tracked.x_95_m;
-    let numbers = [tracked.x_m * 1e3, tracked.speed_m_per_s, tracked.force_n, low_m * 1e3, high_m * 1e3];
-    cells(&numbers.map(Some))
+    [tracked.x_m * 1e3, tracked.speed_m_per_s, tracked.force_n, low_m * 1e3, high_m * 1e3].map(cell).to_vec()
 }
 
-fn csv_on_plane(contact: Option<&Tracked>) -> String {
+fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
     let on_plane = contact.and_then(|tracked| Some((tracked, tracked.across?)));
-    let Some((tracked, across)) = on_plane else { return cells(&[None; 9]) };
+    let Some((tracked, across)) = on_plane else { return vec![String::new(); 9] };
     let ((x_low_m, x_high_m), (y_low_m, y_high_m)) = (tracked.x_95_m, across.y_95_m);
     let numbers = [
         tracked.x_m * 1e3,
@@ -61,12 +64,11 @@ fn csv_on_plane(contact: Option<&Tracked>) -> String {
         y_low_m * 1e3,
         y_high_m * 1e3,
     ];
-    cells(&numbers.map(Some))
+    numbers.map(cell).to_vec()
 }
 
-fn cells(numbers: &[Option<f64>]) -> String {
-    let cell = |number: &Option<f64>| number.map_or_else(String::new, |number| format!("{number:.4}"));
-    numbers.iter().map(cell).collect::<Vec<_>>().join(",")
+fn cell(number: f64) -> String {
+    format!("{number:.4}")
 }
 
 /// A track as JSON.

@@ -65,17 +65,3 @@ fn without_sensors_the_prior_is_all() {
     let objective = objective(DesignCriterion::WithinTolerance);
     assert!((objective.value(&objective.state(&[], Vague)) - 1.0).abs() < 1e-12);
 }
-
-#[test]
-#[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
-fn three_unknowns_are_inverted() {
-    let matrix = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
-    let (inverse, determinant) = inverse(&matrix);
-    for i in 0..3 {
-        for k in 0..3 {
-            let product: f64 = (0..3).map(|m| matrix[i][m] * inverse[m][k]).sum();
-            assert!((product - if i == k { 1.0 } else { 0.0 }).abs() < 1e-14);
-        }
-    }
-    assert!((determinant - 20.89).abs() < 1e-12, "{determinant}");
-}

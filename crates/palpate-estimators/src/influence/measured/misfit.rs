@@ -2,12 +2,12 @@
 
 use std::cmp::Ordering;
 
-use ndarray::{Array1, Array2, Axis, s};
+use ndarray::{Axis, s};
 
 use super::fitting::Presses;
 use super::{MeasuredError, Whitening};
-use palpate_numerics::Cholesky;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
+use palpate_numerics::small::Ldl;
 
 /// Distinct positions from which on some can be held out.
 const LEAST_TO_JUDGE: usize = 15;
@@ -72,7 +72,7 @@ fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
 #[derive(Clone, Debug)]
 struct Prediction {
     mean: Vec<f64>,
-    /// J, one column a coordinate.
+    /// J, one column a coordinate: at most x, y and the hidden one.
     slopes: Vec<Vec<f64>>,
     /// v.
     variance: f64,
@@ -100,15 +100,16 @@ impl Prediction {
         let mut residual = vec![0.0; output.len()];
         whitening.apply(output, &mut residual);
         residual.iter_mut().zip(&self.mean).for_each(|(r, mean)| *r -= mean);
-        let d = self.slopes.len();
-        let information =
-            Array2::from_shape_fn((d, d), |(i, j)| self.product(&self.slopes[i], &self.slopes[j], whitening));
-        let pull = Array1::from_shape_fn(d, |i| self.product(&self.slopes[i], &residual, whitening));
-        let covariance = Cholesky::factor(information).ok()?.inverse();
-        let error = covariance.dot(&pull).slice(s![..dimensions]).to_owned();
-        let of_position = covariance.slice(s![..dimensions, ..dimensions]).to_owned();
-        let standardized = Cholesky::factor(of_position).ok()?.solve_lower(&error);
-        let score = standardized.dot(&standardized);
+        let (mut information, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
+        for (i, slope) in self.slopes.iter().enumerate() {
+            pull[i] = self.product(slope, &residual, whitening);
+            for (j, other) in self.slopes.iter().enumerate() {
+                information[i][j] = self.product(slope, other, whitening);
+            }
+        }
+        let factors = Ldl::of_free(&information, std::array::from_fn(|i| i < self.slopes.len()))?;
+        let of_position = Ldl::of_free(&factors.inverse(), std::array::from_fn(|i| i < dimensions))?;
+        let score = of_position.quadratic(factors.solve(pull));
         score.is_finite().then_some(score)
     }
 

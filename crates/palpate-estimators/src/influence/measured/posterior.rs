@@ -4,8 +4,9 @@ use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
 
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
+use crate::influence::moments::Moments;
 use palpate_mechanics::contact::Position;
-use palpate_numerics::NORMAL_95;
+use palpate_numerics::normal_interval_95;
 
 /// Squared residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
 const CUT: f64 = 20.0;
@@ -22,26 +23,11 @@ struct Part {
     weight: f64,
 }
 
-/// Sums over parts, from which mean and covariance follow.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    weight: f64,
-    x: f64,
-    y: f64,
-    h: f64,
-    xx: f64,
-    xy: f64,
-    xh: f64,
-    yy: f64,
-    yh: f64,
-    hh: f64,
-}
-
 /// A cell of the table that has some probability.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     place: usize,
-    sums: Sums,
+    moments: Moments,
     /// The greatest weight among its parts.
     peak: f64,
 }
@@ -101,7 +87,7 @@ impl<'a> Posterior<'a> {
 
     fn add_cell(&mut self, place: usize, reading: &[f64], reference: f64, buffer: &mut LineBuffer) {
         let (table, noise) = (&self.locator.table, &self.locator.whitening);
-        let mut cell = Cell { place, sums: Sums::default(), peak: 0.0 };
+        let mut cell = Cell { place, moments: Moments::default(), peak: 0.0 };
         for (x, y) in parts_of(table, place) {
             let line = table.line_between(x, y, buffer);
             let marginal = line.marginal(reading, noise, reference);
@@ -110,16 +96,13 @@ impl<'a> Posterior<'a> {
                 let part = Part { x_m: table.x.at(x), y_m: table.y.at(y), weight: marginal.weight };
                 let node = marginal.hidden / marginal.weight;
                 let spread = (marginal.hidden_square / marginal.weight - node * node).max(0.0);
-                cell.sums.add_part(
-                    part,
-                    self.locator.force_at(node),
-                    self.locator.force_spread(node, spread),
-                );
+                cell.moments.add(part.weight, [part.x_m, part.y_m, self.locator.force_at(node)]);
+                cell.moments.add_force_variance(part.weight, self.locator.force_spread(node, spread));
                 cell.peak = cell.peak.max(part.weight);
                 self.parts.push(part);
             }
         }
-        if cell.sums.weight > 0.0 {
+        if cell.moments.weight > 0.0 {
             self.cells.push(cell);
         }
     }
@@ -131,7 +114,7 @@ impl<'a> Posterior<'a> {
 
     /// The posterior's mean and covariance; the most probable mode alone where there are several.
     pub fn estimate(mut self) -> Estimate {
-        let total = Sums::total(self.cells.iter().map(|cell| cell.sums));
+        let total = Moments::total(self.cells.iter().map(|cell| cell.moments));
         if !(total.weight > 0.0 && total.weight.is_finite()) {
             let middle = Position {
                 x_m: self.locator.table.x.at(0.5 * (self.locator.table.x.count - 1) as f64),
@@ -154,8 +137,9 @@ impl<'a> Posterior<'a> {
         let most_probable = ContactEstimate { uncertainty: contact.uncertainty, ..self.contact(*first) };
         let mut estimate = Estimate::of_contact(most_probable, Status::Ambiguous);
         estimate.modes = Few::none(Mode::default());
-        for sums in others {
-            let mode = Mode { contact: self.contact(*sums), probability: sums.weight / total.weight };
+        for moments in others {
+            let probability = moments.weight / total.weight;
+            let mode = Mode { contact: self.contact(*moments), probability };
             if !estimate.modes.push(mode) {
                 break;
             }
@@ -164,28 +148,24 @@ impl<'a> Posterior<'a> {
     }
 
     /// The contact that some of the probability describes, its intervals those of a normal distribution.
-    fn contact(&self, sums: Sums) -> ContactEstimate {
-        let (position, force_n, covariance) = sums.moments();
+    fn contact(&self, moments: Moments) -> ContactEstimate {
+        let ([x_m, y_m, force_n], covariance) = moments.mean_and_covariance();
         let known = self.locator.locates_force();
         let covariance = match known {
             true => covariance,
             false => [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0],
         };
-        let around = |mean_m: f64, variance_m2: f64| {
-            let half_m = NORMAL_95 * variance_m2.sqrt();
-            (mean_m - half_m, mean_m + half_m)
-        };
         let uncertainty = Uncertainty {
             covariance,
-            x_95_m: around(position.x_m, covariance[0]),
-            y_95_m: around(position.y_m, covariance[3]),
+            x_95_m: normal_interval_95(x_m, covariance[0].sqrt()),
+            y_95_m: normal_interval_95(y_m, covariance[3].sqrt()),
         };
         let force_n = if known { Some(force_n) } else { self.locator.force_n };
-        ContactEstimate { position, force_n, uncertainty: Some(uncertainty) }
+        ContactEstimate { position: Position { x_m, y_m }, force_n, uncertainty: Some(uncertainty) }
     }
 
     /// Connected groups of cells that are dense enough, most probable first; only those that are noticeable.
-    fn modes(&self) -> Vec<Sums> {
+    fn modes(&self) -> Vec<Moments> {
         let peak = self.cells.iter().map(|cell| cell.peak).fold(0.0, f64::max);
         let mut left: Vec<Cell> = self.cells.iter().filter(|c| c.peak >= VALLEY * peak).copied().collect();
         let across = self.locator.table.y.count;
@@ -202,10 +182,10 @@ impl<'a> Posterior<'a> {
                 group.extend::<Vec<Cell>>(near);
                 grown += 1;
             }
-            modes.push(Sums::total(group.iter().map(|cell| cell.sums)));
+            modes.push(Moments::total(group.iter().map(|cell| cell.moments)));
         }
         modes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let total: f64 = self.cells.iter().map(|cell| cell.sums.weight).sum();
+        let total: f64 = self.cells.iter().map(|cell| cell.moments.weight).sum();
         modes.retain(|mode| mode.weight >= NOTICEABLE * total);
         modes
     }
@@ -255,50 +235,4 @@ fn cut(node: usize, count: usize, parts: usize) -> Vec<f64> {
     }
     let middles = (0..parts).map(|k| node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5);
     middles.filter(|place| (0.0..=(count - 1) as f64).contains(place)).collect()
-}
-
-impl Sums {
-    fn add_part(&mut self, Part { x_m, y_m, weight }: Part, h: f64, spread: f64) {
-        self.weight += weight;
-        self.x += weight * x_m;
-        self.y += weight * y_m;
-        self.h += weight * h;
-        self.xx += weight * x_m * x_m;
-        self.xy += weight * x_m * y_m;
-        self.xh += weight * x_m * h;
-        self.yy += weight * y_m * y_m;
-        self.yh += weight * y_m * h;
-        self.hh += weight * (h * h + spread);
-    }
-
-    fn total(all: impl Iterator<Item = Self>) -> Self {
-        all.fold(Self::default(), |a, b| Self {
-            weight: a.weight + b.weight,
-            x: a.x + b.x,
-            y: a.y + b.y,
-            h: a.h + b.h,
-            xx: a.xx + b.xx,
-            xy: a.xy + b.xy,
-            xh: a.xh + b.xh,
-            yy: a.yy + b.yy,
-            yh: a.yh + b.yh,
-            hh: a.hh + b.hh,
-        })
-    }
-
-    /// Mean position and force, and the covariance as [`Uncertainty::covariance`] has it.
-    fn moments(self) -> (Position, f64, [f64; 6]) {
-        let mean = |sum: f64| sum / self.weight;
-        let (x, y, h) = (mean(self.x), mean(self.y), mean(self.h));
-        let variance = |square: f64, a: f64| (mean(square) - a * a).max(0.0);
-        let covariance = [
-            variance(self.xx, x),
-            mean(self.xy) - x * y,
-            mean(self.xh) - x * h,
-            variance(self.yy, y),
-            mean(self.yh) - y * h,
-            variance(self.hh, h),
-        ];
-        (Position { x_m: x, y_m: y }, h, covariance)
-    }
 }

@@ -4,7 +4,7 @@ use super::modes::{MODE_THAT_MATTERS, Mode};
 use super::search::{Scratch, Search, Unknowns};
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::NORMAL_95;
+use palpate_numerics::{held_interval, normal_interval_95};
 
 /// The estimate of one contact.
 ///
@@ -39,8 +39,7 @@ fn position([x_m, y_m, _]: Unknowns) -> Position {
 /// A contact with an uncertainty that is held to the surface.
 fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimate {
     let interval = |k: usize, variance: f64| {
-        let half_m = NORMAL_95 * variance.sqrt();
-        ((mode.mean[k] - half_m).max(0.0), (mode.mean[k] + half_m).min(search.size_m[k]))
+        held_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
     };
     let uncertainty =
         Uncertainty { covariance, x_95_m: interval(0, covariance[0]), y_95_m: interval(1, covariance[3]) };

@@ -47,10 +47,7 @@ impl Profile {
 
     /// The best force in a cell, in newtons.
     pub fn force_n(&self, cell: usize, force: ForceBelief) -> f64 {
-        match force {
-            ForceBelief::Known(force_n) => force_n,
-            _ => self.forces.as_flattened()[cell],
-        }
+        force.known_n().unwrap_or_else(|| self.forces.as_flattened()[cell])
     }
 }
 

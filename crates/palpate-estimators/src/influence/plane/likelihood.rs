@@ -3,7 +3,6 @@
 //! Symbols as in [`super::search`].
 
 use super::locator::PlaneLocator;
-use super::refine::solve;
 use super::search::Search;
 use crate::fit::Locate;
 use crate::influence::belief::ForceBelief;
@@ -11,6 +10,7 @@ use crate::likelihood::{ContactFit, Geometry, Likelihood, PlaneLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::small::{Ldl, form};
 
 /// The likelihood of a [`PlaneLocator`], ready to be asked often.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,10 +23,7 @@ pub struct PlateLikelihood {
 impl PlateLikelihood {
     /// The likelihood of the channels that a locator does not leave out.
     pub fn new(locator: &PlaneLocator) -> Self {
-        let force = match locator.force() {
-            ForceBelief::Known(force_n) => ForceBelief::Known(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => ForceBelief::Unknown,
-        };
+        let force = locator.force().known_n().map_or(ForceBelief::Unknown, ForceBelief::Known);
         Self { locator: locator.clone(), search: locator.search_with(force) }
     }
 }
@@ -62,16 +59,9 @@ impl Likelihood for PlateLikelihood {
         let free = [true, true, self.known_force_n().is_none()];
         for (left, contact) in left.iter_mut().zip(contacts) {
             let [a, b] = self.search.calibration(*contact);
-            let column = |k: usize| {
-                let mut unit = [0.0; 3];
-                unit[k] = 1.0;
-                solve(a, unit, free)
-            };
-            if let (Some(x), Some(y)) = (column(0), column(1)) {
-                let spread = |p: [f64; 3], q: [f64; 3]| -> f64 {
-                    (0..3).map(|i| p[i] * (0..3).map(|j| b[i][j] * q[j]).sum::<f64>()).sum()
-                };
-                *left = [spread(x, x), spread(x, y), spread(y, y)];
+            if let Some(factors) = Ldl::of_free(&a, free) {
+                let [x, y, _] = factors.inverse();
+                *left = [form(&x, &b, &x), form(&x, &b, &y), form(&y, &b, &y)];
             }
         }
         left
@@ -87,10 +77,7 @@ impl Likelihood for PlateLikelihood {
     }
 
     fn known_force_n(&self) -> Option<f64> {
-        match self.search.force {
-            ForceBelief::Known(force_n) => Some(force_n),
-            ForceBelief::Unknown | ForceBelief::Normal { .. } => None,
-        }
+        self.search.force.known_n()
     }
 
     fn most_contacts(&self) -> usize {

@@ -7,9 +7,10 @@
 //! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
 use super::coarse::MOST_VALLEYS;
-use super::refine::solve;
 use super::search::{Minimum, Scratch, Search};
-use crate::influence::belief::ForceBelief;
+use crate::influence::moments::Moments;
+use palpate_numerics::ELLIPSE_95;
+use palpate_numerics::small::{Ldl, principal_direction, principal_variances};
 
 /// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,8 +42,6 @@ impl Surroundings {
 
 /// Another place with at least this share of the probability is said.
 pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
-/// The 95th percentile of χ² with two degrees of freedom, −2·ln 0.05.
-pub(super) const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 /// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
 const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.
@@ -105,10 +104,8 @@ impl Search {
     /// Whether the misfit rises from a mode as from a paraboloid's, two standard deviations away along both axes.
     fn is_paraboloid(&self, whitened: &[f64], mode: &Mode) -> bool {
         let [xx, xy, _, yy, ..] = mode.covariance;
-        let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        let radius = half.hypot(xy);
-        let (sin, cos) = (0.5 * xy.atan2(half)).sin_cos();
-        let (longer, shorter) = ((mean + radius).sqrt(), (mean - radius).max(0.0).sqrt());
+        let [longer, shorter] = principal_variances([xx, xy, yy]).map(f64::sqrt);
+        let [cos, sin] = principal_direction([xx, xy, yy]);
         let [x_m, y_m, _] = mode.mean;
         let here = self.profiled(whitened, [x_m, y_m]).1;
         let is_straight = |along: f64, across: f64| {
@@ -123,16 +120,9 @@ impl Search {
 
     /// The inverse of the information; `None` where the reading does not tell.
     fn covariance(&self, minimum: &Minimum) -> Option<[f64; 6]> {
-        let known = matches!(self.force, ForceBelief::Known(_));
-        let free = [true, true, !known];
-        let column = |k: usize| {
-            let mut unit = [0.0; 3];
-            unit[k] = 1.0;
-            solve(minimum.information, unit, free)
-        };
-        let [x, y] = [column(0)?, column(1)?];
-        let force = if known { [0.0; 3] } else { column(2)? };
-        Some([x[0], x[1], x[2], y[1], y[2], force[2]])
+        let free = [true, true, self.force.known_n().is_none()];
+        let [[xx, xy, xf], [_, yy, yf], [_, _, ff]] = Ldl::of_free(&minimum.information, free)?.inverse();
+        Some([xx, xy, xf, yy, yf, ff])
     }
 
     /// Puts the parts of the surface that hold the probability into the scratch; false where they are too many.
@@ -194,13 +184,13 @@ impl Search {
         }
         let mut modes = [Mode::default(); MOST_VALLEYS];
         for ((mode, moments), minimum) in modes.iter_mut().zip(&moments).zip(minima) {
-            *mode = moments.mode(minimum);
+            *mode = mode_of(moments, minimum);
             mode.weight /= all.weight;
             mode.covariance[5] += self.own_variance(minimum);
         }
         let count = minima.len();
         modes[..count].sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let Mode { mean: [x, y, f], mut covariance, .. } = all.mode(&minima[0]);
+        let ([x, y, f], mut covariance) = all.mean_and_covariance();
         let [dx, dy, df] = [x - modes[0].mean[0], y - modes[0].mean[1], f - modes[0].mean[2]];
         let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
@@ -212,8 +202,7 @@ impl Search {
     /// Variance of a force at a place that is known.
     fn own_variance(&self, minimum: &Minimum) -> f64 {
         let told = minimum.information[2][2];
-        let known = matches!(self.force, ForceBelief::Known(_));
-        if known || told <= 0.0 { 0.0 } else { 1.0 / told }
+        if self.force.known_n().is_some() || told <= 0.0 { 0.0 } else { 1.0 / told }
     }
 
     /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
@@ -226,16 +215,21 @@ impl Search {
     }
 }
 
+/// The mode of what lies nearest to a minimum; without a weight where that is nothing.
+fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
+    if moments.weight <= 0.0 {
+        return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
+    }
+    let (mean, covariance) = moments.mean_and_covariance();
+    Mode { weight: moments.weight, mean, covariance }
+}
+
 /// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
 fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
-    let determinant = xx * yy - xy * xy;
-    if determinant.is_nan() || determinant <= 0.0 {
-        return 1.0;
-    }
+    let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
     for leaf in &mut *leaves {
-        let (x, y) = (leaf.at[0] - about[0], leaf.at[1] - about[1]);
-        leaf.distance = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant;
+        leaf.distance = factors.quadratic([leaf.at[0] - about[0], leaf.at[1] - about[1]]);
     }
     leaves.sort_unstable_by(|a, b| a.distance.total_cmp(&b.distance));
     let all: f64 = leaves.iter().map(|leaf| leaf.weight).sum();
@@ -309,36 +303,4 @@ fn nearest(minima: &[Minimum], at: [f64; 2]) -> usize {
     let square = |minimum: &Minimum| (minimum.at[0] - at[0]).powi(2) + (minimum.at[1] - at[1]).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
     minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
-}
-
-/// Sums from which mean and covariance follow.
-#[derive(Clone, Copy, Default)]
-struct Moments {
-    weight: f64,
-    first: [f64; 3],
-    second: [f64; 6],
-}
-
-impl Moments {
-    fn add(&mut self, weight: f64, [x, y, f]: [f64; 3]) {
-        self.weight += weight;
-        let squares = [x * x, x * y, x * f, y * y, y * f, f * f];
-        self.first.iter_mut().zip([x, y, f]).for_each(|(sum, value)| *sum += weight * value);
-        self.second.iter_mut().zip(squares).for_each(|(sum, value)| *sum += weight * value);
-    }
-
-    /// The mode of these moments; where nothing was added, the minimum without a weight.
-    fn mode(&self, minimum: &Minimum) -> Mode {
-        if self.weight <= 0.0 {
-            return Mode { weight: 0.0, mean: minimum.at, covariance: [0.0; 6] };
-        }
-        let mean @ [x, y, f] = self.first.map(|sum| sum / self.weight);
-        let mut covariance = self.second.map(|sum| sum / self.weight);
-        let squares = [x * x, x * y, x * f, y * y, y * f, f * f];
-        covariance.iter_mut().zip(squares).for_each(|(value, square)| *value -= square);
-        for variance in [0, 3, 5] {
-            covariance[variance] = covariance[variance].max(0.0);
-        }
-        Mode { weight: self.weight, mean, covariance }
-    }
 }

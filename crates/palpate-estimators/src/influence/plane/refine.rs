@@ -4,7 +4,7 @@
 //! Symbols as in [`super::search`].
 
 use super::search::{Equations, Minimum, Search, Unknowns};
-use crate::influence::belief::ForceBelief;
+use palpate_numerics::small::Ldl;
 
 /// Steps, those that were refused included.
 const MOST_STEPS: usize = 40;
@@ -48,49 +48,18 @@ impl Search {
     fn step(&self, equations: &Equations, at: Unknowns, damping: f64) -> Option<Unknowns> {
         let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), (0.0, f64::INFINITY)];
         let mut free = [true; 3];
-        free[2] = !matches!(self.force, ForceBelief::Known(_));
+        free[2] = self.force.known_n().is_none();
         for k in 0..3 {
             let right = equations.right[k];
             free[k] &= !(at[k] <= ends[k].0 && right < 0.0 || at[k] >= ends[k].1 && right > 0.0);
+        }
+        if free == [false; 3] {
+            return None;
         }
         let mut matrix = equations.information;
         for (k, row) in matrix.iter_mut().enumerate() {
             row[k] *= 1.0 + damping;
         }
-        solve(matrix, equations.right, free)
+        Some(Ldl::of_free(&matrix, free)?.solve(equations.right))
     }
-}
-
-/// Solves for the free unknowns, the others being 0, by elimination without pivoting, as the matrix is positive definite;
-/// `None` where it is not.
-pub(super) fn solve(mut matrix: [[f64; 3]; 3], mut right: [f64; 3], free: [bool; 3]) -> Option<[f64; 3]> {
-    if !free.contains(&true) {
-        return None;
-    }
-    for k in 0..3 {
-        if !free[k] {
-            matrix.iter_mut().for_each(|row| row[k] = 0.0);
-            matrix[k] = [0.0; 3];
-            matrix[k][k] = 1.0;
-            right[k] = 0.0;
-        }
-    }
-    let diagonal = [matrix[0][0], matrix[1][1], matrix[2][2]];
-    for p in 0..3 {
-        if matrix[p][p].is_nan() || matrix[p][p] <= 1e-14 * diagonal[p] {
-            return None;
-        }
-        let pivot = matrix[p];
-        for r in p + 1..3 {
-            let factor = matrix[r][p] / pivot[p];
-            matrix[r].iter_mut().zip(pivot).for_each(|(entry, above)| *entry -= factor * above);
-            right[r] -= factor * right[p];
-        }
-    }
-    let mut solution = [0.0; 3];
-    for r in (0..3).rev() {
-        let known: f64 = (r + 1..3).map(|c| matrix[r][c] * solution[c]).sum();
-        solution[r] = (right[r] - known) / matrix[r][r];
-    }
-    Some(solution)
 }

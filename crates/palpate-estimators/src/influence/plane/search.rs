@@ -9,8 +9,9 @@ use super::modes::{Block, Leaf};
 use super::patches::{Lanes, Patches};
 use super::table::PlaneTable;
 use crate::influence::belief::ForceBelief;
+use crate::influence::search::worst_misfit;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_numerics::chi_squared_bound;
+use palpate_numerics::small::{Matrix, add_outer};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +64,7 @@ pub(super) struct Minimum {
     /// χ² there.
     pub misfit: f64,
     /// JᵀwJ there, J the derivatives of W·f by x, y and W.
-    pub information: [[f64; 3]; 3],
+    pub information: Matrix<3>,
 }
 
 /// A channel so many standard deviations off is nothing that a contact does.
@@ -92,11 +93,7 @@ impl Search {
                     table.variances[node * table.sensors + s] * inverse * inverse;
             }
         }
-        // Offsets are as uncertain as influences at the calibration's force, so a softer touch counts as one of that force.
-        let weights_force_n = match force {
-            ForceBelief::Known(force_n) => force_n.max(reference_force_n),
-            _ => reference_force_n,
-        };
+        let weights_force_n = force.weights_force_n(reference_force_n);
         let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
         let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
         let coarse = Coarse::new(table, &patches, live.len(), force);
@@ -113,11 +110,8 @@ impl Search {
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
             charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
-            worst_misfit: match channels.saturating_sub(unknowns) {
-                0 => f64::INFINITY,
-                freedom => chi_squared_bound(1e-4, freedom),
-            },
-            worst_noise: chi_squared_bound(1e-4, channels),
+            worst_misfit: worst_misfit(channels.saturating_sub(unknowns)),
+            worst_noise: worst_misfit(channels),
             size_m: [table.length_m, table.width_m],
             live,
             inverse_sd,
@@ -232,10 +226,7 @@ impl Search {
 
     /// The best force at a place.
     pub fn best_force(&self, whitened: &[f64], at: [f64; 2]) -> f64 {
-        match self.force {
-            ForceBelief::Known(force_n) => force_n,
-            _ => self.profiled(whitened, at).0,
-        }
+        self.force.known_n().unwrap_or_else(|| self.profiled(whitened, at).0)
     }
 
     /// The groups of the node nearest to a place.
@@ -252,7 +243,7 @@ impl Search {
     }
 
     /// Σ w·j·jᵀ and Σ w²·v·j·jᵀ at a contact, j the derivatives of W·f by x, y and W.
-    pub fn calibration(&self, contact: Contact) -> [[[f64; 3]; 3]; 2] {
+    pub fn calibration(&self, contact: Contact) -> [Matrix<3>; 2] {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;
         let place = self.patches.place(x_m, y_m);
         let variances = self.near(&self.variances, [x_m, y_m]);
@@ -265,9 +256,7 @@ impl Search {
                 let weight = 1.0 / (1.0 + variance);
                 let j = [force_n * values.along[lane], force_n * values.across[lane], values.f[lane]];
                 for (sum, factor) in sums.iter_mut().zip([weight, weight * weight * variance]) {
-                    for p in 0..3 {
-                        (0..3).for_each(|q| sum[p][q] += factor * j[p] * j[q]);
-                    }
+                    add_outer(sum, factor, &j);
                 }
             }
         }
@@ -332,7 +321,7 @@ impl Search {
 pub(super) struct Equations {
     pub misfit: f64,
     pub right: [f64; 3],
-    pub information: [[f64; 3]; 3],
+    pub information: Matrix<3>,
 }
 
 const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };

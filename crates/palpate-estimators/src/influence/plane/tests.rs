@@ -96,7 +96,7 @@ fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch>
             let is_covered = found.uncertainty.map(|uncertainty| {
                 let [xx, xy, _, yy, ..] = uncertainty.covariance;
                 let square = dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx;
-                square <= super::modes::ELLIPSE_95 * (xx * yy - xy * xy)
+                square <= palpate_numerics::ELLIPSE_95 * (xx * yy - xy * xy)
             });
             let limit_m = [bound.sd_position_m, bound.mean_error_m()];
             touches.push(Touch { error_m: dx.hypot(dy), limit_m, is_covered });

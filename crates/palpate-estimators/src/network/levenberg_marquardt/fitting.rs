@@ -10,6 +10,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, TooFewPositions};
 use crate::setup::Bench;
+use palpate_numerics::mean_and_variance;
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
@@ -173,8 +174,7 @@ fn truths<'a>(bench: &Bench, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) 
 fn output_scales(bench: &Bench, recording: &Recording) -> Vec<OutputScale> {
     let count = recording.rows.len();
     let scale = |truth: &dyn Fn(usize) -> f64| {
-        let mean = (0..count).map(truth).sum::<f64>() / count as f64;
-        let variance = (0..count).map(|i| (truth(i) - mean).powi(2)).sum::<f64>() / count as f64;
+        let (mean, variance) = mean_and_variance((0..count).map(truth));
         OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
     };
     truths(bench, recording).iter().map(|truth| scale(truth.as_ref())).collect()

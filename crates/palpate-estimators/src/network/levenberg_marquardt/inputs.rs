@@ -7,7 +7,7 @@ use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
 use crate::fit::LocatorFault;
 use crate::recording::Recording;
 use palpate_mechanics::sensing::Layout;
-use palpate_numerics::symmetric_eigen;
+use palpate_numerics::{mean, symmetric_eigen};
 
 /// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
 /// training recording.
@@ -69,8 +69,7 @@ impl NetworkInputs {
                 let square = |reading: &[f64]| {
                     channels.iter().map(|s| (reading[s.channel] / s.divisor).powi(2)).sum::<f64>()
                 };
-                let norms = recording.rows.iter().map(|row| square(&row.reading).sqrt());
-                norms.sum::<f64>() / recording.rows.len() as f64
+                mean(recording.rows.iter().map(|row| square(&row.reading).sqrt()))
             }
         };
         let of_feature = |source| match source {

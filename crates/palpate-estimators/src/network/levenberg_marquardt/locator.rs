@@ -12,6 +12,7 @@ use crate::setup::Bench;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::normal_interval_95;
 
 /// Networks that locate; see [`LevenbergMarquardtConfig`](super::LevenbergMarquardtConfig).
 ///
@@ -140,10 +141,7 @@ impl LevenbergMarquardtLocator {
         let y = self.extent.width_m.map(|_| 1);
         let force = (self.scales.len() > 1 + usize::from(y.is_some())).then(|| self.scales.len() - 1);
         let both = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j));
-        let interval = |k: usize| {
-            let half_m = 1.96 * covariance(k, k).sqrt();
-            (value(k) - half_m, value(k) + half_m)
-        };
+        let interval = |k: usize| normal_interval_95(value(k), covariance(k, k).sqrt());
         let x = Some(0);
         ContactEstimate {
             position: Position { x_m: value(0), y_m: y.map_or(0.0, value) },

@@ -139,7 +139,7 @@ impl Surface for Plate {
 
     fn force_supports(&self) -> Vec<Position> {
         let mut places: Vec<Position> = self.spec.supports.iter().map(|support| support.position).collect();
-        places.sort_by(|a, b| a.x_m.total_cmp(&b.x_m).then(a.y_m.total_cmp(&b.y_m)));
+        places.sort_by(Position::cmp_by_x_then_y);
         places
     }
 

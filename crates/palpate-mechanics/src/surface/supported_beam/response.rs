@@ -4,6 +4,7 @@ use super::check::SAME_PLACE;
 use super::shape::{Piece, Shape};
 use super::state::State;
 use super::sweep::{Element, Factors, Hold, Pair, Sweep, combined};
+use palpate_numerics::small::solve_general;
 
 /// The beam between its nodes, with the states that it admits from both ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,17 +164,10 @@ impl Surroundings {
         };
         let [left, right] = [self.left, self.right].map(|pair| pair.map(State::numbers));
         let (force, couple) = (State::SHEAR.numbers(), State::MOMENT.numbers());
-        let mut system = [[0.0; 7]; 6];
+        let (mut system, mut right_side) = ([[0.0; 6]; 6], [0.0; 6]);
         for i in 0..4 {
-            system[i] = [
-                -left[0][i],
-                -left[1][i],
-                right[0][i],
-                right[1][i],
-                -force[i],
-                -couple[i],
-                jump.numbers()[i],
-            ];
+            system[i] = [-left[0][i], -left[1][i], right[0][i], right[1][i], -force[i], -couple[i]];
+            right_side[i] = jump.numbers()[i];
         }
         let on_held_side = |number: usize| {
             let side = if self.held_left { left } else { right };
@@ -183,58 +177,19 @@ impl Surroundings {
         system[4] = match self.hold.yielding {
             Some(c) => {
                 let [a, b, d, e] = on_held_side(0);
-                [a, b, d, e, c, 0.0, settlement]
+                right_side[4] = settlement;
+                [a, b, d, e, c, 0.0]
             }
-            None => [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            None => [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
         };
         system[5] = match self.hold.turning {
             Some(c) => {
                 let [a, b, d, e] = on_held_side(1);
-                [a, b, d, e, 0.0, -c, 0.0]
+                [a, b, d, e, 0.0, -c]
             }
-            None => [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            None => [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
         };
-        let [a, b, c, d, ..] = solved(system);
+        let [a, b, c, d, ..] = solve_general(&system, &right_side);
         ([a, b], [c, d])
     }
-}
-
-/// Six equations, their right-hand side in the last column.
-type System = [[f64; 7]; 6];
-
-/// The solution of six equations; not finite where there is none. Corrected once by what is left over, elimination answers
-/// to rounding for equations near those given, entry by entry, whatever the size of each (Skeel, Math. Comp. 35, 1980).
-fn solved(system: System) -> [f64; 6] {
-    let solution = eliminated(system);
-    let mut left_over = system;
-    for row in &mut left_over {
-        let sum: f64 = row[..6].iter().zip(solution).map(|(value, unknown)| value * unknown).sum();
-        row[6] -= sum;
-    }
-    let correction = eliminated(left_over);
-    std::array::from_fn(|i| solution[i] + correction[i])
-}
-
-/// By elimination with the largest pivot of rows of equal size.
-fn eliminated(mut system: System) -> [f64; 6] {
-    for row in &mut system {
-        let size = row[..6].iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        row.iter_mut().for_each(|value| *value /= size);
-    }
-    for column in 0..6 {
-        let larger = |a: &usize, b: &usize| system[*a][column].abs().total_cmp(&system[*b][column].abs());
-        let pivot = (column..6).max_by(larger).unwrap_or(column);
-        system.swap(column, pivot);
-        let pivot_row = system[column];
-        for row in &mut system[column + 1..] {
-            let factor = row[column] / pivot_row[column];
-            row.iter_mut().zip(pivot_row).for_each(|(value, above)| *value -= factor * above);
-        }
-    }
-    let mut solution = [0.0; 6];
-    for i in (0..6).rev() {
-        let known: f64 = (i + 1..6).map(|j| system[i][j] * solution[j]).sum();
-        solution[i] = (system[i][6] - known) / system[i][i];
-    }
-    solution
 }

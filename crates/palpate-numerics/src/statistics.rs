@@ -1,0 +1,67 @@
+//! What is said of some values in short.
+
+/// The mean; NaN of nothing.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count
+}
+
+/// The mean, and the mean square of the differences to it.
+pub fn mean_and_variance<I: Iterator<Item = f64> + Clone>(values: I) -> (f64, f64) {
+    let middle = mean(values.clone());
+    (middle, mean(values.map(|value| (value - middle).powi(2))))
+}
+
+/// The standard error of the mean, √(Σ(v − mean)²/(n − 1)/n); 0 of a single value.
+pub fn standard_error(values: &[f64]) -> f64 {
+    let (_, variance) = mean_and_variance(values.iter().copied());
+    (variance / (values.len() as f64 - 1.0).max(1.0)).sqrt()
+}
+
+/// √ of the mean square.
+pub fn root_mean_square(values: &[f64]) -> f64 {
+    mean(values.iter().map(|value| value * value)).sqrt()
+}
+
+/// The `percent`-th percentile of values in rising order, linear between them; `None` of nothing.
+pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let place = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
+    let below = place.floor() as usize;
+    let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
+    Some(low + (high - low) * place.fract())
+}
+
+/// The middle one of values in any order, or the mean of the two middle ones; `None` of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    percentile(&values, 50.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_lie_between_the_values() {
+        let values = [1.0, 2.0, 4.0, 8.0, 16.0];
+        assert_eq!(percentile(&values, 0.0), Some(1.0));
+        assert_eq!(percentile(&values, 50.0), Some(4.0));
+        assert_eq!(percentile(&values, 60.0), Some(5.6));
+        assert_eq!(percentile(&values, 100.0), Some(16.0));
+        assert_eq!(percentile(&[3.0], 95.0), Some(3.0));
+        assert_eq!(percentile(&[], 50.0), None);
+    }
+
+    #[test]
+    fn moments_and_median_are_those_of_the_textbook() {
+        let values = vec![2.0, 9.0, 4.0, 5.0];
+        assert_eq!(mean_and_variance(values.iter().copied()), (5.0, 6.5));
+        assert!((standard_error(&values) - (26.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
+        assert!((root_mean_square(&values) - 31.5f64.sqrt()).abs() < 1e-15);
+        assert_eq!(standard_error(&[7.0]), 0.0);
+        assert_eq!(median(values), Some(4.5));
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert!(mean([]).is_nan() && median(Vec::new()).is_none());
+    }
+}

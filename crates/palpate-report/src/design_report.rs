@@ -1,0 +1,382 @@
+//! The report of a sensor design: layouts by several methods, judged alike.
+
+use maud::{Markup, html};
+
+use super::bench_figures::{bench_figure, sites_chart};
+use super::error_lines::in_thousandths;
+use super::extremes::Extremes;
+use super::maps::{self, compared_maps, limits_mm, sensors_mm};
+use super::numbers::{counted, mm, number, quantity, stated};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
+use super::{Axis, Chart, Mark, Marker, Series};
+use palpate_design::sensors::{
+    Assessment, CountPoint, Designed, Method, SensorProblem, Verification, best_design, enough,
+};
+use palpate_design::sensors::{DesignCriterion, KeepOut, Symmetry};
+use palpate_estimators::estimator::Cells;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::limit::LimitCurve;
+
+/// Cells of a map, about, and the least and the most of them along each side.
+const CELLS: f64 = 1600.0;
+const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
+
+/// What a sensor design's report is made from.
+#[derive(Clone, Copy)]
+pub struct SensorDesignReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// The surface, with the rig's own sensors.
+    pub bench: &'a Bench,
+    /// What was designed.
+    pub problem: &'a SensorProblem<'a>,
+    /// The layouts.
+    pub designed: &'a [Designed],
+    /// What simulated calibrations say of some of them.
+    pub verified: &'a [(Method, Verification)],
+    /// Layouts of other numbers of sensors; empty where none were asked for.
+    pub counts: &'a [CountPoint],
+    /// The seed of searches and simulations.
+    pub seed: u64,
+}
+
+/// Reports a design: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
+    let layouts = Section::new("layouts", "The layouts").table(report.table()).table(report.places());
+    let limit = Section::new("limit", "The limit with the best of them");
+    let mut sections = if report.problem.is_plane() {
+        vec![layouts, limit.figures(report.limit_maps())]
+    } else {
+        let bench = report.best().and_then(|best| {
+            let what = "The bench with the best layout";
+            bench_figure(what, &report.bench.surface, &best.layout, report.problem.force_n())
+        });
+        vec![layouts.figure(report.sites_figure()), limit.figure(bench).figure(report.limit_figure())]
+    };
+    sections.extend(report.counts_figure().map(|figure| {
+        let section = Section::new("counts", "How many sensors are enough");
+        section.text(report.counts_in_words()).figure(figure)
+    }));
+    sections.push(Section::new("given", "What was given").text(report.given()));
+    sections.push(Section::new("meaning", "How layouts are found and judged").text(meaning()));
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections,
+        made: html! { ", seed " (report.seed) },
+    }
+    .files()
+}
+
+impl<'a> SensorDesignReport<'a> {
+    fn even(&self) -> Option<&'a Designed> {
+        self.designed.iter().find(|designed| designed.method == Method::Even)
+    }
+
+    fn best(&self) -> Option<&'a Designed> {
+        best_design(self.designed)
+    }
+
+    fn verification(&self, method: Method) -> Option<&'a Verification> {
+        self.verified.iter().find(|(of, _)| *of == method).map(|(_, verification)| verification)
+    }
+
+    fn length_mm(&self) -> f64 {
+        self.bench.surface.extent().length_m * 1e3
+    }
+
+    fn summary(&self) -> Markup {
+        let Some(best) = self.best() else { return html! {} };
+        let limit = |designed: &Designed| designed.assessment.mean_limit_m.map_or(f64::NAN, |m| m * 1e3);
+        let error =
+            |designed: &Designed| self.verification(designed.method).map(|told| told.mean_error_m * 1e3);
+        let compared = |even: f64, best: f64| {
+            let percent = 100.0 * (1.0 - best / even);
+            let word = if percent >= 0.0 { "below" } else { "above" };
+            if percent.is_finite() {
+                format!(", {} % {word} the even layout's {} mm", number(percent.abs()), number(even))
+            } else {
+                String::new()
+            }
+        };
+        let even = self.even();
+        html! {
+            li {
+                "Best of " (counted(self.designed.len(), "layout", "layouts")) " of "
+                (counted(best.layout.len(), "sensor", "sensors")) ": " b { (best.method.name()) } ", "
+                (best.layout.places_in_words(self.problem.is_plane())) "."
+            }
+            li {
+                "Its mean limit is " b { (number(limit(best))) " mm" }
+                @if let Some(even) = even { (compared(limit(even), limit(best))) }
+                "; force " (self.problem.force().name()) "."
+            }
+            @if let (Some(told), Some(even)) = (error(best), even.and_then(error)) {
+                li {
+                    "Calibrated and asked in simulation, its locator is off by " b { (number(told)) " mm" } " on average"
+                    (compared(even, told)) "."
+                }
+            }
+        }
+    }
+
+    fn table(&self) -> Table {
+        let design = self.problem.design();
+        let scale = design.criterion.score_scale();
+        let rows = self.designed.iter().map(|designed| {
+            let worth = &designed.assessment;
+            let star = if worth.keeps_constraints { "" } else { " *" };
+            let told = self.verification(designed.method);
+            let error = told.map_or("–".to_owned(), |told| {
+                format!("{:.3} ± {:.3}", told.mean_error_m * 1e3, told.standard_error_m * 1e3)
+            });
+            let mut cells = vec![
+                text(format!("{}{star}", designed.method.name())),
+                value(worth.score * scale),
+                value_mm(worth.mean_limit_m),
+                value_mm(worth.worst_limit_m),
+                value(worth.within_tolerance_percent),
+                value(worth.score_one_dead.map(|score| score * scale)),
+                value_mm(worth.mean_error_m),
+                text(error),
+            ];
+            if design.has_costs() {
+                cells.push(text(stated(worth.cost)));
+            }
+            cells
+        });
+        let mut columns = vec![
+            short("layout"),
+            numeric("score"),
+            numeric("mean limit, mm"),
+            numeric("largest, mm"),
+            numeric(format!("within {} mm, %", mm(design.tolerance_m))),
+            numeric("one dead: score"),
+            numeric("expected error, mm"),
+            numeric("simulated error, mm"),
+        ];
+        if design.has_costs() {
+            columns.push(numeric("cost"));
+        }
+        let broken = self.designed.iter().any(|designed| !designed.assessment.keeps_constraints);
+        let caption = html! {
+            "The layouts. Score: " (score_in_words(design.criterion)) ", the smaller the better. One dead: the worst score when \
+             any one sensor dies. Expected: the mean error of an estimator at the limit; simulated: that of a locator, \
+             calibrated with noise and asked. A dash: the readings do not tell some contact, or the layout was not simulated."
+            @if broken { " *: breaks a constraint." }
+        };
+        Table::new(columns, rows, caption)
+    }
+
+    fn places(&self) -> Table {
+        let plane = self.problem.is_plane();
+        let rows = self
+            .designed
+            .iter()
+            .map(|designed| vec![text(designed.method.name()), text(designed.layout.places_in_words(plane))]);
+        Table::new([short("layout"), wide("sensors")], rows, html! { "Where their sensors sit." })
+    }
+
+    /// Every layout a row.
+    fn sites_figure(&self) -> Figure {
+        let row = |designed: &'a Designed| (designed.method.name().to_owned(), &designed.layout);
+        let rows: Vec<_> = self.designed.iter().map(row).collect();
+        let chart = sites_chart(&rows, self.length_mm() * 1e-3, self.kept_out());
+        Figure::chart(&chart, html! { "The sensors of every layout, a row each." })
+    }
+
+    /// The limit along the surface, even and best, and where their sensors are.
+    fn limit_figure(&self) -> Option<Figure> {
+        let (even, best) = (self.even(), self.best()?);
+        let name = |designed: &Designed| format!("limit, {} layout", designed.method.name());
+        let limits = |designed: &Designed| {
+            let curve = self.limit_of(designed)?;
+            Some(in_thousandths(curve.by_x(|bound| bound.sd_position_m)))
+        };
+        let of_even = even.and_then(|even| Some(Series::dashes(name(even), 6, limits(even)?)));
+        let of_best = limits(best).map(|limits| Series::line(name(best), 0, limits));
+        let mut series: Vec<Series> = of_even.into_iter().chain(of_best).collect();
+        let extremes = Extremes::of_lines(&series);
+        let Extremes { least, greatest } = extremes;
+        // Sensors stand in two rows beneath the curves.
+        let (from, to, rows) = if extremes.are_far_apart() {
+            (0.35 * least, 1.4 * greatest, [0.6 * least, 0.45 * least])
+        } else {
+            (0.0, 1.1 * greatest, [0.1 * greatest, 0.04 * greatest])
+        };
+        let sites = |designed: &Designed, colour, y, marker| {
+            let points = designed.layout.sensors.iter().map(|sensor| (sensor.position.x_m * 1e3, y));
+            let label = format!("sensors, {} layout", designed.method.name());
+            Series::markers(label, colour, points.collect(), marker)
+        };
+        series.extend(even.map(|even| sites(even, 6, rows[0], Marker::Square)));
+        series.push(sites(best, 0, rows[1], Marker::Triangle));
+        let x = Axis::linear("contact position, mm").from_to(0.0, self.length_mm());
+        let y = extremes.axis("limit, mm").from_to(from, to);
+        let chart = Chart::new("The least standard deviation of a located contact", x, y, series)
+            .with_marks(self.kept_out())
+            .with_height(500);
+        let caption = html! {
+            "The limit at the contacts of the design, for " (stated(self.problem.force_n())) " N, force "
+            (self.problem.force().name()) ", with the sensors of either layout beneath."
+            @if !self.problem.design().keep_out.is_empty() { " Shaded: where no sensor may sit." }
+        };
+        Some(Figure::chart(&chart, caption))
+    }
+
+    /// The limit of a layout at the contacts of the design.
+    fn limit_of(&self, designed: &Designed) -> Option<LimitCurve> {
+        let bench = Bench { layout: designed.layout.clone(), ..self.bench.clone() };
+        let positions = &self.problem.contacts().positions;
+        let limit = bench.cramer_rao_bound().ok()?;
+        LimitCurve::at(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
+    }
+
+    /// The limit over a plane with the best and with the even layout.
+    fn limit_maps(&self) -> Vec<Figure> {
+        let cells = Cells::about(self.bench.surface.extent(), CELLS, CELLS_A_SIDE);
+        let force = (self.problem.force_n(), self.problem.force());
+        let limits = |designed: &'a Designed| {
+            let bench = Bench { layout: designed.layout.clone(), ..self.bench.clone() };
+            let values =
+                limits_mm(&bench.cramer_rao_bound().ok()?, &cells, force, |bound| bound.sd_position_m);
+            let dots_mm = sensors_mm(&designed.layout);
+            Some(maps::Designed { name: designed.method.name(), values, dots_mm })
+        };
+        let designs = self.best().into_iter().chain(self.even()).filter_map(limits).collect();
+        let title = |name: &str| format!("The least standard deviation of a located contact, {name} layout");
+        let caption = |name: &str, most: &str| {
+            html! {
+                "The limit at each contact position with the " (name) " layout, for " (stated(force.0)) " N, force "
+                (force.1.name()) ". Dots: the sensors. Limits above " (most) " mm have its colour."
+            }
+        };
+        compared_maps(cells, "limit, mm", designs, title, caption)
+    }
+
+    fn kept_out(&self) -> Vec<Mark> {
+        let mark = |zone: &KeepOut| Mark::Span {
+            low: zone.from.x_m * 1e3,
+            high: zone.to.x_m * 1e3,
+            label: "kept out".to_owned(),
+        };
+        self.problem.design().keep_out.iter().map(mark).collect()
+    }
+
+    /// The mean limit against the number of sensors.
+    fn counts_figure(&self) -> Option<Figure> {
+        let (first, last) = (self.counts.first()?, self.counts.last()?);
+        let curve = |of: fn(&CountPoint) -> Option<Assessment>| -> Vec<(f64, f64)> {
+            let limit_m = |point| of(point).and_then(|worth| worth.mean_limit_m).unwrap_or(f64::NAN);
+            self.counts.iter().map(|point| (point.count as f64, limit_m(point) * 1e3)).collect()
+        };
+        let (even, designed) = (curve(|point| point.even), curve(|point| Some(point.designed)));
+        let dots =
+            |colour, points: &[(f64, f64)]| Series::markers("", colour, points.to_vec(), Marker::Circle);
+        let dots = [dots(6, &even), dots(0, &designed)];
+        let lines = [Series::dashes("even", 6, even), Series::line("designed", 0, designed)];
+        let series: Vec<Series> = lines.into_iter().chain(dots).collect();
+        let extremes = Extremes::of_lines(&series);
+        let axis = extremes.axis("mean limit, mm");
+        let y = if extremes.are_far_apart() { axis } else { axis.from_to(0.0, 1.1 * extremes.greatest) };
+        let step = (self.counts.len() / 12 + 1).max(1);
+        let ticks: Vec<f64> = self.counts.iter().step_by(step).map(|point| point.count as f64).collect();
+        let ends = (first.count as f64 - 0.5, last.count as f64 + 0.5);
+        let x = Axis::linear("sensors").from_to(ends.0, ends.1).ticks_at(ticks);
+        let caption = html! {
+            "The mean limit of the even layout and of the layout by greedy choice and exchange. Where a curve is missing, the readings \
+             of so few sensors do not tell some contact."
+        };
+        Some(Figure::chart(
+            &Chart::new("How the limit falls with the number of sensors", x, y, series),
+            caption,
+        ))
+    }
+
+    fn counts_in_words(&self) -> Markup {
+        html! {
+            @if let (Some(count), Some(last)) = (enough(self.counts), self.counts.last()) {
+                p {
+                    (counted(count, "sensor comes", "sensors come")) " within 10 % of the score that "
+                    (counted(last.count, "sensor has", "sensors have")) "."
+                }
+            }
+        }
+    }
+
+    fn given(&self) -> Markup {
+        let design = self.problem.design();
+        let plane = self.problem.is_plane();
+        let zone = |from: Position, to: Position| {
+            if plane {
+                format!("{}–{} × {}–{} mm", mm(from.x_m), mm(to.x_m), mm(from.y_m), mm(to.y_m))
+            } else {
+                format!("{}–{} mm", mm(from.x_m), mm(to.x_m))
+            }
+        };
+        let kinds: Vec<String> = design
+            .offers
+            .iter()
+            .map(|offer| {
+                let channel = &offer.channel;
+                let told = |value| quantity(value, offer.kind.dimension());
+                let mut words = format!("{}, noise {}", offer.kind, told(channel.noise_sd));
+                if channel.resolution > 0.0 {
+                    words += &format!(", resolution {}", told(channel.resolution));
+                }
+                if design.has_costs() {
+                    words += &format!(", cost {}", stated(offer.cost));
+                }
+                words
+            })
+            .collect();
+        html! {
+            ul {
+                li { (counted(design.count, "sensor", "sensors")) " out of " (counted(self.problem.candidates(), "candidate", "candidates")) ": " (kinds.join("; ")) "." }
+                li {
+                    (counted(self.problem.contacts().len(), "contact", "contacts")) " over " (zone(design.contacts.from, design.contacts.to))
+                    ", " (stated(self.problem.force_n())) " N, force " (self.problem.force().name())
+                    @if !design.contacts.weights.is_empty() { ", some stretches touched more often than others" }
+                    "."
+                }
+                @if design.spacing_m > 0.0 { li { "Sensors are at least " (mm(design.spacing_m)) " mm apart." } }
+                @for kept in &design.keep_out { li { "Nothing sits within " (zone(kept.from, kept.to)) "." } }
+                @if !design.must_have.is_empty() { li { (counted(design.must_have.len(), "sensor is", "sensors are")) " part of every layout." } }
+                @if let Some(budget) = design.budget { li { "All together cost at most " (stated(budget)) "." } }
+                @if design.symmetry == Symmetry::Wanted { li { "Layouts mirror themselves." } }
+                @if design.symmetry == Symmetry::Forbidden { li { "No sensor mirrors another." } }
+            }
+        }
+    }
+}
+
+fn score_in_words(criterion: DesignCriterion) -> &'static str {
+    match criterion {
+        DesignCriterion::MeanLimit => {
+            "the mean limit in mm, each contact's combined with what the surface's size tells"
+        }
+        DesignCriterion::WorstLimit => "the largest limit in mm, combined with what the surface's size tells",
+        DesignCriterion::WithinTolerance => "the share of contacts whose limit exceeds the tolerance, in %",
+        DesignCriterion::DOptimality => "the mean of ½·ln det of a contact's least covariance",
+    }
+}
+
+fn meaning() -> Markup {
+    html! {
+        p {
+            "A layout is judged by the limit, the least standard deviation with which any estimator that is right on average \
+             can locate a contact, over the contacts that are expected. Where the readings do not tell a contact, the limit is \
+             boundless; the score combines it with what is known without any reading: that the contact is on the surface."
+        }
+        p {
+            b { "greedy-exchange" } " adds the sensor that helps most until all are placed, then exchanges one after the other for \
+             a better one until none is found, from several starts. " b { "exhaustive" } " tries every layout, where they are few. "
+            b { "genetic" } " breeds layouts. " b { "refined" } " moves the best of these off the candidate sites. "
+            b { "d-optimal" } " has the most information about position and force together, " b { "principal-components" }
+            " reconstructs the readings at all sites best, " b { "qr-pivoting" } " takes the sites by which the strongest \
+             components of the readings are told apart; these three do not look at the location error."
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Errors along a surface as lines: medians with their bands, the tolerance, and the limit for the eye to compare with.
+
+use super::numbers::mm;
+use super::{BandPoint, Chart, Mark, Series};
+use palpate_estimators::evaluation::Spread;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::limit::{Bound, Force, Limit, LimitCurve, LimitError};
+use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
+
+/// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
+/// the noise that a plain displacement sensor has, as in `examples/paper.toml`.
+const ASSUMED_NOISE_M: f64 = 5e-6;
+/// What the line is called in a legend, at the beginning.
+const LABEL: &str = "limit";
+
+/// A line along the medians of some spreads and, where `with_band`, a band from the 5th to the 95th percentile under it.
+pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Spread)], with_band: bool) -> Vec<Series> {
+    let line = Series::line(label, colour, along.iter().map(|&(x, spread)| (x, spread.median)).collect());
+    let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 });
+    let band = with_band.then(|| Series::band("", colour, band.collect()));
+    band.into_iter().chain([line]).collect()
+}
+
+/// The tolerance among errors in mm.
+pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
+    Mark::HorizontalLine { y: tolerance_m * 1e3, label: format!("tolerance, {} mm", mm(tolerance_m)) }
+}
+
+/// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` where there is
+/// none: a surface without a model, clean sensors, a force that is not known.
+pub(super) fn limit_line(bench: &Bench) -> Option<Series> {
+    Some(line(&curve(bench, &bench.layout).ok()?, 6, format!("{LABEL}: what physics allows")))
+}
+
+/// The same; where deflection sensors are clean, for a noise that the legend states.
+pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
+    let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
+    match curve(bench, &bench.layout) {
+        Err(LimitError::Noise(NoiseError::Singular { .. })) if bench.layout.sensors.iter().all(clean) => {
+            let mut layout = bench.layout.clone();
+            layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
+            Some(line(&curve(bench, &layout).ok()?, 6, assumed_label()))
+        }
+        _ => limit_line(bench),
+    }
+}
+
+/// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` where there is none. The locator knows the force,
+/// or does not; contacts have `force_n` newtons either way.
+pub(super) fn limit_line_of_arm(bench: &Bench, force_n: f64, colour: usize, label: &str) -> Option<Series> {
+    let limit = bench.cramer_rao_bound().ok()?;
+    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
+    Some(line(&LimitCurve::over(&limit, force_n, force).ok()?, colour, label.to_owned()))
+}
+
+/// What to say of the line in the caption of a chart that has it; else nothing.
+pub(super) fn limit_in_words(chart: &Chart) -> String {
+    let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
+        return String::new();
+    };
+    let mut words = " Black dashes: the limit, which is the mean error of the best unbiased estimator for noisy readings and a \
+                     known force (Cramér–Rao bound)."
+        .to_owned();
+    if line.label == assumed_label() {
+        words += " The readings here are clean, so errors may lie below it.";
+    }
+    words
+}
+
+fn assumed_label() -> String {
+    format!("{LABEL}: what physics allows at {} µm noise", ASSUMED_NOISE_M * 1e6)
+}
+
+fn curve(bench: &Bench, layout: &Layout) -> Result<LimitCurve, LimitError> {
+    let limit = Limit::new(bench.surface.model().ok_or(LimitError::NoModel)?, layout)?;
+    LimitCurve::over(&limit, bench.force_n.ok_or(LimitError::NoForce)?, Force::Known)
+}
+
+fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {
+    Series::dashes(label, colour, in_thousandths(curve.by_x(Bound::mean_error_m)))
+}
+
+/// Pairs of SI units in thousandths: metres in mm, newtons in mN.
+pub(super) fn in_thousandths(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.into_iter().map(|(x, y)| (x * 1e3, y * 1e3)).collect()
+}

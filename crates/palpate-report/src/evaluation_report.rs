@@ -1,0 +1,315 @@
+//! The report of one locator's errors.
+
+use maud::{Markup, html};
+
+use super::error_lines::{banded, in_thousandths, limit_in_words, limit_line, tolerance_mark};
+use super::maps::error_map;
+use super::numbers::{counted, listed, mm, number, stretch, whole};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, words};
+use super::{Axis, Chart, Marker, Series};
+use palpate_estimators::estimator::Locator;
+use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Portion, Spread, percentage_error};
+use palpate_estimators::recording::Provenance;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::surface::SurfaceSpec;
+use palpate_rig::Rig;
+
+/// More positions than this are drawn as a line: markers would hide each other.
+const MOST_MARKERS: usize = 80;
+
+/// What an evaluation's report is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct EvaluationReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// Whose answers are judged.
+    pub judged: Judged<'a>,
+    /// The answers.
+    pub evaluation: &'a Evaluation,
+    /// The recording that was located.
+    pub recording: &'a Provenance,
+    /// Portions of the surface that are also judged by themselves.
+    pub portions: &'a [Portion],
+    /// An error up to this, in metres, is good enough for the effective length.
+    pub tolerance_m: f64,
+}
+
+/// Whose answers an evaluation holds.
+#[derive(Clone, Copy, Debug)]
+pub enum Judged<'a> {
+    /// Those of a locator.
+    Locator(&'a Locator),
+    /// Those of locators of one rig, each fitted without the positions that it was asked for.
+    CrossValidated {
+        /// The rig.
+        rig: &'a Rig,
+        /// How many locators.
+        folds: usize,
+        /// The seed of their fits.
+        seed: u64,
+    },
+}
+
+/// Reports an evaluation: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
+    let (heading, errors) = if report.is_plane() {
+        let evaluations = [("the locator", report.evaluation)];
+        let title = "Median location error over the surface";
+        let map = error_map(report.bench(), title, "Median of the location errors", &evaluations);
+        ("Errors over the surface", map)
+    } else {
+        ("Errors along the surface", report.error_figure())
+    };
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections: vec![
+            Section::new("errors", heading).figure(errors).figure(report.estimate_figure()),
+            Section::new("table", "Errors in numbers").table(report.errors_table()),
+            Section::new("judged", report.judged_heading()).table(report.facts_table()),
+        ],
+        made: report.made(),
+    }
+    .files()
+}
+
+impl EvaluationReport<'_> {
+    fn summary(&self) -> Markup {
+        let effective = self.evaluation.effective_percent(self.tolerance_m);
+        html! {
+            li {
+                (counted(self.evaluation.located.len(), "reading", "readings")) " of " b { (self.recording.source) }
+                ", at " (counted(self.evaluation.by_position().len(), "position", "positions")) ", located and compared \
+                 with where the contact was."
+            }
+            li { (self.whose_answers()) }
+            @if let Some(summary) = self.evaluation.summary(None) {
+                li {
+                    "Average error " b { (number(summary.average_m * 1e3)) " mm" } ", "
+                    (number(percentage_error(summary.average_m, self.evaluation.length_m))) " % of the length; largest "
+                    (number(summary.largest_m * 1e3)) " mm."
+                }
+                li { "Within " (mm(self.tolerance_m)) " mm: " b { (number(effective)) " %" } " of the readings." }
+            }
+        }
+    }
+
+    fn whose_answers(&self) -> String {
+        match self.judged {
+            Judged::CrossValidated { folds, .. } => format!(
+                "Cross-validated by position in {}: each position was located by a locator that had not seen it.",
+                counted(folds, "fold", "folds")
+            ),
+            Judged::Locator(locator) if *self.recording == locator.provenance.recording => {
+                "The locator was fitted to this very recording, so the errors tell how well it remembers, not how well it \
+                 would locate elsewhere."
+                    .to_owned()
+            }
+            Judged::Locator(_) => "The locator was fitted to another recording.".to_owned(),
+        }
+    }
+
+    fn bench(&self) -> &Bench {
+        match self.judged {
+            Judged::Locator(locator) => &locator.bench,
+            Judged::CrossValidated { rig, .. } => &rig.bench,
+        }
+    }
+
+    fn is_plane(&self) -> bool {
+        self.bench().surface.extent().is_plane()
+    }
+
+    fn judged_heading(&self) -> &'static str {
+        match self.judged {
+            Judged::Locator(_) => "The locator",
+            Judged::CrossValidated { .. } => "The rig",
+        }
+    }
+
+    fn error_figure(&self) -> Figure {
+        let by_position = self.evaluation.by_position();
+        let several = by_position.iter().any(|(_, summary)| summary.count > 1);
+        let drawn = |label, colour, marker, figure: fn(&ErrorSummary) -> f64| {
+            let points: Vec<(f64, f64)> =
+                by_position.iter().map(|(at, summary)| (at.x_m * 1e3, figure(summary) * 1e3)).collect();
+            if points.len() > MOST_MARKERS {
+                Series::line(label, colour, points)
+            } else {
+                Series::markers(label, colour, points, marker)
+            }
+        };
+        let label = if several { "average of the readings there" } else { "error of the reading there" };
+        let mut series = vec![drawn(label, 0, Marker::Circle, |summary| summary.average_m)];
+        if several {
+            let largest = |summary: &ErrorSummary| summary.largest_m;
+            series.push(drawn("largest of the readings there", 1, Marker::Triangle, largest));
+        }
+        series.extend(limit_line(self.bench()));
+        let (x, y) = (self.axis("contact position, mm"), Axis::log10("location error, mm"));
+        let chart = Chart::new("Location error along the surface", x, y, series)
+            .with_marks(vec![tolerance_mark(self.tolerance_m)]);
+        let caption = html! {
+            "Location error at each contact position, on a logarithmic axis."
+            (limit_in_words(&chart))
+        };
+        Figure::chart(&chart, caption)
+    }
+
+    fn estimate_figure(&self) -> Figure {
+        let length_mm = self.evaluation.length_m * 1e3;
+        let identity = vec![(0.0, 0.0), (length_mm, length_mm)];
+        let mut series = vec![Series::dashes("estimated = true", 6, identity)];
+        let along = if self.is_plane() { "along the surface" } else { "estimated" };
+        series.extend(self.estimates(along, 0, |located| (located.truth.x_m, located.estimate.x_m)));
+        if self.is_plane() {
+            let across = |located: &Located| (located.truth.y_m, located.estimate.y_m);
+            series.extend(self.estimates("across the surface", 1, across));
+        }
+        let banded = series.iter().any(Series::is_band);
+        let (x, y) = (self.axis("true position, mm"), Axis::linear("estimated position, mm"));
+        let chart = Chart::new("Estimated against true position", x, y, series).with_height(560);
+        let caption = html! {
+            "Where the contact was seen, against where it was. On the dashes both are the same."
+            @if banded { " Line: median of the readings at a position; band: 5–95 % of them." }
+        };
+        Figure::chart(&chart, caption)
+    }
+
+    fn axis(&self, label: &str) -> Axis {
+        Axis::linear(label).from_to(0.0, self.evaluation.length_m * 1e3)
+    }
+
+    /// A marker a reading, of where the contact was and where it was seen; where that would be too many, the median of the readings
+    /// at a position and their band.
+    fn estimates(
+        &self,
+        label: &str,
+        colour: usize,
+        coordinate: impl Fn(&Located) -> (f64, f64),
+    ) -> Vec<Series> {
+        let mut pairs = in_thousandths(self.evaluation.located.iter().map(coordinate).collect());
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if pairs.len() <= MOST_MARKERS {
+            return vec![Series::markers(label, colour, pairs, Marker::Circle)];
+        }
+        let spread = |place: &[(f64, f64)]| Spread::of(place.iter().map(|pair| pair.1).collect());
+        let places: Vec<(f64, Spread)> = pairs
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter_map(|place| Some((place[0].0, spread(place)?)))
+            .collect();
+        banded(label, colour, &places, places.len() < pairs.len())
+    }
+
+    fn errors_table(&self) -> Table {
+        let everywhere = std::iter::once(("everywhere".to_owned(), None));
+        let portions = self.portions.iter().map(|portion| (stretch(*portion), Some(*portion)));
+        let rows = everywhere.chain(portions).filter_map(|(name, portion)| {
+            Some(self.error_row(&name, portion, self.evaluation.summary(portion)?))
+        });
+        let in_units = |name: &str| numeric(format!("{name}, mm (%)"));
+        let columns = [short("portion"), numeric("readings")]
+            .into_iter()
+            .chain(["average", "median", "95th percentile", "largest", "root mean square"].map(in_units))
+            .chain([numeric(format!("within {} mm, %", mm(self.tolerance_m)))]);
+        let effective = if self.is_plane() { "area" } else { "length" };
+        let caption = html! {
+            "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly over the surface, the \
+             share within the tolerance is the effective " (effective) "."
+        };
+        Table::new(columns.collect::<Vec<_>>(), rows, caption)
+    }
+
+    fn error_row(&self, name: &str, portion: Option<Portion>, summary: ErrorSummary) -> Vec<Markup> {
+        let both = |error_m: f64| {
+            let percent = percentage_error(error_m, self.evaluation.length_m);
+            format!("{} ({})", number(error_m * 1e3), number(percent))
+        };
+        let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
+        let located = self.evaluation.located.iter().filter(inside).copied().collect();
+        let part = Evaluation { length_m: self.evaluation.length_m, located };
+        let ErrorSummary { count, average_m, median_m, p95_m, largest_m, rmse_m } = summary;
+        let mut cells = vec![name.to_owned(), whole(count as f64)];
+        cells.extend([average_m, median_m, p95_m, largest_m, rmse_m].map(both));
+        cells.push(number(part.effective_percent(self.tolerance_m)));
+        cells.iter().map(text).collect()
+    }
+
+    fn facts_table(&self) -> Table {
+        let force = self.bench().force_n;
+        let force = force.map_or("unknown".to_owned(), |force_n| format!("{} N", number(force_n)));
+        let mut facts = vec![
+            ("surface", text(self.surface_in_words())),
+            ("sensors", text(self.sensors_in_words())),
+            ("contact force", text(force)),
+        ];
+        facts.extend(match self.judged {
+            Judged::Locator(locator) => locator_facts(locator),
+            Judged::CrossValidated { rig, folds, seed } => rig_facts(rig, folds, seed),
+        });
+        let rows = facts.into_iter().map(|(name, value)| vec![text(name), value]);
+        let caption = html! { "What was judged, and where it comes from." };
+        Table::new([short("fact"), words("value")], rows, caption)
+    }
+
+    fn surface_in_words(&self) -> String {
+        let extent = self.bench().surface.extent();
+        let kind = match &self.bench().surface {
+            SurfaceSpec::Beam(_) => "beam".to_owned(),
+            SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
+            SurfaceSpec::Plate(_) => "plate".to_owned(),
+            SurfaceSpec::Digit(_) => "flexible digit".to_owned(),
+            SurfaceSpec::Measured(_) => "measured, without a model".to_owned(),
+        };
+        let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));
+        format!("{kind}, {} mm{width}", mm(extent.length_m))
+    }
+
+    fn sensors_in_words(&self) -> String {
+        let names = self.bench().layout.names();
+        let mut kinds: Vec<&str> = self.bench().layout.kinds().into_iter().map(|kind| kind.name()).collect();
+        kinds.dedup();
+        format!("{}, {}: {}", names.len(), listed(&kinds), names.join(", "))
+    }
+
+    fn made(&self) -> Markup {
+        let seed = match self.judged {
+            Judged::Locator(locator) => locator.provenance.seed,
+            Judged::CrossValidated { seed, .. } => seed,
+        };
+        html! { " from " (self.recording.source) (digests(self.recording)) "; fitted from seed " (seed) }
+    }
+}
+
+fn locator_facts(locator: &Locator) -> Vec<(&'static str, Markup)> {
+    let training = locator.training_outcome().map(|outcome| {
+        ("training", text(format!("{} after {} epochs", outcome.status, whole(f64::from(outcome.epochs)))))
+    });
+    let fitted_to = &locator.provenance.recording;
+    let mut facts = vec![("estimator", text(locator.kind()))];
+    facts.extend(training);
+    facts.extend([
+        (
+            "fitted to",
+            html! { (fitted_to.source) ", " (counted(fitted_to.rows, "row", "rows")) (digests(fitted_to)) },
+        ),
+        ("fitted from seed", text(locator.provenance.seed.to_string())),
+        ("fitted by palpate", text(&locator.provenance.palpate)),
+    ]);
+    facts
+}
+
+fn rig_facts(rig: &Rig, folds: usize, seed: u64) -> Vec<(&'static str, Markup)> {
+    let mut facts = vec![
+        ("folds", text(whole(folds as f64))),
+        ("fitted from seed", text(seed.to_string())),
+        ("estimator", text(rig.estimator.kind())),
+    ];
+    facts.extend(rig.estimator.settings().into_iter().map(|setting| (setting.name, text(setting.value))));
+    facts
+}
+
+fn digests(recording: &Provenance) -> Markup {
+    html! { @for digest in &recording.digests { ", SHA-256 " code { (digest) } } }
+}

@@ -1,0 +1,307 @@
+//! The report of a bench's limit: what physics allows, position by position.
+
+use maud::{Markup, html};
+
+use super::bench_figures::bench_figure;
+use super::digit_figures::{force_limit_figure, linear_theory_figures};
+use super::error_lines::in_thousandths;
+use super::extremes::Extremes;
+use super::maps::{limits_mm, sensors_mm};
+use super::numbers::{counted, mm, number, place, quantity, stated};
+use super::page::{
+    Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide, words,
+};
+use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
+use palpate_estimators::estimator::Cells;
+use palpate_estimators::setup::Bench;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::{Force, Limit, LimitCurve, LimitWarning};
+use palpate_mechanics::sensing::Sensor;
+use palpate_mechanics::surface::SurfaceSpec;
+
+/// Where the surface ends, errors do: limits beyond this many lengths are cut off.
+const MOST_LENGTHS: f64 = 10.0;
+/// Cells of a map, about, and the least and the most of them along each side.
+const CELLS: f64 = 2000.0;
+const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
+
+/// What a limit's report is made from.
+#[derive(Clone, Copy)]
+pub struct LimitReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// The surface and its sensors.
+    pub bench: &'a Bench,
+    /// Its limit.
+    pub limit: &'a Limit<'a>,
+    /// The limit all over the surface for a known force.
+    pub known: &'a LimitCurve,
+    /// The same for an unknown force.
+    pub unknown: &'a LimitCurve,
+    /// What is known of the force on this bench, which the warnings are about.
+    pub force: Force,
+    /// What the limit warns of.
+    pub warnings: &'a [LimitWarning],
+    /// Positions for the table.
+    pub listed: &'a [Position],
+}
+
+/// Reports a limit: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
+    let (layout, force_n) = (&report.bench.layout, report.known.force_n);
+    let (heading, figure) = if report.known.extent.is_plane() {
+        ("The limit over the surface", report.limit_map())
+    } else {
+        ("The limit along the surface", report.limit_figure())
+    };
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections: vec![
+            Section::new("bench", "The bench")
+                .figure(bench_figure("The bench", &report.bench.surface, layout, force_n))
+                .table(report.sensor_table()),
+            Section::new("limit", heading)
+                .figure(figure)
+                .table(report.limit_table())
+                .figures(report.digit_figures()),
+            Section::new("warnings", "What this bench cannot tell").text(report.warnings_in_words()),
+            Section::new("meaning", "What the limit means").text(meaning()),
+        ],
+        made: Markup::default(),
+    }
+    .files()
+}
+
+impl LimitReport<'_> {
+    /// The curve that holds for this bench.
+    fn curve(&self) -> &LimitCurve {
+        match self.force {
+            Force::Known => self.known,
+            Force::Unknown => self.unknown,
+        }
+    }
+
+    fn summary(&self) -> Markup {
+        let extent = self.known.extent;
+        let percent = |limit_m: f64| number(100.0 * limit_m / extent.length_m);
+        let at = |(position, limit_m): (Position, f64)| {
+            format!("{} mm at {} mm", number(limit_m * 1e3), place(position, extent))
+        };
+        html! {
+            li {
+                "What physics allows on this bench: " (counted(self.limit.alive(), "live sensor", "live sensors")) ", "
+                (stated(self.known.force_n)) " N, force " (self.force.name()) "."
+            }
+            @if let Some(summary) = self.curve().summary() {
+                li {
+                    "Median limit " b { (number(summary.median_m * 1e3)) " mm" } ", " (percent(summary.median_m))
+                    " % of the length; mean " (number(summary.mean_m * 1e3)) " mm, smallest " (at(summary.best))
+                    ", largest " (at(summary.worst)) "."
+                }
+            } @else {
+                li { "With this knowledge of the force the readings do not tell the position anywhere." }
+            }
+            li { a href="#warnings" { (counted(self.warnings.len(), "warning", "warnings")) } "." }
+        }
+    }
+
+    fn limit_figure(&self) -> Figure {
+        let length_mm = self.known.extent.length_m * 1e3;
+        let line = |curve: &LimitCurve, label, colour| {
+            Series::line(label, colour, in_thousandths(curve.by_x(|bound| bound.sd_position_m)))
+        };
+        let series =
+            vec![line(self.known, "force known", 0), line(self.unknown, "force unknown, estimated along", 1)];
+        let extremes = Extremes::of_lines(&series);
+        let chart = Chart::new(
+            "The least standard deviation of a located contact",
+            Axis::linear("contact position, mm").from_to(0.0, length_mm),
+            limit_axis(extremes, length_mm),
+            series,
+        )
+        .with_marks(self.marks(extremes.greatest > length_mm))
+        .with_height(480);
+        let caption = html! {
+            "The limit at each contact position, for " (stated(self.known.force_n)) " N. No unbiased estimator has a smaller \
+             standard deviation; where its errors are Gaussian, its mean error is √(2/π) ≈ 0.8 of it on a line."
+            @if !self.warnings.is_empty() { " Shaded: what the warnings are about." }
+            @if extremes.greatest > MOST_LENGTHS * length_mm {
+                " Limits above " (stated(MOST_LENGTHS)) " lengths are not shown: contacts there cannot be located."
+            }
+        };
+        Figure::chart(&chart, caption)
+    }
+
+    /// The zones of the warnings, and the length of the surface where limits reach `beyond` it, which means "anywhere".
+    fn marks(&self, beyond: bool) -> Vec<Mark> {
+        let length_m = self.known.extent.length_m;
+        let label = format!("length of the surface, {} mm", mm(length_m));
+        let length = beyond.then_some(Mark::HorizontalLine { y: length_m * 1e3, label });
+        let zones = self.warnings.iter().flat_map(|warning| {
+            let (label, twins) = match warning {
+                LimitWarning::Blind { .. } => ("blind", None),
+                LimitWarning::Mirror { twins, .. } => ("ambiguous", Some(*twins)),
+                LimitWarning::Faint { .. } => ("faint", None),
+            };
+            std::iter::once(warning.zone()).chain(twins).map(move |zone| Mark::Span {
+                low: zone.from.x_m * 1e3,
+                high: zone.to.x_m * 1e3,
+                label: label.to_owned(),
+            })
+        });
+        length.into_iter().chain(zones).collect()
+    }
+
+    /// The limit over a plane, as two maps.
+    fn limit_map(&self) -> Figure {
+        let extent = self.known.extent;
+        let cells = Cells::about(extent, CELLS, CELLS_A_SIDE);
+        let panel = |name, force| {
+            let limits = limits_mm(self.limit, &cells, (self.known.force_n, force), |b| b.sd_position_m);
+            HeatPanel::new(name, limits)
+        };
+        let panels =
+            vec![panel("force known", Force::Known), panel("force unknown, estimated along", Force::Unknown)];
+        let limits = || panels.iter().flat_map(|panel| &panel.values);
+        let length_mm = extent.length_m * 1e3;
+        let cut_off = limits().any(|limit_mm| *limit_mm > length_mm);
+        let nowhere = limits().any(|limit_mm| limit_mm.is_nan());
+        let map = HeatMap {
+            title: "The least standard deviation of a located contact".to_owned(),
+            cells,
+            panels,
+            dots_mm: sensors_mm(&self.bench.layout),
+            label: "limit, mm".to_owned(),
+            most: length_mm,
+            width_px: 860,
+        };
+        let caption = html! {
+            "The limit at each contact position, for " (stated(self.known.force_n)) " N: the root of the sum of the least variances \
+             along and across. No unbiased estimator has a smaller one. Dots: the sensors."
+            @if cut_off { " Limits above the length of the surface have its colour: contacts there cannot be located." }
+            @if nowhere { " Grey: the readings do not tell the position." }
+        };
+        Figure::map(&map, caption)
+    }
+
+    /// What only a digit has: the limit of the force, and how far the linear theory goes.
+    fn digit_figures(&self) -> Vec<Figure> {
+        let SurfaceSpec::Digit(digit) = &self.bench.surface else { return Vec::new() };
+        let force_limit = force_limit_figure(self.unknown);
+        std::iter::once(force_limit).chain(linear_theory_figures(self.bench, self.limit, digit)).collect()
+    }
+
+    fn limit_table(&self) -> Table {
+        let rows = self.listed.iter().map(|&position| {
+            let contact = Contact { position, force_n: self.known.force_n };
+            let [known, unknown] = [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force));
+            vec![
+                text(place(position, self.known.extent)),
+                value_mm(known.map(|bound| bound.sd_position_m)),
+                value_mm(known.map(|bound| bound.mean_error_m())),
+                value_mm(unknown.map(|bound| bound.sd_position_m)),
+                value(unknown.and_then(|bound| bound.sd_force_n)),
+            ]
+        });
+        let columns = [
+            short("position, mm"),
+            numeric("force known: limit, mm"),
+            numeric("mean error, mm"),
+            numeric("force unknown: limit, mm"),
+            numeric("of the force, N"),
+        ];
+        let caption = html! {
+            "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: \
+             the readings do not tell."
+        };
+        Table::new(columns, rows, caption)
+    }
+
+    fn warnings_in_words(&self) -> Markup {
+        html! {
+            @if self.warnings.is_empty() {
+                p {
+                    "Nothing to warn of with the force " (self.force.name()) ": no blind zone, no two contacts that read alike, no \
+                     contact that drowns in the noise."
+                }
+            } @else {
+                ul {
+                    @for warning in self.warnings {
+                        li { (sentence(&warning.to_string())) " " b { "What would help:" } " " (warning.help()) "." }
+                    }
+                }
+            }
+        }
+    }
+
+    fn sensor_table(&self) -> Table {
+        let rows = self.bench.layout.sensors.iter().enumerate().map(|(i, sensor)| {
+            vec![
+                text((i + 1).to_string()),
+                text(sensor.kind.name()),
+                text(place(sensor.position, self.known.extent)),
+                text(noise_in_words(sensor)),
+            ]
+        });
+        let columns = [short("sensor"), words("measures"), numeric("position, mm"), wide("noise")];
+        Table::new(columns, rows, html! { "The sensors and their noise, from which the limit follows." })
+    }
+}
+
+fn limit_axis(extremes: Extremes, length_mm: f64) -> Axis {
+    let Extremes { least, greatest } = extremes;
+    let axis = extremes.axis("limit, mm");
+    if extremes.are_far_apart() {
+        let top = greatest.min(MOST_LENGTHS * length_mm);
+        axis.from_to(0.7 * least, (1.4 * top).max(2.0 * least))
+    } else if greatest > 0.0 {
+        axis.from_to(0.0, 1.1 * greatest)
+    } else {
+        axis
+    }
+}
+
+/// With a capital at its beginning and a full stop at its end.
+fn sentence(words: &str) -> String {
+    let mut characters = words.chars();
+    let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", characters.as_str())
+}
+
+fn noise_in_words(sensor: &Sensor) -> String {
+    let channel = &sensor.channel;
+    if channel.dead {
+        return "dead: left out".to_owned();
+    }
+    let told = |value| quantity(value, sensor.kind.dimension());
+    let mut parts = Vec::new();
+    if channel.noise_sd > 0.0 {
+        parts.push(format!("standard deviation {}", told(channel.noise_sd)));
+    }
+    if channel.resolution > 0.0 {
+        parts.push(format!("resolution {}", told(channel.resolution)));
+    }
+    parts.join(", ")
+}
+
+fn meaning() -> Markup {
+    html! {
+        p {
+            "Readings are noisy, so the same contact is never read twice the same, and whatever is computed from a reading \
+             scatters. How little it can scatter follows from how fast the readings change with the contact, measured in \
+             standard deviations of their noise: this is the Cramér–Rao bound, here called the limit. A clever estimator \
+             reaches it; none that is right on average beats it."
+        }
+        p {
+            "With a known force, a change of any reading tells. With an unknown force, what a harder touch would do to the \
+             readings cannot be told from what a move does, and only the rest counts: next to a support, where all \
+             deflections vanish together, little is left."
+        }
+        p {
+            "The limit looks at small errors. That two contacts far apart may read alike it does not see; the warnings do. \
+             Errors of gain and offset are not in it: calibration removes them."
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! The report of one load profile: how force is spread, how far that can be told, and what is left unexplained.
+
+use maud::{Markup, html};
+
+use super::maps::sensors_mm;
+use super::numbers::{counted, mm, number, place, stated};
+use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, words};
+use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
+use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
+use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::surface::UniformLoad;
+
+/// Places whose averaging kernels are drawn, as shares of the length, and on a plane of the width.
+const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1, 0.5]];
+/// N/mm in N/m, and kPa in Pa.
+const PER_THOUSAND: f64 = 1e-3;
+
+/// What a profile's report is made from.
+#[derive(Clone, Copy)]
+pub struct ProfileReport<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// The sensors.
+    pub layout: &'a Layout,
+    /// The reading, in SI units.
+    pub reading: &'a [f64],
+    /// The load that it tells.
+    pub profile: &'a LoadProfile,
+    /// The limit of each patch, where the readings tell them all.
+    pub limits: Option<&'a [PatchLimit]>,
+    /// What the layout resolves; `None` without load.
+    pub resolution: Option<&'a Resolution>,
+    /// The loads that were simulated; none where the truth is not known.
+    pub truth: &'a [UniformLoad],
+}
+
+/// Reports a load profile: `report.html`, one self-contained page, and its figures as SVG files.
+pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
+    let load = if report.is_plane() { report.pressure_map() } else { report.load_figure() };
+    let resolved = report.resolution.map(|resolution| {
+        if report.is_plane() {
+            (report.width_map(resolution), report.kernel_map(resolution))
+        } else {
+            (report.width_figure(resolution), report.kernel_figure(resolution))
+        }
+    });
+    let (widths, kernels) = resolved.unzip();
+    Page {
+        title: report.title.to_owned(),
+        lead: Markup::default(),
+        summary: report.summary(),
+        sections: vec![
+            Section::new("profile", "The load").figure(load).table(report.patch_table()),
+            Section::new("resolution", "What this layout resolves").figure(widths).figure(kernels),
+            Section::new("readings", "Readings and what is left of them")
+                .figure(report.residual_figure())
+                .table(report.reading_table()),
+            Section::new("meaning", "What the profile means").text(meaning()),
+        ],
+        made: Markup::default(),
+    }
+    .files()
+}
+
+impl ProfileReport<'_> {
+    fn is_plane(&self) -> bool {
+        self.profile.cells.extent.is_plane()
+    }
+
+    fn summary(&self) -> Markup {
+        let profile = self.profile;
+        let (low, high) = profile.total_95_n();
+        html! {
+            li { (status_in_words(profile)) }
+            @if let Some(centre) = &profile.centre {
+                li { "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (number(low)) "–" (number(high)) " N." }
+                li {
+                    "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
+                    (interval_mm(centre.x_95_m())) " mm"
+                    @if self.is_plane() {
+                        "; across at " b { (number(centre.position.y_m * 1e3)) " mm" } ", 95 % interval "
+                        (interval_mm(centre.y_95_m())) " mm"
+                    }
+                    "."
+                }
+                li { a href="#table-1" { (counted(profile.patches.len(), "patch", "patches")) } "." }
+            }
+        }
+    }
+
+    /// The middle of each cell of a line in mm, with a figure of the cell.
+    fn along(&self, figure: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+        let centres = self.profile.cells.centres().enumerate();
+        centres.map(|(cell, centre)| (centre.x_m * 1e3, figure(cell))).collect()
+    }
+
+    fn axis(&self, label: &str) -> Axis {
+        Axis::linear(label).from_to(0.0, self.profile.cells.extent.length_m * 1e3)
+    }
+
+    fn load_figure(&self) -> Figure {
+        let profile = self.profile;
+        let load = self.along(|cell| profile.density(cell).0 * PER_THOUSAND);
+        let interval = |(cell, (x, _)): (usize, &(f64, f64))| {
+            let (low, high) = profile.density(cell).1;
+            BandPoint { x: *x, low: low * PER_THOUSAND, high: high * PER_THOUSAND }
+        };
+        let band = load.iter().enumerate().map(interval).collect();
+        let mut series = vec![Series::band("95 % interval", 0, band), Series::line("load", 0, load)];
+        if !self.truth.is_empty() {
+            series.push(Series::dashes("true load", 1, self.truth_steps()));
+        }
+        let centre = profile.centre.map(|centre| Mark::VerticalLine {
+            x: centre.position.x_m * 1e3,
+            label: "centre of pressure".to_owned(),
+        });
+        let (x, y) = (self.axis("position, mm"), Axis::linear("load, N/mm"));
+        let chart =
+            Chart::new("The load along the surface", x, y, series).with_marks(centre.into_iter().collect());
+        let caption = html! {
+            "The load that the reading tells, with its 95 % interval cell by cell."
+            @if !self.truth.is_empty() { " Dashes: the load that was simulated." }
+            " Neighbouring cells share their uncertainty: where one is too high, the next is too low, and their sum is told better than \
+             either."
+        };
+        Figure::chart(&chart, caption)
+    }
+
+    /// The simulated loads in N/mm as a line that steps up and down.
+    fn truth_steps(&self) -> Vec<(f64, f64)> {
+        let mut loads = self.truth.to_vec();
+        loads.sort_by(|a, b| a.from.x_m.total_cmp(&b.from.x_m));
+        let steps = loads.iter().flat_map(|load| {
+            let (from, to) = (load.from.x_m * 1e3, load.to.x_m * 1e3);
+            let density = load.force_n / (to - from);
+            [(from, 0.0), (from, density), (to, density), (to, 0.0)]
+        });
+        let end = (self.profile.cells.extent.length_m * 1e3, 0.0);
+        std::iter::once((0.0, 0.0)).chain(steps).chain([end]).collect()
+    }
+
+    fn width_figure(&self, resolution: &Resolution) -> Figure {
+        let points = self.along(|cell| resolution.widths_m[cell] * 1e3);
+        let most = points.iter().fold(0.0, |most: f64, point| most.max(point.1));
+        let sensors = self.layout.sensors.iter();
+        let sensors = sensors.map(|sensor| (sensor.position.x_m * 1e3, 0.02 * most)).collect();
+        let series =
+            vec![Series::line("width", 0, points), Series::markers("sensors", 2, sensors, Marker::Triangle)];
+        let y = Axis::linear("width at half height, mm").from_to(0.0, 1.1 * most);
+        let chart = Chart::new("Width of the averaging kernels", self.axis("position, mm"), y, series);
+        let caption = html! { "Over how much of the surface the profile is a mean, at the smoothness of this reading." };
+        Figure::chart(&chart, caption)
+    }
+
+    fn kernel_figure(&self, resolution: &Resolution) -> Figure {
+        let cells = resolution.cells;
+        let kernel = |(colour, share): (usize, &f64)| {
+            let of = ((share * cells.columns as f64) as usize).min(cells.columns - 1);
+            let label = format!("of {} mm", mm(cells.centre(of).x_m));
+            Series::line(label, colour, self.along(|cell| resolution.kernels[[of, cell]]))
+        };
+        let series = KERNEL_PLACES.iter().enumerate().map(kernel).collect();
+        let (x, y) = (self.axis("position of the load, mm"), Axis::linear("share of a cell's load"));
+        let caption = html! {
+            "What load elsewhere adds to the profile at five places: the ideal is a spike at the place itself. Negative lobes take away."
+        };
+        Figure::chart(&Chart::new("Averaging kernels", x, y, series), caption)
+    }
+
+    fn map(&self, title: &str, label: &str, panels: Vec<HeatPanel>) -> HeatMap {
+        HeatMap {
+            title: title.to_owned(),
+            cells: self.profile.cells,
+            panels,
+            dots_mm: sensors_mm(self.layout),
+            label: label.to_owned(),
+            most: f64::INFINITY,
+            width_px: 860,
+        }
+    }
+
+    fn pressure_map(&self) -> Figure {
+        let profile = self.profile;
+        let cells = 0..profile.cells.len();
+        let kpa =
+            |name, pa: Vec<f64>| HeatPanel::new(name, pa.into_iter().map(|pa| pa * PER_THOUSAND).collect());
+        let mut panels = vec![kpa("told", cells.clone().map(|cell| profile.density(cell).0).collect())];
+        if !self.truth.is_empty() {
+            panels.push(kpa("simulated", profile.cells.mean_density(self.truth)));
+        }
+        panels.push(kpa("standard deviation", cells.map(|cell| profile.density_sd(cell)).collect()));
+        let caption = html! {
+            "The pressure that the reading tells, cell by cell"
+            @if !self.truth.is_empty() { ", the pressure that was simulated," }
+            " and the standard deviation of what is told. Neighbouring cells share their uncertainty: where one is too high, the next is too \
+             low, and their sum is told better than either. Dots: the sensors."
+        };
+        Figure::map(&self.map("The pressure on the surface", "kPa", panels), caption)
+    }
+
+    fn width_map(&self, resolution: &Resolution) -> Figure {
+        let widths = resolution.widths_m.iter().map(|width_m| width_m * 1e3).collect();
+        let caption = html! {
+            "Over how much of the surface the pressure map is a mean, at the smoothness of this reading: the side of a square as large as \
+             the area where the averaging kernel of a place is above half of its height."
+        };
+        let panels = vec![HeatPanel::new("", widths)];
+        Figure::map(&self.map("Width of the averaging kernels", "width, mm", panels), caption)
+    }
+
+    fn kernel_map(&self, resolution: &Resolution) -> Figure {
+        let cells = resolution.cells;
+        let kernel = |[along, across]: [f64; 2]| {
+            let number = |share: f64, count: usize| ((share * count as f64) as usize).min(count - 1);
+            let cell = number(across, cells.rows) * cells.columns + number(along, cells.columns);
+            let name = format!("of {} mm", place(cells.centre(cell), cells.extent));
+            HeatPanel::new(name, resolution.kernels.row(cell).to_vec())
+        };
+        let panels = KERNEL_PLACES_ON_A_PLANE.into_iter().map(kernel).collect();
+        let caption = html! {
+            "What load elsewhere adds to the map at three places: the ideal is a spike at the place itself. Negative lobes take away."
+        };
+        Figure::map(&self.map("Averaging kernels", "share", panels), caption)
+    }
+
+    /// The residuals: along a line by place, on a plane by number.
+    fn residual_figure(&self) -> Figure {
+        let mut kinds = self.layout.kinds();
+        kinds.dedup();
+        let of_kind = |(colour, kind): (usize, &SensorKind)| {
+            let sensors = self.layout.sensors.iter().enumerate().filter(|(_, sensor)| sensor.kind == *kind);
+            let points = sensors.filter_map(|(i, sensor)| {
+                let at = if self.is_plane() { (i + 1) as f64 } else { sensor.position.x_m * 1e3 };
+                Some((at, self.profile.residuals.get(i).copied().flatten()?))
+            });
+            let marker = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Cross][colour % 4];
+            Series::markers(kind.name(), colour, points.collect(), marker)
+        };
+        let series = kinds.iter().enumerate().map(of_kind).collect();
+        let x = if self.is_plane() {
+            Axis::linear("sensor").from_to(0.0, self.layout.len() as f64 + 1.0)
+        } else {
+            self.axis("sensor position, mm")
+        };
+        let y = Axis::linear("residual, standard deviations of the noise");
+        let line_at = |y, label: &str| Mark::HorizontalLine { y, label: label.to_owned() };
+        let chart = Chart::new("What the profile leaves of the reading", x, y, series)
+            .with_marks(vec![line_at(2.0, "two standard deviations"), line_at(-2.0, "")])
+            .with_height(340);
+        let caption = html! { "Reading less what the sensor would read of the profile, over the standard deviation of its noise." };
+        Figure::chart(&chart, caption)
+    }
+
+    fn patch_table(&self) -> Table {
+        // Stretch, centre, its interval and its limit: along the surface, and on a plane across it.
+        let columns_of =
+            |stretch, centre| [numeric(stretch), numeric(centre), numeric("95 %, mm"), numeric("limit, mm")];
+        let cells_of = |from_m: f64, to_m: f64, centre_m: f64, interval_m, limit_m: Option<f64>| {
+            [
+                text(format!("{}–{}", mm(from_m), mm(to_m))),
+                text(tenths_mm(centre_m)),
+                text(interval_mm(interval_m)),
+                value_mm(limit_m),
+            ]
+        };
+        let mut columns = vec![short("patch")];
+        if self.is_plane() {
+            columns.extend(columns_of("along, mm", "centre x, mm"));
+            columns.extend(columns_of("across, mm", "centre y, mm"));
+        } else {
+            columns.extend(columns_of("stretch, mm", "centre, mm"));
+        }
+        columns.extend([numeric("force, N"), numeric("95 %, N"), numeric("limit, N")]);
+        let row = |(i, patch): (usize, &Patch)| {
+            let limit = self.limits.and_then(|limits| limits.get(i));
+            let Patch { from, to, centre, .. } = patch;
+            let mut row = vec![text((i + 1).to_string())];
+            let sd_x_m = limit.map(|limit| limit.sd_x_m);
+            row.extend(cells_of(from.x_m, to.x_m, centre.position.x_m, centre.x_95_m(), sd_x_m));
+            if self.is_plane() {
+                let sd_y_m = limit.map(|limit| limit.sd_y_m);
+                row.extend(cells_of(from.y_m, to.y_m, centre.position.y_m, centre.y_95_m(), sd_y_m));
+            }
+            let (low_n, high_n) = patch.force_95_n();
+            let interval = text(format!("{}–{}", number(low_n), number(high_n)));
+            row.extend([value(patch.force_n), interval, value(limit.map(|limit| limit.sd_force_n))]);
+            row
+        };
+        let caption = html! {
+            "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
+             standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have."
+        };
+        Table::new(columns, self.profile.patches.iter().enumerate().map(row), caption)
+    }
+
+    fn reading_table(&self) -> Table {
+        let rows = self.layout.sensors.iter().enumerate().map(|(i, sensor)| {
+            let unit = sensor.kind.unit();
+            let shown = |value: Option<f64>| {
+                text(value.map_or_else(|| "–".to_owned(), |value| format!("{:.4}", value / unit.factor())))
+            };
+            vec![
+                text((i + 1).to_string()),
+                text(format!("{}, {}", sensor.kind.name(), unit.symbol())),
+                text(place(sensor.position, self.profile.cells.extent)),
+                shown(self.reading.get(i).copied()),
+                shown(self.profile.fitted.get(i).copied().flatten()),
+                value(self.profile.residuals.get(i).copied().flatten()),
+            ]
+        });
+        let columns = [
+            short("sensor"),
+            words("measures"),
+            numeric("position, mm"),
+            numeric("read"),
+            numeric("of the profile"),
+            numeric("left, sd"),
+        ];
+        let caption = html! {
+            "What each sensor read, what it would read of the profile, and the difference in standard deviations of its noise."
+        };
+        Table::new(columns, rows, caption)
+    }
+}
+
+/// Both ends of an interval in millimetres, to a tenth.
+fn interval_mm((from_m, to_m): (f64, f64)) -> String {
+    format!("{}–{}", tenths_mm(from_m), tenths_mm(to_m))
+}
+
+/// A length in millimetres, to a tenth.
+fn tenths_mm(length_m: f64) -> String {
+    format!("{:.1}", length_m * 1e3)
+}
+
+fn status_in_words(profile: &LoadProfile) -> Markup {
+    let (misfit, worst) = (number(profile.misfit), stated(profile.worst_misfit.round()));
+    match profile.status {
+        Status::NoContact => html! { "No contact: the reading is no more than its noise." },
+        Status::OutsideModel => html! {
+            b { "Outside the model" } ": no load explains the reading within its noise. The least sum of squared residuals is "
+            (misfit) " standard deviations squared; noise alone seldom makes more than " (worst) "."
+        },
+        _ => html! {
+            "A load explains the reading: the least sum of squared residuals is " (misfit) " standard deviations squared, below "
+            (worst) "."
+        },
+    }
+}
+
+fn meaning() -> Markup {
+    html! {
+        p {
+            "A few readings do not tell a whole function. Shown is the mixture of all non-negative loads that explain the reading, \
+             from very smooth to rough, each smoothness weighed by how probable it makes the reading. Total force, centre of \
+             pressure, and the centres and forces of patches are told far better than the shape of the load."
+        }
+        p {
+            "The averaging kernels say over how much of the surface the profile is a mean. They are those of the linear inverse; \
+             that a load cannot pull resolves more than they show. What lies next to a support hardly moves any sensor, and the \
+             profile puts no load there unless the reading asks for it."
+        }
+    }
+}

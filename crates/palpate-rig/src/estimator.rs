@@ -1,0 +1,183 @@
+//! `[estimator]`
+
+use serde::Deserialize;
+
+use palpate_estimators::centroid::CentroidConfig;
+use palpate_estimators::closed_form::ClosedFormConfig;
+use palpate_estimators::digit::{DigitConfig, DigitTheory};
+use palpate_estimators::estimator::EstimatorConfig;
+use palpate_estimators::gaussian_process::GaussianProcessConfig;
+use palpate_estimators::influence::{InfluenceConfig, InfluenceSource};
+use palpate_estimators::neighbours::NeighboursConfig;
+use palpate_estimators::network::{
+    Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
+    PresentationOrder,
+};
+use palpate_mechanics::sensing::Layout;
+
+use crate::document::At;
+use crate::error::{RigError, RigProblem};
+use crate::values::{AboveZero, Count, Force, Fraction, Number, Positive, Written};
+
+/// The method that locates.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename = "by kind or network", rename_all = "kebab-case")]
+pub(crate) enum EstimatorKeys {
+    /// The founding paper's network.
+    Network(NetworkKeys),
+    /// Networks trained by Levenberg–Marquardt with Bayesian regularisation.
+    NetworkLm,
+    /// Influence functions, inverted.
+    Influence(InfluenceKeys),
+    /// Gaussian-process regression of the position.
+    GaussianProcess,
+    /// The beam's own equations.
+    ClosedForm,
+    /// The bending finger's own equations.
+    Digit(DigitKeys),
+    /// Nearest neighbours.
+    Neighbours,
+    /// The calibrated centroid of array sensors.
+    Centroid,
+    /// Whichever of the others locates best in cross-validation.
+    Auto,
+}
+
+/// A feed-forward network and its training by back-propagation; what is not said is as in the founding paper.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NetworkKeys {
+    /// Nodes of each hidden layer, input side first.
+    pub hidden: Option<At<Vec<Count<1, 1000>>>>,
+    /// Activation of the hidden layers.
+    pub hidden_activation: Option<Activation>,
+    /// Activation of the output layer.
+    pub output_activation: Option<Activation>,
+    /// Whether every node has a bias.
+    pub biases: Option<bool>,
+    /// What the output stands for.
+    pub output: Option<OutputCoding>,
+    /// How readings become inputs: `full-scale`, `standardized`, or a reading to divide by.
+    pub input_scale: Option<At<Written>>,
+    /// The step along the gradient.
+    pub learning_rate: Option<Positive<Number>>,
+    /// The share of the previous step that is repeated.
+    pub momentum: Option<Fraction>,
+    /// Training converges when the sum of squared output errors over an epoch is at most this.
+    pub aggregate_error: Option<Positive<Number>>,
+    /// Training is capped after this many epochs.
+    pub max_epochs: Option<Count<1, { u32::MAX as i64 }>>,
+    /// In which order patterns are presented.
+    pub order: Option<PresentationOrder>,
+    /// Weights start uniform within ± this.
+    pub initial_weights: Option<Positive<Number>>,
+}
+
+/// What each sensor reads as a function of the contact, inverted.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct InfluenceKeys {
+    /// Where the influence functions come from.
+    pub from: Option<InfluenceSource>,
+    /// The most contacts that may touch at once.
+    pub contacts: Option<Count<1, 3>>,
+    /// Standard deviation of the contact's force about that of `[contact]`.
+    pub force_sd: Option<At<Positive<Force>>>,
+}
+
+/// The elastica of the finger, or its linearisation.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DigitKeys {
+    /// The theory of bending.
+    #[serde(default)]
+    pub theory: DigitTheory,
+}
+
+impl EstimatorKeys {
+    pub fn build(&self, layout: &Layout, force_n: Option<f64>) -> Result<EstimatorConfig, RigError> {
+        Ok(match self {
+            Self::Network(keys) => EstimatorConfig::Network(keys.build(layout)?),
+            Self::NetworkLm => EstimatorConfig::NetworkLm(LevenbergMarquardtConfig::default()),
+            Self::Influence(keys) => EstimatorConfig::Influence(keys.build(force_n)?),
+            Self::GaussianProcess => EstimatorConfig::GaussianProcess(GaussianProcessConfig::default()),
+            Self::ClosedForm => EstimatorConfig::ClosedForm(ClosedFormConfig),
+            Self::Digit(DigitKeys { theory }) => EstimatorConfig::Digit(DigitConfig { theory: *theory }),
+            Self::Neighbours => EstimatorConfig::Neighbours(NeighboursConfig::default()),
+            Self::Centroid => EstimatorConfig::Centroid(CentroidConfig),
+            Self::Auto => EstimatorConfig::Auto,
+        })
+    }
+}
+
+impl NetworkKeys {
+    fn build(&self, layout: &Layout) -> Result<NetworkConfig, RigError> {
+        const MOST_LAYERS: usize = 16;
+        let default = NetworkConfig::default();
+        let hidden = match &self.hidden {
+            Some(layers) if layers.len() > MOST_LAYERS => {
+                return Err(layers.place.refuse(format!("a list of at most {MOST_LAYERS}")));
+            }
+            Some(layers) => layers.iter().map(|nodes| nodes.get()).collect(),
+            None => default.hidden,
+        };
+        let number = |key: Option<Positive<Number>>, default| key.map_or(default, |number| number.si);
+        let training = default.training;
+        Ok(NetworkConfig {
+            hidden,
+            hidden_activation: self.hidden_activation.unwrap_or(default.hidden_activation),
+            output_activation: self.output_activation.unwrap_or(default.output_activation),
+            biases: self.biases.unwrap_or(default.biases),
+            output: self.output.unwrap_or(default.output),
+            input_scale: match &self.input_scale {
+                Some(scale) => input_scale(scale, layout)?,
+                None => default.input_scale,
+            },
+            training: BackPropagation {
+                learning_rate: number(self.learning_rate, training.learning_rate),
+                momentum: self.momentum.map_or(training.momentum, |momentum| momentum.si),
+                aggregate_error: number(self.aggregate_error, training.aggregate_error),
+                max_epochs: self.max_epochs.map_or(training.max_epochs, |epochs| epochs.get() as u32),
+                order: self.order.unwrap_or(training.order),
+                initial_weights: number(self.initial_weights, training.initial_weights),
+            },
+        })
+    }
+}
+
+/// "full-scale", "standardized", or a reading in the sensors' own dimension.
+fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigError> {
+    if let Written::Text(text) = &**scale {
+        match text.as_str() {
+            "full-scale" => return Ok(InputScale::FullScale),
+            "standardized" => return Ok(InputScale::Standardized),
+            word if word.trim_start().starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) => {}
+            word => {
+                let (key, known) = (scale.place.key().to_owned(), vec!["full-scale", "standardized"]);
+                return Err(RigProblem::UnknownWord { key, word: word.to_owned(), known }.at(&scale.place));
+            }
+        }
+    }
+    let kinds = layout.kinds();
+    let Some(first) = kinds.first() else { return Ok(InputScale::FullScale) };
+    if let Some(second) = kinds.iter().find(|kind| kind.dimension() != first.dimension()) {
+        let bound = format!("a word: no one reading scales both {first} and {second} sensors");
+        return Err(scale.place.refuse(bound));
+    }
+    scale.si::<AboveZero>(first.dimension()).map(InputScale::DivideBy)
+}
+
+impl InfluenceKeys {
+    fn build(&self, force_n: Option<f64>) -> Result<InfluenceConfig, RigError> {
+        let default = InfluenceConfig::default();
+        if let (Some(force_sd), None) = (&self.force_sd, force_n) {
+            let with = "an unknown force; give [contact] `force`, about which it spreads";
+            return Err(force_sd.place.unused(with));
+        }
+        Ok(InfluenceConfig {
+            from: self.from.unwrap_or(default.from),
+            contacts: self.contacts.map_or(default.contacts, Count::get),
+            force_sd_n: self.force_sd.as_ref().map(|force_sd| force_sd.si),
+        })
+    }
+}

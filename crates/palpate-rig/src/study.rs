@@ -1,0 +1,306 @@
+//! The study file: a rig's sections, an `[evaluation]`, and `[[arm]]`s that replace some of them.
+
+use std::ops::Range;
+
+use palpate_design::sensors::Method;
+use palpate_estimators::evaluation::Portion;
+use palpate_estimators::network::Precision;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::units::format_length_mm;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use sha2::{Digest, Sha256};
+use toml::Spanned;
+use toml::de::DeValue;
+
+use crate::Rig;
+use crate::design::DesignKeys;
+use crate::document::{self, At, place};
+use crate::error::{RigError, RigProblem};
+use crate::estimator::EstimatorKeys;
+use crate::file::RigFile;
+use crate::sensors::SensorsKeys;
+use crate::surface::SurfaceKeys;
+use crate::training::{ContactKeys, TrainingKeys};
+use crate::values::{Count, Length, OneOrMany, Positive};
+
+/// A set of experiments: every arm is a rig, fitted once a seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Study {
+    /// Its name.
+    pub name: String,
+    /// Seeds 0 to this less 1, unless the caller wants another number; at least 1.
+    pub seeds: u64,
+    /// The arithmetic of training in lanes.
+    pub precision: Precision,
+    /// Where and how its locators are judged.
+    pub judging: Judging,
+    /// Its arms, at least 1, with names of their own.
+    pub arms: Vec<Arm>,
+    /// SHA-256 of the study file, in hexadecimal.
+    pub digest: String,
+}
+
+/// One row of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arm {
+    /// Its name, unique in the study.
+    pub name: String,
+    /// What is fitted; where a layout is asked for, it takes the place of the rig's own when the study is prepared.
+    pub rig: Rig,
+    /// The layout that it asks for by method.
+    pub layout: Option<AskedLayout>,
+    /// The title of the figure that it shares with other arms in reports; `None` for a figure of its own.
+    pub figure: Option<String>,
+}
+
+/// A layout asked for by method.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AskedLayout {
+    /// The method.
+    pub method: Method,
+    /// The bytes of the study file that ask for it.
+    pub place: Range<usize>,
+}
+
+/// Where and how a study's locators are judged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judging {
+    /// Contact positions, evenly spaced.
+    pub positions: Vec<Position>,
+    /// Readings at each position, where sensors have noise; at least 1.
+    pub readings: usize,
+    /// An error up to this, in metres, is good enough for the effective length.
+    pub tolerance_m: f64,
+    /// Portions of the surface that are also judged by themselves.
+    pub portions: Vec<Portion>,
+    /// Whether errors between the outermost training positions, and beyond them, are also judged by themselves.
+    pub training_span: bool,
+}
+
+/// A study file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyFile {
+    /// Its name.
+    name: At<String>,
+    /// How many seeds each arm is fitted from; 100 unless said otherwise.
+    seeds: Option<Count<1, 1_000_000>>,
+    /// The arithmetic of training networks.
+    #[serde(default)]
+    precision: Precision,
+    /// The surface of every arm.
+    surface: Option<At<SurfaceKeys>>,
+    /// The sensors of arms that have none of their own.
+    sensors: Option<At<OneOrMany<SensorsKeys>>>,
+    /// The contact of arms that have none of their own.
+    contact: Option<ContactKeys>,
+    /// The calibration of arms that have none of their own.
+    training: Option<At<TrainingKeys>>,
+    /// The estimator; its keys hold for arms that do not say the same keys. Read by [`estimator`].
+    #[serde(rename = "estimator")]
+    _estimator: Option<IgnoredAny>,
+    /// What layouts that are asked for by method may choose from.
+    design: Option<At<DesignKeys>>,
+    /// Where and how locators are judged.
+    evaluation: Option<EvaluationKeys>,
+    /// The arms.
+    #[serde(default)]
+    arm: Vec<ArmKeys>,
+}
+
+/// Where and how locators are judged.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EvaluationKeys {
+    /// The first contact position.
+    from: Positive<Length>,
+    /// The last.
+    to: At<Positive<Length>>,
+    /// The distance between two.
+    step: At<Positive<Length>>,
+    /// Readings at each position; 5 unless said otherwise.
+    readings: Option<Count<1, 1000>>,
+    /// An error up to this is good enough; 2 mm unless said otherwise.
+    tolerance: Option<Positive<Length>>,
+    /// Portions of the surface that are also judged by themselves.
+    #[serde(default)]
+    portions: Vec<At<PortionKeys>>,
+    /// Whether errors between the outermost training positions, and beyond them, are also judged by themselves.
+    #[serde(default)]
+    training_span: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(expecting = "a list of 2 lengths, the smaller one first")]
+struct PortionKeys(Positive<Length>, Positive<Length>);
+
+/// One row of a study.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ArmKeys {
+    /// Its name.
+    name: At<String>,
+    /// The title of a figure that it shares with other arms.
+    figure: Option<String>,
+    /// The method that places its sensors.
+    layout: Option<At<Method>>,
+    /// Its own sensors.
+    sensors: Option<At<OneOrMany<SensorsKeys>>>,
+    /// Its own contact.
+    contact: Option<ContactKeys>,
+    /// Its own calibration.
+    training: Option<At<TrainingKeys>>,
+    /// Its own keys of the estimator. Read by [`estimator`].
+    #[serde(rename = "estimator")]
+    _estimator: Option<IgnoredAny>,
+}
+
+impl Study {
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// [`RigError`], with the place in `text`, the value and its bound.
+    pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        let document = document::parse(text)?;
+        let file: StudyFile = document::read("", &document)?;
+        let mut arms: Vec<Arm> = Vec::new();
+        for (i, keys) in file.arm.iter().enumerate() {
+            let arm = keys.build(&file, estimator(document.get_ref(), i)?)?;
+            if arms.iter().any(|other| other.name == arm.name) {
+                return Err(keys.name.place.refuse_as(format!("{} again", arm.name), "a name of its own"));
+            }
+            arms.push(arm);
+        }
+        let missing = |section| RigProblem::MissingSection { section }.nowhere();
+        let first = arms.first().ok_or_else(|| missing("[[arm]]"))?;
+        let judging = file.judging(first)?;
+        Ok(Self {
+            name: checked_name(&file.name)?,
+            seeds: file.seeds.map_or(100, |seeds| seeds.get() as u64),
+            precision: file.precision,
+            judging,
+            arms,
+            digest: Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect(),
+        })
+    }
+}
+
+/// The estimator of an arm: its own keys, and the base's where it is silent.
+fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, RigError> {
+    let base = document.get("estimator");
+    let own = document.get("arm").and_then(|arms| arms.get_ref().get(arm)?.get_ref().get("estimator"));
+    match (own, base) {
+        (Some(own), Some(base)) => {
+            let both = match (own.get_ref(), base.get_ref()) {
+                (DeValue::Table(own), DeValue::Table(base)) => {
+                    let mut both = base.clone();
+                    both.extend(own.clone());
+                    DeValue::Table(both)
+                }
+                (own, _) => own.clone(),
+            };
+            document::read("estimator", &Spanned::new(own.span(), both)).map(Some)
+        }
+        (own, base) => own.or(base).map(|keys| document::read("estimator", keys)).transpose(),
+    }
+}
+
+impl ArmKeys {
+    /// The base's sections; those of the arm take their place.
+    fn build(&self, base: &StudyFile, estimator: Option<EstimatorKeys>) -> Result<Arm, RigError> {
+        let name = checked_name(&self.name)?;
+        let rig = RigFile {
+            surface: base.surface.clone(),
+            sensors: self.sensors.as_ref().or(base.sensors.as_ref()).cloned(),
+            contact: self.contact.as_ref().or(base.contact.as_ref()).cloned(),
+            training: self.training.as_ref().or(base.training.as_ref()).cloned(),
+            estimator,
+            design: base.design.clone(),
+            ..RigFile::default()
+        };
+        let layout = self.asked_layout()?;
+        let rig = rig.build()?;
+        if let (Some(surface), None) = (&base.surface, rig.bench.surface.model()) {
+            return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
+        }
+        if rig.training.is_none() {
+            return Err(RigProblem::MissingSection { section: "[training]" }.nowhere());
+        }
+        Ok(Arm { name, rig, layout, figure: self.figure.clone() })
+    }
+
+    /// The layout by its method, which leaves nothing for positions to say.
+    fn asked_layout(&self) -> Result<Option<AskedLayout>, RigError> {
+        let Some(layout) = &self.layout else { return Ok(None) };
+        for sensors in self.sensors.iter().flat_map(|sensors| sensors.sections()) {
+            if let Some(key) = place(&sensors.positions).or(place(&sensors.grid)) {
+                return Err(key.unused("`layout`"));
+            }
+        }
+        Ok(Some(AskedLayout { method: **layout, place: layout.place.span.clone() }))
+    }
+}
+
+fn checked_name(name: &At<String>) -> Result<String, RigError> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if name.is_empty() || !name.chars().all(fits) {
+        return Err(name.place.refuse("of letters, digits, `-` and `_`"));
+    }
+    Ok((**name).clone())
+}
+
+impl StudyFile {
+    /// Without an `[evaluation]`: 399 positions, 5 readings at each, tolerance 2 mm, no portions.
+    fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
+        let extent = first.rig.bench.surface.extent();
+        if let (Some(surface), true) = (&self.surface, extent.is_plane()) {
+            return Err(surface.place.refuse_as("a plane", "a line, along which a study judges"));
+        }
+        let default = Judging {
+            positions: (1..400).map(|i| Position::along(f64::from(i) / 400.0 * extent.length_m)).collect(),
+            readings: 5,
+            tolerance_m: 2e-3,
+            portions: Vec::new(),
+            training_span: false,
+        };
+        let Some(keys) = &self.evaluation else { return Ok(default) };
+        Ok(Judging {
+            positions: keys.positions(extent.length_m)?,
+            readings: keys.readings.map_or(default.readings, Count::get),
+            tolerance_m: keys.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),
+            portions: keys.portions.iter().map(At::<PortionKeys>::build).collect::<Result<_, _>>()?,
+            training_span: keys.training_span,
+        })
+    }
+}
+
+impl EvaluationKeys {
+    fn positions(&self, length_m: f64) -> Result<Vec<Position>, RigError> {
+        /// The most contact positions a study judges at.
+        const MOST: usize = 100_000;
+        let (from_m, to_m, step_m) = (self.from.si, self.to.si, self.step.si);
+        if to_m < from_m || to_m > length_m {
+            let [from, length] = [from_m, length_m].map(format_length_mm);
+            let bound = format!("at least `from`, {from}, and at most the surface's length, {length}");
+            return Err(self.to.place.refuse(bound));
+        }
+        // A rounding error of a millionth of a step does not lose the last position.
+        let steps = ((to_m - from_m) / step_m + 1e-6).floor();
+        if steps >= MOST as f64 {
+            return Err(self.step.place.refuse(format!("a distance that makes at most {MOST} contact positions")));
+        }
+        Ok((0..=steps as usize).map(|i| Position::along(from_m + i as f64 * step_m)).collect())
+    }
+}
+
+impl At<PortionKeys> {
+    fn build(&self) -> Result<Portion, RigError> {
+        let portion = Portion { from_m: self.0.si, to_m: self.1.si };
+        if portion.from_m < portion.to_m {
+            Ok(portion)
+        } else {
+            Err(self.place.refuse("a list of 2 lengths, the smaller one first"))
+        }
+    }
+}

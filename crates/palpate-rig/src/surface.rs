@@ -1,0 +1,385 @@
+//! `[surface]`
+
+use serde::Deserialize;
+
+use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
+use palpate_mechanics::surface::{
+    Beam, BeamPart, BeamSection, BeamSupport, BeamSupportKind, Digit, Extent, ForceDirection, Plate,
+    PlateError, SupportedBeam, SupportedBeamSpec, SurfaceSpec,
+};
+
+use crate::document::{At, Place, place};
+use crate::error::{RigError, RigProblem};
+use crate::values::{Count, Density, Length, Modulus, Number, Point, Positive, Quantity};
+use crate::values::{RotationalStiffness, Stiffness};
+
+/// The elastic body that is touched.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename = "by kind", rename_all = "kebab-case")]
+pub(crate) enum SurfaceKeys {
+    /// A straight beam.
+    Beam(BeamKeys),
+    /// A rectangular plate.
+    Plate(PlateKeys),
+    /// A flexible finger, clamped at 0 and free at its tip.
+    Digit(DigitKeys),
+    /// A surface without a model, of which there are recordings only.
+    Measured(MeasuredKeys),
+}
+
+/// A straight beam of rectangular section; simply supported at both ends unless `supports` says otherwise.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BeamKeys {
+    /// Length.
+    pub length: Positive<Length>,
+    /// Width of the section; that of `sections` which have none of their own.
+    pub width: Option<Positive<Length>>,
+    /// Thickness of the section; that of `sections` which have none of their own.
+    pub thickness: Option<Positive<Length>>,
+    /// Young's modulus.
+    pub youngs_modulus: Positive<Modulus>,
+    /// What holds it.
+    pub supports: Option<At<BeamSupportsKeys>>,
+    /// Stretches of one section each, from left to right.
+    pub sections: Option<At<Vec<At<SectionKeys>>>>,
+    /// Density, which only a beam that swings under a moving contact needs.
+    pub density: Option<At<Positive<Density>>>,
+}
+
+/// A word for both ends, or a list.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename = "by shape", expecting = "a word such as \"simple\", or a list of supports")]
+pub(crate) enum BeamSupportsKeys {
+    Text(EndsKeys),
+    List(Vec<BeamSupportKeys>),
+}
+
+/// How both ends are held.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum EndsKeys {
+    /// No deflection, free to turn.
+    Simple,
+}
+
+/// A support of a beam.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(
+    rename = "by kind",
+    rename_all = "kebab-case",
+    deny_unknown_fields,
+    expecting = "a support such as { at = \"0 mm\", kind = \"clamped\" }"
+)]
+pub(crate) enum BeamSupportKeys {
+    /// No deflection, free to turn.
+    Simple { at: At<Quantity<Length>> },
+    /// Neither deflection nor slope.
+    Clamped { at: At<Quantity<Length>> },
+    /// Nothing: an end of the beam without a support, said so.
+    Free { at: At<Quantity<Length>> },
+    /// No slope, free to deflect.
+    Guided { at: At<Quantity<Length>> },
+    /// A spring.
+    Elastic {
+        at: At<Quantity<Length>>,
+        /// Upward force per downward deflection.
+        stiffness: Positive<Stiffness>,
+        /// Couple against the slope; without it the beam is free to turn there.
+        rotational_stiffness: Option<Positive<RotationalStiffness>>,
+    },
+}
+
+/// A stretch of a beam that has one width and thickness.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a section such as { to = \"100 mm\", thickness = \"2 mm\" }")]
+pub(crate) struct SectionKeys {
+    /// Where it ends; the last one ends with the beam unless it says otherwise.
+    pub to: Option<At<Positive<Length>>>,
+    /// Its width, if not the beam's.
+    pub width: Option<Positive<Length>>,
+    /// Its thickness, if not the beam's.
+    pub thickness: Option<Positive<Length>>,
+}
+
+/// A rectangular plate; x runs along its length, y along its width.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PlateKeys {
+    /// Length.
+    pub length: Positive<Length>,
+    /// Width.
+    pub width: Positive<Length>,
+    /// Thickness.
+    pub thickness: Positive<Length>,
+    /// Young's modulus.
+    pub youngs_modulus: Positive<Modulus>,
+    /// Poisson's ratio.
+    pub poissons_ratio: At<Quantity<Number>>,
+    /// How its edges are held; free unless said otherwise.
+    pub edges: Option<At<EdgesKeys>>,
+    /// What holds it at points.
+    pub supports: Option<At<PointSupportsKeys>>,
+    /// Elements along the longer side.
+    pub elements: Option<At<Count<1, { i64::MAX }>>>,
+}
+
+/// A word for all edges, or one for each.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename = "by shape", expecting = "a word such as \"simple\", or a table of left, right, bottom and top")]
+pub(crate) enum EdgesKeys {
+    Text(Edge),
+    Table(EachEdgeKeys),
+}
+
+/// How each edge is held; free where nothing is said.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EachEdgeKeys {
+    /// The edge x = 0.
+    pub left: Option<Edge>,
+    /// The edge x = length.
+    pub right: Option<Edge>,
+    /// The edge y = 0.
+    pub bottom: Option<Edge>,
+    /// The edge y = width.
+    pub top: Option<Edge>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename = "by shape", expecting = "a list of points on a plate; its edges are held by `edges`")]
+pub(crate) enum PointSupportsKeys {
+    List(Vec<At<PointSupportKeys>>),
+}
+
+/// A support of a plate at one point.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(
+    rename = "by kind",
+    rename_all = "kebab-case",
+    deny_unknown_fields,
+    expecting = "a support such as { at = [\"10 mm\", \"10 mm\"], kind = \"simple\" }"
+)]
+pub(crate) enum PointSupportKeys {
+    /// It does not move, and the plate can turn on it.
+    Simple { at: At<Point> },
+    /// A spring.
+    Elastic {
+        at: At<Point>,
+        /// Upward force per downward deflection.
+        stiffness: Positive<Stiffness>,
+    },
+}
+
+/// A flexible finger of rectangular section, clamped at 0 and free at its tip.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DigitKeys {
+    /// Length.
+    pub length: Positive<Length>,
+    /// Width of the section.
+    pub width: Positive<Length>,
+    /// Thickness of the section.
+    pub thickness: Positive<Length>,
+    /// Young's modulus.
+    pub youngs_modulus: Positive<Modulus>,
+    /// Where a contact's force points.
+    pub direction: ForceDirection,
+}
+
+/// The size of a surface without a model.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MeasuredKeys {
+    /// Length.
+    pub length: Positive<Length>,
+    /// Width, if it is touched along and across.
+    pub width: Option<Positive<Length>>,
+}
+
+impl At<SurfaceKeys> {
+    pub fn build(&self) -> Result<SurfaceSpec, RigError> {
+        match &**self {
+            SurfaceKeys::Beam(keys) => keys.build(&self.place),
+            SurfaceKeys::Plate(keys) => keys.build(&self.place).map(SurfaceSpec::Plate),
+            SurfaceKeys::Digit(keys) => {
+                let digit = Digit {
+                    length_m: keys.length.si,
+                    width_m: keys.width.si,
+                    thickness_m: keys.thickness.si,
+                    youngs_modulus_pa: keys.youngs_modulus.si,
+                    direction: keys.direction,
+                };
+                digit.validate().map_err(|error| RigProblem::Digit(error).at(&self.place))?;
+                Ok(SurfaceSpec::Digit(digit))
+            }
+            SurfaceKeys::Measured(keys) => Ok(SurfaceSpec::Measured(Extent {
+                length_m: keys.length.si,
+                width_m: keys.width.map(|width| width.si),
+            })),
+        }
+    }
+
+    /// Its density, if it says one.
+    pub fn density(&self) -> Option<&At<Positive<Density>>> {
+        match &**self {
+            SurfaceKeys::Beam(keys) => keys.density.as_ref(),
+            _ => None,
+        }
+    }
+}
+
+impl BeamKeys {
+    fn build(&self, place: &Place) -> Result<SurfaceSpec, RigError> {
+        let (length_m, youngs_modulus_pa) = (self.length.si, self.youngs_modulus.si);
+        let size = |key, own: Option<Positive<Length>>, beams: Option<Positive<Length>>| {
+            own.or(beams).map(|size| size.si).ok_or_else(|| place.missing(key))
+        };
+        let section = |to_m, width, thickness| {
+            let width_m = size("width", width, self.width)?;
+            Ok(BeamSection { to_m, width_m, thickness_m: size("thickness", thickness, self.thickness)? })
+        };
+        let supports = match self.supports.as_deref() {
+            Some(BeamSupportsKeys::List(listed)) => Some(listed.as_slice()),
+            Some(BeamSupportsKeys::Text(EndsKeys::Simple)) | None => None,
+        };
+        let sections = match &self.sections {
+            None => vec![section(length_m, None, None)?],
+            Some(listed) => {
+                let last = listed.len().saturating_sub(1);
+                let each = listed.iter().enumerate().map(|(i, own)| {
+                    let to_m = match &own.to {
+                        Some(to) => to.si,
+                        None if i == last => length_m,
+                        None => return Err(own.place.missing("to")),
+                    };
+                    section(to_m, own.width, own.thickness)
+                });
+                each.collect::<Result<_, _>>()?
+            }
+        };
+        if let (None, None, [BeamSection { width_m, thickness_m, .. }]) =
+            (supports, &self.sections, sections.as_slice())
+        {
+            let beam =
+                Beam { length_m, width_m: *width_m, thickness_m: *thickness_m, youngs_modulus_pa };
+            beam.validate().map_err(|error| RigProblem::Beam(error).at(place))?;
+            return Ok(SurfaceSpec::Beam(beam));
+        }
+        let supports = match supports {
+            Some(listed) => listed.iter().map(|support| support.build().1).collect(),
+            None => vec![
+                BeamSupport { at_m: 0.0, kind: BeamSupportKind::Simple },
+                BeamSupport { at_m: length_m, kind: BeamSupportKind::Simple },
+            ],
+        };
+        let spec = SupportedBeamSpec { length_m, youngs_modulus_pa, sections, supports };
+        let beam = SupportedBeam::new(spec).map_err(|error| {
+            let part = self.place_of(error.part()).unwrap_or(place);
+            RigProblem::SupportedBeam(error).at(part)
+        })?;
+        Ok(SurfaceSpec::SupportedBeam(Box::new(beam)))
+    }
+
+    /// Where the document says what is at fault.
+    fn place_of(&self, part: BeamPart) -> Option<&Place> {
+        match part {
+            BeamPart::Whole => None,
+            BeamPart::Supports => place(&self.supports),
+            BeamPart::Support(i) => match self.supports.as_deref()? {
+                BeamSupportsKeys::List(listed) => Some(listed.get(i)?.build().0),
+                BeamSupportsKeys::Text(_) => None,
+            },
+            BeamPart::Sections => place(&self.sections),
+            BeamPart::Section(i) => {
+                let section = self.sections.as_ref()?.get(i)?;
+                place(&section.to).or(Some(&section.place))
+            }
+        }
+    }
+}
+
+impl BeamSupportKeys {
+    /// The support, and where the document says its position.
+    fn build(&self) -> (&Place, BeamSupport) {
+        let (at, kind) = match self {
+            Self::Simple { at } => (at, BeamSupportKind::Simple),
+            Self::Clamped { at } => (at, BeamSupportKind::Clamped),
+            Self::Free { at } => (at, BeamSupportKind::Free),
+            Self::Guided { at } => (at, BeamSupportKind::Guided),
+            Self::Elastic { at, stiffness, rotational_stiffness } => (
+                at,
+                BeamSupportKind::Elastic {
+                    stiffness_n_per_m: stiffness.si,
+                    rotational_stiffness_nm_per_rad: rotational_stiffness.map(|stiffness| stiffness.si),
+                },
+            ),
+        };
+        (&at.place, BeamSupport { at_m: at.si, kind })
+    }
+}
+
+impl PlateKeys {
+    fn build(&self, place: &Place) -> Result<Plate, RigError> {
+        let extent = Extent { length_m: self.length.si, width_m: Some(self.width.si) };
+        let edges = match self.edges.as_deref() {
+            None => Edges::all(Edge::Free),
+            Some(EdgesKeys::Text(edge)) => Edges::all(*edge),
+            Some(EdgesKeys::Table(EachEdgeKeys { left, right, bottom, top })) => {
+                let [left, right, bottom, top] =
+                    [left, right, bottom, top].map(|edge| edge.unwrap_or(Edge::Free));
+                Edges { left, right, bottom, top }
+            }
+        };
+        let spec = PlateSpec {
+            length_m: self.length.si,
+            width_m: self.width.si,
+            thickness_m: self.thickness.si,
+            youngs_modulus_pa: self.youngs_modulus.si,
+            poissons_ratio: self.poissons_ratio.si,
+            edges,
+            supports: self.supports().iter().map(|support| support.build(extent)).collect::<Result<_, _>>()?,
+            elements: self.elements.as_ref().map_or(PlateSpec::DEFAULT_ELEMENTS, |elements| elements.get()),
+        };
+        Plate::new(spec)
+            .map_err(|error| RigProblem::Plate(error).at(self.place_of(error).unwrap_or(place)))
+    }
+
+    fn supports(&self) -> &[At<PointSupportKeys>] {
+        match self.supports.as_deref() {
+            Some(PointSupportsKeys::List(listed)) => listed,
+            None => &[],
+        }
+    }
+
+    /// Where the document says what is at fault.
+    fn place_of(&self, error: PlateError) -> Option<&Place> {
+        match error {
+            PlateError::SupportOffPlate { number, .. }
+            | PlateError::Stiffness { number, .. }
+            | PlateError::SupportOnHeldEdge { number, .. }
+            | PlateError::SupportsAtOnePlace { second: number, .. }
+            | PlateError::SupportsTooClose { second: number, .. } => {
+                self.supports().get(number - 1).map(|support| &support.place)
+            }
+            PlateError::NotHeld | PlateError::HeldAtOnePoint { .. } | PlateError::HeldOnALine { .. } => {
+                place(&self.supports).or(place(&self.edges))
+            }
+            PlateError::Elements { .. } | PlateError::MeshTooLarge { .. } => place(&self.elements),
+            PlateError::PoissonsRatio { .. } => Some(&self.poissons_ratio.place),
+            PlateError::NotPositive { .. } | PlateError::Compliance { .. } | PlateError::Unsolvable { .. } => None,
+        }
+    }
+}
+
+impl PointSupportKeys {
+    fn build(&self, extent: Extent) -> Result<PointSupport, RigError> {
+        let (at, kind) = match self {
+            Self::Simple { at } => (at, PointSupportKind::Simple),
+            Self::Elastic { at, stiffness } => {
+                (at, PointSupportKind::Elastic { stiffness_n_per_m: stiffness.si })
+            }
+        };
+        Ok(PointSupport { position: at.position(extent)?, kind })
+    }
+}

@@ -1,0 +1,177 @@
+//! `[contact]`, `[training]` and `[[load]]`: where and how hard the surface is pressed.
+
+use serde::Deserialize;
+
+use palpate_estimators::arrangement::{Arrangement, ArrangementError, Training};
+use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec, UniformLoad};
+
+use crate::document::{At, Place, place};
+use crate::error::{RigError, RigProblem};
+use crate::values::{Count, Force, Grid, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
+
+/// More training positions, or presses of one position, than anyone makes.
+const MOST: i64 = 100_000;
+
+/// The contacts to be located.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ContactKeys {
+    /// Their force, where it is known.
+    pub force: Option<At<Positive<Force>>>,
+}
+
+/// The presses of a calibration.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TrainingKeys {
+    /// The rule that places them; `explicit` or `grid` where there are `positions` or a `grid`, and otherwise `even`.
+    pub arrangement: Option<Rule>,
+    /// How many positions there are.
+    pub count: Option<At<Count<1, MOST>>>,
+    /// Columns and rows of a `grid`.
+    pub grid: Option<At<Grid<MOST>>>,
+    /// How many positions of `edge-dense` lie in the middle portion.
+    pub middle: Option<At<Count<2, MOST>>>,
+    /// Start and end of the middle portion of `edge-dense`, or of what `even` covers, as shares of the length.
+    pub portion: Option<At<PortionKeys>>,
+    /// The positions of `explicit`.
+    pub positions: Option<At<Vec<At<Point>>>>,
+    /// How often each position is pressed; once unless said otherwise.
+    pub repeats: Option<Count<1, MOST>>,
+    /// The force, where it is not that of the contacts to be located.
+    pub force: Option<At<Positive<Force>>>,
+}
+
+/// A rule that places positions.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Rule {
+    /// Equally spaced, all along or over a `portion`.
+    Even,
+    /// Fewer in the middle and more towards the edges.
+    EdgeDense,
+    /// At Chebyshev's nodes.
+    Chebyshev,
+    /// In the middles of equal cells of a plane.
+    Grid,
+    /// One by one.
+    Explicit,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(expecting = "a list of 2, start and end")]
+pub(crate) struct PortionKeys(Quantity<Ratio>, Quantity<Ratio>);
+
+/// A force spread evenly over part of the surface.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LoadKeys {
+    /// The left end, or lower left corner.
+    pub from: At<Point>,
+    /// The right end, or upper right corner.
+    pub to: At<Point>,
+    /// The whole force.
+    pub force: Positive<Force>,
+}
+
+impl At<TrainingKeys> {
+    pub fn build(&self, extent: Extent) -> Result<Training, RigError> {
+        let need = |key| self.place.missing(key);
+        let rule = match (self.arrangement, &self.positions, &self.grid) {
+            (Some(rule), ..) => rule,
+            (None, Some(_), _) => Rule::Explicit,
+            (None, None, Some(_)) => Rule::Grid,
+            (None, None, None) => Rule::Even,
+        };
+        self.refuse_unused(rule)?;
+        if extent.is_plane() && !matches!(rule, Rule::Grid | Rule::Explicit) {
+            return Err(self.count.as_ref().map_or(need("grid"), |count| count.place.unused(ON_A_PLANE)));
+        }
+        let portion = self.portion.as_ref().map(|portion| (portion.0.si, portion.1.si));
+        let arrangement = match rule {
+            Rule::Even => portion.map_or(Arrangement::Even, |portion| Arrangement::EvenOver { portion }),
+            Rule::EdgeDense => Arrangement::EdgeDense {
+                middle: self.middle.as_ref().ok_or_else(|| need("middle"))?.get(),
+                portion: portion.unwrap_or(Arrangement::PAPER_PORTION),
+            },
+            Rule::Chebyshev => Arrangement::Chebyshev,
+            Rule::Grid => {
+                let (columns, rows) = self.grid.as_ref().ok_or_else(|| need("grid"))?.sides(extent)?;
+                Arrangement::Grid { columns, rows }
+            }
+            Rule::Explicit => {
+                let listed = self.positions.as_ref().ok_or_else(|| need("positions"))?;
+                if listed.is_empty() {
+                    return Err(listed.place.refuse("a list of at least 1"));
+                }
+                let positions = listed.iter().map(|point| point.on_surface(extent));
+                Arrangement::Explicit(positions.collect::<Result<_, _>>()?)
+            }
+        };
+        let count = match (&self.count, &arrangement) {
+            (Some(count), _) => count.get(),
+            (None, Arrangement::Explicit(positions)) => positions.len(),
+            (None, Arrangement::Grid { columns, rows }) => columns * rows,
+            (None, _) => return Err(need("count")),
+        };
+        let training = Training {
+            arrangement,
+            count,
+            repeats: self.repeats.map_or(1, Count::get),
+            force_n: self.force.as_ref().map(|force| force.si),
+        };
+        training.positions(extent).map_err(|error| {
+            let place = self.place_of(&error).unwrap_or(&self.place);
+            RigProblem::Arrangement(error).at(place)
+        })?;
+        Ok(training)
+    }
+
+    /// Refuses keys of other rules.
+    fn refuse_unused(&self, rule: Rule) -> Result<(), RigError> {
+        let (name, meant): (_, &[&str]) = match rule {
+            Rule::Even => ("even", &["portion"]),
+            Rule::EdgeDense => ("edge-dense", &["middle", "portion"]),
+            Rule::Chebyshev => ("chebyshev", &[]),
+            Rule::Grid => ("grid", &["grid"]),
+            Rule::Explicit => ("explicit", &["positions"]),
+        };
+        let keys = [place(&self.middle), place(&self.portion), place(&self.positions), place(&self.grid)];
+        match keys.into_iter().flatten().find(|key| !meant.contains(&key.key())) {
+            Some(key) => Err(key.unused(format!("arrangement = \"{name}\""))),
+            None => Ok(()),
+        }
+    }
+
+    /// The key that `error` is about.
+    fn place_of(&self, error: &ArrangementError) -> Option<&Place> {
+        match error {
+            ArrangementError::MiddleTooSmall { .. } => place(&self.middle),
+            ArrangementError::Portion { .. } | ArrangementError::EvenPortion { .. } => place(&self.portion),
+            _ => place(&self.count),
+        }
+    }
+}
+
+/// Refuses a force beyond a digit's model, which goes as far as a load of [`Digit::MOST_LOAD`] at the tip.
+pub(crate) fn check_force(force: Option<&At<Positive<Force>>>, surface: &SurfaceSpec) -> Result<(), RigError> {
+    let (Some(force), SurfaceSpec::Digit(digit)) = (force, surface) else { return Ok(()) };
+    let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
+    if force.si <= most_n {
+        return Ok(());
+    }
+    let most = Digit::MOST_LOAD;
+    Err(force.place.refuse(format!("at most {most_n:.3} N on this digit, at its tip a load F·l²/(E·I) of {most}")))
+}
+
+impl At<LoadKeys> {
+    pub fn build(&self, surface: &SurfaceSpec) -> Result<UniformLoad, RigError> {
+        if let SurfaceSpec::Digit(_) = surface {
+            return Err(self.place.unused("a digit, whose readings under several loads do not add up"));
+        }
+        let extent = surface.extent();
+        let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);
+        check_order(from, to, extent, &self.to.place)?;
+        Ok(UniformLoad { from, to, force_n: self.force.si })
+    }
+}

@@ -1,0 +1,223 @@
+//! The values of a file's keys, as types that read and check themselves: quantities with units, counts, positions.
+
+use std::marker::PhantomData;
+
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{self, Dimension, UnitError};
+use serde::de::{Deserialize, Deserializer, Error, Unexpected};
+
+use crate::document::{At, Place};
+use crate::error::RigError;
+
+/// A quantity in SI units that measures `D` and keeps to the bound `B`: "400 mm" becomes 0.4.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quantity<D, B = Finite> {
+    pub si: f64,
+    of: PhantomData<(D, B)>,
+}
+
+/// A quantity greater than 0.
+pub(crate) type Positive<D> = Quantity<D, AboveZero>;
+/// A quantity of at least 0.
+pub(crate) type NotNegative<D> = Quantity<D, AtLeastZero>;
+/// A share or a percentage, at least 0 and below 1.
+pub(crate) type Fraction = Quantity<Ratio, BelowOne>;
+
+/// What a quantity measures.
+pub(crate) trait Measure {
+    const DIMENSION: Dimension;
+}
+
+/// What a quantity must be, in words, and whether a value in SI units is.
+pub(crate) trait Bound {
+    const WORDS: &'static str;
+    fn holds(si: f64) -> bool;
+}
+
+macro_rules! measures {
+    ($($name:ident = $dimension:ident),*) => {$(
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) enum $name {}
+        impl Measure for $name {
+            const DIMENSION: Dimension = Dimension::$dimension;
+        }
+    )*};
+}
+measures!(Number = None, Length = Length, Force = Force, Modulus = Modulus, Ratio = Ratio, Density = Density);
+measures!(Stiffness = Stiffness, RotationalStiffness = RotationalStiffness, Speed = Speed, Time = Time);
+measures!(Frequency = Frequency);
+
+macro_rules! bounds {
+    ($($name:ident: $words:literal if $holds:expr;)*) => {$(
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) enum $name {}
+        impl Bound for $name {
+            const WORDS: &'static str = $words;
+            fn holds(si: f64) -> bool {
+                let holds: fn(f64) -> bool = $holds;
+                holds(si)
+            }
+        }
+    )*};
+}
+bounds! {
+    Finite: "finite" if f64::is_finite;
+    AboveZero: "greater than 0" if |si| si > 0.0;
+    AtLeastZero: "at least 0" if |si| si >= 0.0;
+    BelowOne: "at least 0 and below 1" if |si| (0.0..1.0).contains(&si);
+}
+
+impl<'de, D: Measure, B: Bound> Deserialize<'de> for Quantity<D, B> {
+    fn deserialize<T: Deserializer<'de>>(deserializer: T) -> Result<Self, T::Error> {
+        let si = Written::deserialize(deserializer)?.si(D::DIMENSION).map_err(T::Error::custom)?;
+        if B::holds(si) {
+            Ok(Self { si, of: PhantomData })
+        } else {
+            Err(T::Error::invalid_value(Unexpected::Float(si), &B::WORDS))
+        }
+    }
+}
+
+/// A quantity as it is written: its dimension is that of the sensors it belongs to.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(rename = "by shape", expecting = "a quantity such as \"400 mm\", or a number")]
+pub(crate) enum Written {
+    Text(String),
+    Number(f64),
+}
+
+impl Written {
+    fn si(&self, wanted: Dimension) -> Result<f64, UnitError> {
+        match self {
+            Self::Text(text) => units::Quantity::parse_as(text, wanted),
+            Self::Number(number) if !number.is_finite() => {
+                Err(UnitError::NotFinite { text: number.to_string() })
+            }
+            Self::Number(number) if matches!(wanted, Dimension::None | Dimension::Ratio) => Ok(*number),
+            Self::Number(number) => Err(UnitError::MissingUnit { text: number.to_string(), wanted }),
+        }
+    }
+}
+
+impl At<Written> {
+    /// Its SI value as a quantity that measures `wanted` and keeps to the bound `B`.
+    pub fn si<B: Bound>(&self, wanted: Dimension) -> Result<f64, RigError> {
+        match Written::si(self, wanted) {
+            Ok(si) if B::holds(si) => Ok(si),
+            Ok(_) => Err(self.place.refuse(B::WORDS)),
+            Err(error) => Err(self.place.invalid(error)),
+        }
+    }
+}
+
+/// A whole number within bounds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Count<const LEAST: i64, const MOST: i64>(usize);
+
+impl<const LEAST: i64, const MOST: i64> Count<LEAST, MOST> {
+    pub const fn get(self) -> usize {
+        self.0
+    }
+}
+
+impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, MOST> {
+    fn deserialize<T: Deserializer<'de>>(deserializer: T) -> Result<Self, T::Error> {
+        let number = i64::deserialize(deserializer)?;
+        match usize::try_from(number) {
+            Ok(count) if (LEAST..=MOST).contains(&number) => Ok(Self(count)),
+            _ => {
+                let most = if MOST == i64::MAX { String::new() } else { format!(" and at most {MOST}") };
+                let bound = format!("at least {LEAST}{most}");
+                Err(T::Error::invalid_value(Unexpected::Signed(number), &bound.as_str()))
+            }
+        }
+    }
+}
+
+/// What a number of positions does not go with.
+pub(crate) const ON_A_PLANE: &str = "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
+
+/// Columns and rows of a grid of at most `MOST` positions.
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
+#[serde(expecting = "a list of 2, columns along the length and rows across the width")]
+pub(crate) struct Grid<const MOST: i64>(Count<1, MOST>, Count<1, MOST>);
+
+impl<const MOST: i64> At<Grid<MOST>> {
+    /// Columns and rows.
+    pub fn sides(&self, extent: Extent) -> Result<(usize, usize), RigError> {
+        if !extent.is_plane() {
+            return Err(self.place.unused("a surface that is a line; say `count`"));
+        }
+        let (columns, rows) = (self.0.get(), self.1.get());
+        if columns.saturating_mul(rows) as u64 > MOST.unsigned_abs() {
+            let bound = format!("at least 1 and at most {MOST} in all");
+            return Err(self.place.refuse_as(format!("{columns} × {rows}"), bound));
+        }
+        Ok((columns, rows))
+    }
+}
+
+/// A position: a length along a line, or a pair of lengths on a plane, along and across.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(rename = "by shape", expecting = "a length such as \"75 mm\", or two of them on a plane")]
+pub(crate) enum Point {
+    Scalar(Quantity<Length>),
+    List(Vec<Quantity<Length>>),
+}
+
+impl At<Point> {
+    /// The position on a surface of this `extent`, or beside it.
+    pub fn position(&self, extent: Extent) -> Result<Position, RigError> {
+        match (&**self, extent.is_plane()) {
+            (Point::Scalar(x), false) => Ok(Position::along(x.si)),
+            (Point::List(_), false) => Err(self.place.refuse("one length along the surface")),
+            (Point::List(list), true) if list.len() == 2 => Ok(Position { x_m: list[0].si, y_m: list[1].si }),
+            (_, true) => {
+                Err(self.place.refuse("a pair of lengths, along and across, such as [\"75 mm\", \"40 mm\"]"))
+            }
+        }
+    }
+
+    /// The position, refused beside the surface.
+    pub fn on_surface(&self, extent: Extent) -> Result<Position, RigError> {
+        match self.position(extent)? {
+            position if extent.contains(position) => Ok(position),
+            position => {
+                let bound = format!("on the surface, within {}", extent.bounds_in_words());
+                Err(self.place.refuse_as(extent.place_in_words(position), bound))
+            }
+        }
+    }
+}
+
+/// Refuses a stretch or rectangle, of which the end stands at `place`, that does not go from left to right, and upward on a plane.
+pub(crate) fn check_order(
+    from: Position,
+    to: Position,
+    extent: Extent,
+    place: &Place,
+) -> Result<(), RigError> {
+    if from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m) {
+        return Ok(());
+    }
+    let bound = format!("beyond `from`, {}", extent.place_in_words(from));
+    Err(place.refuse_as(extent.place_in_words(to), bound))
+}
+
+/// One section, or several of one name.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(rename = "by shape", expecting = "a table, or a list of tables")]
+pub(crate) enum OneOrMany<T> {
+    Table(At<T>),
+    List(Vec<At<T>>),
+}
+
+impl<T> OneOrMany<T> {
+    pub fn sections(&self) -> &[At<T>] {
+        match self {
+            Self::Table(section) => std::slice::from_ref(section),
+            Self::List(sections) => sections,
+        }
+    }
+}
