@@ -1,9 +1,7 @@
 //! `palpate design sensors` from outside: layouts against the even one, the rig with the best, and what is refused.
 
 use crate::support::command::{complained, folder, json, run, said};
-use crate::support::examples::{FSI_WATER, PAPER, PLATE};
 use crate::support::examples::{FSI_WATER, PAPER, PLATE, SENSOR_DESIGN};
-use crate::support::toml::Toml;
 use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fmt::Display;

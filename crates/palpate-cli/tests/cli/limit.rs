@@ -11,7 +11,7 @@ fn limit(rig: impl Display, arguments: &[&str]) -> String {
     said(&run(folder(rig).path(), &[&["limit", "rig.toml"], arguments].concat()))
 }
 
-fn found(rig: impl Display, arguments: &[&str]) -> Value {
+fn curve(rig: impl Display, arguments: &[&str]) -> Value {
     json(folder(rig).path(), &[&["limit", "rig.toml"], arguments].concat())
 }
 
@@ -22,7 +22,7 @@ fn the_papers_bench_has_its_limit_and_its_warnings() {
 
 #[test]
 fn with_an_unknown_force_the_warnings_are_others() {
-    let unknown = found(PAPER, &["--unknown-force"]);
+    let unknown = curve(PAPER, &["--unknown-force"]);
     assert_eq!(unknown["force"], "unknown");
     let warnings = unknown["warnings"].as_array().unwrap();
     assert_eq!(warnings.iter().map(|warning| &warning["kind"]).collect::<Vec<_>>(), ["blind", "blind"]);
@@ -31,12 +31,12 @@ fn with_an_unknown_force_the_warnings_are_others() {
     assert!(warnings[0]["help"].as_str().unwrap().contains("reaction sensors"));
     // A rig without a force does not know it.
     let without = Toml::of(PAPER).remove("contact");
-    assert_eq!(found(without, &["--force", "3 N"])["warnings"], unknown["warnings"]);
+    assert_eq!(curve(without, &["--force", "3 N"])["warnings"], unknown["warnings"]);
 }
 
 #[test]
 fn the_json_has_the_papers_figures() {
-    let found = found(PAPER, &["--every", "50 mm"]);
+    let found = curve(PAPER, &["--every", "50 mm"]);
     let positions = found["positions"].as_array().unwrap();
     assert_eq!(positions.len(), 7);
     let at = |i: usize, key: &str| positions[i][key].as_f64().unwrap();
@@ -49,7 +49,7 @@ fn the_json_has_the_papers_figures() {
     assert!((mean_error_mm / mean_mm - 0.79788).abs() < 1e-4);
     assert_eq!(found["warnings"][0]["kind"], "mirror");
     // The limit goes with the noise, and against the force.
-    let louder = found(PAPER, &["--noise", "10 um", "--force", "6 N"]);
+    let louder = curve(PAPER, &["--noise", "10 um", "--force", "6 N"]);
     let ratio = louder["known_force"]["mean_mm"].as_f64().unwrap() / mean_mm;
     assert!((ratio - 1.0).abs() < 1e-9);
 }
@@ -57,7 +57,7 @@ fn the_json_has_the_papers_figures() {
 #[test]
 fn what_the_readings_do_not_tell_is_null() {
     let one = Toml::of(PAPER).set("sensors.count", 1).to_string();
-    let found = found(&one, &[]);
+    let found = curve(&one, &[]);
     assert!(
         found["unknown_force"].is_null() && found["positions"][0]["unknown_force_mm"].is_null(),
         "{found}"
@@ -68,7 +68,7 @@ fn what_the_readings_do_not_tell_is_null() {
 #[test]
 fn a_dead_sensor_is_left_out() {
     let dead = Toml::of(PAPER).add("sensors.dead", Array::from_iter([4]));
-    let (whole, rest) = (found(PAPER, &[]), found(dead, &[]));
+    let (whole, rest) = (curve(PAPER, &[]), curve(dead, &[]));
     assert_eq!((&rest["sensors"], &rest["sensors_alive"]), (&Value::from(8), &Value::from(7)));
     let mean = |found: &Value| found["known_force"]["mean_mm"].as_f64().unwrap();
     assert!(mean(&rest) > mean(&whole));

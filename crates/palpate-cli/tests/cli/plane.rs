@@ -3,7 +3,6 @@
 use crate::support::command::{complained, folder, json, palpate, run, said};
 use crate::support::examples::PLATE;
 use crate::support::toml::Toml;
-use serde_json::Value;
 use std::fs;
 use std::path::Path;
 

@@ -1,9 +1,7 @@
 //! `palpate design positions` from outside: arrangements against the even one, the next press, and what is refused.
 
 use crate::support::command::{complained, folder, run, said};
-use crate::support::examples::{FSI_WATER, PLATE, SENSOR_DESIGN};
 use crate::support::examples::{FSI_WATER, PLATE, SENSOR_DESIGN, TRAINING_POSITIONS};
-use crate::support::toml::Toml;
 use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fs;

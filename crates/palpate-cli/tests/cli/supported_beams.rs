@@ -1,11 +1,8 @@
 //! Beams on any supports, through every command.
 
 use crate::support::command::{complained, folder, json, run, said};
-use crate::support::examples::CANTILEVER;
 use crate::support::examples::{CANTILEVER, CONTINUOUS_BEAM};
 use crate::support::toml::{Toml, replaced};
-use crate::support::toml::{Toml, replaced};
-use serde_json::Value;
 use std::fmt::Display;
 use std::fs;
 
