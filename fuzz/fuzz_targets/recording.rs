@@ -11,12 +11,12 @@ static RIG: LazyLock<Rig> = LazyLock::new(|| {
 });
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok(recording) = RIG.bench.read_recording("fuzz", bytes) {
+    if let Ok(recording) = RIG.setup.read_recording("fuzz", bytes) {
         assert!(recording.rows.iter().all(|row| row.reading.iter().all(|value| value.is_finite())));
         let _ = recording.warnings();
         let _ = recording.folds(5);
     }
-    let mut parser = ReadingParser::new("fuzz", &RIG.bench.recording_columns());
+    let mut parser = ReadingParser::new("fuzz", &RIG.setup.recording_columns());
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         let _ = parser.parse_line(line);
     }

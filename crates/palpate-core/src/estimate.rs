@@ -11,9 +11,9 @@ pub struct Estimate {
     pub status: Status,
     /// Other places that explain the same single contact, most probable first, when the status is
     /// [`Status::Ambiguous`].
-    pub modes: Few<Mode, 3>,
+    pub modes: BoundedList<Mode, 3>,
     /// Contacts beside the first that touch at the same time, strongest first.
-    pub further: Few<ContactEstimate, 2>,
+    pub further: BoundedList<ContactEstimate, 2>,
 }
 
 /// One estimated contact.
@@ -67,12 +67,12 @@ impl Estimate {
     /// An estimate that is a position and nothing more.
     pub const fn of_position(position: Position, status: Status) -> Self {
         let contact = ContactEstimate { position, force_n: None, uncertainty: None };
-        Self { contact, status, modes: Few::none(NO_MODE), further: Few::none(NO_CONTACT) }
+        Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
     }
 
     /// An estimate of one contact.
     pub const fn of_contact(contact: ContactEstimate, status: Status) -> Self {
-        Self { contact, status, modes: Few::none(NO_MODE), further: Few::none(NO_CONTACT) }
+        Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
     }
 }
 
@@ -95,12 +95,12 @@ const NO_MODE: Mode = Mode { contact: NO_CONTACT, probability: 0.0 };
 
 /// A list of at most N, without allocation.
 #[derive(Clone, Copy, Debug)]
-pub struct Few<T, const N: usize> {
+pub struct BoundedList<T, const N: usize> {
     items: [T; N],
     len: usize,
 }
 
-impl<T: Copy, const N: usize> Few<T, N> {
+impl<T: Copy, const N: usize> BoundedList<T, N> {
     /// An empty list; `filler` stands where nothing is.
     pub const fn none(filler: T) -> Self {
         Self { items: [filler; N], len: 0 }
@@ -125,7 +125,7 @@ impl<T: Copy, const N: usize> Few<T, N> {
     }
 }
 
-impl<T: Copy + PartialEq, const N: usize> PartialEq for Few<T, N> {
+impl<T: Copy + PartialEq, const N: usize> PartialEq for BoundedList<T, N> {
     fn eq(&self, other: &Self) -> bool {
         self.as_slice() == other.as_slice()
     }
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_full_list_takes_no_more() {
-        let mut few = Few::<u8, 2>::none(0);
+        let mut few = BoundedList::<u8, 2>::none(0);
         assert!(few.as_slice().is_empty());
         assert!(few.push(1) && few.push(2));
         assert!(!few.push(3));
@@ -146,9 +146,9 @@ mod tests {
 
     #[test]
     fn a_cleared_list_equals_an_empty_one() {
-        let mut few = Few::<u8, 2>::none(0);
+        let mut few = BoundedList::<u8, 2>::none(0);
         few.push(7);
         few.clear();
-        assert_eq!(few, Few::none(0));
+        assert_eq!(few, BoundedList::none(0));
     }
 }

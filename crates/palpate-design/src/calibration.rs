@@ -5,10 +5,10 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use super::sensors::WeightedContacts;
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, Method, ReadingError};
+use palpate_estimators::estimator::{Estimator, FitError, Locator, Method, ReadingError};
 use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::ChannelModel;
@@ -50,13 +50,13 @@ pub struct Verification {
 /// A bench that is calibrated again and again, and the contacts that its locators are asked about.
 pub(super) struct Trial<'a> {
     /// The bench as it is pressed to calibrate.
-    pub pressed: Bench,
+    pub pressed: Setup,
     /// The same with the force of the contacts that are located afterwards.
-    pub touched: Bench,
+    pub touched: Setup,
     /// What the locator knows: without a force where it is to be unknown.
-    pub used: Bench,
+    pub used: Setup,
     /// What is fitted.
-    pub estimator: &'a EstimatorConfig,
+    pub estimator: &'a Estimator,
     /// The contacts.
     pub contacts: &'a WeightedContacts,
     /// Readings of each contact in a calibration.
@@ -104,7 +104,7 @@ impl Trial<'_> {
         }
         let calibrated = seeds.all().map(|seed| {
             let (recording, asked) = self.simulate(&training, seed)?;
-            let task = FitTask { bench: &self.used, recording: &recording, seed, watch };
+            let task = FitTask { setup: &self.used, recording: &recording, seed, watch };
             Ok(self.ask(&self.estimator.fit_task(task)?, &asked)?)
         });
         calibrated.collect()
@@ -118,7 +118,7 @@ impl Trial<'_> {
         watch: Watch,
     ) -> Result<Vec<Calibrated>, CalibrationError> {
         let (recording, asked) = self.simulate(training, seeds.first)?;
-        let task = FitTask { bench: &self.used, recording: &recording, seed: seeds.first, watch };
+        let task = FitTask { setup: &self.used, recording: &recording, seed: seeds.first, watch };
         let mut queue = Queue { seeds: seeds.all().collect(), fitted: Vec::new() };
         self.estimator.fit_many(task, &mut queue)?;
         let mut fitted = queue.fitted;

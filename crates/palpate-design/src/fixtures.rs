@@ -1,9 +1,9 @@
 //! Setups that tests share: those of the examples, as values.
 
 use palpate_estimators::arrangement::Training;
-use palpate_estimators::estimator::EstimatorConfig;
-use palpate_estimators::influence::InfluenceConfig;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::estimator::Estimator;
+use palpate_estimators::influence::Influence;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind::Deflection;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
@@ -14,27 +14,27 @@ use crate::sensors::{ContactPrior, SensorDesign, Sites};
 
 /// A setup, how it is pressed to calibrate, and the estimator that is fitted.
 pub(crate) struct Example {
-    pub bench: Bench,
+    pub setup: Setup,
     pub training: Option<Training>,
-    pub estimator: EstimatorConfig,
+    pub estimator: Estimator,
 }
 
 /// The founding paper's beam with eight deflection sensors and a known force.
-pub(crate) fn beam(noise_m: f64) -> Bench {
+pub(crate) fn beam(noise_m: f64) -> Setup {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(noise_m)).unwrap();
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(noise_m)).unwrap();
     setup.known_force(newtons(3.0)).unwrap()
 }
 
 /// The beam with noise, pressed at twenty places, for the influence estimator.
 pub(crate) fn noisy() -> Example {
-    let estimator = EstimatorConfig::Influence(InfluenceConfig::default());
-    Example { bench: beam(um(5.0)), training: Some(Training::even(20).repeated(5)), estimator }
+    let estimator = Estimator::Influence(Influence::default());
+    Example { setup: beam(um(5.0)), training: Some(Training::even(20).repeated(5)), estimator }
 }
 
 /// The beam without noise, pressed at ten places, for the paper's network.
 pub(crate) fn paper() -> Example {
-    Example { bench: beam(0.0), training: Some(Training::even(10)), estimator: EstimatorConfig::default() }
+    Example { setup: beam(0.0), training: Some(Training::even(10)), estimator: Estimator::default() }
 }
 
 /// A simply supported plate over 3 × 3 deflection sensors.
@@ -49,23 +49,23 @@ pub(crate) fn plate(elements: usize) -> Example {
         supports: Vec::new(),
         elements,
     });
-    let setup = Bench::new(plate.unwrap()).sensors(Deflection.grid(3, 3).noise(um(5.0))).unwrap();
-    let bench = setup.known_force(newtons(5.0)).unwrap();
-    let estimator = EstimatorConfig::Influence(InfluenceConfig::default());
-    Example { bench, training: Some(Training::grid(6, 6).repeated(5)), estimator }
+    let setup = Setup::new(plate.unwrap()).sensors(Deflection.grid(3, 3).noise(um(5.0))).unwrap();
+    let setup = setup.known_force(newtons(5.0)).unwrap();
+    let estimator = Estimator::Influence(Influence::default());
+    Example { setup, training: Some(Training::grid(6, 6).repeated(5)), estimator }
 }
 
 /// The beam with the task of placing eight deflection sensors every 5 mm for contacts of unknown force within 20–380 mm.
-pub(crate) fn sensor_design() -> (Bench, SensorDesign) {
-    let bench = beam(um(5.0));
+pub(crate) fn sensor_design() -> (Setup, SensorDesign) {
+    let setup = beam(um(5.0));
     let contacts = ContactPrior {
         from: Position::along(mm(20.0)),
         to: Position::along(mm(380.0)),
         every_m: mm(5.0),
         weights: Vec::new(),
     };
-    let design = SensorDesign::of(&bench.layout, bench.surface.extent()).unwrap();
+    let design = SensorDesign::of(&setup.layout, setup.surface.extent()).unwrap();
     let sites = Sites::Every(mm(5.0));
     let design = SensorDesign { sites, contacts, force_is_known: Some(false), ..design };
-    (bench, design)
+    (setup, design)
 }

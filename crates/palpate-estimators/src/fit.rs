@@ -5,13 +5,13 @@ use palpate_mechanics::sensing::Layout;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 use crate::recording::{Provenance, Recording};
-use crate::setup::Bench;
+use crate::setup::Setup;
 
 /// What an estimator is fitted to.
 #[derive(Clone, Copy, Debug)]
 pub struct FitTask<'a> {
     /// Surface, sensors, known force.
-    pub bench: &'a Bench,
+    pub setup: &'a Setup,
     /// Readings with their contacts; as many channels as the bench has sensors, and at least one row.
     pub recording: &'a Recording,
     /// Fixes whatever the method draws at random.
@@ -22,8 +22,8 @@ pub struct FitTask<'a> {
 
 impl<'a> FitTask<'a> {
     /// A fit with seed 0 that nobody watches.
-    pub fn new(bench: &'a Bench, recording: &'a Recording) -> Self {
-        Self { bench, recording, seed: 0, watch: Watch::NONE }
+    pub fn new(setup: &'a Setup, recording: &'a Recording) -> Self {
+        Self { setup, recording, seed: 0, watch: Watch::NONE }
     }
 
     /// The same from another seed.
@@ -43,7 +43,7 @@ impl<'a> FitTask<'a> {
     /// # Errors
     /// [`ChannelMismatch`], with both numbers.
     pub fn check_channels(&self) -> Result<(), ChannelMismatch> {
-        let (needed, found) = (self.bench.layout.len(), self.recording.channels.len());
+        let (needed, found) = (self.setup.layout.len(), self.recording.channels.len());
         if needed == found { Ok(()) } else { Err(ChannelMismatch { needed, found }) }
     }
 }
@@ -71,16 +71,16 @@ pub trait SeedQueue<M> {
 /// ```
 /// use palpate_estimators::arrangement::Training;
 /// use palpate_estimators::fit::Fit;
-/// use palpate_estimators::influence::InfluenceConfig;
-/// use palpate_estimators::setup::Bench;
+/// use palpate_estimators::influence::Influence;
+/// use palpate_estimators::setup::Setup;
 /// use palpate_mechanics::sensing::SensorKind::Deflection;
 /// use palpate_mechanics::surface::Beam;
 /// use palpate_mechanics::units::{gpa, mm, newtons, um};
 ///
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-/// let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let presses = setup.simulate(&Training::even(10), 0)?;
-/// let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+/// let locator = Influence::default().fit(&setup, &presses)?;
 /// let estimate = locator.locate(&presses.rows[4].reading)?;
 /// assert!((estimate.contact.position.x_m - mm(180.0)).abs() < mm(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -101,8 +101,8 @@ pub trait Fit {
     ///
     /// # Errors
     /// When the recording does not suit the setup or the method.
-    fn fit(&self, bench: &Bench, recording: &Recording) -> Result<Fitted<Self::Method>, Self::Error> {
-        self.fit_task(FitTask::new(bench, recording))
+    fn fit(&self, setup: &Setup, recording: &Recording) -> Result<Fitted<Self::Method>, Self::Error> {
+        self.fit_task(FitTask::new(setup, recording))
     }
 
     /// Fits with a seed, watched.
@@ -137,7 +137,7 @@ pub trait Locate {
     ///
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault>;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault>;
 }
 
 /// A locator: a fitted method with its setup and provenance, so that nothing it needs is outside it.
@@ -145,7 +145,7 @@ pub trait Locate {
 #[serde(deny_unknown_fields)]
 pub struct Fitted<M> {
     /// The surface that is touched, and its sensors.
-    pub bench: Bench,
+    pub setup: Setup,
     /// Where it comes from.
     pub provenance: LocatorProvenance,
     /// The method and what it learnt.
@@ -172,17 +172,17 @@ impl<M> Fitted<M> {
             seed: task.seed,
             recording: task.recording.provenance.clone(),
         };
-        Self { bench: task.bench.clone(), provenance, method }
+        Self { setup: task.setup.clone(), provenance, method }
     }
 
     /// The same locator with its method as another type.
     pub fn map<N>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
-        Fitted { bench: self.bench, provenance: self.provenance, method: convert(self.method) }
+        Fitted { setup: self.setup, provenance: self.provenance, method: convert(self.method) }
     }
 
     /// The sensors, a channel of a reading each.
     pub fn layout(&self) -> &Layout {
-        &self.bench.layout
+        &self.setup.layout
     }
 }
 
@@ -192,7 +192,7 @@ impl<M: Locate> Fitted<M> {
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        ReadingError::check(reading, self.bench.layout.len())?;
+        ReadingError::check(reading, self.setup.layout.len())?;
         Ok(self.method.locate(reading))
     }
 
@@ -201,7 +201,7 @@ impl<M: Locate> Fitted<M> {
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
     pub fn check(&self) -> Result<(), LocatorFault> {
-        self.method.check(&self.bench)
+        self.method.check(&self.setup)
     }
 }
 

@@ -10,22 +10,22 @@ use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
 
 use crate::arrangement::Training;
 use crate::recording::{Columns, Frame, Recording};
-use crate::setup::Bench;
+use crate::setup::Setup;
 
 /// A setup, and how it is pressed to calibrate.
 #[derive(Clone, Debug)]
 pub(crate) struct Example {
-    pub bench: Bench,
+    pub setup: Setup,
     pub training: Training,
 }
 
 impl Example {
     pub fn simulate(&self, seed: u64) -> Recording {
-        self.bench.simulate(&self.training, seed).unwrap()
+        self.setup.simulate(&self.training, seed).unwrap()
     }
 
-    pub fn pressed_bench(&self) -> Bench {
-        self.bench.pressed_by(&self.training)
+    pub fn pressed_setup(&self) -> Setup {
+        self.setup.pressed_by(&self.training)
     }
 }
 
@@ -41,9 +41,9 @@ pub(crate) fn paper(noise_m: f64, repeats: usize) -> Example {
 
 /// The same with these faults of every channel.
 pub(crate) fn faulty_paper(channel: ChannelModel, repeats: usize) -> Example {
-    let setup = Bench::new(beam()).sensors(Deflection.evenly(8).channel(channel));
-    let bench = setup.and_then(|setup| setup.known_force(newtons(3.0))).unwrap();
-    Example { bench, training: Training::even(10).repeated(repeats) }
+    let setup = Setup::new(beam()).sensors(Deflection.evenly(8).channel(channel));
+    let setup = setup.and_then(|setup| setup.known_force(newtons(3.0))).unwrap();
+    Example { setup, training: Training::even(10).repeated(repeats) }
 }
 
 /// A steel plate, simply supported all around, over this grid of deflection sensors; pressed with its known force at 6 × 6
@@ -59,9 +59,9 @@ pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
         supports: Vec::new(),
         elements,
     });
-    let setup = Bench::new(plate.unwrap()).sensors(Deflection.grid(3, 3).channel(channel));
-    let bench = setup.and_then(|setup| setup.known_force(newtons(5.0))).unwrap();
-    Example { bench, training: Training::grid(6, 6).repeated(5) }
+    let setup = Setup::new(plate.unwrap()).sensors(Deflection.grid(3, 3).channel(channel));
+    let setup = setup.and_then(|setup| setup.known_force(newtons(5.0))).unwrap();
+    Example { setup, training: Training::grid(6, 6).repeated(5) }
 }
 
 /// A finger with five strain gauges whose force is not known, pressed with `force_n` at 24 places, twice each.
@@ -74,8 +74,8 @@ pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
         direction,
     };
     let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
-    let bench = Bench::new(digit).sensors(gauges).unwrap();
-    Example { bench, training: Training::even(24).repeated(2).with_force(force_n) }
+    let setup = Setup::new(digit).sensors(gauges).unwrap();
+    Example { setup, training: Training::even(24).repeated(2).with_force(force_n) }
 }
 
 /// To and fro four times between two places, at 0.5 m/s.
@@ -106,7 +106,7 @@ pub(crate) fn moving_beam() -> Example {
 
 /// Two loads on the paper's beam, read by deflections and strains; their forces are not known.
 pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
-    let setup = Bench::new(beam())
+    let setup = Setup::new(beam())
         .sensors(Deflection.evenly(8).noise(um(20.0)))
         .and_then(|setup| setup.sensors(Strain.evenly(8).noise(microstrain(5.0))));
     let training = Training::even(10).repeated(50).with_force(newtons(3.0));
@@ -120,7 +120,7 @@ pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
         touch_s: 0.1,
     };
     let second = Motion { lifted_s: 0.5, touch_s: 0.05, ..motion(250.0, 340.0, 0.1, 3) };
-    (Example { bench: setup.unwrap(), training }, [motion(60.0, 150.0, 0.2, 6), second])
+    (Example { setup: setup.unwrap(), training }, [motion(60.0, 150.0, 0.2, 6), second])
 }
 
 /// The plate on a mesh that is solved at once, as it is calibrated to follow a contact that slides over it.
@@ -131,17 +131,17 @@ pub(crate) fn moving_plate() -> Example {
 }
 
 /// A strip over a channel with two pressure sensors, known by recordings only.
-pub(crate) fn strip() -> Bench {
+pub(crate) fn strip() -> Setup {
     let depth = Unit::from_symbol("mm").unwrap();
-    let columns = Columns::along("X", ["Pl", "Pr"]).force("F").hidden("depth", depth);
-    Bench::measured(mm(100.0), &["Pl", "Pr"]).unwrap().recorded_as(columns)
+    let columns = Columns::along("X", ["Pl", "Pr"]).force("F").nuisance("depth", depth);
+    Setup::measured(mm(100.0), &["Pl", "Pr"]).unwrap().recorded_as(columns)
 }
 
 /// A magnetic pad of fifteen channels, known by recordings only.
-pub(crate) fn pad() -> Bench {
+pub(crate) fn pad() -> Setup {
     let names: Vec<String> = (1..=15).map(|i| format!("raw_{i}")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let origin = Position { x_m: mm(274.0), y_m: mm(-115.0) };
     let columns = Columns::plane(2, 3, 2..=16usize).in_frame(Frame { origin, round_m: Some(mm(1.0)) });
-    Bench::measured_plane(mm(30.0), mm(30.0), &names).unwrap().recorded_as(columns)
+    Setup::measured_plane(mm(30.0), mm(30.0), &names).unwrap().recorded_as(columns)
 }

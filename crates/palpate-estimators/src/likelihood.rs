@@ -74,14 +74,14 @@ pub struct ContactFit<const K: usize> {
     /// χ².
     pub misfit: f64,
     /// g, per unit of each unknown.
-    pub pull: [f64; K],
+    pub score: [f64; K],
     /// A: the Fisher information of each pair of unknowns.
     pub information: [[f64; K]; K],
 }
 
 impl<const K: usize> ContactFit<K> {
     /// The fit of no data at all.
-    pub const NOTHING: Self = Self { misfit: 0.0, pull: [0.0; K], information: [[0.0; K]; K] };
+    pub const NOTHING: Self = Self { misfit: 0.0, score: [0.0; K], information: [[0.0; K]; K] };
 
     /// Adds a residual with its derivatives, the sign changed, and its weight; `information` only on and above its diagonal.
     #[inline(always)]
@@ -90,7 +90,7 @@ impl<const K: usize> ContactFit<K> {
         self.misfit += weight * residual * residual;
         for i in 0..K {
             let weighed = weight * derivatives[i];
-            self.pull[i] += weighed * residual;
+            self.score[i] += weighed * residual;
             for j in i..K {
                 self.information[i][j] += weighed * derivatives[j];
             }

@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use crate::arrangement::inner_grid;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::limit::{Limit, LimitError};
+use palpate_mechanics::limit::{CramerRaoBound, LimitError};
 use palpate_mechanics::sensing::{Layout, Placement, Sensor, SensorGroup, SensorKind, even_positions};
-use palpate_mechanics::surface::{Extent, NothingToRead, SurfaceSpec};
+use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
 
 /// A surface with its sensors, all checked. A rig describes it, and a locator keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bench {
+pub struct Setup {
     /// The surface that is touched.
     pub surface: SurfaceSpec,
     /// Its sensors, one a channel of a reading.
@@ -67,7 +67,7 @@ pub enum SetupError {
         /// The surface.
         extent: Extent,
         /// Why.
-        reason: NothingToRead,
+        reason: InsensitiveSensor,
     },
     /// A sensor on a digit that is no strain gauge.
     #[error("a digit is read by strain gauges, not by {kind} sensors")]
@@ -126,23 +126,23 @@ pub fn check_sensor(
     if kind == SensorKind::Reaction && !model.is_supported_at(position) {
         return Err(SetupError::NoSupport { number, position, extent });
     }
-    match model.nothing_to_read(kind, position) {
+    match model.insensitive_sensor(kind, position) {
         Some(reason) => Err(SetupError::Insensitive { number, kind, position, extent, reason }),
         None => Ok(()),
     }
 }
 
-impl Bench {
+impl Setup {
     /// A surface without sensors yet, touched by contacts of unknown force.
     ///
     /// ```
-    /// use palpate_estimators::setup::Bench;
+    /// use palpate_estimators::setup::Setup;
     /// use palpate_mechanics::sensing::SensorKind::Deflection;
     /// use palpate_mechanics::surface::Beam;
     /// use palpate_mechanics::units::{gpa, mm, newtons, um};
     ///
     /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    /// let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
     /// assert_eq!(setup.layout.len(), 8);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -158,7 +158,7 @@ impl Bench {
         Self::of_extent(Extent { length_m, width_m: None }, channels)
     }
 
-    /// A plane without a model, known by recordings only; see [`Bench::measured`].
+    /// A plane without a model, known by recordings only; see [`Setup::measured`].
     ///
     /// # Errors
     /// [`SetupError`] without channels, or for a length or width that is not greater than 0 and finite.
@@ -232,8 +232,8 @@ impl Bench {
     ///
     /// # Errors
     /// [`LimitError`] for a measured surface, for a live sensor without noise, and when none is alive.
-    pub fn cramer_rao_bound(&self) -> Result<Limit<'_>, LimitError> {
-        Limit::new(self.surface.model().ok_or(LimitError::NoModel)?, &self.layout)
+    pub fn cramer_rao_bound(&self) -> Result<CramerRaoBound<'_>, LimitError> {
+        CramerRaoBound::new(self.surface.model().ok_or(LimitError::NoModel)?, &self.layout)
     }
 
     /// Which column of a recording is what: those that were named, or those that palpate itself writes.
@@ -264,7 +264,7 @@ impl Bench {
         recording::read_pair(readings, contacts, &self.schema(&self.recording_columns()))
     }
 
-    /// What a file must agree with to be a recording of this bench, by columns such as [`Bench::recording_columns`].
+    /// What a file must agree with to be a recording of this bench, by columns such as [`Setup::recording_columns`].
     pub fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
         let extent = self.surface.extent();
         Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }

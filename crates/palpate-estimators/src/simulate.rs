@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
@@ -68,7 +68,7 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
     CleanSensors::new(surface, layout).reading(contact)
 }
 
-impl Bench {
+impl Setup {
     /// The bench as it is when pressed to calibrate: with the force of these presses.
     pub fn pressed_by(&self, training: &Training) -> Self {
         Self { force_n: training.force_n.or(self.force_n), ..self.clone() }
@@ -93,19 +93,19 @@ impl Bench {
 /// # Errors
 /// [`SimulateError`] when the bench lacks a model or a force, or a position lies off the surface.
 pub fn simulate_at(
-    bench: &Bench,
+    setup: &Setup,
     positions: &[Position],
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
-    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
-    let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
+    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
+    let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
     let mut places = rng.clone();
     places.jump();
-    let sensors = CleanSensors::new(surface, &displaced(&bench.layout, surface.extent(), &mut places));
-    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let sensors = CleanSensors::new(surface, &displaced(&setup.layout, surface.extent(), &mut places));
+    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
         if !surface.contains(position) {
@@ -113,13 +113,13 @@ pub fn simulate_at(
         }
         let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
-            let reading = measure(&bench.layout, &clean, &errors, &mut rng);
-            rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
+            let reading = measure(&setup.layout, &clean, &errors, &mut rng);
+            rows.push(Row { position, force_n: Some(force_n), nuisance: None, reading });
         }
     }
     let source = "simulation".to_owned();
     let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
-    Ok(Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance })
+    Ok(Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance })
 }
 
 /// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
@@ -130,19 +130,19 @@ pub fn simulate_at(
 /// # Errors
 /// [`SimulateError::NoModel`] for a measured surface.
 pub fn simulate_loads(
-    bench: &Bench,
+    setup: &Setup,
     loads: &[UniformLoad],
     repeats: usize,
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
-    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
+    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut places = rng.clone();
     places.jump();
-    let placed = displaced(&bench.layout, surface.extent(), &mut places);
-    let errors = ChannelErrors::draw(&bench.layout, &mut rng);
+    let placed = displaced(&setup.layout, surface.extent(), &mut places);
+    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
     let clean = clean_reading_of_loads(surface, &placed, loads);
-    Ok((0..repeats).map(|_| measure(&bench.layout, &clean, &errors, &mut rng)).collect())
+    Ok((0..repeats).map(|_| measure(&setup.layout, &clean, &errors, &mut rng)).collect())
 }
 
 /// What the sensors of `layout` would read without any fault under all of `loads` at once, by superposition, in the SI unit of

@@ -6,7 +6,7 @@ use crate::estimator::{
 };
 use crate::evaluation::covered;
 use crate::recording::TimedRecording;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::{MovingContacts, SimulateError, simulate_moving};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -215,16 +215,16 @@ pub const SPEED_RATIOS: [f64; 8] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.95
 pub fn sweep_speeds(
     locator: &Locator,
     config: TrackerConfig,
-    bench: &Bench,
+    setup: &Setup,
     moving: &MovingContacts,
     seed: u64,
 ) -> Result<Vec<SpeedErrors>, SweepError> {
     let beam = moving.beam.ok_or(SweepError::NoCriticalSpeed)?;
-    let extent = bench.surface.extent();
+    let extent = setup.surface.extent();
     let mut sweep = Vec::new();
     for ratio in SPEED_RATIOS {
         let speed_m_per_s = ratio * beam.critical_speed_m_per_s();
-        let recording = simulate_moving(bench, &moving.at_speed(speed_m_per_s), seed)?;
+        let recording = simulate_moving(setup, &moving.at_speed(speed_m_per_s), seed)?;
         let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
         let errors =

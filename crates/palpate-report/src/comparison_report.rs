@@ -9,7 +9,7 @@ use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text
 use super::{Axis, Chart, Series};
 use palpate_estimators::estimator::Comparison;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio, percentage_error};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 
 /// Stretches of the surface over which errors are summed up.
 const STRETCHES: usize = 40;
@@ -22,7 +22,7 @@ pub struct ComparisonReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface and its sensors.
-    pub bench: &'a Bench,
+    pub setup: &'a Setup,
     /// What the estimators were tried on, in words.
     pub trials: &'a str,
     /// The estimators, best first.
@@ -58,7 +58,7 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
 
 impl ComparisonReport<'_> {
     fn is_plane(&self) -> bool {
-        self.bench.surface.extent().is_plane()
+        self.setup.surface.extent().is_plane()
     }
 
     fn summary(&self) -> Markup {
@@ -71,7 +71,7 @@ impl ComparisonReport<'_> {
                     "The least mean error is that of " b { (best.estimator.kind()) } ": "
                     (number(mean.average_m * 1e3)) " mm, median " (number(mean.median_m * 1e3)) " mm."
                 }
-                @if let Some(ratio) = limit_ratio(self.bench, &best.tried.evaluation) {
+                @if let Some(ratio) = limit_ratio(self.setup, &best.tried.evaluation) {
                     li { "That is " (number(ratio)) " times what physics allows where the limit is small." }
                 }
             }
@@ -91,7 +91,7 @@ impl ComparisonReport<'_> {
                 value_mm(summary.rmse_m),
                 value(evaluation.effective_percent(self.tolerance_m)),
                 value(evaluation.coverage_percent()),
-                value(limit_ratio(self.bench, evaluation)),
+                value(limit_ratio(self.setup, evaluation)),
                 value(comparison.tried.fit_seconds * 1e3),
                 value(comparison.tried.locate_ns * 1e-3),
             ])
@@ -148,13 +148,13 @@ impl ComparisonReport<'_> {
         let evaluations: Vec<(&str, &Evaluation)> =
             shown.map(|comparison| (comparison.estimator.kind(), &comparison.tried.evaluation)).collect();
         let what = "Median error of each estimator, from the best mean to the worst and all on one scale";
-        error_map(self.bench, "Median error over the surface", what, &evaluations)
+        error_map(self.setup, "Median error over the surface", what, &evaluations)
     }
 
     fn along_figure(&self) -> Figure {
-        let length_mm = self.bench.surface.extent().length_m * 1e3;
+        let length_mm = self.setup.surface.extent().length_m * 1e3;
         let mut series = self.series(|evaluation| in_thousandths(evaluation.median_by_stretch_m(STRETCHES)));
-        series.extend(limit_line(self.bench));
+        series.extend(limit_line(self.setup));
         let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);
         let y = Axis::log10("location error, mm");
         let chart = Chart::new("Median error along the surface", x, y, series).with_height(480);

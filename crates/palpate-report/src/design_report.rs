@@ -14,7 +14,7 @@ use palpate_design::sensors::{
 };
 use palpate_design::sensors::{DesignCriterion, KeepOut, Symmetry};
 use palpate_estimators::estimator::Cells;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitCurve;
 
@@ -28,7 +28,7 @@ pub struct SensorDesignReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface, with the rig's own sensors.
-    pub bench: &'a Bench,
+    pub setup: &'a Setup,
     /// What was designed.
     pub problem: &'a SensorProblem<'a>,
     /// The layouts.
@@ -48,11 +48,11 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
     let mut sections = if report.problem.is_plane() {
         vec![layouts, limit.figures(report.limit_maps())]
     } else {
-        let bench = report.best().and_then(|best| {
+        let setup = report.best().and_then(|best| {
             let what = "The bench with the best layout";
-            bench_figure(what, &report.bench.surface, &best.layout, report.problem.force_n())
+            bench_figure(what, &report.setup.surface, &best.layout, report.problem.force_n())
         });
-        vec![layouts.figure(report.sites_figure()), limit.figure(bench).figure(report.limit_figure())]
+        vec![layouts.figure(report.sites_figure()), limit.figure(setup).figure(report.limit_figure())]
     };
     sections.extend(report.counts_figure().map(|figure| {
         let section = Section::new("counts", "How many sensors are enough");
@@ -84,7 +84,7 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn length_mm(&self) -> f64 {
-        self.bench.surface.extent().length_m * 1e3
+        self.setup.surface.extent().length_m * 1e3
     }
 
     fn summary(&self) -> Markup {
@@ -228,20 +228,20 @@ impl<'a> SensorDesignReport<'a> {
 
     /// The limit of a layout at the contacts of the design.
     fn limit_of(&self, designed: &Designed) -> Option<LimitCurve> {
-        let bench = Bench { layout: designed.layout.clone(), ..self.bench.clone() };
+        let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };
         let positions = &self.problem.contacts().positions;
-        let limit = bench.cramer_rao_bound().ok()?;
+        let limit = setup.cramer_rao_bound().ok()?;
         LimitCurve::at(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
     }
 
     /// The limit over a plane with the best and with the even layout.
     fn limit_maps(&self) -> Vec<Figure> {
-        let cells = Cells::about(self.bench.surface.extent(), CELLS, CELLS_A_SIDE);
+        let cells = Cells::about(self.setup.surface.extent(), CELLS, CELLS_A_SIDE);
         let force = (self.problem.force_n(), self.problem.force());
         let limits = |designed: &'a Designed| {
-            let bench = Bench { layout: designed.layout.clone(), ..self.bench.clone() };
+            let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };
             let values =
-                limits_mm(&bench.cramer_rao_bound().ok()?, &cells, force, |bound| bound.sd_position_m);
+                limits_mm(&setup.cramer_rao_bound().ok()?, &cells, force, |bound| bound.sd_position_m);
             let dots_mm = sensors_mm(&designed.layout);
             Some(maps::Designed { name: designed.method.name(), values, dots_mm })
         };

@@ -7,9 +7,9 @@ use super::numbers::{counted, mm, stated};
 use super::page::Figure;
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::digit::LinearTheory;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Force, Limit, LimitCurve};
+use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Digit, ForceDirection};
 
@@ -76,8 +76,8 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
 
 /// What the linear theory makes of clean readings: its errors of position and of force by the force, each against the limit of
 /// the exact one. Empty where no estimator suits the bench.
-pub(super) fn linear_theory_figures(bench: &Bench, limit: &Limit, digit: &Digit) -> Vec<Figure> {
-    let Some(theory) = LinearTheory::of(bench, digit) else { return Vec::new() };
+pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
+    let Some(theory) = LinearTheory::of(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {
         let bound = limit.at(contact, Force::Unknown);
         bound.map_or([f64::NAN; 2], |bound| [bound.sd_position_m, bound.sd_force_n.unwrap_or(f64::NAN)])

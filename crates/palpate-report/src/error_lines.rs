@@ -3,8 +3,8 @@
 use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
 use palpate_estimators::evaluation::Spread;
-use palpate_estimators::setup::Bench;
-use palpate_mechanics::limit::{Bound, Force, Limit, LimitCurve, LimitError};
+use palpate_estimators::setup::Setup;
+use palpate_mechanics::limit::{Bound, Force, CramerRaoBound, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
 /// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
@@ -28,28 +28,28 @@ pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
 
 /// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` where there is
 /// none: a surface without a model, clean sensors, a force that is not known.
-pub(super) fn limit_line(bench: &Bench) -> Option<Series> {
-    Some(line(&curve(bench, &bench.layout).ok()?, 6, format!("{LABEL}: what physics allows")))
+pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
+    Some(line(&curve(setup, &setup.layout).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
 /// The same; where deflection sensors are clean, for a noise that the legend states.
-pub(super) fn limit_line_or_assumed(bench: &Bench) -> Option<Series> {
+pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
-    match curve(bench, &bench.layout) {
-        Err(LimitError::Noise(NoiseError::Singular { .. })) if bench.layout.sensors.iter().all(clean) => {
-            let mut layout = bench.layout.clone();
+    match curve(setup, &setup.layout) {
+        Err(LimitError::Noise(NoiseError::Singular { .. })) if setup.layout.sensors.iter().all(clean) => {
+            let mut layout = setup.layout.clone();
             layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
-            Some(line(&curve(bench, &layout).ok()?, 6, assumed_label()))
+            Some(line(&curve(setup, &layout).ok()?, 6, assumed_label()))
         }
-        _ => limit_line(bench),
+        _ => limit_line(setup),
     }
 }
 
 /// The mean error of the best unbiased estimator of an arm, in mm, dashed; `None` where there is none. The locator knows the force,
 /// or does not; contacts have `force_n` newtons either way.
-pub(super) fn limit_line_of_arm(bench: &Bench, force_n: f64, colour: usize, label: &str) -> Option<Series> {
-    let limit = bench.cramer_rao_bound().ok()?;
-    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
+pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
+    let limit = setup.cramer_rao_bound().ok()?;
+    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
     Some(line(&LimitCurve::over(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 
@@ -71,9 +71,9 @@ fn assumed_label() -> String {
     format!("{LABEL}: what physics allows at {} µm noise", ASSUMED_NOISE_M * 1e6)
 }
 
-fn curve(bench: &Bench, layout: &Layout) -> Result<LimitCurve, LimitError> {
-    let limit = Limit::new(bench.surface.model().ok_or(LimitError::NoModel)?, layout)?;
-    LimitCurve::over(&limit, bench.force_n.ok_or(LimitError::NoForce)?, Force::Known)
+fn curve(setup: &Setup, layout: &Layout) -> Result<LimitCurve, LimitError> {
+    let limit = CramerRaoBound::new(setup.surface.model().ok_or(LimitError::NoModel)?, layout)?;
+    LimitCurve::over(&limit, setup.force_n.ok_or(LimitError::NoForce)?, Force::Known)
 }
 
 fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {

@@ -10,7 +10,7 @@ use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Portion, Spread, percentage_error};
 use palpate_estimators::recording::Provenance;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_rig::Rig;
 
@@ -55,7 +55,7 @@ pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
     let (heading, errors) = if report.is_plane() {
         let evaluations = [("the locator", report.evaluation)];
         let title = "Median location error over the surface";
-        let map = error_map(report.bench(), title, "Median of the location errors", &evaluations);
+        let map = error_map(report.setup(), title, "Median of the location errors", &evaluations);
         ("Errors over the surface", map)
     } else {
         ("Errors along the surface", report.error_figure())
@@ -110,15 +110,15 @@ impl EvaluationReport<'_> {
         }
     }
 
-    fn bench(&self) -> &Bench {
+    fn setup(&self) -> &Setup {
         match self.judged {
-            Judged::Locator(locator) => &locator.bench,
-            Judged::CrossValidated { rig, .. } => &rig.bench,
+            Judged::Locator(locator) => &locator.setup,
+            Judged::CrossValidated { rig, .. } => &rig.setup,
         }
     }
 
     fn is_plane(&self) -> bool {
-        self.bench().surface.extent().is_plane()
+        self.setup().surface.extent().is_plane()
     }
 
     fn judged_heading(&self) -> &'static str {
@@ -146,7 +146,7 @@ impl EvaluationReport<'_> {
             let largest = |summary: &ErrorSummary| summary.largest_m;
             series.push(drawn("largest of the readings there", 1, Marker::Triangle, largest));
         }
-        series.extend(limit_line(self.bench()));
+        series.extend(limit_line(self.setup()));
         let (x, y) = (self.axis("contact position, mm"), Axis::log10("location error, mm"));
         let chart = Chart::new("Location error along the surface", x, y, series)
             .with_marks(vec![tolerance_mark(self.tolerance_m)]);
@@ -237,7 +237,7 @@ impl EvaluationReport<'_> {
     }
 
     fn facts_table(&self) -> Table {
-        let force = self.bench().force_n;
+        let force = self.setup().force_n;
         let force = force.map_or("unknown".to_owned(), |force_n| format!("{} N", number(force_n)));
         let mut facts = vec![
             ("surface", text(self.surface_in_words())),
@@ -254,8 +254,8 @@ impl EvaluationReport<'_> {
     }
 
     fn surface_in_words(&self) -> String {
-        let extent = self.bench().surface.extent();
-        let kind = match &self.bench().surface {
+        let extent = self.setup().surface.extent();
+        let kind = match &self.setup().surface {
             SurfaceSpec::Beam(_) => "beam".to_owned(),
             SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
             SurfaceSpec::Plate(_) => "plate".to_owned(),
@@ -267,8 +267,8 @@ impl EvaluationReport<'_> {
     }
 
     fn sensors_in_words(&self) -> String {
-        let names = self.bench().layout.names();
-        let mut kinds: Vec<&str> = self.bench().layout.kinds().into_iter().map(|kind| kind.name()).collect();
+        let names = self.setup().layout.names();
+        let mut kinds: Vec<&str> = self.setup().layout.kinds().into_iter().map(|kind| kind.name()).collect();
         kinds.dedup();
         format!("{}, {}: {}", names.len(), listed(&kinds), names.join(", "))
     }

@@ -13,9 +13,9 @@ use super::page::{
 };
 use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
 use palpate_estimators::estimator::Cells;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Force, Limit, LimitCurve, LimitWarning};
+use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::Sensor;
 use palpate_mechanics::surface::SurfaceSpec;
 
@@ -31,9 +31,9 @@ pub struct LimitReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface and its sensors.
-    pub bench: &'a Bench,
+    pub setup: &'a Setup,
     /// Its limit.
-    pub limit: &'a Limit<'a>,
+    pub limit: &'a CramerRaoBound<'a>,
     /// The limit all over the surface for a known force.
     pub known: &'a LimitCurve,
     /// The same for an unknown force.
@@ -48,7 +48,7 @@ pub struct LimitReport<'a> {
 
 /// Reports a limit: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
-    let (layout, force_n) = (&report.bench.layout, report.known.force_n);
+    let (layout, force_n) = (&report.setup.layout, report.known.force_n);
     let (heading, figure) = if report.known.extent.is_plane() {
         ("The limit over the surface", report.limit_map())
     } else {
@@ -60,7 +60,7 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
         summary: report.summary(),
         sections: vec![
             Section::new("bench", "The bench")
-                .figure(bench_figure("The bench", &report.bench.surface, layout, force_n))
+                .figure(bench_figure("The bench", &report.setup.surface, layout, force_n))
                 .table(report.sensor_table()),
             Section::new("limit", heading)
                 .figure(figure)
@@ -172,7 +172,7 @@ impl LimitReport<'_> {
             title: "The least standard deviation of a located contact".to_owned(),
             cells,
             panels,
-            dots_mm: sensors_mm(&self.bench.layout),
+            dots_mm: sensors_mm(&self.setup.layout),
             label: "limit, mm".to_owned(),
             most: length_mm,
             width_px: 860,
@@ -188,9 +188,9 @@ impl LimitReport<'_> {
 
     /// What only a digit has: the limit of the force, and how far the linear theory goes.
     fn digit_figures(&self) -> Vec<Figure> {
-        let SurfaceSpec::Digit(digit) = &self.bench.surface else { return Vec::new() };
+        let SurfaceSpec::Digit(digit) = &self.setup.surface else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);
-        std::iter::once(force_limit).chain(linear_theory_figures(self.bench, self.limit, digit)).collect()
+        std::iter::once(force_limit).chain(linear_theory_figures(self.setup, self.limit, digit)).collect()
     }
 
     fn limit_table(&self) -> Table {
@@ -237,7 +237,7 @@ impl LimitReport<'_> {
     }
 
     fn sensor_table(&self) -> Table {
-        let rows = self.bench.layout.sensors.iter().enumerate().map(|(i, sensor)| {
+        let rows = self.setup.layout.sensors.iter().enumerate().map(|(i, sensor)| {
             vec![
                 text((i + 1).to_string()),
                 text(sensor.kind.name()),

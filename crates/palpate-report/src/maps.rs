@@ -7,9 +7,9 @@ use super::page::Figure;
 use super::{HeatMap, HeatPanel};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::evaluation::{Evaluation, percentile};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Bound, Force, Limit};
+use palpate_mechanics::limit::{Bound, Force, CramerRaoBound};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 
@@ -20,12 +20,12 @@ const SPARSE: usize = 4;
 
 /// The median errors of some locators by cells, and the limit where there is one; the scale is that of the errors.
 pub(super) fn error_map(
-    bench: &Bench,
+    setup: &Setup,
     title: &str,
     what: &str,
     evaluations: &[(&str, &Evaluation)],
 ) -> Figure {
-    let cells = error_cells(evaluations, bench.surface.extent());
+    let cells = error_cells(evaluations, setup.surface.extent());
     let in_mm = |errors_m: Vec<f64>| errors_m.into_iter().map(|error_m| error_m * 1e3).collect();
     let errors = evaluations
         .iter()
@@ -34,13 +34,13 @@ pub(super) fn error_map(
     let finite =
         panels.iter().flat_map(|panel| &panel.values).copied().filter(|error_mm| error_mm.is_finite());
     let most = finite.fold(0.0, f64::max);
-    let limit = bench.cramer_rao_bound().ok().zip(bench.force_n).map(|(limit, force_n)| {
+    let limit = setup.cramer_rao_bound().ok().zip(setup.force_n).map(|(limit, force_n)| {
         let values = limits_mm(&limit, &cells, (force_n, Force::Known), Bound::mean_error_m);
         HeatPanel::new("the limit", values)
     });
     let limited = limit.is_some();
     panels.extend(limit);
-    let (dots_mm, label) = (sensors_mm(&bench.layout), "error, mm".to_owned());
+    let (dots_mm, label) = (sensors_mm(&setup.layout), "error, mm".to_owned());
     let map = HeatMap { title: title.to_owned(), cells, panels, dots_mm, label, most, width_px: 860 };
     let [along, across] = cells.sides_m().map(|side_m| number(side_m * 1e3));
     let caption = html! {
@@ -76,7 +76,7 @@ fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
 
 /// A figure of the bound at the middle of each cell, in mm, for a force and what is known of it; NaN where there is no bound.
 pub(super) fn limits_mm(
-    limit: &Limit,
+    limit: &CramerRaoBound,
     cells: &Cells,
     (force_n, force): (f64, Force),
     figure: impl Fn(&Bound) -> f64,

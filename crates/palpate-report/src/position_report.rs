@@ -10,7 +10,7 @@ use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text
 use super::{Axis, Chart, Marker, Series};
 use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
 use palpate_estimators::estimator::Cells;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::in_words;
 
 /// What a report of training positions is made from.
@@ -19,7 +19,7 @@ pub struct PositionDesignReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface with its sensors.
-    pub bench: &'a Bench,
+    pub setup: &'a Setup,
     /// The estimator's kind.
     pub estimator: &'a str,
     /// What was designed.
@@ -158,7 +158,7 @@ impl<'a> PositionDesignReport<'a> {
     fn maps(&self) -> Vec<Figure> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);
-        let cells = Cells { extent: self.bench.surface.extent(), columns, rows: contacts.len() / columns };
+        let cells = Cells { extent: self.setup.surface.extent(), columns, rows: contacts.len() / columns };
         let designed = |placed: &'a Placed| Designed {
             name: placed.placement.name(),
             values: placed.errors_m.iter().map(|error_m| error_m * 1e3).collect(),
@@ -176,7 +176,7 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn axis(&self, label: &str) -> Axis {
-        Axis::linear(label).from_to(0.0, self.bench.surface.extent().length_m * 1e3)
+        Axis::linear(label).from_to(0.0, self.setup.surface.extent().length_m * 1e3)
     }
 
     fn meaning(&self) -> Markup {

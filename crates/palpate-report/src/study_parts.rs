@@ -58,7 +58,7 @@ impl<'a> StudyReport<'a> {
 
     /// Length of the surface in metres; that of the first arm.
     pub(crate) fn length_m(&self) -> f64 {
-        self.study.study.arms.first().map_or(f64::NAN, |arm| arm.rig.bench.surface.extent().length_m)
+        self.study.study.arms.first().map_or(f64::NAN, |arm| arm.rig.setup.surface.extent().length_m)
     }
 
     /// A sentence on the networks that did not converge; none where all did.
@@ -94,7 +94,7 @@ pub(crate) fn error_chart(report: &StudyReport, title: &str, arms: &[Drawn]) -> 
     if series.is_empty() {
         return None;
     }
-    series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(&report.arm(drawn.arm)?.rig.bench)));
+    series.extend(arms.iter().find_map(|drawn| limit_line_or_assumed(&report.arm(drawn.arm)?.rig.setup)));
     Some(error_chart_of(report, title, series))
 }
 

@@ -173,7 +173,7 @@ fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
         layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
     };
     for arm in &report.study.study.arms {
-        let layout = &arm.rig.bench.layout;
+        let layout = &arm.rig.setup.layout;
         match layouts.iter_mut().find(|(_, other)| places(other) == places(layout)) {
             Some((arms, _)) => arms.push(&arm.name),
             None => layouts.push((vec![&arm.name], layout)),
@@ -224,7 +224,7 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
     let title = format!("Location error of {}", arm.name);
     let label = if seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
     let drawn = Drawn { arm: &arm.name, label, colour };
-    let (chart, limit) = if arm.rig.bench.force_n.is_some() {
+    let (chart, limit) = if arm.rig.setup.force_n.is_some() {
         let chart = error_chart(report, &title, &[drawn])?;
         let words = limit_in_words(&chart);
         (chart, words)
@@ -263,6 +263,6 @@ fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
 }
 
 fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {
-    let bench = &arm.rig.bench;
-    limit_line_of_arm(bench, bench.force_n.or(arm.rig.pressed_bench().force_n)?, colour, label)
+    let setup = &arm.rig.setup;
+    limit_line_of_arm(setup, setup.force_n.or(arm.rig.pressed_setup().force_n)?, colour, label)
 }

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use palpate_design::sensors::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
 use palpate_mechanics::surface::Extent;
 
@@ -123,14 +123,14 @@ pub(crate) struct MustHaveKeys {
 }
 
 impl At<DesignKeys> {
-    pub fn build(&self, bench: &Bench) -> Result<SensorDesign, RigError> {
-        let extent = bench.surface.extent();
-        let Some(default) = SensorDesign::of(&bench.layout, extent) else {
+    pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
+        let extent = setup.surface.extent();
+        let Some(default) = SensorDesign::of(&setup.layout, extent) else {
             let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
             return Err(self.place.unused(with));
         };
         let offers = match &self.kinds {
-            Some(kinds) => offers(kinds, bench)?,
+            Some(kinds) => offers(kinds, setup)?,
             None => default.offers,
         };
         let must_have = self.must_have.iter().map(|keys| keys.build(&offers, extent));
@@ -154,13 +154,13 @@ impl At<DesignKeys> {
     }
 }
 
-fn offers(listed: &At<Vec<At<OfferKeys>>>, bench: &Bench) -> Result<Vec<SensorOffer>, RigError> {
+fn offers(listed: &At<Vec<At<OfferKeys>>>, setup: &Setup) -> Result<Vec<SensorOffer>, RigError> {
     if listed.is_empty() {
         return Err(listed.place.refuse("a list of at least 1"));
     }
     let mut offers: Vec<SensorOffer> = Vec::new();
     for keys in listed.iter() {
-        let offer = keys.build(bench)?;
+        let offer = keys.build(setup)?;
         if offers.iter().any(|other| other.kind == offer.kind) {
             let value = format!("{} for the second time", offer.kind);
             return Err(keys.measure.place.refuse_as(value, "another kind; each is offered once"));
@@ -172,9 +172,9 @@ fn offers(listed: &At<Vec<At<OfferKeys>>>, bench: &Bench) -> Result<Vec<SensorOf
 
 impl At<OfferKeys> {
     /// A kind with its noise and cost; the faults that are not named here are those of the rig's own sensors of the kind.
-    fn build(&self, bench: &Bench) -> Result<SensorOffer, RigError> {
-        let kind = kind_on(&bench.surface, &self.measure)?;
-        let own = bench.layout.sensors.iter().find(|sensor| sensor.kind == kind);
+    fn build(&self, setup: &Setup) -> Result<SensorOffer, RigError> {
+        let kind = kind_on(&setup.surface, &self.measure)?;
+        let own = setup.layout.sensors.iter().find(|sensor| sensor.kind == kind);
         let own = own.map_or_else(ChannelModel::default, |sensor| sensor.channel);
         let size = |key: &Option<At<Written>>, own| {
             key.as_ref().map_or(Ok(own), |written| written.si::<AtLeastZero>(kind.dimension()))
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn a_silent_section_takes_the_rigs_sensors_all_over_the_surface() {
         let rig = designed("").unwrap();
-        assert_eq!(rig.design, SensorDesign::of(&rig.bench.layout, rig.bench.surface.extent()));
+        assert_eq!(rig.design, SensorDesign::of(&rig.setup.layout, rig.setup.surface.extent()));
     }
 
     #[test]

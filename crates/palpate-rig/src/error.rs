@@ -8,7 +8,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::modal::ModalBeamError;
 use palpate_mechanics::surface::{
-    BeamError, DigitError, Extent, NothingToRead, PlateError, SupportedBeamError,
+    BeamError, DigitError, Extent, InsensitiveSensor, PlateError, SupportedBeamError,
 };
 use serde::de::{Expected, Unexpected};
 
@@ -113,7 +113,7 @@ pub enum RigProblem {
         "{kind} sensor {number} is at {} and would read nothing: {reason}",
         extent.place_in_words(*position)
     )]
-    NothingToRead {
+    InsensitiveSensor {
         /// Which sensor of its section, from 1.
         number: usize,
         /// What it measures.
@@ -123,7 +123,7 @@ pub enum RigProblem {
         /// The surface.
         extent: Extent,
         /// Why.
-        reason: NothingToRead,
+        reason: InsensitiveSensor,
     },
     /// A reaction sensor where nothing supports the surface.
     #[error(
@@ -164,7 +164,7 @@ impl RigError {
                 Some("add `force = \"3 N\"` to [training] when later contacts have another, unknown force; to [contact] when they have the same".to_owned())
             }
             RigProblem::NoSupport { .. } => Some("a reaction sensor sits at a support".to_owned()),
-            RigProblem::NothingToRead { .. } => Some("move it off the support, or leave it out".to_owned()),
+            RigProblem::InsensitiveSensor { .. } => Some("move it off the support, or leave it out".to_owned()),
             RigProblem::SupportedBeam(error) => error.help().map(str::to_owned),
             _ => None,
         }

@@ -2,15 +2,15 @@
 
 use serde::Deserialize;
 
-use palpate_estimators::centroid::CentroidConfig;
-use palpate_estimators::closed_form::ClosedFormConfig;
-use palpate_estimators::digit::{DigitConfig, DigitTheory};
-use palpate_estimators::estimator::EstimatorConfig;
-use palpate_estimators::gaussian_process::GaussianProcessConfig;
-use palpate_estimators::influence::{InfluenceConfig, InfluenceSource};
-use palpate_estimators::neighbours::NeighboursConfig;
+use palpate_estimators::centroid::Centroid;
+use palpate_estimators::closed_form::ClosedForm;
+use palpate_estimators::digit::{DigitEstimator, DigitTheory};
+use palpate_estimators::estimator::Estimator;
+use palpate_estimators::gaussian_process::GaussianProcessEstimator;
+use palpate_estimators::influence::{Influence, InfluenceSource};
+use palpate_estimators::neighbours::Neighbours;
 use palpate_estimators::network::{
-    Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
+    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding,
     Precision, PresentationOrder,
 };
 use palpate_mechanics::sensing::Layout;
@@ -95,25 +95,25 @@ pub(crate) struct DigitKeys {
 }
 
 impl EstimatorKeys {
-    pub fn build(&self, layout: &Layout, force_n: Option<f64>) -> Result<EstimatorConfig, RigError> {
+    pub fn build(&self, layout: &Layout, force_n: Option<f64>) -> Result<Estimator, RigError> {
         Ok(match self {
-            Self::Network(keys) => EstimatorConfig::Network(keys.build(layout)?),
-            Self::NetworkLm => EstimatorConfig::NetworkLm(LevenbergMarquardtConfig::default()),
-            Self::Influence(keys) => EstimatorConfig::Influence(keys.build(force_n)?),
-            Self::GaussianProcess => EstimatorConfig::GaussianProcess(GaussianProcessConfig::default()),
-            Self::ClosedForm => EstimatorConfig::ClosedForm(ClosedFormConfig),
-            Self::Digit(DigitKeys { theory }) => EstimatorConfig::Digit(DigitConfig { theory: *theory }),
-            Self::Neighbours => EstimatorConfig::Neighbours(NeighboursConfig::default()),
-            Self::Centroid => EstimatorConfig::Centroid(CentroidConfig),
-            Self::Auto => EstimatorConfig::Auto,
+            Self::Network(keys) => Estimator::Network(keys.build(layout)?),
+            Self::NetworkLm => Estimator::NetworkLm(LevenbergMarquardt::default()),
+            Self::Influence(keys) => Estimator::Influence(keys.build(force_n)?),
+            Self::GaussianProcess => Estimator::GaussianProcess(GaussianProcessEstimator::default()),
+            Self::ClosedForm => Estimator::ClosedForm(ClosedForm),
+            Self::Digit(DigitKeys { theory }) => Estimator::Digit(DigitEstimator { theory: *theory }),
+            Self::Neighbours => Estimator::Neighbours(Neighbours::default()),
+            Self::Centroid => Estimator::Centroid(Centroid),
+            Self::Auto => Estimator::Auto,
         })
     }
 }
 
 impl NetworkKeys {
-    fn build(&self, layout: &Layout) -> Result<NetworkConfig, RigError> {
+    fn build(&self, layout: &Layout) -> Result<Network, RigError> {
         const MOST_LAYERS: usize = 16;
-        let default = NetworkConfig::default();
+        let default = Network::default();
         let hidden = match &self.hidden {
             Some(layers) if layers.len() > MOST_LAYERS => {
                 return Err(layers.place.refuse(format!("a list of at most {MOST_LAYERS}")));
@@ -123,7 +123,7 @@ impl NetworkKeys {
         };
         let number = |key: Option<Positive<Number>>, default| key.map_or(default, |number| number.si);
         let training = default.training;
-        Ok(NetworkConfig {
+        Ok(Network {
             hidden,
             hidden_activation: self.hidden_activation.unwrap_or(default.hidden_activation),
             output_activation: self.output_activation.unwrap_or(default.output_activation),
@@ -169,13 +169,13 @@ fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigEr
 }
 
 impl InfluenceKeys {
-    fn build(&self, force_n: Option<f64>) -> Result<InfluenceConfig, RigError> {
-        let default = InfluenceConfig::default();
+    fn build(&self, force_n: Option<f64>) -> Result<Influence, RigError> {
+        let default = Influence::default();
         if let (Some(force_sd), None) = (&self.force_sd, force_n) {
             let with = "an unknown force; give [contact] `force`, about which it spreads";
             return Err(force_sd.place.unused(with));
         }
-        Ok(InfluenceConfig {
+        Ok(Influence {
             from: self.from.unwrap_or(default.from),
             contacts: self.contacts.map_or(default.contacts, Count::get),
             force_sd_n: self.force_sd.as_ref().map(|force_sd| force_sd.si),

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use palpate_estimators::arrangement::Training;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::SurfaceSpec;
 
@@ -82,9 +82,9 @@ impl RigFile {
             self.recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let moving = |keys| motion::build(keys, &surface, surface_keys.density(), force_n);
         let motion = self.motion.as_ref().map(moving).transpose()?;
-        let bench = Bench { surface, layout, force_n, columns };
-        let design = self.design.as_ref().map(|keys| keys.build(&bench)).transpose()?;
-        Ok(Rig { bench, training, estimator, loads, motion, design })
+        let setup = Setup { surface, layout, force_n, columns };
+        let design = self.design.as_ref().map(|keys| keys.build(&setup)).transpose()?;
+        Ok(Rig { setup, training, estimator, loads, motion, design })
     }
 
     /// The training positions, of which the readings can be simulated or are recorded.

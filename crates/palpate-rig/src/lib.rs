@@ -23,10 +23,10 @@ pub use study::{Arm, AskedLayout, Judging, Study};
 
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
-use palpate_estimators::estimator::EstimatorConfig;
+use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::Trial;
 use palpate_estimators::recording::{Recording, TimedRecording};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
 use palpate_mechanics::surface::UniformLoad;
 
@@ -34,11 +34,11 @@ use palpate_mechanics::surface::UniformLoad;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Surface, sensors and contact.
-    pub bench: Bench,
+    pub setup: Setup,
     /// Where to press to calibrate.
     pub training: Option<Training>,
     /// The method that locates.
-    pub estimator: EstimatorConfig,
+    pub estimator: Estimator,
     /// Loads for a load profile to be simulated from.
     pub loads: Vec<UniformLoad>,
     /// How a contact moves, and what moves with it, where the rig says.
@@ -49,16 +49,16 @@ pub struct Rig {
 
 impl Rig {
     /// The bench as it is when pressed to calibrate: with the force of the training presses.
-    pub fn pressed_bench(&self) -> Bench {
-        self.training.as_ref().map_or_else(|| self.bench.clone(), |training| self.bench.pressed_by(training))
+    pub fn pressed_setup(&self) -> Setup {
+        self.training.as_ref().map_or_else(|| self.setup.clone(), |training| self.setup.pressed_by(training))
     }
 
-    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Bench::simulate`].
+    /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Setup::simulate`].
     ///
     /// # Errors
     /// [`RigSimulationError`] when the rig has no training positions, no model or no force.
     pub fn simulate(&self, seed: u64) -> Result<Recording, RigSimulationError> {
-        Ok(self.bench.simulate(self.training()?, seed)?)
+        Ok(self.setup.simulate(self.training()?, seed)?)
     }
 
     /// Simulated calibrations at the training positions; see [`Trial::by_simulation`].
@@ -66,7 +66,7 @@ impl Rig {
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Trial>, RigSimulationError> {
-        Ok(Trial::by_simulation(&self.bench, self.training()?, count, seed)?)
+        Ok(Trial::by_simulation(&self.setup, self.training()?, count, seed)?)
     }
 
     /// The training positions.
@@ -83,7 +83,7 @@ impl Rig {
     /// [`RigSimulationError`] when the rig has no motion, no model or no force.
     pub fn simulate_moving(&self, seed: u64) -> Result<TimedRecording, RigSimulationError> {
         let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
-        Ok(simulate_moving(&self.pressed_bench(), moving, seed)?)
+        Ok(simulate_moving(&self.pressed_setup(), moving, seed)?)
     }
 }
 

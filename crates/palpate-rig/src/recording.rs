@@ -38,9 +38,9 @@ pub(crate) struct RecordingKeys {
     /// The unit of forces.
     pub force_unit: Option<At<String>>,
     /// A coordinate that readings depend on and nobody wants to know.
-    pub hidden: Option<At<ColumnKey>>,
+    pub nuisance: Option<At<ColumnKey>>,
     /// The unit of that coordinate.
-    pub hidden_unit: Option<At<String>>,
+    pub nuisance_unit: Option<At<String>>,
     /// The file's coordinates of the surface's left end or lower left corner.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
@@ -81,14 +81,14 @@ impl At<RecordingKeys> {
             frame: self.frame(extent)?,
             channels: self.channels(layout, own.channels)?,
             force: self.force(own.force)?,
-            hidden: self.hidden()?,
+            nuisance: self.nuisance()?,
         })
     }
 
     /// Without a header, columns must be numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
-        let values = [&self.force, &self.hidden].into_iter().flatten();
+        let values = [&self.force, &self.nuisance].into_iter().flatten();
         let channels = self.channels.iter().flat_map(|channels| channels.iter());
         let named = |key: &&At<ColumnKey>| matches!(***key, ColumnKey::Text(_));
         match positions.clone().chain(values).chain(channels).find(named) {
@@ -164,15 +164,15 @@ impl At<RecordingKeys> {
         Ok(values.map(|values| ForceColumn { values, need: Need::Required }))
     }
 
-    fn hidden(&self) -> Result<Option<ValueColumn>, RigError> {
-        let unit = match (&self.hidden, &self.hidden_unit) {
+    fn nuisance(&self) -> Result<Option<ValueColumn>, RigError> {
+        let unit = match (&self.nuisance, &self.nuisance_unit) {
             (None, None) => return Ok(None),
-            (None, Some(unit)) => return Err(self.lacks("hidden", unit)),
+            (None, Some(unit)) => return Err(self.lacks("nuisance", unit)),
             (Some(_), None) => Unit::NONE,
             (Some(_), Some(symbol)) => Unit::from_symbol(symbol)
                 .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: (**symbol).clone() }))?,
         };
-        Ok(self.hidden.as_ref().map(|hidden| ValueColumn { column: hidden.column(), unit }))
+        Ok(self.nuisance.as_ref().map(|nuisance| ValueColumn { column: nuisance.column(), unit }))
     }
 
     /// The error for a unit without its column.

@@ -194,8 +194,8 @@ fn check_sensor(
     if kind == SensorKind::Reaction && !model.is_supported_at(position) {
         return Err(RigProblem::NoSupport { number, position, supports: model.force_supports(), extent });
     }
-    match model.nothing_to_read(kind, position) {
-        Some(reason) => Err(RigProblem::NothingToRead { number, kind, position, extent, reason }),
+    match model.insensitive_sensor(kind, position) {
+        Some(reason) => Err(RigProblem::InsensitiveSensor { number, kind, position, extent, reason }),
         None => Ok(()),
     }
 }

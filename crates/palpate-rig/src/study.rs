@@ -221,7 +221,7 @@ impl ArmKeys {
         };
         let layout = self.asked_layout()?;
         let rig = rig.build()?;
-        if let (Some(surface), None) = (&base.surface, rig.bench.surface.model()) {
+        if let (Some(surface), None) = (&base.surface, rig.setup.surface.model()) {
             return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
         }
         if rig.training.is_none() {
@@ -253,7 +253,7 @@ fn checked_name(name: &At<String>) -> Result<String, RigError> {
 impl StudyFile {
     /// Without an `[evaluation]`: 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
-        let extent = first.rig.bench.surface.extent();
+        let extent = first.rig.setup.surface.extent();
         if let (Some(surface), true) = (&self.surface, extent.is_plane()) {
             return Err(surface.place.refuse_as("a plane", "a line, along which a study judges"));
         }

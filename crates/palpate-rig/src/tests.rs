@@ -5,7 +5,7 @@ mod plates;
 
 use super::*;
 use palpate_estimators::arrangement::Arrangement;
-use palpate_estimators::network::{InputScale, NetworkConfig, OutputCoding};
+use palpate_estimators::network::{InputScale, Network, OutputCoding};
 use palpate_estimators::recording::{Column, PositionColumns};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::sensing::SensorKind;
@@ -21,27 +21,27 @@ const FSI_WATER: &str = include_str!("../../../examples/fsi-water.toml");
 fn the_papers_bench_is_what_the_paper_says() {
     let rig = Rig::from_toml(PAPER).unwrap();
     let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
-    assert_eq!(rig.bench.surface, SurfaceSpec::Beam(beam));
+    assert_eq!(rig.setup.surface, SurfaceSpec::Beam(beam));
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6);
-    assert_eq!(rig.bench.layout, layout);
-    assert_eq!(rig.bench.force_n, Some(3.0));
+    assert_eq!(rig.setup.layout, layout);
+    assert_eq!(rig.setup.force_n, Some(3.0));
     assert_eq!(
         rig.training,
         Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
     );
-    assert_eq!(rig.estimator, EstimatorConfig::Network(NetworkConfig::default()));
-    assert_eq!(rig.bench.columns, None);
+    assert_eq!(rig.estimator, Estimator::Network(Network::default()));
+    assert_eq!(rig.setup.columns, None);
 }
 
 #[test]
 fn the_water_strip_maps_foreign_columns() {
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    assert_eq!(rig.bench.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
-    assert_eq!(rig.bench.layout.names(), ["Pl", "Pr"]);
-    let EstimatorConfig::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
+    assert_eq!(rig.setup.surface, SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None }));
+    assert_eq!(rig.setup.layout.names(), ["Pl", "Pr"]);
+    let Estimator::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
     assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));
-    let columns = rig.bench.columns.unwrap();
+    let columns = rig.setup.columns.unwrap();
     assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
     assert_eq!(columns.position_unit.symbol(), "mm");
 }
@@ -50,7 +50,7 @@ fn the_water_strip_maps_foreign_columns() {
 fn the_water_strips_recording_is_read() {
     let Some(path) = recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    let recording = rig.bench.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
+    let recording = rig.setup.read_recording("water", std::fs::File::open(path).unwrap()).unwrap();
     assert_eq!(recording.rows.len(), 779);
     assert_eq!(recording.distinct_positions().len(), 41);
     assert_eq!(recording.rows[0].reading, [2.04354199724436, 1.42585650614297]);
@@ -296,7 +296,7 @@ fn every_key_can_be_said() {
 #[test]
 fn an_input_scale_is_a_reading_of_the_sensors() {
     let text = BENCH.replace("kind = \"network\"", "kind = \"network\"\ninput_scale = \"5 mm\"");
-    let EstimatorConfig::Network(network) = Rig::from_toml(&text).unwrap().estimator else {
+    let Estimator::Network(network) = Rig::from_toml(&text).unwrap().estimator else {
         panic!("not a network")
     };
     assert_eq!(network.input_scale, InputScale::DivideBy(0.005));

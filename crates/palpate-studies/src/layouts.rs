@@ -3,7 +3,7 @@
 use super::{Arm, AskedLayout, Study, StudyRunError};
 use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{DesignError, Method, SensorProblem};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::watch::Watch;
 
@@ -26,7 +26,7 @@ pub(super) fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunE
                 layout
             }
         };
-        arm.rig.bench.layout = layout;
+        arm.rig.setup.layout = layout;
     }
     Ok(study)
 }
@@ -35,23 +35,23 @@ pub(super) fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunE
 #[derive(PartialEq)]
 struct Wish {
     method: Method,
-    bench: Bench,
+    setup: Setup,
     design: SensorDesign,
 }
 
 impl Wish {
     fn layout(&self, watch: Watch) -> Result<Layout, DesignError> {
-        let problem = SensorProblem::new(&self.bench, &self.design, watch)?;
+        let problem = SensorProblem::new(&self.setup, &self.design, watch)?;
         Ok(problem.by_method(self.method, SEED, watch)?.layout)
     }
 }
 
 fn wish(arm: &Arm) -> Option<(AskedLayout, Wish)> {
     let asked = arm.layout.clone()?;
-    let bench = arm.rig.pressed_bench();
-    let own = || SensorDesign::of(&bench.layout, bench.surface.extent());
+    let setup = arm.rig.pressed_setup();
+    let own = || SensorDesign::of(&setup.layout, setup.surface.extent());
     let mut design = arm.rig.design.clone().or_else(own)?;
-    design.force_is_known.get_or_insert(arm.rig.bench.force_n.is_some());
+    design.force_is_known.get_or_insert(arm.rig.setup.force_n.is_some());
     let method = asked.method;
-    Some((asked, Wish { method, bench, design }))
+    Some((asked, Wish { method, setup, design }))
 }

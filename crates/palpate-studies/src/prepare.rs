@@ -4,15 +4,15 @@ use std::ops::Range;
 
 use super::layouts::lay_out;
 use super::run::{Trained, TrainedSeed};
-use super::seed_by_seed::{SeedBySeed, touched_bench};
+use super::seed_by_seed::{SeedBySeed, touched_setup};
 use super::{Arm, Judging, Study};
 use palpate_design::sensors::DesignError;
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, Method, ReadingError};
+use palpate_estimators::estimator::{Estimator, FitError, Locator, Method, ReadingError};
 use palpate_estimators::evaluation::Evaluation;
 use palpate_estimators::fit::FitTask;
-use palpate_estimators::network::{NetworkConfig, TrainingOutcome};
+use palpate_estimators::network::{Network, TrainingOutcome};
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -81,15 +81,15 @@ pub(super) enum PreparedArm {
 #[derive(Clone, Debug)]
 pub(super) struct InLanes {
     /// What is fitted: networks.
-    pub estimator: EstimatorConfig,
-    pub bench: Bench,
+    pub estimator: Estimator,
+    pub setup: Setup,
     pub recording: Recording,
     pub judged: Recording,
 }
 
 impl InLanes {
     pub fn task<'a>(&'a self, watch: Watch<'a>) -> FitTask<'a> {
-        FitTask::new(&self.bench, &self.recording).watch(watch)
+        FitTask::new(&self.setup, &self.recording).watch(watch)
     }
 }
 
@@ -135,7 +135,7 @@ impl PreparedStudy {
         outcome: TrainingOutcome,
     ) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
-        let EstimatorConfig::Network(network) = &prepared.estimator else { return None };
+        let Estimator::Network(network) = &prepared.estimator else { return None };
         let task = prepared.task(Watch::NONE).seed(seed);
         let locator = network.restore(task, weights, outcome).ok()??;
         self.judge(arm, seed, locator.map(Method::Network))
@@ -151,16 +151,16 @@ impl PreparedArm {
     fn of(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
         let judging = &study.judging;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
-        let bench = &arm.rig.bench;
-        let perfect = bench.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
+        let setup = &arm.rig.setup;
+        let perfect = setup.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
-            EstimatorConfig::Network(network) if perfect => {
-                let judged = simulate_at(&touched_bench(&arm.rig), &judging.positions, 1, 0)
+            Estimator::Network(network) if perfect => {
+                let judged = simulate_at(&touched_setup(&arm.rig), &judging.positions, 1, 0)
                     .map_err(|error| simulated(error.into()))?;
                 let recording = arm.rig.simulate(0).map_err(simulated)?;
-                let network = NetworkConfig { precision: study.precision, ..network.clone() };
-                let estimator = EstimatorConfig::Network(network);
-                Ok(Self::InLanes(Box::new(InLanes { estimator, bench: bench.clone(), recording, judged })))
+                let network = Network { precision: study.precision, ..network.clone() };
+                let estimator = Estimator::Network(network);
+                Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), recording, judged })))
             }
             _ => Ok(Self::SeedBySeed(SeedBySeed::of(&arm.rig, judging).map_err(simulated)?)),
         }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::limits::expected_errors_m;
-use super::seed_by_seed::touched_bench;
+use super::seed_by_seed::touched_setup;
 use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error,
@@ -183,12 +183,12 @@ impl SetUp {
             measure: sensor.kind,
             position_mm: 1e3 * sensor.position.x_m,
         };
-        let bench = &arm.rig.bench;
+        let setup = &arm.rig.setup;
         Self {
             estimator: arm.rig.estimator.kind(),
-            force: if bench.force_n.is_some() { Force::Known } else { Force::Unknown },
+            force: if setup.force_n.is_some() { Force::Known } else { Force::Unknown },
             layout: arm.layout.as_ref().map(|asked| asked.method.name()),
-            sensors: bench.layout.sensors.iter().map(place).collect(),
+            sensors: setup.layout.sensors.iter().map(place).collect(),
         }
     }
 }
@@ -201,7 +201,7 @@ impl ArmResults {
         let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
             spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
         };
-        let length_m = arm.rig.bench.surface.extent().length_m;
+        let length_m = arm.rig.setup.surface.extent().length_m;
         let allowed = allowed(arm, judging);
         let portions = judging.portions.iter().filter_map(|portion| {
             Some(PortionResults {
@@ -218,7 +218,7 @@ impl ArmResults {
         let limit = allowed.as_ref().and_then(|allowed| {
             Some(LimitResults {
                 limit_error_percent: percentage_error(mean(allowed, None)?, length_m),
-                error_over_limit: spread(&|fit| limit_ratio(&fit.locator.bench, &fit.evaluation)),
+                error_over_limit: spread(&|fit| limit_ratio(&fit.locator.setup, &fit.evaluation)),
             })
         });
         Some(Self {
@@ -242,8 +242,8 @@ impl ArmResults {
 
 /// Positions where locators are judged, with the mean error there of an estimator at the limit, in metres.
 fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
-    let force_n = touched_bench(&arm.rig).force_n?;
-    let errors_m = expected_errors_m(&arm.rig.bench, force_n, &judging.positions)?;
+    let force_n = touched_setup(&arm.rig).force_n?;
+    let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }
 
@@ -256,7 +256,7 @@ fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
 
 fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults> {
     let training = arm.rig.training.as_ref()?;
-    let positions = training.positions(arm.rig.bench.surface.extent()).ok()?;
+    let positions = training.positions(arm.rig.setup.surface.extent()).ok()?;
     let (low, high) = positions
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at.x_m), high.max(at.x_m)));

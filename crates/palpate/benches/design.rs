@@ -5,7 +5,7 @@
 use cpu_time::ThreadTime;
 use palpate_design::sensors::{SensorDesign, Sites};
 use palpate_design::sensors::{SensorProblem, condition_number, pivoted_columns};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_numerics::median;
@@ -24,8 +24,8 @@ fn main() {
         Rig::from_toml(include_str!("../../../examples/sensor-design.toml")).expect("the example is sound");
     let design =
         SensorDesign { sites: Sites::Count(SITES), ..rig.design.clone().expect("the example designs") };
-    by_limit(&rig.bench, &design);
-    let SurfaceSpec::Beam(beam) = rig.bench.surface else { return };
+    by_limit(&rig.setup, &design);
+    let SurfaceSpec::Beam(beam) = rig.setup.surface else { return };
     by_pivoting("sines", &sines());
     by_pivoting("deflections at 8 contacts, orthonormal", &deflections(&beam));
 }
@@ -45,9 +45,9 @@ fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
     (median(times).expect("rounds"), last.expect("there is a round"))
 }
 
-fn by_limit(bench: &Bench, design: &SensorDesign) {
-    let (rows_s, _) = timed(|| SensorProblem::new(bench, design, Watch::NONE).expect("a sound design"));
-    let problem = SensorProblem::new(bench, design, Watch::NONE).expect("a sound design");
+fn by_limit(setup: &Setup, design: &SensorDesign) {
+    let (rows_s, _) = timed(|| SensorProblem::new(setup, design, Watch::NONE).expect("a sound design"));
+    let problem = SensorProblem::new(setup, design, Watch::NONE).expect("a sound design");
     let (search_s, designed) = timed(|| problem.greedy_exchange(0, Watch::NONE).expect("it is judged"));
     let limit_mm = designed.assessment.mean_limit_m.unwrap_or(f64::NAN) * 1e3;
     println!("{SENSORS} of {SITES} sites by the limit, {} contacts:", problem.contacts().len());

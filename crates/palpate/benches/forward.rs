@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use cpu_time::ThreadTime;
-use palpate_estimators::network::{BatchNetwork, InstructionSet, NetworkConfig, PreparedNetwork, Topology};
+use palpate_estimators::network::{BatchNetwork, InstructionSet, Network, PreparedNetwork, Topology};
 use palpate_numerics::median;
 
 const ROUNDS: usize = 15;
@@ -13,7 +13,7 @@ const READINGS: usize = 4096;
 const REPEATS: usize = 50;
 
 fn main() {
-    let topology = Topology::new(&NetworkConfig::default(), 8, 1);
+    let topology = Topology::new(&Network::default(), 8, 1);
     let weights: Vec<f64> = (0..topology.weight_count()).map(|k| (k as f64 * 1.3).sin()).collect();
     let inputs: Vec<f64> = (0..8 * READINGS).map(|k| (k as f64 * 0.37).cos()).collect();
     let singles: Vec<f32> = inputs.iter().map(|x| *x as f32).collect();

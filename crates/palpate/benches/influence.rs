@@ -5,9 +5,9 @@
 use cpu_time::ThreadTime;
 use palpate_core::{Estimate, Status};
 use palpate_estimators::fit::FitTask;
-use palpate_estimators::influence::{BeamLocator, InfluenceConfig, InfluenceSource, Scratch};
+use palpate_estimators::influence::{BeamLocator, Influence, InfluenceSource, Scratch};
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::clean_reading;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::median;
@@ -21,19 +21,19 @@ fn main() {
     let rig = Rig::from_toml(&text).expect("the paper's rig is sound");
     let recording = rig.simulate(0).expect("the paper's rig can be simulated");
     for from in [InfluenceSource::Recording, InfluenceSource::Corrected] {
-        let config = InfluenceConfig { from, ..InfluenceConfig::default() };
+        let config = Influence { from, ..Influence::default() };
         let times: Vec<f64> = (0..21)
             .map(|_| {
                 let start = ThreadTime::now();
-                std::hint::black_box(fit(config, &rig.bench, &recording));
+                std::hint::black_box(fit(config, &rig.setup, &recording));
                 start.elapsed().as_secs_f64()
             })
             .collect();
         println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
     }
     for force_n in [Some(3.0), None] {
-        let bench = Bench { force_n, ..rig.bench.clone() };
-        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        let setup = Setup { force_n, ..rig.setup.clone() };
+        let locator = fit(Influence::default(), &setup, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
         let Times { single, batch } = nanoseconds(&locator, &rig);
         println!("estimate with uncertainty, force {known}: {single:.0} ns a reading");
@@ -45,8 +45,8 @@ fn main() {
     }
 }
 
-fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    let fitted = config.fit_beam(FitTask::new(bench, recording));
+fn fit(config: Influence, setup: &Setup, recording: &Recording) -> BeamLocator {
+    let fitted = config.fit_beam(FitTask::new(setup, recording));
     fitted.expect("the presses suit the bench")
 }
 
@@ -58,11 +58,11 @@ struct Times {
 
 /// Median times of an estimate, alone and in a batch, over readings all along the beam in no order.
 fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
-    let surface = rig.bench.surface.model().expect("a beam has a model");
+    let surface = rig.setup.surface.model().expect("a beam has a model");
     let readings: Vec<f64> = (0..READINGS)
         .flat_map(|i| {
             let position = Position::along(0.02 + 0.36 * (i * 619 % READINGS) as f64 / READINGS as f64);
-            clean_reading(surface, &rig.bench.layout, Contact { position, force_n: 3.0 })
+            clean_reading(surface, &rig.setup.layout, Contact { position, force_n: 3.0 })
         })
         .collect();
     let mut scratch = Scratch::default();
@@ -71,7 +71,7 @@ fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
     let (mut single, mut batch) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
         let start = ThreadTime::now();
-        for reading in readings.chunks_exact(rig.bench.layout.len()) {
+        for reading in readings.chunks_exact(rig.setup.layout.len()) {
             std::hint::black_box(locator.locate_with(reading, &mut scratch));
         }
         single.push(start.elapsed().as_nanos() as f64 / READINGS as f64);

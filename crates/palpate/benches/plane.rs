@@ -4,9 +4,9 @@
 use cpu_time::ThreadTime;
 use palpate_estimators::arrangement::every;
 use palpate_estimators::fit::FitTask;
-use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
+use palpate_estimators::influence::{Influence, PlaneLocator, PlaneScratch};
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -21,7 +21,7 @@ fn main() {
     let times: Vec<f64> = (0..5)
         .map(|_| {
             let start = ThreadTime::now();
-            std::hint::black_box(fit(&rig.bench, &recording));
+            std::hint::black_box(fit(&rig.setup, &recording));
             start.elapsed().as_secs_f64()
         })
         .collect();
@@ -31,8 +31,8 @@ fn main() {
     let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
     let plain: Vec<Position> = all.iter().copied().filter(middle).collect();
     for force_n in [Some(5.0), None] {
-        let bench = Bench { force_n, ..rig.bench.clone() };
-        let locator = fit(&bench, &recording);
+        let setup = Setup { force_n, ..rig.setup.clone() };
+        let locator = fit(&setup, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
         for (place, positions) in [("the middle, half as long and wide", &plain), ("the whole plate", &all)] {
             let time_us = microseconds(&locator, &rig, positions);
@@ -41,15 +41,15 @@ fn main() {
     }
 }
 
-fn fit(bench: &Bench, recording: &Recording) -> PlaneLocator {
-    let fitted = InfluenceConfig::default().fit_plane(FitTask::new(bench, recording));
+fn fit(setup: &Setup, recording: &Recording) -> PlaneLocator {
+    let fitted = Influence::default().fit_plane(FitTask::new(setup, recording));
     fitted.expect("the presses suit the bench")
 }
 
 /// Median time of an estimate, readings being all alike.
 fn microseconds(locator: &PlaneLocator, rig: &Rig, positions: &[Position]) -> f64 {
-    let surface = rig.bench.surface.model().expect("a plate has a model");
-    let sensors = CleanSensors::new(surface, &rig.bench.layout);
+    let surface = rig.setup.surface.model().expect("a plate has a model");
+    let sensors = CleanSensors::new(surface, &rig.setup.layout);
     let readings: Vec<Vec<f64>> =
         positions.iter().map(|&position| sensors.reading(Contact { position, force_n: 5.0 })).collect();
     let mut scratch = PlaneScratch::default();

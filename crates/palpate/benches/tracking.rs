@@ -5,7 +5,7 @@ use cpu_time::ThreadTime;
 use palpate_estimators::estimator::{Locator, Swing, Track, Tracker, TrackerConfig};
 use palpate_estimators::fit::Fit;
 use palpate_estimators::recording::TimedRecording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
 use palpate_numerics::median;
 use palpate_rig::Rig;
@@ -21,7 +21,7 @@ fn main() {
     for (name, text) in [("beam", BEAM), ("plate", PLATE)] {
         let rig = Rig::from_toml(text).expect("the example is sound");
         let moving = rig.motion.expect("the example moves");
-        for force_n in [rig.bench.force_n, None] {
+        for force_n in [rig.setup.force_n, None] {
             println!("{name}, force {}", if force_n.is_some() { "known" } else { "unknown" });
             let locator = fit(&rig, force_n);
             for speed_m_per_s in [0.1, 0.2, 0.5, 1.0] {
@@ -34,9 +34,9 @@ fn main() {
 }
 
 fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
-    let bench = Bench { force_n, ..rig.bench.clone() };
+    let setup = Setup { force_n, ..rig.setup.clone() };
     let recording = rig.simulate(1).expect("the example can be simulated");
-    rig.estimator.fit(&bench, &recording).expect("the presses suit the bench")
+    rig.estimator.fit(&setup, &recording).expect("the presses suit the bench")
 }
 
 fn measure(locator: &Locator, rig: &Rig) {
@@ -59,7 +59,7 @@ fn measure(locator: &Locator, rig: &Rig) {
                 .iter()
                 .zip(&moving)
                 .map(|(followed, timed)| {
-                    TrackErrors::of(tracks(followed), &timed.truths(), rig.bench.surface.extent())
+                    TrackErrors::of(tracks(followed), &timed.truths(), rig.setup.surface.extent())
                         .expect("something was tracked")
                 })
                 .collect();

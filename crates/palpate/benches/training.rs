@@ -3,7 +3,7 @@
 
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{
-    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, Topology,
+    BackPropagation, InstructionSet, Network, Patterns, Precision, PresentationOrder, Topology,
     TrainedNetwork, TrainingQueue, TrainingTask, train_many, train_one,
 };
 use palpate_numerics::median;
@@ -24,7 +24,7 @@ fn main() {
 /// What drawing a fresh order every epoch costs, against presenting the patterns as they are.
 fn price_of_shuffling(precision: Precision) {
     let patterns = beam_patterns(30);
-    let topology = Topology::new(&NetworkConfig::default(), patterns.inputs, patterns.outputs);
+    let topology = Topology::new(&Network::default(), patterns.inputs, patterns.outputs);
     let set = InstructionSet::best();
     let mut shares = Vec::new();
     for _ in 0..ROUNDS {
@@ -51,7 +51,7 @@ fn price_of_shuffling(precision: Precision) {
 
 fn compare(count: usize, precision: Precision) {
     let patterns = beam_patterns(count);
-    let topology = Topology::new(&NetworkConfig::default(), patterns.inputs, patterns.outputs);
+    let topology = Topology::new(&Network::default(), patterns.inputs, patterns.outputs);
     let rule = BackPropagation { aggregate_error: 0.0, max_epochs: EPOCHS, ..BackPropagation::default() };
     let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
     let sets = InstructionSet::available();

@@ -10,9 +10,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Distance of the estimate from a contact at 150 mm, in metres.
 pub fn error_m() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
     let presses = setup.simulate(&Training::even(10).repeated(10).with_force(newtons(3.0)), 0)?;
-    let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+    let locator = Influence::default().fit(&setup, &presses)?;
 
     let touched = setup.known_force(newtons(2.0))?;
     let reading = &simulate_at(&touched, &[Position::along(mm(150.0))], 1, 7)?.rows[0].reading;

@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The limit at mid-span for a known force, in metres.
 pub fn mid_span_m() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
     let bound = setup.cramer_rao_bound()?;
     for x_m in [mm(20.0), mm(100.0), mm(200.0)] {
         let contact = Contact { position: Position::along(x_m), force_n: newtons(3.0) };

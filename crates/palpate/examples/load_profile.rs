@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The estimated total of 3 N spread over 150–230 mm, in newtons.
 pub fn total_n() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam)
+    let setup = Setup::new(beam)
         .sensors(Deflection.evenly(8).noise(um(1.0)))?
         .sensors(Strain.evenly(8).noise(microstrain(0.2)))?;
     let load = UniformLoad::along(mm(150.0), mm(230.0), newtons(3.0));

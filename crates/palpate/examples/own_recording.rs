@@ -14,11 +14,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Mean error at positions that the locator was not fitted to, in metres.
 pub fn mean_error_m() -> Result<f64, Box<dyn std::error::Error>> {
     let columns = Columns::along("x", ["left", "right"]);
-    let setup = Bench::measured(mm(90.0), &["left", "right"])?.recorded_as(columns);
+    let setup = Setup::measured(mm(90.0), &["left", "right"])?.recorded_as(columns);
     let presses = setup.read_recording("presses.csv", PRESSES.as_bytes())?;
-    let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+    let locator = Influence::default().fit(&setup, &presses)?;
     println!("{:?}", locator.locate(&[0.56, 0.45])?.contact.position);
 
-    let judged = cross_validate(&InfluenceConfig::default(), FitTask::new(&setup, &presses), 4)?;
+    let judged = cross_validate(&Influence::default(), FitTask::new(&setup, &presses), 4)?;
     Ok(judged.summary(None).map_or(f64::NAN, |errors| errors.average_m))
 }

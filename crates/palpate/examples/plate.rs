@@ -10,9 +10,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The estimated force of a contact of 4 N, in newtons.
 pub fn force_n() -> Result<f64, Box<dyn std::error::Error>> {
     let plate = Plate::simply_supported((mm(300.0), mm(200.0)), mm(0.8), gpa(200.0), 0.3)?;
-    let setup = Bench::new(plate).sensors(Deflection.grid(3, 3).noise(um(5.0)))?;
+    let setup = Setup::new(plate).sensors(Deflection.grid(3, 3).noise(um(5.0)))?;
     let presses = setup.simulate(&Training::grid(6, 4).repeated(5).with_force(newtons(5.0)), 1)?;
-    let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+    let locator = Influence::default().fit(&setup, &presses)?;
 
     let touched = setup.known_force(newtons(4.0))?;
     let place = Position { x_m: mm(110.0), y_m: mm(60.0) };

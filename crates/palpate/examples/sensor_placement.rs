@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// By which share the mean limit of the designed layout is below that of the even one.
 pub fn gain() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
     let design = SensorDesign::of(&setup.layout, setup.surface.extent());
     let mut design = design.ok_or("no model explains the sensors")?;
     design.sites = Sites::Every(mm(5.0));

@@ -10,9 +10,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Mean error of a track along the beam, in metres.
 pub fn mean_error_m() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(20.0)))?.known_force(newtons(3.0))?;
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(20.0)))?.known_force(newtons(3.0))?;
     let presses = setup.simulate(&Training::even(10).repeated(50), 0)?;
-    let locator = InfluenceConfig::default().fit(&setup, &presses)?.into_locator();
+    let locator = Influence::default().fit(&setup, &presses)?.into_locator();
 
     let path: Vec<Position> = (0..500).map(|i| Position::along(mm(100.0 + 0.3 * f64::from(i)))).collect();
     let config = TrackerConfig::default();

@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Where a recording of presses in the left half is best continued, in metres.
 pub fn next_m() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-    let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
     let pressed = [20.0, 60.0, 100.0, 140.0, 180.0].map(|x| Position::along(mm(x)));
     let begun = simulate_at(&setup, &pressed, 5, 3)?;
     let advice = next_press(&setup, None, &begun, 5.0, Watch::NONE)?;

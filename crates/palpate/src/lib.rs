@@ -5,10 +5,10 @@
 //! use palpate::prelude::*;
 //!
 //! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-//! let setup = Bench::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+//! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
 //! let training = Training::even(10).repeated(10).with_force(newtons(3.0));
 //! let presses = setup.simulate(&training, 0)?;
-//! let locator = InfluenceConfig::default().fit(&setup, &presses)?;
+//! let locator = Influence::default().fit(&setup, &presses)?;
 //! let estimate = locator.locate(&presses.rows[40].reading)?;
 //! let (position, force_n) = (estimate.contact.position, estimate.contact.force_n.unwrap());
 //! assert!((position.x_m - mm(180.0)).abs() < mm(1.0) && (force_n - newtons(3.0)).abs() < 0.1);

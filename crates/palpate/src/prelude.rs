@@ -3,23 +3,23 @@
 pub use palpate_design::positions::{Advice, Budget, PositionProblem, best_placed, next_press};
 pub use palpate_design::sensors::{SensorDesign, SensorProblem, Sites};
 pub use palpate_estimators::arrangement::{Arrangement, Training, all_over};
-pub use palpate_estimators::centroid::CentroidConfig;
-pub use palpate_estimators::closed_form::ClosedFormConfig;
-pub use palpate_estimators::digit::DigitConfig;
+pub use palpate_estimators::centroid::Centroid;
+pub use palpate_estimators::closed_form::ClosedForm;
+pub use palpate_estimators::digit::DigitEstimator;
 pub use palpate_estimators::estimator::{
-    ContactEstimate, Estimate, EstimatorConfig, Locator, Profiler, Status, Tracker, TrackerConfig,
+    ContactEstimate, Estimate, Estimator, Locator, Profiler, Status, Tracker, TrackerConfig,
 };
 pub use palpate_estimators::evaluation::{Evaluation, Portion, cross_validate};
 pub use palpate_estimators::fit::{Fit, FitTask, Fitted, Locate};
-pub use palpate_estimators::gaussian_process::GaussianProcessConfig;
-pub use palpate_estimators::influence::InfluenceConfig;
-pub use palpate_estimators::neighbours::NeighboursConfig;
-pub use palpate_estimators::network::{LevenbergMarquardtConfig, NetworkConfig};
+pub use palpate_estimators::gaussian_process::GaussianProcessEstimator;
+pub use palpate_estimators::influence::Influence;
+pub use palpate_estimators::neighbours::Neighbours;
+pub use palpate_estimators::network::{LevenbergMarquardt, Network};
 pub use palpate_estimators::recording::{Columns, Recording, Row};
-pub use palpate_estimators::setup::Bench;
+pub use palpate_estimators::setup::Setup;
 pub use palpate_estimators::simulate::{simulate_at, simulate_loads};
 pub use palpate_mechanics::contact::{Contact, Position};
-pub use palpate_mechanics::limit::{Force, Limit, LimitCurve};
+pub use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve};
 pub use palpate_mechanics::sensing::SensorKind::{Deflection, Raw, Reaction, Slope, Strain};
 pub use palpate_mechanics::surface::{Beam, Digit, Extent, Plate, SupportedBeam, UniformLoad};
 pub use palpate_mechanics::units::{gpa, microstrain, mm, mpa, newtons, um};

@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         trials: trials.len(),
         readings: trials.iter().map(|trial| trial.judged.rows.len()).sum(),
         seed: arguments.seed,
-        length_mm: rig.bench.surface.extent().length_m * 1e3,
+        length_mm: rig.setup.surface.extent().length_m * 1e3,
         tolerance_mm: arguments.tolerance * 1e3,
         estimators: rows.collect(),
         left_out,
@@ -126,7 +126,7 @@ fn write_report(
     let left_out: Vec<_> = left_out.iter().map(|left_out| (left_out.name, left_out.why.clone())).collect();
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
-        bench: &rig.bench,
+        setup: &rig.setup,
         trials: how,
         comparisons,
         left_out: &left_out,
@@ -144,7 +144,7 @@ struct Trials {
 }
 
 fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
-    let Some(recording) = arguments.files.read(&rig.bench)? else {
+    let Some(recording) = arguments.files.read(&rig.setup)? else {
         let trials = rig.trials(u64::from(arguments.calibrations), arguments.seed);
         let trials = trials.map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
@@ -167,7 +167,7 @@ fn compare(
     trials: &[Trial],
 ) -> Result<(Vec<Comparison>, Vec<LeftOut>), Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
-    let mut contenders = contenders(&rig.bench, &rig.estimator, rows);
+    let mut contenders = contenders(&rig.setup, &rig.estimator, rows);
     let known: Vec<&str> = contenders.iter().map(|contender| contender.kind()).collect();
     if let Some(unknown) = arguments.only.iter().find(|kind| !known.contains(&kind.as_str())) {
         let complaint = Complaint::new(format!("--only {unknown}: no estimator of this kind suits the rig"));
@@ -183,7 +183,7 @@ fn compare(
         bar.set_prefix(contender.kind());
         let clock = || start.elapsed().as_secs_f64();
         let go_on = |_| !interrupt::asked();
-        match try_estimator(&rig.bench, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
+        match try_estimator(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
             Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
             Err(error) => left_out.push(LeftOut { name: contender.kind(), why: error.to_string() }),
@@ -214,7 +214,7 @@ fn row(rig: &Rig, comparison: &Comparison, tolerance_m: f64) -> Option<Row> {
         error_percent: percentage_error(summary.average_m, evaluation.length_m),
         effective_percent: evaluation.effective_percent(tolerance_m),
         coverage_95: evaluation.coverage_percent(),
-        limit_ratio: limit_ratio(&rig.bench, evaluation),
+        limit_ratio: limit_ratio(&rig.setup, evaluation),
         fit_seconds: comparison.tried.fit_seconds,
         locate_ns: comparison.tried.locate_ns,
     })

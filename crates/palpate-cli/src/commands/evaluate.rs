@@ -90,11 +90,11 @@ enum Subject {
 
 impl Answers {
     fn is_plane(&self) -> bool {
-        let bench = match &self.subject {
-            Subject::Locator(locator) => &locator.bench,
-            Subject::Rig(rig) => &rig.bench,
+        let setup = match &self.subject {
+            Subject::Locator(locator) => &locator.setup,
+            Subject::Rig(rig) => &rig.setup,
         };
-        bench.surface.extent().is_plane()
+        setup.surface.extent().is_plane()
     }
 }
 
@@ -126,14 +126,14 @@ fn is_toml(path: &Path) -> bool {
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
 fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
     let rig = input::read_rig(&arguments.subject)?;
-    let recording = match arguments.files.read(&rig.bench)? {
+    let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     let observer = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds());
     let observe = |progress| observer.observe(progress);
-    let task = FitTask::new(&rig.bench, &recording).seed(seed).watch(Watch::new(&observe));
+    let task = FitTask::new(&rig.setup, &recording).seed(seed).watch(Watch::new(&observe));
     let evaluation = cross_validate(&rig.estimator, task, folds).map_err(|error| Failure::of(&error))?;
     drop(observer);
     Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
@@ -142,7 +142,7 @@ fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
 /// A locator, judged by a recording or by its own bench's simulation.
 fn located(arguments: &Arguments) -> Result<Answers, Failure> {
     let locator = input::read_locator(&arguments.subject)?;
-    let recording = match arguments.files.read(&locator.bench)? {
+    let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
             recording
@@ -160,8 +160,8 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
 
 /// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
-    let positions = all_over(locator.bench.surface.extent());
-    Ok(simulate_at(&locator.bench, &positions, 1, seed).map_err(simulation_complaint)?)
+    let positions = all_over(locator.setup.surface.extent());
+    Ok(simulate_at(&locator.setup, &positions, 1, seed).map_err(simulation_complaint)?)
 }
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {

@@ -5,7 +5,7 @@ use crate::progress::Observer;
 use crate::recording_files::RecordingFiles;
 use crate::{input, interrupt, output};
 use palpate_estimators::estimator::choose;
-use palpate_estimators::estimator::{CHOICE_FOLDS, EstimatorConfig};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -46,7 +46,7 @@ struct Outcome<'a> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     output::check_writable(&arguments.out)?;
     let rig = input::read_rig(&arguments.rig)?;
-    let recording = match arguments.files.read(&rig.bench)? {
+    let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => rig.simulate(arguments.seed).map_err(|error| {
             Complaint::new(format!("{}: {error}", arguments.rig.display()))
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
     let observer = Observer::of_rounds(rig.estimator.most_rounds());
     let observe = |progress| observer.observe(progress);
-    let task = FitTask::new(&rig.bench, &recording).seed(arguments.seed).watch(Watch::new(&observe));
+    let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed).watch(Watch::new(&observe));
     let locator = rig.estimator.fit_task(task).map_err(|error| Failure::of(&error))?;
     drop(observer);
     let training = locator.training_outcome();
@@ -91,11 +91,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.
 fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result<Rig, Failure> {
-    if rig.estimator != EstimatorConfig::Auto {
+    if rig.estimator != Estimator::Auto {
         return Ok(rig);
     }
     let go_on = |_| !interrupt::asked();
-    let task = FitTask::new(&rig.bench, recording).seed(arguments.seed).watch(Watch::new(&go_on));
+    let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
     let choice = choose(task).map_err(|error| Failure::of(&error))?;
     let errors: Vec<String> = choice
         .mean_errors_m

@@ -7,9 +7,9 @@ use palpate_estimators::arrangement::Training;
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::InfluenceLocator;
-use palpate_estimators::influence::measured::{HiddenRole, MeasuredLocator};
+use palpate_estimators::influence::measured::{NuisanceRole, MeasuredLocator};
 use palpate_estimators::network::Topology;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn rig(rig: &Rig) -> Vec<String> {
     let mut lines = vec!["a rig".to_owned()];
-    lines.extend(bench(&rig.bench));
+    lines.extend(setup(&rig.setup));
     if let Some(training) = &rig.training {
         lines.push(format!("training positions: {}", training_words(training)));
     }
@@ -53,9 +53,9 @@ fn rig(rig: &Rig) -> Vec<String> {
     lines
 }
 
-fn bench(bench: &Bench) -> Vec<String> {
-    let extent = bench.surface.extent();
-    let surface = match &bench.surface {
+fn setup(setup: &Setup) -> Vec<String> {
+    let extent = setup.surface.extent();
+    let surface = match &setup.surface {
         SurfaceSpec::Beam(beam) => format!(
             "simply supported beam, {} × {} × {}, Young's modulus {}",
             format_length_mm(beam.length_m),
@@ -106,10 +106,10 @@ fn bench(bench: &Bench) -> Vec<String> {
             None => format!("measured, {} long", format_length_mm(extent.length_m)),
         },
     };
-    let force = bench.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
+    let force = setup.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
     vec![
         format!("surface: {surface}"),
-        format!("sensors: {}", layout(&bench.layout, extent)),
+        format!("sensors: {}", layout(&setup.layout, extent)),
         format!("contact force: {force}"),
     ]
 }
@@ -151,7 +151,7 @@ fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         study.judging.positions.len()
     )];
     if let Some(arm) = study.arms.first() {
-        lines.extend(bench(&arm.rig.bench));
+        lines.extend(setup(&arm.rig.setup));
     }
     for arm in &study.arms {
         let training = arm.rig.training.as_ref().map_or_else(String::new, training_words);
@@ -171,7 +171,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         provenance.palpate,
         provenance.seed
     )];
-    lines.extend(bench(&locator.bench));
+    lines.extend(setup(&locator.setup));
     lines.extend(method(&locator.method));
     let recording = &provenance.recording;
     lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
@@ -251,9 +251,9 @@ fn learnt(measured: &MeasuredLocator) -> String {
     let counts = [table.x.count, table.y.count, table.hidden.count];
     let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
     let hidden = match measured.role {
-        HiddenRole::None => "",
-        HiddenRole::Force => " and force",
-        HiddenRole::Other => " and the hidden coordinate",
+        NuisanceRole::None => "",
+        NuisanceRole::Force => " and force",
+        NuisanceRole::Other => " and the hidden coordinate",
     };
     format!(
         "influence functions learnt from the recording, over position{hidden}: {} nodes",
@@ -268,8 +268,8 @@ fn shape(topology: &Topology) -> String {
 /// With a rig the CSV is read as its recording; otherwise it is described as a table.
 fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return Ok(table(text)) };
-    let bench = input::read_rig(rig)?.bench;
-    let recording = read_recording(&bench, path)?;
+    let setup = input::read_rig(rig)?.setup;
+    let recording = read_recording(&setup, path)?;
     let positions = recording.distinct_positions();
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
@@ -278,7 +278,7 @@ fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failu
         let (low, high) = range(&mut positions.iter().map(of));
         format!("{} to {}", format_length_mm(low), format_length_mm(high))
     };
-    let across = if bench.surface.extent().is_plane() {
+    let across = if setup.surface.extent().is_plane() {
         format!(" along, {} across", ends(|position| position.y_m))
     } else {
         String::new()

@@ -3,10 +3,10 @@
 use crate::failure::{Complaint, Failure};
 use crate::table::table;
 use crate::{input, output};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
-    Bound, Force, Limit, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
+    Bound, Force, CramerRaoBound, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
 };
 use palpate_mechanics::sensing::NoiseError;
 use palpate_mechanics::surface::Extent;
@@ -92,7 +92,7 @@ struct Warning {
 
 /// The limit for both kinds of knowledge of the force.
 struct Limits<'a> {
-    limit: &'a Limit<'a>,
+    limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
     known: LimitCurve,
@@ -102,25 +102,25 @@ struct Limits<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let bench = bench(arguments)?;
+    let setup = setup(arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
-    let limit = bench.cramer_rao_bound().map_err(complain)?;
-    let limits = limits(&limit, &bench, arguments).map_err(complain)?;
+    let limit = setup.cramer_rao_bound().map_err(complain)?;
+    let limits = limits(&limit, &setup, arguments).map_err(complain)?;
     if let Some(out) = &arguments.out {
-        write_report(&limits, &bench, arguments, out)?;
+        write_report(&limits, &setup, arguments, out)?;
     }
     if arguments.json {
-        output::say_json(&findings(&limits, &bench, arguments))
+        output::say_json(&findings(&limits, &setup, arguments))
     } else {
-        print(&limits, &bench, arguments)
+        print(&limits, &setup, arguments)
     }
 }
 
 /// The rig's bench, with the force and the noise of the command line.
-fn bench(arguments: &Arguments) -> Result<Bench, Failure> {
-    let mut bench = input::read_rig(&arguments.rig)?.bench;
+fn setup(arguments: &Arguments) -> Result<Setup, Failure> {
+    let mut setup = input::read_rig(&arguments.rig)?.setup;
     for noise in &arguments.noise {
-        let mut meant = bench
+        let mut meant = setup
             .layout
             .sensors
             .iter_mut()
@@ -133,7 +133,7 @@ fn bench(arguments: &Arguments) -> Result<Bench, Failure> {
         }
         meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
     }
-    Ok(bench)
+    Ok(setup)
 }
 
 fn complaint(error: LimitError, rig: &Path) -> Failure {
@@ -153,11 +153,11 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
     complaint.help(help).into()
 }
 
-fn limits<'a>(limit: &'a Limit<'a>, bench: &Bench, arguments: &Arguments) -> Result<Limits<'a>, LimitError> {
-    let force_n = arguments.force.or(bench.force_n).ok_or(LimitError::NoForce)?;
-    let unknown = arguments.unknown_force || bench.force_n.is_none();
+fn limits<'a>(limit: &'a CramerRaoBound<'a>, setup: &Setup, arguments: &Arguments) -> Result<Limits<'a>, LimitError> {
+    let force_n = arguments.force.or(setup.force_n).ok_or(LimitError::NoForce)?;
+    let unknown = arguments.unknown_force || setup.force_n.is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };
-    let extent = bench.surface.extent();
+    let extent = setup.surface.extent();
     let listed = match arguments.every {
         Some(every_m) => {
             let curve = LimitCurve::every(limit, force_n, force, every_m)?;
@@ -199,10 +199,10 @@ impl Limits<'_> {
     }
 }
 
-fn write_report(limits: &Limits, bench: &Bench, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
+fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
     let report = LimitReport {
         title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
-        bench,
+        setup,
         limit: limits.limit,
         known: &limits.known,
         unknown: &limits.unknown,
@@ -214,7 +214,7 @@ fn write_report(limits: &Limits, bench: &Bench, arguments: &Arguments, out: &Pat
     output::write_report(out, files)
 }
 
-fn findings(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Findings {
+fn findings(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Findings {
     let at = |&position: &Position| {
         let [known, unknown] = limits.at(position);
         let [x_mm, y_mm] = in_mm(position);
@@ -229,8 +229,8 @@ fn findings(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Findings {
     Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         rig: arguments.rig.display().to_string(),
-        length_mm: bench.surface.extent().length_m * 1e3,
-        sensors: bench.layout.len(),
+        length_mm: setup.surface.extent().length_m * 1e3,
+        sensors: setup.layout.len(),
         sensors_alive: limits.limit.alive(),
         force_n: limits.force_n,
         force: limits.force,
@@ -272,19 +272,19 @@ fn in_mm(position: Position) -> [f64; 2] {
     [position.x_m * 1e3, position.y_m * 1e3]
 }
 
-fn print(limits: &Limits, bench: &Bench, arguments: &Arguments) -> Result<(), Failure> {
+fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Failure> {
     output::say(format!(
         "{}: {} of {} sensors alive, {} N, force {}\n",
         arguments.rig.display(),
         limits.limit.alive(),
-        bench.layout.len(),
+        setup.layout.len(),
         limits.force_n,
         limits.force.name()
     ))?;
-    if bench.surface.extent().is_plane() {
+    if setup.surface.extent().is_plane() {
         print_plane(limits)?;
     } else {
-        print_line(limits, bench.surface.extent())?;
+        print_line(limits, setup.surface.extent())?;
     }
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;

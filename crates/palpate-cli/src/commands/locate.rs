@@ -6,7 +6,7 @@ use crate::lines::Lines;
 use crate::{input, output};
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -44,12 +44,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let lines = Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
     let mut stream = Stream { locator: &locator, json: arguments.json, shape: arguments.shape, lost: 0 };
-    stream.run(lines, &columns(&locator.bench, arguments.no_header))
+    stream.run(lines, &columns(&locator.setup, arguments.no_header))
 }
 
 /// Which columns of readings are the channels.
-pub fn columns(bench: &Bench, no_header: bool) -> Columns {
-    let mut columns = bench.recording_columns();
+pub fn columns(setup: &Setup, no_header: bool) -> Columns {
+    let mut columns = setup.recording_columns();
     if no_header {
         columns.header = Header::Absent;
         for (i, channel) in columns.channels.iter_mut().enumerate() {
@@ -120,6 +120,6 @@ impl Stream<'_> {
     }
 
     fn is_plane(&self) -> bool {
-        self.locator.bench.surface.extent().width_m.is_some()
+        self.locator.setup.surface.extent().width_m.is_some()
     }
 }

@@ -9,10 +9,10 @@ use crate::lines::Lines;
 use crate::{input, output};
 use findings::Findings;
 use palpate_estimators::estimator::{
-    LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, bench_load_sensors, patch_limits,
+    LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, setup_load_sensors, patch_limits,
 };
 use palpate_estimators::recording::ReadingParser;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_loads;
 use palpate_mechanics::surface::UniformLoad;
 use palpate_report::{ProfileReport, profile_report};
@@ -47,10 +47,10 @@ enum Subject {
 }
 
 impl Subject {
-    fn bench(&self) -> &Bench {
+    fn setup(&self) -> &Setup {
         match self {
-            Self::Rig(rig) => &rig.bench,
-            Self::Locator(locator) => &locator.bench,
+            Self::Rig(rig) => &rig.setup,
+            Self::Locator(locator) => &locator.setup,
         }
     }
 
@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Subject::Locator(Box::new(input::read_locator(path)?))
     };
     let sensors = match &subject {
-        Subject::Rig(rig) => bench_load_sensors(&rig.bench),
+        Subject::Rig(rig) => setup_load_sensors(&rig.setup),
         Subject::Locator(locator) => locator.load_sensors(),
     };
     let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);
@@ -115,7 +115,7 @@ impl Printer<'_> {
             return Err(complaint.help(help).into());
         }
         self.truth = loads;
-        let readings = simulate_loads(self.subject.bench(), loads, 1, self.arguments.seed);
+        let readings = simulate_loads(self.subject.setup(), loads, 1, self.arguments.seed);
         for reading in readings.map_err(Complaint::new)? {
             self.tell(&reading, None)?;
         }
@@ -124,7 +124,7 @@ impl Printer<'_> {
 
     fn stream(&mut self, path: &Path) -> Result<(), Failure> {
         let mut lines = Lines::open(path)?;
-        let columns = columns(self.subject.bench(), self.arguments.no_header);
+        let columns = columns(self.subject.setup(), self.arguments.no_header);
         let mut parser = ReadingParser::new(&lines.name, &columns);
         let mut lost = 0;
         while let Some(line) = lines.next()? {
@@ -179,7 +179,7 @@ impl Printer<'_> {
         let resolution = self.profiler.resolution(profile);
         let report = ProfileReport {
             title: &format!("The load on {}", self.arguments.subject.display()),
-            layout: &self.subject.bench().layout,
+            layout: &self.subject.setup().layout,
             reading,
             profile,
             limits,

@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.report {
         let sweep = match rig.as_ref().and_then(|rig| Some((rig, rig.motion.as_ref()?))) {
             Some((rig, moving)) if beam.is_some() => {
-                sweep_speeds(&locator, config, &rig.pressed_bench(), moving, arguments.seed)
+                sweep_speeds(&locator, config, &rig.pressed_setup(), moving, arguments.seed)
                     .map_err(Complaint::new)?
             }
             _ => Vec::new(),
@@ -137,8 +137,8 @@ struct Stream<'a> {
 
 impl Stream<'_> {
     fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
-        let columns = locator.bench.recording_columns();
-        let mut parser = TimedParser::new(&self.lines.name, locator.bench.schema(&columns));
+        let columns = locator.setup.recording_columns();
+        let mut parser = TimedParser::new(&self.lines.name, locator.setup.schema(&columns));
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
             output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;

@@ -39,13 +39,13 @@ fn pages() -> [Vec<ReportFile>; 2] {
 
 /// The page of the limit of the paper's bench.
 fn limit_page() -> Vec<ReportFile> {
-    let bench = Rig::from_toml(PAPER).unwrap().bench;
-    let limit = bench.cramer_rao_bound().unwrap();
+    let setup = Rig::from_toml(PAPER).unwrap().setup;
+    let limit = setup.cramer_rao_bound().unwrap();
     let [known, unknown] =
         [Force::Known, Force::Unknown].map(|force| LimitCurve::over(&limit, 3.0, force).unwrap());
     let report = LimitReport {
         title: "The limit",
-        bench: &bench,
+        setup: &setup,
         limit: &limit,
         known: &known,
         unknown: &unknown,

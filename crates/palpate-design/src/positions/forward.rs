@@ -5,7 +5,7 @@ use ndarray::Array2;
 use super::PositionError;
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
@@ -41,21 +41,21 @@ struct Whitened {
 
 impl Forward {
     /// Of a bench with a model, from its clean readings.
-    pub fn of_model(bench: &Bench, force: Force, watch: Watch) -> Result<Self, PositionError> {
-        let surface = bench.surface.model().ok_or(PositionError::NoModel)?;
-        let force_n = bench.force_n.ok_or(PositionError::NoForce)?;
+    pub fn of_model(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
+        let surface = setup.surface.model().ok_or(PositionError::NoModel)?;
+        let force_n = setup.force_n.ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
         let side = if extent.is_plane() { ASKED_ON_A_PLANE } else { ASKED };
         let positions = cells(extent, side, if extent.is_plane() { side } else { 1 });
-        let sensors = CleanSensors::new(surface, &bench.layout);
+        let sensors = CleanSensors::new(surface, &setup.layout);
         let clean: Vec<Vec<f64>> =
             positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
         let full_scale = |s: usize| clean.iter().map(|reading| reading[s].abs()).fold(0.0, f64::max);
-        let sd = |s: usize| match bench.layout.sensors[s].channel.reading_sd() {
+        let sd = |s: usize| match setup.layout.sensors[s].channel.reading_sd() {
             sd if sd > 0.0 => sd,
             _ => (NOMINAL_NOISE * full_scale(s)).max(f64::MIN_POSITIVE),
         };
-        let alive = living(&bench.layout);
+        let alive = living(&setup.layout);
         let sds: Vec<f64> = alive.iter().map(|s| sd(*s)).collect();
         let whitened = Whitened {
             coordinates: coordinates(&positions, extent),

@@ -21,8 +21,8 @@ use crate::sensors::ContactPrior;
 use crate::sensors::{SensorDesign, WeightedContacts};
 use forward::Forward;
 use palpate_estimators::arrangement::{Arrangement, Training, cells, chebyshev, squarest, warped_cells};
-use palpate_estimators::estimator::EstimatorConfig;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::estimator::Estimator;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::ChannelModel;
@@ -127,9 +127,9 @@ pub struct Budget {
 
 /// A bench whose training positions are designed.
 pub struct PositionProblem<'a> {
-    bench: &'a Bench,
+    setup: &'a Setup,
     training: Option<&'a Training>,
-    estimator: &'a EstimatorConfig,
+    estimator: &'a Estimator,
     budget: Budget,
     extent: Extent,
     force: Force,
@@ -145,33 +145,33 @@ impl<'a> PositionProblem<'a> {
     /// # Errors
     /// [`PositionError`], with what is missing.
     pub fn new(
-        bench: &'a Bench,
+        setup: &'a Setup,
         training: Option<&'a Training>,
-        estimator: &'a EstimatorConfig,
+        estimator: &'a Estimator,
         design: Option<&SensorDesign>,
         budget: Budget,
     ) -> Result<Self, PositionError> {
-        if bench.surface.model().is_none() {
+        if setup.surface.model().is_none() {
             return Err(PositionError::NoModel);
         }
-        if pressed(bench, training).force_n.is_none() {
+        if pressed(setup, training).force_n.is_none() {
             return Err(PositionError::NoForce);
         }
-        if *estimator == EstimatorConfig::Auto {
+        if *estimator == Estimator::Auto {
             return Err(PositionError::Auto);
         }
         let needed = estimator.positions_needed();
         if budget.count < needed {
             return Err(PositionError::TooFew { count: budget.count, needed, kind: estimator.kind() });
         }
-        let extent = bench.surface.extent();
+        let extent = setup.surface.extent();
         let prior = design.map(|design| design.contacts.clone());
         let contacts = WeightedContacts::of(&prior.unwrap_or_else(|| ContactPrior::all_over(extent)), extent);
         let tolerance_m = design.map_or(Self::TOLERANCE_M, |design| design.tolerance_m);
         let known =
-            design.and_then(|design| design.force_is_known).unwrap_or(true) && bench.force_n.is_some();
+            design.and_then(|design| design.force_is_known).unwrap_or(true) && setup.force_n.is_some();
         let force = if known { Force::Known } else { Force::Unknown };
-        Ok(Self { bench, training, estimator, budget, extent, force, contacts, tolerance_m })
+        Ok(Self { setup, training, estimator, budget, extent, force, contacts, tolerance_m })
     }
 
     /// An error up to this is good enough unless the design says otherwise.
@@ -284,9 +284,9 @@ impl<'a> PositionProblem<'a> {
 
     /// Whether the bench reads the same, sensors in reverse, when the contact is mirrored.
     fn is_mirrored(&self) -> bool {
-        let bench = self.pressed();
-        let (Some(surface), Some(force_n)) = (bench.surface.model(), bench.force_n) else { return false };
-        !self.extent.is_plane() && search::reads_mirrored(surface, &bench.layout, force_n)
+        let setup = self.pressed();
+        let (Some(surface), Some(force_n)) = (setup.surface.model(), setup.force_n) else { return false };
+        !self.extent.is_plane() && search::reads_mirrored(surface, &setup.layout, force_n)
     }
 
     /// What calibrations with fresh noise give.
@@ -311,20 +311,20 @@ impl<'a> PositionProblem<'a> {
     }
 
     /// The bench with the force of the presses.
-    fn pressed(&self) -> Bench {
-        pressed(self.bench, self.training)
+    fn pressed(&self) -> Setup {
+        pressed(self.setup, self.training)
     }
 
     fn trial(&self, readings: usize) -> Trial<'_> {
         let pressed = self.pressed();
-        let touched = Bench { force_n: self.bench.force_n.or(pressed.force_n), ..pressed.clone() };
+        let touched = Setup { force_n: self.setup.force_n.or(pressed.force_n), ..pressed.clone() };
         let clean = pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
         let draws = if clean { 1 } else { readings.div_ceil(self.contacts.len()) };
-        let known_n = self.bench.force_n.filter(|_| self.force() == Force::Known);
+        let known_n = self.setup.force_n.filter(|_| self.force() == Force::Known);
         Trial {
             pressed,
             touched,
-            used: Bench { force_n: known_n, ..self.bench.clone() },
+            used: Setup { force_n: known_n, ..self.setup.clone() },
             estimator: self.estimator,
             contacts: &self.contacts,
             draws,
@@ -333,8 +333,8 @@ impl<'a> PositionProblem<'a> {
     }
 }
 
-fn pressed(bench: &Bench, training: Option<&Training>) -> Bench {
-    training.map_or_else(|| bench.clone(), |training| bench.pressed_by(training))
+fn pressed(setup: &Setup, training: Option<&Training>) -> Setup {
+    training.map_or_else(|| setup.clone(), |training| setup.pressed_by(training))
 }
 
 /// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that

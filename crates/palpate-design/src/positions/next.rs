@@ -7,7 +7,7 @@ use super::variance::Expectation;
 use crate::sensors::ContactPrior;
 use crate::sensors::WeightedContacts;
 use palpate_estimators::recording::Recording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_numerics::watch::Watch;
@@ -79,17 +79,17 @@ impl Advice {
 /// # Errors
 /// [`PositionError`] when the recording is not the bench's, or too short to learn from.
 pub fn next_press(
-    bench: &Bench,
+    setup: &Setup,
     contacts: Option<&ContactPrior>,
     recording: &Recording,
     stop_percent: f64,
     watch: Watch,
 ) -> Result<Advice, PositionError> {
-    let extent = bench.surface.extent();
+    let extent = setup.surface.extent();
     let prior = contacts.cloned().unwrap_or_else(|| ContactPrior::all_over(extent));
     let contacts = WeightedContacts::of(&prior, extent);
-    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let forward = Forward::of_recording(recording, &bench.layout, extent, force, watch)?;
+    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let forward = Forward::of_recording(recording, &setup.layout, extent, force, watch)?;
     let mut expectation = Expectation::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
     let first = expectation.places.len();

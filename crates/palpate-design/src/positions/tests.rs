@@ -14,7 +14,7 @@ fn budget(count: usize) -> Budget {
 }
 
 fn problem(example: &Example, budget: Budget) -> Result<PositionProblem<'_>, PositionError> {
-    PositionProblem::new(&example.bench, example.training.as_ref(), &example.estimator, None, budget)
+    PositionProblem::new(&example.setup, example.training.as_ref(), &example.estimator, None, budget)
 }
 
 /// The score of a layout of positions by themselves: how far each is from where it should be.
@@ -63,21 +63,21 @@ fn a_search_keeps_to_its_trials() {
 
 #[test]
 fn a_bench_is_mirrored_or_not() {
-    let bench = paper().bench;
-    let surface = bench.surface.model().unwrap();
-    assert!(reads_mirrored(surface, &bench.layout, 3.0));
-    let mut moved = bench.layout.clone();
+    let setup = paper().setup;
+    let surface = setup.surface.model().unwrap();
+    assert!(reads_mirrored(surface, &setup.layout, 3.0));
+    let mut moved = setup.layout.clone();
     moved.sensors[0].position.x_m += 1e-3;
     assert!(!reads_mirrored(surface, &moved, 3.0));
 }
 
-fn forward(bench: &Bench) -> Forward {
-    Forward::of_model(bench, Force::Known, Watch::NONE).unwrap()
+fn forward(setup: &Setup) -> Forward {
+    Forward::of_model(setup, Force::Known, Watch::NONE).unwrap()
 }
 
 #[test]
 fn presses_at_one_place_add_up_and_tell_their_neighbours() {
-    let forward = forward(&noisy().bench);
+    let forward = forward(&noisy().setup);
     let places: Vec<Position> = [0.1, 0.12, 0.3].map(Position::along).into();
     let before = Knowledge::before(&forward, &places);
     let (mut twice, mut once) = (before.clone(), before.clone());
@@ -97,9 +97,9 @@ fn presses_at_one_place_add_up_and_tell_their_neighbours() {
 
 #[test]
 fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
-    let bench = noisy().bench;
-    let forward = forward(&bench);
-    let limit = bench.cramer_rao_bound().unwrap();
+    let setup = noisy().setup;
+    let forward = forward(&setup);
+    let limit = setup.cramer_rao_bound().unwrap();
     for x_m in [0.05, 0.13, 0.25, 0.33] {
         let contact = palpate_mechanics::contact::Contact { position: Position::along(x_m), force_n: 3.0 };
         let (ours, theirs) =
@@ -110,9 +110,9 @@ fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
 
 #[test]
 fn the_least_variance_is_less_than_the_even_positions() {
-    for (bench, count) in [(noisy().bench, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).bench, 9)] {
-        let forward = forward(&bench);
-        let extent = bench.surface.extent();
+    for (setup, count) in [(noisy().setup, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).setup, 9)] {
+        let forward = forward(&setup);
+        let extent = setup.surface.extent();
         let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent);
         let found = variance::least(&forward, &contacts, extent, &budget(count), Watch::NONE).unwrap();
         let error_m = |positions: &[Position]| {
@@ -170,25 +170,25 @@ fn what_cannot_be_designed_is_refused() {
     };
     let network = "an estimator of kind `network` needs at least 2";
     assert_eq!(refusal(&paper(), 1), format!("1 training position(s); {network}"));
-    let auto = Example { estimator: EstimatorConfig::Auto, ..noisy() };
+    let auto = Example { estimator: Estimator::Auto, ..noisy() };
     assert!(refusal(&auto, 5).contains("positions are designed for one estimator"));
     let mut unknown = Example { training: None, ..noisy() };
-    unknown.bench.force_n = None;
+    unknown.setup.force_n = None;
     assert!(refusal(&unknown, 5).contains("the force of the presses is not known"));
-    let measured = Example { bench: Bench::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
+    let measured = Example { setup: Setup::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
     assert!(refusal(&measured, 5).contains("has no model"));
 }
 
-fn begun(positions_m: &[f64], repeats: usize) -> (Bench, palpate_estimators::recording::Recording) {
-    let bench = noisy().bench;
+fn begun(positions_m: &[f64], repeats: usize) -> (Setup, palpate_estimators::recording::Recording) {
+    let setup = noisy().setup;
     let positions: Vec<Position> = positions_m.iter().map(|x_m| Position::along(*x_m)).collect();
-    let recording = simulate_at(&bench, &positions, repeats, 3).unwrap();
-    (bench, recording)
+    let recording = simulate_at(&setup, &positions, repeats, 3).unwrap();
+    (setup, recording)
 }
 
 fn advised(positions_m: &[f64], repeats: usize) -> Advice {
-    let (bench, recording) = begun(positions_m, repeats);
-    next_press(&bench, None, &recording, 5.0, Watch::NONE).unwrap()
+    let (setup, recording) = begun(positions_m, repeats);
+    next_press(&setup, None, &recording, 5.0, Watch::NONE).unwrap()
 }
 
 #[test]
@@ -212,17 +212,17 @@ fn enough_is_said_when_little_is_left_to_gain() {
 
 #[test]
 fn a_recording_that_tells_too_little_is_refused() {
-    let (bench, recording) = begun(&[0.1, 0.2, 0.3], 2);
-    let refused = |bench: &Bench, recording: &palpate_estimators::recording::Recording| {
-        next_press(bench, None, recording, 5.0, Watch::NONE).unwrap_err().to_string()
+    let (setup, recording) = begun(&[0.1, 0.2, 0.3], 2);
+    let refused = |setup: &Setup, recording: &palpate_estimators::recording::Recording| {
+        next_press(setup, None, recording, 5.0, Watch::NONE).unwrap_err().to_string()
     };
-    assert!(refused(&bench, &recording).contains("3 distinct positions; at least 4"));
-    let (mut bench, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
-    for sensor in &mut bench.layout.sensors {
+    assert!(refused(&setup, &recording).contains("3 distinct positions; at least 4"));
+    let (mut setup, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
+    for sensor in &mut setup.layout.sensors {
         sensor.channel = ChannelModel::default();
     }
-    assert!(refused(&bench, &recording).contains("how noisy channel 1 is"));
-    bench.layout.sensors.pop();
-    assert!(refused(&bench, &recording).contains("8 channels, the rig 7"));
-    assert_eq!(bench.layout.kinds()[0], SensorKind::Deflection);
+    assert!(refused(&setup, &recording).contains("how noisy channel 1 is"));
+    setup.layout.sensors.pop();
+    assert!(refused(&setup, &recording).contains("8 channels, the rig 7"));
+    assert_eq!(setup.layout.kinds()[0], SensorKind::Deflection);
 }

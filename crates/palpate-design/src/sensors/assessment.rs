@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::DesignError;
 use super::objective::{Block, ForceBelief};
 use super::{SensorProblem, candidates::PlacedSensor, pool::exclusion};
-use palpate_mechanics::limit::{Limit, LimitCurve};
+use palpate_mechanics::limit::{CramerRaoBound, LimitCurve};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 
 /// How good a layout is for the contacts of a design.
@@ -33,10 +33,10 @@ impl SensorProblem<'_> {
     /// Judges a layout, its own or any other of the same surface.
     ///
     /// # Errors
-    /// [`DesignError::Limit`] where a sensor has no noise or all are dead.
+    /// [`DesignError::CramerRaoBound`] where a sensor has no noise or all are dead.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let touches = &self.touches;
-        let limit = Limit::new(touches.surface, layout)?;
+        let limit = CramerRaoBound::new(touches.surface, layout)?;
         let contacts = &touches.contacts;
         let curve = LimitCurve::at(&limit, touches.force_n, touches.force, &contacts.positions)?;
         let bounds: Option<Vec<_>> = curve.points.iter().map(|point| point.bound).collect();

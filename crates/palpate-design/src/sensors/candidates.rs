@@ -141,7 +141,7 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
 
 /// Whether a sensor reads anything at a place, wherever the surface is touched.
 pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position: Position) -> bool {
-    let still = surface.nothing_to_read(kind, position).is_some();
+    let still = surface.insensitive_sensor(kind, position).is_some();
     let carried = kind != SensorKind::Reaction || surface.is_supported_at(position);
     !still && carried && kind != SensorKind::Raw
 }

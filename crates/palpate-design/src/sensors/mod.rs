@@ -50,7 +50,7 @@ use candidates::Candidates;
 use exchange::Found;
 use objective::{Block, Objective};
 use palpate_estimators::arrangement::{inner_grid, squarest};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitError};
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
@@ -73,7 +73,7 @@ pub struct Designed {
 
 /// A design made ready: what every candidate tells of every contact.
 pub struct SensorProblem<'a> {
-    bench: &'a Bench,
+    setup: &'a Setup,
     touches: Touches<'a>,
     candidates: Candidates,
     table: Arc<Vec<Block>>,
@@ -88,9 +88,9 @@ impl<'a> SensorProblem<'a> {
     ///
     /// # Errors
     /// [`DesignError`], with the constraint that no layout can keep.
-    pub fn new(bench: &'a Bench, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
-        let surface = bench.surface.model().ok_or(LimitError::NoModel)?;
-        let force_n = bench.force_n.ok_or(LimitError::NoForce)?;
+    pub fn new(setup: &'a Setup, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
+        let surface = setup.surface.model().ok_or(LimitError::NoModel)?;
+        let force_n = setup.force_n.ok_or(LimitError::NoForce)?;
         let silent = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
         if let Some(offer) = silent {
             return Err(DesignError::SingularNoise { kind: offer.kind });
@@ -101,7 +101,7 @@ impl<'a> SensorProblem<'a> {
         let touches = Touches { surface, contacts, force_n, force };
         let candidates = Candidates::of(surface, design)?;
         let table = touches.table(&candidates.sensors, design, watch)?;
-        Self::with_table(bench, touches, candidates, Arc::new(table), design)
+        Self::with_table(setup, touches, candidates, Arc::new(table), design)
     }
 
     /// The same for another number of sensors.
@@ -111,11 +111,11 @@ impl<'a> SensorProblem<'a> {
     pub fn with_count(&self, count: usize) -> Result<Self, DesignError> {
         let design = SensorDesign { count, ..self.pool.design.clone() };
         let (touches, candidates) = (self.touches.clone(), self.candidates.clone());
-        Self::with_table(self.bench, touches, candidates, Arc::clone(&self.table), &design)
+        Self::with_table(self.setup, touches, candidates, Arc::clone(&self.table), &design)
     }
 
     fn with_table(
-        bench: &'a Bench,
+        setup: &'a Setup,
         touches: Touches<'a>,
         candidates: Candidates,
         table: Arc<Vec<Block>>,
@@ -126,7 +126,7 @@ impl<'a> SensorProblem<'a> {
         let all: Vec<usize> = (0..pool.units.len()).collect();
         let packed = starts::packed(&pool, &all)?;
         let objective = touches.objective(Arc::clone(&table), design.criterion, design.tolerance_m);
-        Ok(Self { bench, touches, candidates, table, pool, objective, packed })
+        Ok(Self { setup, touches, candidates, table, pool, objective, packed })
     }
 
     /// What is designed.
@@ -179,7 +179,7 @@ impl<'a> SensorProblem<'a> {
     /// # Errors
     /// As [`SensorProblem::assess`].
     pub fn own(&self, even: Option<&Designed>) -> Result<Option<Designed>, DesignError> {
-        let layout = &self.bench.layout;
+        let layout = &self.setup.layout;
         let places = |layout: &Layout| -> Vec<_> {
             layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
         };

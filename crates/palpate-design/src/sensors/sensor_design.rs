@@ -114,7 +114,7 @@ pub enum DesignCriterion {
     MeanLimit,
     /// A small largest limit.
     WorstLimit,
-    /// Few contacts whose limit is above the tolerance.
+    /// BoundedList contacts whose limit is above the tolerance.
     WithinTolerance,
     /// Much information on all that is unknown of a contact: a small mean of ½·ln det of its least covariance.
     DOptimality,

@@ -6,12 +6,12 @@ use palpate_numerics::watch::Progress;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-fn problem<'a>(bench: &'a Bench, design: &SensorDesign) -> SensorProblem<'a> {
-    SensorProblem::new(bench, design, Watch::NONE).unwrap()
+fn problem<'a>(setup: &'a Setup, design: &SensorDesign) -> SensorProblem<'a> {
+    SensorProblem::new(setup, design, Watch::NONE).unwrap()
 }
 
-fn refusal(bench: &Bench, design: &SensorDesign) -> DesignError {
-    SensorProblem::new(bench, design, Watch::NONE).map(|_| ()).unwrap_err()
+fn refusal(setup: &Setup, design: &SensorDesign) -> DesignError {
+    SensorProblem::new(setup, design, Watch::NONE).map(|_| ()).unwrap_err()
 }
 
 fn exchanged(problem: &SensorProblem) -> Designed {
@@ -38,8 +38,8 @@ fn places(designed: &Designed) -> Vec<f64> {
 /// The issue's own figures: eight deflection sensors, contacts from 20 to 380 mm every 5 mm, force unknown.
 #[test]
 fn the_papers_beam_gains_at_least_18_percent() {
-    let (bench, design) = sensor_design();
-    let problem = problem(&bench, &design);
+    let (setup, design) = sensor_design();
+    let problem = problem(&setup, &design);
     let even = problem.even().unwrap().unwrap().assessment.mean_limit_m.unwrap();
     assert!((even - 2.64e-3).abs() < 5e-6, "{even}");
     let designed = exchanged(&problem);
@@ -50,24 +50,24 @@ fn the_papers_beam_gains_at_least_18_percent() {
 /// What the assessment says is what `palpate::limit` says, and scores never exceed what the surface's size tells.
 #[test]
 fn scores_agree_with_the_limit() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     for known in [true, false] {
         design.force_is_known = Some(known);
-        let problem = problem(&bench, &design);
+        let problem = problem(&setup, &design);
         let even = problem.even().unwrap().unwrap();
         let limit_m = even.assessment.mean_limit_m.unwrap();
         assert!(even.assessment.score < limit_m && even.assessment.score > 0.9 * limit_m, "{even:?}");
         assert!(even.assessment.score_one_dead.unwrap() > even.assessment.score);
     }
     design.count = 1;
-    let problem = problem(&bench, &design);
+    let problem = problem(&setup, &design);
     let one = problem.even().unwrap().unwrap().assessment;
     assert_eq!((one.mean_limit_m, one.worst_limit_m, one.score_one_dead), (None, None, None));
     assert!((one.score / (0.4 / 12f64.sqrt()) - 1.0).abs() < 1e-3, "{one:?}");
 }
 
 /// C(20, 4) at random: kinds, noise, contacts, criterion, knowledge of the force.
-fn random_problem(bench: &Bench, design: &SensorDesign, rng: &mut impl Rng) -> SensorDesign {
+fn random_problem(setup: &Setup, design: &SensorDesign, rng: &mut impl Rng) -> SensorDesign {
     let kinds = [
         offer(SensorKind::Deflection, 10f64.powf(rng.random_range(-6.0..-5.0)), 1.0),
         offer(SensorKind::Strain, 10f64.powf(rng.random_range(-6.5..-5.5)), 1.0),
@@ -78,7 +78,7 @@ fn random_problem(bench: &Bench, design: &SensorDesign, rng: &mut impl Rng) -> S
     } else {
         vec![kinds[0].clone(), kinds[rng.random_range(1..3)].clone()]
     };
-    let length_m = bench.surface.extent().length_m;
+    let length_m = setup.surface.extent().length_m;
     let sites: Vec<Position> =
         (0..20 / offers.len()).map(|_| Position::along(rng.random_range(0.01..0.99) * length_m)).collect();
     let from = rng.random_range(0.02..0.3) * length_m;
@@ -105,12 +105,12 @@ fn random_problem(bench: &Bench, design: &SensorDesign, rng: &mut impl Rng) -> S
 #[test]
 fn greedy_and_exchange_find_the_optimum_of_small_problems() {
     const PROBLEMS: usize = 100;
-    let (bench, design) = sensor_design();
+    let (setup, design) = sensor_design();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut found = 0;
     for _ in 0..PROBLEMS {
-        let design = random_problem(&bench, &design, &mut rng);
-        let problem = problem(&bench, &design);
+        let design = random_problem(&setup, &design, &mut rng);
+        let problem = problem(&setup, &design);
         assert_eq!((problem.candidates(), problem.packed.len()), (20, 4));
         let all = exhaustive::search(&problem.pool, &*problem.objective, 4, Watch::NONE).unwrap().unwrap();
         let ours = problem.exchanged(&*problem.objective, 0, Watch::NONE).unwrap();
@@ -123,7 +123,7 @@ fn greedy_and_exchange_find_the_optimum_of_small_problems() {
 
 #[test]
 fn every_search_keeps_every_constraint() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.offers = four_kinds();
     design.spacing_m = 0.02;
     design.keep_out = vec![KeepOut { from: Position::along(0.09), to: Position::along(0.13) }];
@@ -131,7 +131,7 @@ fn every_search_keeps_every_constraint() {
     design.budget = Some(24.0);
     for (symmetry, count) in [(Symmetry::Any, 6), (Symmetry::Wanted, 7), (Symmetry::Forbidden, 6)] {
         let design = SensorDesign { symmetry, count, ..design.clone() };
-        let problem = problem(&bench, &design);
+        let problem = problem(&setup, &design);
         let all = problem.all(3, Watch::NONE).unwrap();
         assert!(all.iter().filter(|designed| designed.method.is_search()).count() >= 3);
         for designed in &all {
@@ -154,7 +154,7 @@ fn every_search_keeps_every_constraint() {
 
 #[test]
 fn what_cannot_be_met_is_named() {
-    let (bench, base) = sensor_design();
+    let (setup, base) = sensor_design();
     let spaced = SensorDesign { spacing_m: 0.06, ..base.clone() };
     let poor = SensorDesign { budget: Some(7.5), ..base.clone() };
     let few = SensorDesign { sites: Sites::Count(5), ..base.clone() };
@@ -192,25 +192,25 @@ fn what_cannot_be_met_is_named() {
         ),
     ];
     let told = cases.map(|(what, design)| {
-        let error = refusal(&bench, &design);
+        let error = refusal(&setup, &design);
         format!("{what}: {error}\n  help: {}", error.help())
     });
     insta::assert_snapshot!(told.join("\n"));
     // As many as the message says do fit.
-    assert!(matches!(refusal(&bench, &spaced), DesignError::Spacing { most: 7, .. }));
-    problem(&bench, &SensorDesign { count: 7, ..spaced });
-    let unknown = Bench { force_n: None, ..bench.clone() };
+    assert!(matches!(refusal(&setup, &spaced), DesignError::Spacing { most: 7, .. }));
+    problem(&setup, &SensorDesign { count: 7, ..spaced });
+    let unknown = Setup { force_n: None, ..setup.clone() };
     assert_eq!(refusal(&unknown, &base), DesignError::Limit(LimitError::NoForce));
 }
 
 #[test]
 fn budgets_buy_what_helps_most() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.offers = four_kinds();
     design.count = 4;
     let score = |budget: Option<f64>| {
         let design = SensorDesign { budget, ..design.clone() };
-        let designed = exchanged(&problem(&bench, &design));
+        let designed = exchanged(&problem(&setup, &design));
         assert!(budget.is_none_or(|budget| designed.assessment.cost <= budget));
         designed.assessment.score
     };
@@ -221,33 +221,33 @@ fn budgets_buy_what_helps_most() {
 /// With an unknown force, two reaction sensors tell the position at the supports that deflections do not.
 #[test]
 fn mixed_kinds_go_beyond_deflections() {
-    let (bench, mut design) = sensor_design();
-    let deflections = exchanged(&problem(&bench, &design)).assessment.score;
+    let (setup, mut design) = sensor_design();
+    let deflections = exchanged(&problem(&setup, &design)).assessment.score;
     design.offers = four_kinds();
-    let designed = exchanged(&problem(&bench, &design));
+    let designed = exchanged(&problem(&setup, &design));
     assert!(designed.assessment.score < 0.5 * deflections, "{:?}", designed.assessment);
 }
 
 #[test]
 fn many_sites_are_searched_as_few_are() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.sites = Sites::Count(1599);
-    let few = exchanged(&problem(&bench, &design)).assessment.score;
+    let few = exchanged(&problem(&setup, &design)).assessment.score;
     design.sites = Sites::Count(6399);
-    let many = exchanged(&problem(&bench, &design)).assessment.score;
+    let many = exchanged(&problem(&setup, &design)).assessment.score;
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }
 
 /// What the samples left out is found all the same: exchanged one by one, no unit of all gains a millionth of the score.
 #[test]
 fn no_exchange_for_one_of_very_many_matters() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.offers = four_kinds();
     design.contacts.every_m = 0.02;
     design.spacing_m = 0.002;
     for (symmetry, sites) in [(Symmetry::Any, 1000), (Symmetry::Wanted, 1500), (Symmetry::Forbidden, 1000)] {
         let design = SensorDesign { sites: Sites::Count(sites), symmetry, count: 4, ..design.clone() };
-        let problem = problem(&bench, &design);
+        let problem = problem(&setup, &design);
         let (pool, objective) = (&problem.pool, &*problem.objective);
         assert!(pool.units.len() > 2000, "{}", pool.units.len());
         let found = problem.exchanged(objective, 0, Watch::NONE).unwrap();
@@ -271,30 +271,30 @@ fn no_exchange_for_one_of_very_many_matters() {
 
 #[test]
 fn more_sensors_never_tell_less() {
-    let (bench, design) = sensor_design();
-    let points = problem(&bench, &design).counts(2..=6, 0, Watch::NONE).unwrap();
+    let (setup, design) = sensor_design();
+    let points = problem(&setup, &design).counts(2..=6, 0, Watch::NONE).unwrap();
     assert!(points.windows(2).all(|pair| pair[1].designed.score < pair[0].designed.score));
     assert_eq!(points.iter().map(|point| point.count).collect::<Vec<_>>(), [2, 3, 4, 5, 6]);
     assert!(enough(&points).is_some_and(|count| count > 2));
-    let beyond = problem(&bench, &design).counts(2..=80, 0, Watch::new(&|_| panic!("nothing is searched")));
+    let beyond = problem(&setup, &design).counts(2..=80, 0, Watch::new(&|_| panic!("nothing is searched")));
     assert_eq!(beyond.unwrap_err(), DesignError::TooFewSites { count: 80, sites: 79 });
 }
 
 #[test]
 fn plates_are_designed_too() {
-    let bench = plate(24).bench;
-    let mut design = SensorDesign::of(&bench.layout, bench.surface.extent()).unwrap();
+    let setup = plate(24).setup;
+    let mut design = SensorDesign::of(&setup.layout, setup.surface.extent()).unwrap();
     design.sites = Sites::Every(0.03);
     let corner = |at_m| Position { x_m: at_m, y_m: at_m };
     design.contacts =
         ContactPrior { from: corner(0.03), to: corner(0.27), every_m: 0.03, weights: Vec::new() };
     for known in [true, false] {
         design.force_is_known = Some(known);
-        let problem = problem(&bench, &design);
+        let problem = problem(&setup, &design);
         // 11 × 11 sites, of which those on the simply supported edges never move.
         assert_eq!((problem.candidates(), problem.contacts().len()), (81, 81));
         let even = problem.even().unwrap().unwrap();
-        assert_eq!(even.layout, bench.layout);
+        assert_eq!(even.layout, setup.layout);
         let designed = exchanged(&problem);
         assert!(designed.assessment.score < even.assessment.score);
     }
@@ -302,10 +302,10 @@ fn plates_are_designed_too() {
 
 #[test]
 fn a_layout_does_what_its_score_promises() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.contacts.every_m = 0.02;
-    let problem = problem(&bench, &design);
-    let estimator = palpate_estimators::estimator::EstimatorConfig::Influence(Default::default());
+    let problem = problem(&setup, &design);
+    let estimator = palpate_estimators::estimator::Estimator::Influence(Default::default());
     let verify =
         |layout: &Layout| problem.verify(layout, &estimator, 2, 1, Watch::NONE).unwrap().mean_error_m;
     let (even, designed) = (problem.even().unwrap().unwrap(), exchanged(&problem));
@@ -319,21 +319,21 @@ fn a_layout_does_what_its_score_promises() {
 
 #[test]
 fn a_search_can_be_stopped() {
-    let (bench, design) = sensor_design();
-    let stopped = SensorProblem::new(&bench, &design, Watch::new(&|_| false)).map(|_| ());
+    let (setup, design) = sensor_design();
+    let stopped = SensorProblem::new(&setup, &design, Watch::new(&|_| false)).map(|_| ());
     assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
     let breeds =
         |progress| matches!(progress, Progress::Stage { name, .. } if name == Stage::Genetic.in_words());
-    let stopped = problem(&bench, &design).all(0, Watch::new(&|progress| !breeds(progress)));
+    let stopped = problem(&setup, &design).all(0, Watch::new(&|progress| !breeds(progress)));
     assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
 }
 
 /// One method alone has the layout that it has among all.
 #[test]
 fn a_method_that_is_asked_for_gives_its_own_layout() {
-    let (bench, mut design) = sensor_design();
+    let (setup, mut design) = sensor_design();
     design.sites = Sites::Every(0.02);
-    let problem = problem(&bench, &design);
+    let problem = problem(&setup, &design);
     let all = problem.all(0, Watch::NONE).unwrap();
     for method in Method::NAMED {
         let asked = problem.by_method(method, 0, Watch::NONE).unwrap();
@@ -346,12 +346,12 @@ fn a_method_that_is_asked_for_gives_its_own_layout() {
         }
     }
     design.criterion = DesignCriterion::DOptimality;
-    let informed = SensorProblem::new(&bench, &design, Watch::NONE).unwrap();
+    let informed = SensorProblem::new(&setup, &design, Watch::NONE).unwrap();
     let asked = informed.by_method(Method::DOptimal, 0, Watch::NONE).unwrap();
     assert_eq!(asked.layout, all.iter().find(|d| d.method == Method::DOptimal).unwrap().layout);
     design.offers = vec![offer(SensorKind::Reaction, 5e-3, 1.0)];
     design.count = 2;
-    let reactions = SensorProblem::new(&bench, &design, Watch::NONE).unwrap();
+    let reactions = SensorProblem::new(&setup, &design, Watch::NONE).unwrap();
     let refused = reactions.by_method(Method::Even, 0, Watch::NONE).map(|_| ()).unwrap_err();
     assert_eq!(refused, DesignError::NoLayout { method: "even" });
 }

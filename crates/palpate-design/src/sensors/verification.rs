@@ -4,8 +4,8 @@ use super::SensorProblem;
 use super::Stage;
 use crate::calibration::{CalibrationError, Seeds, Trial, Verification};
 use palpate_estimators::arrangement::cells;
-use palpate_estimators::estimator::EstimatorConfig;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::estimator::Estimator;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::Layout;
@@ -28,23 +28,23 @@ impl SensorProblem<'_> {
     pub fn verify(
         &self,
         layout: &Layout,
-        estimator: &EstimatorConfig,
+        estimator: &Estimator,
         calibrations: usize,
         seed: u64,
         watch: Watch,
     ) -> Result<Verification, CalibrationError> {
         let force_n = self.touches.force_n;
-        let touched = Bench {
-            surface: self.bench.surface.clone(),
+        let touched = Setup {
+            surface: self.setup.surface.clone(),
             layout: layout.clone(),
             force_n: Some(force_n),
             columns: None,
         };
         let known = (self.touches.force == Force::Known).then_some(force_n);
-        let used = Bench { force_n: known, ..touched.clone() };
-        let guess = EstimatorConfig::contenders(&used).into_iter().next();
+        let used = Setup { force_n: known, ..touched.clone() };
+        let guess = Estimator::contenders(&used).into_iter().next();
         let estimator = match (estimator, &guess) {
-            (EstimatorConfig::Influence(_), _) | (_, None) => estimator,
+            (Estimator::Influence(_), _) | (_, None) => estimator,
             (_, Some(guess)) => guess,
         };
         let contacts = &self.touches.contacts;

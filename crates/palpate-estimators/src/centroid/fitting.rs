@@ -7,7 +7,7 @@ use super::{CentroidLocator, Weighing};
 use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::held_out::HeldOutSpread;
 use crate::recording::{Recording, Row, TooFewPositions};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
 
@@ -18,7 +18,7 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite};
 /// training recording. Raw channels have no positions, so least squares gives each one a position of its own:
 /// the estimate is Σ w_i·p_i.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CentroidConfig;
+pub struct Centroid;
 
 /// Why a centroid cannot be calibrated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -49,12 +49,12 @@ pub enum CentroidFitError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Fit for CentroidConfig {
+impl Fit for Centroid {
     type Method = CentroidLocator;
     type Error = CentroidFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<CentroidLocator, CentroidFitError> {
-        let mut locator = uncalibrated(task.bench, task.recording)?;
+        let mut locator = uncalibrated(task.setup, task.recording)?;
         let terms = locator.weighing.terms(locator.channel_scales.len(), locator.extent.width_m.is_some());
         task.recording.check_distinct_positions(terms)?;
         let rows: Vec<&Row> = task.recording.rows.iter().collect();
@@ -66,8 +66,8 @@ impl Fit for CentroidConfig {
 }
 
 /// A locator that can weigh, but whose map is still empty.
-fn uncalibrated(bench: &Bench, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
-    let sensors = &bench.layout.sensors;
+fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
+    let sensors = &setup.layout.sensors;
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
     if live < 2 {
         return Err(CentroidFitError::TooFewSensors { found: live });
@@ -94,11 +94,11 @@ fn uncalibrated(bench: &Bench, recording: &Recording) -> Result<CentroidLocator,
         Weighing::Positions(sensors.iter().map(|sensor| sensor.position).collect())
     };
     Ok(CentroidLocator {
-        extent: bench.surface.extent(),
+        extent: setup.surface.extent(),
         channel_scales,
         weighing,
         map: Vec::new(),
-        force_n: bench.force_n,
+        force_n: setup.force_n,
         spread: None,
     })
 }

@@ -4,12 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{Locate, LocatorFault};
 use crate::held_out::HeldOutSpread;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 
-/// A centroid that locates; see [`CentroidConfig`](super::CentroidConfig).
+/// A centroid that locates; see [`Centroid`](super::Centroid).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentroidLocator {
@@ -92,8 +92,8 @@ impl Locate for CentroidLocator {
         Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        let channels = bench.layout.len();
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        let channels = setup.layout.len();
         LocatorFault::check_count("channel scales", channels, self.channel_scales.len())?;
         LocatorFault::check_numbers(
             "channel scale",

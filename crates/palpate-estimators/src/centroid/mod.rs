@@ -3,7 +3,7 @@
 mod fitting;
 mod locator;
 
-pub use fitting::{CentroidConfig, CentroidFitError};
+pub use fitting::{Centroid, CentroidFitError};
 pub use locator::{CentroidLocator, Weighing};
 
 #[cfg(test)]

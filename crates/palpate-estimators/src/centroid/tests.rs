@@ -3,34 +3,34 @@
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
 
-fn recording(bench: &Bench, rows: Vec<Row>) -> Recording {
+fn recording(setup: &Setup, rows: Vec<Row>) -> Recording {
     let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };
-    Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance }
+    Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance }
 }
 
-fn fit(bench: &Bench, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitError> {
-    let recording = recording(bench, rows);
-    let task = FitTask::new(bench, &recording);
-    let locator = CentroidConfig.fit_method(task)?;
-    assert_eq!(locator.check(bench), Ok(()));
+fn fit(setup: &Setup, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitError> {
+    let recording = recording(setup, rows);
+    let task = FitTask::new(setup, &recording);
+    let locator = Centroid.fit_method(task)?;
+    assert_eq!(locator.check(setup), Ok(()));
     let text = serde_json::to_string(&locator).unwrap();
-    assert_eq!(serde_json::from_str::<CentroidLocator>(&text).unwrap().check(bench), Ok(()));
+    assert_eq!(serde_json::from_str::<CentroidLocator>(&text).unwrap().check(setup), Ok(()));
     Ok(locator)
 }
 
 /// A pad of raw channels; `width_m` where it is two-dimensional.
-fn pad(channels: usize, width_m: Option<f64>) -> Bench {
+fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     let mut layout = Layout::even(SensorKind::Raw, channels, 0.1);
     for (i, sensor) in layout.sensors.iter_mut().enumerate() {
         sensor.name = format!("c{i}");
     }
-    Bench {
+    Setup {
         surface: SurfaceSpec::Measured(Extent { length_m: 0.1, width_m }),
         layout,
         force_n: None,
@@ -39,7 +39,7 @@ fn pad(channels: usize, width_m: Option<f64>) -> Bench {
 }
 
 /// Two supports share a force by the lever: their centroid is the contact itself.
-fn scales() -> Bench {
+fn scales() -> Setup {
     let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
     let support = |name: &str, x_m| Sensor {
         kind: SensorKind::Reaction,
@@ -48,7 +48,7 @@ fn scales() -> Bench {
         channel: Default::default(),
     };
     let layout = Layout { sensors: vec![support("left", 0.0), support("right", 0.4)] };
-    Bench { surface: SurfaceSpec::Beam(beam), layout, force_n: None, columns: None }
+    Setup { surface: SurfaceSpec::Beam(beam), layout, force_n: None, columns: None }
 }
 
 fn lever(x_m: f64, force_n: f64) -> Row {
@@ -56,7 +56,7 @@ fn lever(x_m: f64, force_n: f64) -> Row {
     Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
-        hidden: None,
+        nuisance: None,
         reading: vec![force_n - right, right],
     }
 }
@@ -75,16 +75,16 @@ fn reactions_make_the_centroid_exact_at_any_force() {
 
 #[test]
 fn raw_channels_find_their_positions() {
-    let bench = pad(3, Some(0.1));
+    let setup = pad(3, Some(0.1));
     let places = [[0.0, 0.0], [0.1, 0.0], [0.05, 0.1]];
     let row = |i: usize, j: usize| {
         let weights = [i as f64, j as f64, (5 - i - j) as f64].map(|w| w / 5.0);
         let along = |axis: usize| (0..3).map(|c| weights[c] * places[c][axis]).sum::<f64>();
         let position = Position { x_m: along(0), y_m: along(1) };
-        Row { position, force_n: None, hidden: None, reading: weights.iter().map(|w| -3.0 * w).collect() }
+        Row { position, force_n: None, nuisance: None, reading: weights.iter().map(|w| -3.0 * w).collect() }
     };
     let rows: Vec<Row> = (0..=5).flat_map(|i| (0..=5 - i).map(move |j| row(i, j))).collect();
-    let locator = fit(&bench, rows.clone()).unwrap();
+    let locator = fit(&setup, rows.clone()).unwrap();
     for row in rows {
         assert!(locator.locate(&row.reading).contact.position.distance_m(row.position) < 1e-9);
     }
@@ -108,21 +108,21 @@ fn beyond_the_edge_is_said() {
 
 #[test]
 fn what_does_not_calibrate_is_named() {
-    let message = |bench: &Bench, rows| fit(bench, rows).unwrap_err().to_string();
-    let mut bench = scales();
+    let message = |setup: &Setup, rows| fit(setup, rows).unwrap_err().to_string();
+    let mut setup = scales();
     let rows: Vec<Row> = (1..20).map(|i| lever(0.02 * f64::from(i), 3.0)).collect();
     assert_eq!(
-        message(&bench, rows[..1].to_vec()),
+        message(&setup, rows[..1].to_vec()),
         "the recording has 1 distinct positions; at least 2 are needed"
     );
     let silent = rows.iter().map(|row| Row { reading: vec![0.0; 2], ..row.clone() }).collect();
     assert_eq!(
-        message(&bench, silent),
+        message(&setup, silent),
         "every reaction reading of the recording is 0; a centroid weighs sensors by what they read"
     );
-    bench.layout.sensors[0].channel.dead = true;
+    setup.layout.sensors[0].channel.dead = true;
     assert_eq!(
-        message(&bench, rows),
+        message(&setup, rows),
         "a centroid needs at least 2 sensors that are not dead; the layout has 1"
     );
 }

@@ -2,7 +2,7 @@
 
 use super::ClosedFormLocator;
 use crate::fit::{ChannelMismatch, Fit, FitTask};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::Cancelled;
@@ -16,7 +16,7 @@ use palpate_numerics::watch::Cancelled;
 /// Uncertainty is propagated from the channels' noise (and quantisation) to first order; where the layout gives a channel no noise
 /// there is none, and a reading that is off by more than a tenth of itself is outside the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ClosedFormConfig;
+pub struct ClosedForm;
 
 /// Why the closed form does not suit a bench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -54,26 +54,26 @@ pub enum ClosedFormFitError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Fit for ClosedFormConfig {
+impl Fit for ClosedForm {
     type Method = ClosedFormLocator;
     type Error = ClosedFormFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
-        locator(task.bench)
+        locator(task.setup)
     }
 }
 
-fn locator(bench: &Bench) -> Result<ClosedFormLocator, ClosedFormFitError> {
-    if bench.surface.model().is_none() {
+fn locator(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
+    if setup.surface.model().is_none() {
         return Err(ClosedFormFitError::NoModel);
     }
-    let SurfaceSpec::Beam(beam) = bench.surface else { return Err(ClosedFormFitError::NotABeam) };
-    let kinds = bench.layout.kinds();
+    let SurfaceSpec::Beam(beam) = setup.surface else { return Err(ClosedFormFitError::NotABeam) };
+    let kinds = setup.layout.kinds();
     if let Some(kind) = kinds.into_iter().find(|kind| *kind == SensorKind::Raw) {
         return Err(ClosedFormFitError::NotModelled { kind });
     }
-    let locator = ClosedFormLocator { beam, layout: bench.layout.clone(), force_n: bench.force_n };
-    let (needed, found) = (1 + usize::from(bench.force_n.is_none()), locator.seeing().len());
+    let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
+    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.seeing().len());
     if found < needed {
         return Err(ClosedFormFitError::TooFewSensors { needed, found });
     }

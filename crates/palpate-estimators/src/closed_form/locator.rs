@@ -6,14 +6,14 @@ use super::balance::Balance;
 use super::posterior::{Posterior, RARE};
 use super::segment::Segment;
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Surface};
 use palpate_numerics::{chi_squared_bound, normal_interval_95};
 
-/// A closed form that locates; see [`ClosedFormConfig`](super::ClosedFormConfig).
+/// A closed form that locates; see [`ClosedForm`](super::ClosedForm).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosedFormLocator {
@@ -136,8 +136,8 @@ impl Locate for ClosedFormLocator {
         Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise }.estimate()
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("sensors", bench.layout.len(), self.layout.len())?;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("sensors", setup.layout.len(), self.layout.len())?;
         let beam =
             [self.beam.length_m, self.beam.width_m, self.beam.thickness_m, self.beam.youngs_modulus_pa];
         LocatorFault::check_numbers("beam", beam, |x| x > 0.0, "a number greater than 0")?;

@@ -11,7 +11,7 @@ mod polynomial;
 mod posterior;
 mod segment;
 
-pub use fitting::{ClosedFormConfig, ClosedFormFitError};
+pub use fitting::{ClosedForm, ClosedFormFitError};
 pub use locator::ClosedFormLocator;
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, Sensor, SensorKind, measure};
@@ -13,7 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
 
-fn bench(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> Bench {
+fn setup(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> Setup {
     let sensors = sensors.iter().enumerate().map(|(i, (kind, x_m))| Sensor {
         kind: *kind,
         position: Position::along(*x_m),
@@ -21,7 +21,7 @@ fn bench(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> 
         channel: ChannelModel { noise_sd, ..ChannelModel::default() },
     });
     let layout = Layout { sensors: sensors.collect() };
-    Bench { surface: SurfaceSpec::Beam(BEAM), layout, force_n, columns: None }
+    Setup { surface: SurfaceSpec::Beam(BEAM), layout, force_n, columns: None }
 }
 
 fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
@@ -30,31 +30,31 @@ fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
 
 const SCALES: [(SensorKind, f64); 2] = [(SensorKind::Reaction, 0.0), (SensorKind::Reaction, 0.4)];
 
-fn fit(bench: &Bench) -> Result<ClosedFormLocator, ClosedFormFitError> {
+fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
     let row = Row {
         position: Position::along(0.1),
         force_n: None,
-        hidden: None,
-        reading: vec![0.0; bench.layout.len()],
+        nuisance: None,
+        reading: vec![0.0; setup.layout.len()],
     };
     let provenance = Provenance { source: "test".into(), rows: 1, digests: vec![], seed: None };
-    let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
+    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
     let recording = Recording { channels, kinds, rows: vec![row], provenance };
-    let task = FitTask::new(bench, &recording);
-    let locator = ClosedFormConfig.fit_method(task)?;
-    assert_eq!(locator.check(bench), Ok(()));
+    let task = FitTask::new(setup, &recording);
+    let locator = ClosedForm.fit_method(task)?;
+    assert_eq!(locator.check(setup), Ok(()));
     Ok(locator)
 }
 
-fn clean(bench: &Bench, x_m: f64, force_n: f64) -> Vec<f64> {
+fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     let contact = Position::along(x_m);
-    let sensors = bench.layout.sensors.iter();
+    let sensors = setup.layout.sensors.iter();
     sensors.map(|s| force_n * BEAM.influence(s.kind, s.position, contact)).collect()
 }
 
 /// Distance from the truth to the nearest place that the estimate names, in metres.
-fn nearest_m(bench: &Bench, locator: &ClosedFormLocator, x_m: f64, force_n: f64) -> f64 {
-    let estimate = locator.locate(&clean(bench, x_m, force_n));
+fn nearest_m(setup: &Setup, locator: &ClosedFormLocator, x_m: f64, force_n: f64) -> f64 {
+    let estimate = locator.locate(&clean(setup, x_m, force_n));
     assert!(matches!(estimate.status, Status::Located | Status::Ambiguous), "{x_m}: {estimate:?}");
     let places = std::iter::once(estimate.contact).chain(estimate.modes.as_slice().iter().map(|m| m.contact));
     places.map(|contact| (contact.position.x_m - x_m).abs()).fold(f64::INFINITY, f64::min)
@@ -62,11 +62,11 @@ fn nearest_m(bench: &Bench, locator: &ClosedFormLocator, x_m: f64, force_n: f64)
 
 #[test]
 fn clean_reactions_give_every_position_and_force() {
-    let bench = bench(&SCALES, 0.0, None);
-    let locator = fit(&bench).unwrap();
+    let setup = setup(&SCALES, 0.0, None);
+    let locator = fit(&setup).unwrap();
     for x_mm in 0..=400 {
         let x_m = f64::from(x_mm) * 1e-3;
-        let contact = locator.locate(&clean(&bench, x_m, 2.5)).contact;
+        let contact = locator.locate(&clean(&setup, x_m, 2.5)).contact;
         assert!((contact.position.x_m - x_m).abs() < 1e-12 && (contact.force_n.unwrap() - 2.5).abs() < 1e-12);
     }
 }
@@ -74,11 +74,11 @@ fn clean_reactions_give_every_position_and_force() {
 #[test]
 fn clean_deflections_give_every_position_at_unknown_force() {
     for count in [2, 3, 8] {
-        let bench = bench(&even(SensorKind::Deflection, count), 0.0, None);
-        let locator = fit(&bench).unwrap();
+        let setup = setup(&even(SensorKind::Deflection, count), 0.0, None);
+        let locator = fit(&setup).unwrap();
         for x_mm in 5..=395 {
             let x_m = f64::from(x_mm) * 1e-3;
-            let off_m = nearest_m(&bench, &locator, x_m, 1.7);
+            let off_m = nearest_m(&setup, &locator, x_m, 1.7);
             assert!(off_m < 1e-7, "{count} sensors, {x_mm} mm: {off_m}");
         }
     }
@@ -87,11 +87,11 @@ fn clean_deflections_give_every_position_at_unknown_force() {
 #[test]
 fn clean_deflections_give_every_position_at_known_force() {
     for count in [1, 2, 8] {
-        let bench = bench(&even(SensorKind::Deflection, count), 0.0, Some(3.0));
-        let locator = fit(&bench).unwrap();
+        let setup = setup(&even(SensorKind::Deflection, count), 0.0, Some(3.0));
+        let locator = fit(&setup).unwrap();
         for x_mm in 1..=399 {
             let x_m = f64::from(x_mm) * 1e-3;
-            let off_m = nearest_m(&bench, &locator, x_m, 3.0);
+            let off_m = nearest_m(&setup, &locator, x_m, 3.0);
             // One sensor at mid-span reads a maximum there, which roots in double precision know to half their digits.
             let bound_m = if count == 1 { 1e-6 } else { 1e-9 };
             assert!(off_m < bound_m, "{count} sensors, {x_mm} mm: {off_m}");
@@ -101,8 +101,8 @@ fn clean_deflections_give_every_position_at_known_force() {
 
 #[test]
 fn one_sensor_sees_the_mirror_image_and_says_so() {
-    let bench = bench(&even(SensorKind::Deflection, 1), 5e-6, Some(3.0));
-    let estimate = fit(&bench).unwrap().locate(&clean(&bench, 0.1, 3.0));
+    let setup = setup(&even(SensorKind::Deflection, 1), 5e-6, Some(3.0));
+    let estimate = fit(&setup).unwrap().locate(&clean(&setup, 0.1, 3.0));
     assert_eq!(estimate.status, Status::Ambiguous);
     let [mode] = estimate.modes.as_slice() else { panic!("{estimate:?}") };
     let sum_m = estimate.contact.position.x_m + mode.contact.position.x_m;
@@ -111,27 +111,27 @@ fn one_sensor_sees_the_mirror_image_and_says_so() {
 
 #[test]
 fn two_strains_see_between_them_and_are_blind_outside() {
-    let bench = bench(&even(SensorKind::Strain, 2), 1e-7, None);
-    let locator = fit(&bench).unwrap();
+    let setup = setup(&even(SensorKind::Strain, 2), 1e-7, None);
+    let locator = fit(&setup).unwrap();
     for x_mm in (140..=260).step_by(10) {
         let x_m = f64::from(x_mm) * 1e-3;
-        assert!(nearest_m(&bench, &locator, x_m, 3.0) < 1e-9, "{x_mm} mm");
+        assert!(nearest_m(&setup, &locator, x_m, 3.0) < 1e-9, "{x_mm} mm");
     }
-    let blind = locator.locate(&clean(&bench, 0.05, 3.0));
+    let blind = locator.locate(&clean(&setup, 0.05, 3.0));
     assert_eq!(blind.status, Status::Ambiguous);
     let (low, high) = blind.contact.uncertainty.unwrap().x_95_m;
     assert!(low < 0.001 && high > 0.4 / 3.0, "{blind:?}");
 }
 
 /// Mean and standard deviation of position errors over noise, the mean propagated sd, and the share within the 95 % interval.
-fn monte_carlo(bench: &Bench, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
-    let locator = fit(bench).unwrap();
+fn monte_carlo(setup: &Setup, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
+    let locator = fit(setup).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
-    let truth = clean(bench, x_m, force_n);
+    let truth = clean(setup, x_m, force_n);
     let (mut sum, mut squares, mut sd, mut covered) = (0.0, 0.0, 0.0, 0.0);
     let draws = 2000;
     for _ in 0..draws {
-        let reading = measure(&bench.layout, &truth, &ChannelErrors::none(&bench.layout), &mut rng);
+        let reading = measure(&setup.layout, &truth, &ChannelErrors::none(&setup.layout), &mut rng);
         let contact = locator.locate(&reading).contact;
         let (error, uncertainty) = (contact.position.x_m - x_m, contact.uncertainty.unwrap());
         sum += error;
@@ -147,15 +147,15 @@ fn monte_carlo(bench: &Bench, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
 #[test]
 fn noise_spreads_as_much_as_was_propagated() {
     let cases = [
-        (bench(&SCALES, 0.01, None), 0.13, 3.0),
-        (bench(&SCALES, 0.01, Some(3.0)), 0.13, 3.0),
-        (bench(&even(SensorKind::Deflection, 8), 5e-6, Some(3.0)), 0.05, 3.0),
-        (bench(&even(SensorKind::Deflection, 8), 5e-6, None), 0.17, 3.0),
-        (bench(&even(SensorKind::Deflection, 2), 1e-6, None), 0.17, 3.0),
-        (bench(&even(SensorKind::Strain, 2), 1e-7, None), 0.17, 3.0),
+        (setup(&SCALES, 0.01, None), 0.13, 3.0),
+        (setup(&SCALES, 0.01, Some(3.0)), 0.13, 3.0),
+        (setup(&even(SensorKind::Deflection, 8), 5e-6, Some(3.0)), 0.05, 3.0),
+        (setup(&even(SensorKind::Deflection, 8), 5e-6, None), 0.17, 3.0),
+        (setup(&even(SensorKind::Deflection, 2), 1e-6, None), 0.17, 3.0),
+        (setup(&even(SensorKind::Strain, 2), 1e-7, None), 0.17, 3.0),
     ];
-    for (i, (bench, x_m, force_n)) in cases.into_iter().enumerate() {
-        let (mean, spread, propagated, covered) = monte_carlo(&bench, x_m, force_n);
+    for (i, (setup, x_m, force_n)) in cases.into_iter().enumerate() {
+        let (mean, spread, propagated, covered) = monte_carlo(&setup, x_m, force_n);
         // 2000 draws know a standard deviation to 1.6 % and a coverage of 0.95 to 0.005.
         assert!((spread / propagated - 1.0).abs() < 0.06, "case {i}: {spread} against {propagated}");
         assert!(mean.abs() < 0.1 * spread, "case {i}: mean {mean}, sd {spread}");
@@ -165,7 +165,7 @@ fn noise_spreads_as_much_as_was_propagated() {
 
 #[test]
 fn what_no_contact_explains_is_not_located() {
-    let deflections = bench(&even(SensorKind::Deflection, 8), 5e-6, None);
+    let deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
     let locator = fit(&deflections).unwrap();
     assert_eq!(locator.locate(&[3e-6, -4e-6, 1e-6, 0.0, 2e-6, -6e-6, 5e-6, 1e-6]).status, Status::NoContact);
     let pulled: Vec<f64> = clean(&deflections, 0.2, 3.0).iter().map(|r| -r).collect();
@@ -174,7 +174,7 @@ fn what_no_contact_explains_is_not_located() {
     let two: Vec<f64> = two.map(|(a, b)| a + b).collect();
     assert_eq!(locator.locate(&two).status, Status::OutsideModel);
 
-    let scales = fit(&bench(&SCALES, 0.01, None)).unwrap();
+    let scales = fit(&setup(&SCALES, 0.01, None)).unwrap();
     assert_eq!(scales.locate(&[0.01, -0.005]).status, Status::NoContact);
     assert_eq!(scales.locate(&[-0.5, 2.5]).status, Status::OutsideSurface);
     assert_eq!(scales.locate(&[-1.0, -2.0]).status, Status::OutsideModel);
@@ -185,7 +185,7 @@ fn what_no_contact_explains_is_not_located() {
 
 #[test]
 fn a_dead_channel_is_left_out() {
-    let mut deflections = bench(&even(SensorKind::Deflection, 8), 5e-6, None);
+    let mut deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
     deflections.layout.sensors[3].channel.dead = true;
     let mut reading = clean(&deflections, 0.17, 3.0);
     reading[3] = 0.0;
@@ -196,16 +196,16 @@ fn a_dead_channel_is_left_out() {
 
 #[test]
 fn what_does_not_suit_is_named() {
-    let message = |bench: &Bench| fit(bench).unwrap_err().to_string();
-    let mut measured = bench(&SCALES, 0.0, None);
+    let message = |setup: &Setup| fit(setup).unwrap_err().to_string();
+    let mut measured = setup(&SCALES, 0.0, None);
     measured.surface = SurfaceSpec::Measured(Extent { length_m: 0.4, width_m: None });
     assert!(message(&measured).contains("no model"));
     assert_eq!(
-        message(&bench(&[(SensorKind::Raw, 0.1)], 0.0, None)),
+        message(&setup(&[(SensorKind::Raw, 0.1)], 0.0, None)),
         "the closed form needs deflection, slope, strain or reaction sensors; the layout has a raw channel"
     );
     assert_eq!(
-        message(&bench(&even(SensorKind::Deflection, 1), 0.0, None)),
+        message(&setup(&even(SensorKind::Deflection, 1), 0.0, None)),
         "the closed form needs at least 2 sensors that see a contact (the force is unknown); the layout has 1"
     );
 }

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use super::DigitLocator;
 use crate::fit::{ChannelMismatch, Fit, FitTask};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Digit, SurfaceSpec};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DigitConfig {
+pub struct DigitEstimator {
     /// What the gauges read.
     pub theory: DigitTheory,
 }
@@ -78,30 +78,30 @@ pub enum DigitFitError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Fit for DigitConfig {
+impl Fit for DigitEstimator {
     type Method = DigitLocator;
     type Error = DigitFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<DigitLocator, DigitFitError> {
-        locator(task.bench, self.theory)
+        locator(task.setup, self.theory)
     }
 }
 
-fn locator(bench: &Bench, theory: DigitTheory) -> Result<DigitLocator, DigitFitError> {
-    let SurfaceSpec::Digit(digit) = bench.surface else { return Err(DigitFitError::NotADigit) };
-    if let Some(kind) = bench.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
+fn locator(setup: &Setup, theory: DigitTheory) -> Result<DigitLocator, DigitFitError> {
+    let SurfaceSpec::Digit(digit) = setup.surface else { return Err(DigitFitError::NotADigit) };
+    if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
         return Err(DigitFitError::NotAGauge { kind });
     }
-    let locator = DigitLocator { digit, layout: bench.layout.clone(), force_n: bench.force_n, theory };
+    let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n: setup.force_n, theory };
     if let Some(i) = locator.gauge_without_noise() {
         return Err(DigitFitError::NoNoise { gauge: i + 1 });
     }
-    let (needed, found) = (1 + usize::from(bench.force_n.is_none()), locator.living());
+    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.living());
     if found < needed {
         return Err(DigitFitError::TooFewGauges { needed, found });
     }
     let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
-    match bench.force_n {
+    match setup.force_n {
         Some(force_n) if force_n > most_n => Err(DigitFitError::TooMuchForce { force_n, most_n }),
         _ => Ok(locator),
     }

@@ -3,9 +3,9 @@
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::{Digit, Surface};
 
-use super::{DigitConfig, DigitLocator, DigitTheory};
+use super::{DigitEstimator, DigitLocator, DigitTheory};
 use crate::fit::{Fit, Fitted};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::{CleanSensors, simulate_at};
 
 /// A locator by the linear theory, and the exact readings that it is asked for.
@@ -16,13 +16,13 @@ pub struct LinearTheory<'a> {
 
 impl<'a> LinearTheory<'a> {
     /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
-    pub fn of(bench: &Bench, digit: &'a Digit) -> Option<Self> {
-        let unknown = Bench { force_n: None, ..bench.clone() };
-        let pressed = Bench { force_n: Some(digit.characteristic_force_n()), ..bench.clone() };
+    pub fn of(setup: &Setup, digit: &'a Digit) -> Option<Self> {
+        let unknown = Setup { force_n: None, ..setup.clone() };
+        let pressed = Setup { force_n: Some(digit.characteristic_force_n()), ..setup.clone() };
         // The estimator learns nothing, but every fit wants a recording.
         let recording = simulate_at(&pressed, &[Position::along(digit.length_m())], 1, 0).ok()?;
-        let locator = DigitConfig { theory: DigitTheory::Linear }.fit(&unknown, &recording).ok()?;
-        Some(Self { locator, sensors: CleanSensors::new(digit, &bench.layout) })
+        let locator = DigitEstimator { theory: DigitTheory::Linear }.fit(&unknown, &recording).ok()?;
+        Some(Self { locator, sensors: CleanSensors::new(digit, &setup.layout) })
     }
 
     /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for what is not found.

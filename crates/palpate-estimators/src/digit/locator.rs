@@ -8,7 +8,7 @@ use super::likelihood::Likelihood;
 use super::posterior::{Piece, Posterior};
 use super::shape::DigitShape;
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -22,7 +22,7 @@ const NEGLIGIBLE: f64 = 0.05;
 /// Where one gauge sees a contact alone, an interval wider than this share of the length is no place.
 const WIDE: f64 = 0.01;
 
-/// A digit's estimator that locates; see [`DigitConfig`](super::DigitConfig).
+/// A digit's estimator that locates; see [`DigitEstimator`](super::DigitEstimator).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitLocator {
@@ -131,8 +131,8 @@ impl Locate for DigitLocator {
         self.estimate(Posterior::new(&likelihood), gauges.len().saturating_sub(unknowns))
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("gauges", bench.layout.len(), self.layout.len())?;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("gauges", setup.layout.len(), self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
         LocatorFault::check_count("sensors that are no gauges", 0, others)?;
         let Digit { length_m, width_m, thickness_m, youngs_modulus_pa, .. } = self.digit;

@@ -17,7 +17,7 @@ mod posterior;
 mod refine;
 mod shape;
 
-pub use fitting::{DigitConfig, DigitFitError, DigitTheory};
+pub use fitting::{DigitEstimator, DigitFitError, DigitTheory};
 pub use linear_theory::LinearTheory;
 pub use locator::DigitLocator;
 pub use shape::{DigitShape, ShapePoint};

@@ -1,29 +1,29 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimator::{ContactEstimate, EstimatorConfig, Locator, Method, Status};
+use crate::estimator::{ContactEstimate, Estimator, Locator, Method, Status};
 use crate::fit::Fit;
 use crate::fixtures;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::{clean_reading, simulate_at};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::surface::{Digit, ForceDirection, SurfaceSpec};
 
-fn example() -> Bench {
-    fixtures::digit(ForceDirection::Normal, 4.0).bench
+fn example() -> Setup {
+    fixtures::digit(ForceDirection::Normal, 4.0).setup
 }
 
-fn digit(bench: &Bench) -> Digit {
-    let SurfaceSpec::Digit(digit) = bench.surface else { panic!("{:?}", bench.surface) };
+fn digit(setup: &Setup) -> Digit {
+    let SurfaceSpec::Digit(digit) = setup.surface else { panic!("{:?}", setup.surface) };
     digit
 }
 
-fn locator(bench: &Bench, theory: DigitTheory) -> Locator {
-    let pressed = Bench { force_n: Some(1.0), ..bench.clone() };
+fn locator(setup: &Setup, theory: DigitTheory) -> Locator {
+    let pressed = Setup { force_n: Some(1.0), ..setup.clone() };
     let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
-    let config = EstimatorConfig::Digit(DigitConfig { theory });
-    config.fit(bench, &recording).unwrap()
+    let config = Estimator::Digit(DigitEstimator { theory });
+    config.fit(setup, &recording).unwrap()
 }
 
 fn method(locator: &Locator) -> &DigitLocator {
@@ -31,9 +31,9 @@ fn method(locator: &Locator) -> &DigitLocator {
     digit
 }
 
-fn clean(bench: &Bench, x_m: f64, force_n: f64) -> Vec<f64> {
+fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     let contact = Contact { position: Position::along(x_m), force_n };
-    clean_reading(bench.surface.model().unwrap(), &bench.layout, contact)
+    clean_reading(setup.surface.model().unwrap(), &setup.layout, contact)
 }
 
 /// How a locator did on contacts between the second gauge and the tip.
@@ -52,14 +52,14 @@ struct Tally {
 }
 
 /// Presses with simulated noise, evenly from `from_m` to the tip.
-fn tally(bench: &Bench, force_n: f64, from_m: f64, count: usize, seed: u64) -> Tally {
-    let l = digit(bench).length_m;
+fn tally(setup: &Setup, force_n: f64, from_m: f64, count: usize, seed: u64) -> Tally {
+    let l = digit(setup).length_m;
     let share = |i: usize| (i as f64 + 0.5) / count as f64;
     let positions: Vec<Position> =
         (0..count).map(|i| Position::along(from_m + share(i) * (l - from_m))).collect();
-    let pressed = Bench { force_n: Some(force_n), ..bench.clone() };
+    let pressed = Setup { force_n: Some(force_n), ..setup.clone() };
     let recording = simulate_at(&pressed, &positions, 1, seed).unwrap();
-    let (locator, limit) = (locator(bench, DigitTheory::Exact), bench.cramer_rao_bound().unwrap());
+    let (locator, limit) = (locator(setup, DigitTheory::Exact), setup.cramer_rao_bound().unwrap());
     let mut tally = Tally::default();
     let (mut errors, mut bounds) = ([0.0; 2], [0.0; 2]);
     for row in &recording.rows {
@@ -73,7 +73,7 @@ fn tally(bench: &Bench, force_n: f64, from_m: f64, count: usize, seed: u64) -> T
         tally.covered[0] += f64::from((low_m..=high_m).contains(&truth.position.x_m));
         tally.covered[1] += f64::from(error_n <= 1.96 * sd_n);
         let shape = method(&locator).shape(&estimate.contact, 40);
-        tally.shape_percent = tally.shape_percent.max(100.0 * shape.distance_m(&digit(bench), truth) / l);
+        tally.shape_percent = tally.shape_percent.max(100.0 * shape.distance_m(&digit(setup), truth) / l);
         if limit.whitened_reading(truth)[1].abs() >= 5.0 {
             let bound = limit.at(truth, Force::Unknown).unwrap();
             tally.counts[1] += 1.0;
@@ -93,11 +93,11 @@ fn tally(bench: &Bench, force_n: f64, from_m: f64, count: usize, seed: u64) -> T
 #[test]
 fn beyond_the_second_gauge_position_force_and_shape_are_at_their_limits() {
     for direction in [ForceDirection::Normal, ForceDirection::Vertical] {
-        let bench = fixtures::digit(direction, 4.0).bench;
+        let setup = fixtures::digit(direction, 4.0).setup;
         let mut covered = [0.0; 2];
         for (i, force_n) in [1.0, 3.0, 5.0, 8.0, 13.0].into_iter().enumerate() {
-            let tally = tally(&bench, force_n, 0.020, 400, i as u64);
-            let turn = digit(&bench).shape(Contact { position: Position::along(0.12), force_n }).angle(0.12);
+            let tally = tally(&setup, force_n, 0.020, 400, i as u64);
+            let turn = digit(&setup).shape(Contact { position: Position::along(0.12), force_n }).angle(0.12);
             println!("{direction:?} {force_n} N, tip turned by {:.0}°: {tally:.3?}", turn.to_degrees());
             assert!(tally.ratios.iter().all(|ratio| *ratio < 1.2), "{tally:?}");
             assert!(tally.located > 97.0 && tally.counts[1] > 390.0, "{tally:?}");
@@ -116,9 +116,9 @@ proptest! {
         // Within the noise of a gauge both of its sides explain a reading.
         prop_assume!([0.04, 0.06, 0.08].iter().all(|gauge_m| (x - gauge_m).abs() > 5e-4));
         let direction = if vertical { ForceDirection::Vertical } else { ForceDirection::Normal };
-        let bench = fixtures::digit(direction, 4.0).bench;
-        let force_n = load * digit(&bench).bending_stiffness() / (x * x);
-        let estimate = locator(&bench, DigitTheory::Exact).locate(&clean(&bench, x, force_n)).unwrap();
+        let setup = fixtures::digit(direction, 4.0).setup;
+        let force_n = load * digit(&setup).bending_stiffness() / (x * x);
+        let estimate = locator(&setup, DigitTheory::Exact).locate(&clean(&setup, x, force_n)).unwrap();
         prop_assert_eq!(estimate.status, Status::Located);
         prop_assert!((estimate.contact.position.x_m - x).abs() < 1e-9, "{:?}", estimate.contact);
         prop_assert!((estimate.contact.force_n.unwrap() / force_n - 1.0).abs() < 1e-7);
@@ -127,16 +127,16 @@ proptest! {
 
 #[test]
 fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
-    let bench = example();
-    let reading = clean(&bench, 0.014, 2.0);
-    let estimate = locator(&bench, DigitTheory::Exact).locate(&reading).unwrap();
+    let setup = example();
+    let reading = clean(&setup, 0.014, 2.0);
+    let estimate = locator(&setup, DigitTheory::Exact).locate(&reading).unwrap();
     assert_eq!(estimate.status, Status::Ambiguous);
     let ContactEstimate { position, force_n, uncertainty } = estimate.contact;
     let (low_m, high_m) = uncertainty.unwrap().x_95_m;
     assert!(low_m < 0.006 && high_m > 0.018 && high_m < 0.021, "{low_m} {high_m}");
     // The moment at the gauge is told, and so force times lever.
     assert!((force_n.unwrap() * (position.x_m - 0.004) / (2.0 * 0.010) - 1.0).abs() < 0.02);
-    let known = Bench { force_n: Some(2.0), ..bench.clone() };
+    let known = Setup { force_n: Some(2.0), ..setup.clone() };
     let estimate = locator(&known, DigitTheory::Exact).locate(&reading).unwrap();
     assert_eq!(estimate.status, Status::Located);
     assert!((estimate.contact.position.x_m - 0.014).abs() < 1e-9);
@@ -144,15 +144,15 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
 
 #[test]
 fn readings_that_no_push_explains_say_so() {
-    let bench = example();
-    let locator = locator(&bench, DigitTheory::Exact);
+    let setup = example();
+    let locator = locator(&setup, DigitTheory::Exact);
     let status = |reading: &[f64]| locator.locate(reading).unwrap().status;
     assert_eq!(status(&[1e-6, -1e-6, 0.5e-6, 0.0, -0.5e-6]), Status::NoContact);
     // Before the first gauge no gauge sees a contact.
-    assert_eq!(status(&clean(&bench, 0.003, 3.0)), Status::NoContact);
-    let pulled: Vec<f64> = clean(&bench, 0.09, 3.0).into_iter().map(|strain| -strain).collect();
+    assert_eq!(status(&clean(&setup, 0.003, 3.0)), Status::NoContact);
+    let pulled: Vec<f64> = clean(&setup, 0.09, 3.0).into_iter().map(|strain| -strain).collect();
     assert_eq!(status(&pulled), Status::OutsideModel);
-    let mut broken = clean(&bench, 0.09, 3.0);
+    let mut broken = clean(&setup, 0.09, 3.0);
     broken[2] += 50e-6;
     assert_eq!(status(&broken), Status::OutsideModel);
     assert_eq!(status(&[1.0, -1.0, 1e300, -1e300, 1e-300]), Status::OutsideModel);
@@ -160,10 +160,10 @@ fn readings_that_no_push_explains_say_so() {
 
 #[test]
 fn dead_and_saturated_gauges_are_left_out() {
-    let mut bench = example();
-    bench.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
-    let mut locator = locator(&bench, DigitTheory::Exact);
-    let mut reading = clean(&bench, 0.09, 2.0);
+    let mut setup = example();
+    setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
+    let mut locator = locator(&setup, DigitTheory::Exact);
+    let mut reading = clean(&setup, 0.09, 2.0);
     assert!(reading[0] < -1500e-6 && reading[2] > -1500e-6);
     reading[0] = -1500e-6;
     let position_m = |locator: &Locator, reading: &[f64]| {
@@ -185,10 +185,10 @@ fn dead_and_saturated_gauges_are_left_out() {
 
 #[test]
 fn the_linear_theory_is_right_for_small_forces_and_far_off_for_large_ones() {
-    let bench = fixtures::digit(ForceDirection::Vertical, 4.0).bench;
-    let linear = locator(&bench, DigitTheory::Linear);
+    let setup = fixtures::digit(ForceDirection::Vertical, 4.0).setup;
+    let linear = locator(&setup, DigitTheory::Linear);
     let off_mm = |force_n: f64| {
-        let contact = linear.locate(&clean(&bench, 0.09, force_n)).unwrap().contact;
+        let contact = linear.locate(&clean(&setup, 0.09, force_n)).unwrap().contact;
         ((contact.position.x_m - 0.09) * 1e3, contact.force_n.unwrap() / force_n)
     };
     let (small_mm, small) = off_mm(0.02);
@@ -200,16 +200,16 @@ fn the_linear_theory_is_right_for_small_forces_and_far_off_for_large_ones() {
 
 #[test]
 fn the_shape_has_an_honest_band() {
-    let bench = example();
-    let locator = locator(&bench, DigitTheory::Exact);
+    let setup = example();
+    let locator = locator(&setup, DigitTheory::Exact);
     let truth = Contact { position: Position::along(0.07), force_n: 4.0 };
-    let pressed = Bench { force_n: Some(truth.force_n), ..bench.clone() };
+    let pressed = Setup { force_n: Some(truth.force_n), ..setup.clone() };
     let recording = simulate_at(&pressed, &[truth.position], 400, 3).unwrap();
     let (mut squares, mut variances) = (0.0, 0.0);
     for row in &recording.rows {
         let shape = locator.shape(&locator.locate(&row.reading).unwrap(), 10).unwrap();
         let tip = shape.tip().unwrap();
-        let [x_m, y_m] = digit(&bench).shape(truth).point(0.12);
+        let [x_m, y_m] = digit(&setup).shape(truth).point(0.12);
         squares += (tip.x_m - x_m).powi(2) + (tip.y_m - y_m).powi(2);
         variances += tip.sd_m.powi(2);
         assert_eq!((shape.points[0].x_m, shape.points[0].y_m), (0.0, 0.0));
@@ -244,25 +244,25 @@ fn a_locator_survives_its_file_and_bad_numbers_do_not() {
 
 #[test]
 fn benches_that_do_not_suit_are_refused_in_words() {
-    let paper = fixtures::paper(5e-6, 1).bench;
+    let paper = fixtures::paper(5e-6, 1).setup;
     let good = example();
-    let refused = |bench: &Bench| {
-        let pressed = Bench { force_n: Some(1.0), ..bench.clone() };
+    let refused = |setup: &Setup| {
+        let pressed = Setup { force_n: Some(1.0), ..setup.clone() };
         let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
-        let config = EstimatorConfig::Digit(DigitConfig::default());
-        config.fit(bench, &recording).unwrap_err().to_string()
+        let config = Estimator::Digit(DigitEstimator::default());
+        config.fit(setup, &recording).unwrap_err().to_string()
     };
-    let with = |change: &dyn Fn(&mut Bench)| {
-        let mut bench = good.clone();
-        change(&mut bench);
-        refused(&bench)
+    let with = |change: &dyn Fn(&mut Setup)| {
+        let mut setup = good.clone();
+        change(&mut setup);
+        refused(&setup)
     };
     let shown = [
         refused(&paper),
-        with(&|bench| bench.layout.sensors[3].kind = palpate_mechanics::sensing::SensorKind::Deflection),
-        with(&|bench| bench.layout.sensors[3].channel.noise_sd = 0.0),
-        with(&|bench| bench.layout.sensors.truncate(1)),
-        with(&|bench| bench.force_n = Some(20.0)),
+        with(&|setup| setup.layout.sensors[3].kind = palpate_mechanics::sensing::SensorKind::Deflection),
+        with(&|setup| setup.layout.sensors[3].channel.noise_sd = 0.0),
+        with(&|setup| setup.layout.sensors.truncate(1)),
+        with(&|setup| setup.force_n = Some(20.0)),
     ];
     insta::assert_snapshot!(shown.join("\n"));
 }
@@ -272,15 +272,15 @@ fn benches_that_do_not_suit_are_refused_in_words() {
 fn for_small_forces_influence_functions_are_at_the_limit() {
     let rig = fixtures::digit(ForceDirection::Normal, 0.3);
     let recording = rig.simulate(1);
-    let config = EstimatorConfig::Influence(crate::influence::InfluenceConfig {
+    let config = Estimator::Influence(crate::influence::Influence {
         from: crate::influence::InfluenceSource::Mechanics,
         ..Default::default()
     });
-    let locator = config.fit(&rig.bench, &recording).unwrap();
-    let limit = rig.bench.cramer_rao_bound().unwrap();
+    let locator = config.fit(&rig.setup, &recording).unwrap();
+    let limit = rig.setup.cramer_rao_bound().unwrap();
     let positions: Vec<Position> =
         (0..200).map(|i| Position::along(0.03 + 0.09 * f64::from(i) / 200.0)).collect();
-    let judged = simulate_at(&rig.pressed_bench(), &positions, 1, 9).unwrap();
+    let judged = simulate_at(&rig.pressed_setup(), &positions, 1, 9).unwrap();
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for row in &judged.rows {
         error_m += locator.locate(&row.reading).unwrap().contact.position.distance_m(row.position);

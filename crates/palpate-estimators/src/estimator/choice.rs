@@ -1,16 +1,16 @@
 //! The estimators that suit a setup, compared; and the choice of the best.
 
-use super::{EstimatorConfig, FitError};
+use super::{Estimator, FitError};
 use crate::evaluation::{Trial, Tried, try_estimator};
 use crate::fit::FitTask;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_numerics::watch::Cancelled;
 
 /// How one estimator did over some trials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The estimator.
-    pub estimator: EstimatorConfig,
+    pub estimator: Estimator,
     /// Its answers to all trials together, and their times.
     pub tried: Tried,
 }
@@ -18,14 +18,14 @@ pub struct Comparison {
 /// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
 /// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
 /// take some seconds.
-pub fn contenders(bench: &Bench, own: &EstimatorConfig, rows: usize) -> Vec<EstimatorConfig> {
+pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
     const MOST_PRESENTATIONS: usize = 20_000_000;
-    let mut contenders = EstimatorConfig::contenders(bench);
+    let mut contenders = Estimator::contenders(setup);
     for contender in &mut contenders {
         if contender.kind() == own.kind() {
             *contender = own.clone();
         }
-        if let EstimatorConfig::Network(config) = contender {
+        if let Estimator::Network(config) = contender {
             let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
             config.training.max_epochs = config.training.max_epochs.min(most);
         }
@@ -37,7 +37,7 @@ pub fn contenders(bench: &Bench, own: &EstimatorConfig, rows: usize) -> Vec<Esti
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The estimator with the least mean error.
-    pub best: EstimatorConfig,
+    pub best: Estimator,
     /// Kinds with their mean errors in metres, best first; those that do not suit the recording are left out.
     pub mean_errors_m: Vec<(&'static str, f64)>,
 }
@@ -51,15 +51,15 @@ pub const CHOICE_FOLDS: usize = 5;
 /// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason; and
 /// [`FitError::Cancelled`] when the watch stopped it.
 pub fn choose(task: FitTask) -> Result<Choice, FitError> {
-    let FitTask { bench, recording, seed, watch } = task;
+    let FitTask { setup, recording, seed, watch } = task;
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
     let trials =
         Trial::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
     let mut tried = Vec::new();
     let mut last = None;
-    for estimator in contenders(bench, &EstimatorConfig::Auto, recording.rows.len()) {
-        match try_estimator(bench, &estimator, &trials, seed, &|| 0.0, watch) {
+    for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
+        match try_estimator(setup, &estimator, &trials, seed, &|| 0.0, watch) {
             Ok(one) => {
                 if let Some(summary) = one.evaluation.summary(None) {
                     tried.push((estimator, summary.average_m));

@@ -1,39 +1,39 @@
 //! What a rig's `[estimator]` section says.
 
-use crate::centroid::CentroidConfig;
-use crate::closed_form::ClosedFormConfig;
-use crate::digit::{DigitConfig, DigitTheory};
-use crate::gaussian_process::GaussianProcessConfig;
-use crate::influence::InfluenceConfig;
-use crate::neighbours::NeighboursConfig;
-use crate::network::{LevenbergMarquardtConfig, NetworkConfig};
-use crate::setup::Bench;
+use crate::centroid::Centroid;
+use crate::closed_form::ClosedForm;
+use crate::digit::{DigitEstimator, DigitTheory};
+use crate::gaussian_process::GaussianProcessEstimator;
+use crate::influence::Influence;
+use crate::neighbours::Neighbours;
+use crate::network::{LevenbergMarquardt, Network};
+use crate::setup::Setup;
 use palpate_mechanics::surface::SurfaceSpec;
 
 /// A configured method; fitting it to a recording gives a locator.
 #[derive(Clone, Debug, PartialEq)]
-pub enum EstimatorConfig {
+pub enum Estimator {
     /// The founding paper's network (`kind = "network"`).
-    Network(NetworkConfig),
+    Network(Network),
     /// Networks trained by Levenberg–Marquardt with Bayesian regularisation (`kind = "network-lm"`).
-    NetworkLm(LevenbergMarquardtConfig),
+    NetworkLm(LevenbergMarquardt),
     /// Influence functions, inverted (`kind = "influence"`).
-    Influence(InfluenceConfig),
+    Influence(Influence),
     /// Gaussian-process regression of the position (`kind = "gaussian-process"`).
-    GaussianProcess(GaussianProcessConfig),
+    GaussianProcess(GaussianProcessEstimator),
     /// The beam's own equations (`kind = "closed-form"`).
-    ClosedForm(ClosedFormConfig),
+    ClosedForm(ClosedForm),
     /// The bending finger's own equations (`kind = "digit"`).
-    Digit(DigitConfig),
+    Digit(DigitEstimator),
     /// Nearest neighbours (`kind = "neighbours"`).
-    Neighbours(NeighboursConfig),
+    Neighbours(Neighbours),
     /// The calibrated centroid of array sensors (`kind = "centroid"`).
-    Centroid(CentroidConfig),
+    Centroid(Centroid),
     /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
     Auto,
 }
 
-impl EstimatorConfig {
+impl Estimator {
     /// Every `kind` that a rig can name.
     pub const KINDS: &'static [&'static str] = &[
         "network",
@@ -48,28 +48,28 @@ impl EstimatorConfig {
     ];
 
     /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
-    pub fn contenders(bench: &Bench) -> Vec<Self> {
+    pub fn contenders(setup: &Setup) -> Vec<Self> {
         let mut contenders = vec![
-            Self::Influence(InfluenceConfig::default()),
-            Self::GaussianProcess(GaussianProcessConfig::default()),
+            Self::Influence(Influence::default()),
+            Self::GaussianProcess(GaussianProcessEstimator::default()),
         ];
-        if matches!(bench.surface, SurfaceSpec::Beam(_)) {
-            contenders.push(Self::ClosedForm(ClosedFormConfig));
+        if matches!(setup.surface, SurfaceSpec::Beam(_)) {
+            contenders.push(Self::ClosedForm(ClosedForm));
         }
-        if matches!(bench.surface, SurfaceSpec::Digit(_)) {
-            contenders.insert(0, Self::Digit(DigitConfig::default()));
+        if matches!(setup.surface, SurfaceSpec::Digit(_)) {
+            contenders.insert(0, Self::Digit(DigitEstimator::default()));
         }
         contenders.extend([
-            Self::Neighbours(NeighboursConfig::default()),
-            Self::Centroid(CentroidConfig),
-            Self::NetworkLm(LevenbergMarquardtConfig::default()),
-            Self::Network(NetworkConfig::default()),
+            Self::Neighbours(Neighbours::default()),
+            Self::Centroid(Centroid),
+            Self::NetworkLm(LevenbergMarquardt::default()),
+            Self::Network(Network::default()),
         ]);
         contenders
     }
 
     /// A digit's estimator by the linear theory of bending, to be compared with.
-    pub const LINEAR_DIGIT: Self = Self::Digit(DigitConfig { theory: DigitTheory::Linear });
+    pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator { theory: DigitTheory::Linear });
 
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {
@@ -103,8 +103,8 @@ impl EstimatorConfig {
     }
 }
 
-impl Default for EstimatorConfig {
+impl Default for Estimator {
     fn default() -> Self {
-        Self::Network(NetworkConfig::default())
+        Self::Network(Network::default())
     }
 }

@@ -1,9 +1,9 @@
 //! Every estimator behind one type: fitting whichever it is.
 
-use super::{EstimatorConfig, FitError, Method, choose};
+use super::{Estimator, FitError, Method, choose};
 use crate::fit::{Fit, FitTask, Fitted, SeedQueue};
 
-impl Fit for EstimatorConfig {
+impl Fit for Estimator {
     type Method = Method;
     type Error = FitError;
 

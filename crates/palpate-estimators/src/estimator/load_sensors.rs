@@ -5,23 +5,23 @@ use std::sync::Arc;
 use super::{Locator, Method};
 use crate::influence::InfluenceLocator;
 use crate::load_profile::{LoadChannel, LoadSensors, LoadSensorsError, Profiler};
-use crate::setup::Bench;
+use crate::setup::Setup;
 
 /// The sensors of a bench, by mechanics.
 ///
 /// # Errors
 /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
-pub fn bench_load_sensors(bench: &Bench) -> Result<LoadSensors<'_>, LoadSensorsError> {
-    LoadSensors::new(bench.surface.model().ok_or(LoadSensorsError::NoModel)?, &bench.layout)
+pub fn setup_load_sensors(setup: &Setup) -> Result<LoadSensors<'_>, LoadSensorsError> {
+    LoadSensors::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
 }
 
 impl<'a> Profiler<'a> {
     /// For readings of a setup, by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] as for [`bench_load_sensors`].
-    pub fn of(bench: &'a Bench) -> Result<Self, LoadSensorsError> {
-        Ok(Self::new(bench_load_sensors(bench)?))
+    /// [`LoadSensorsError`] as for [`setup_load_sensors`].
+    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+        Ok(Self::new(setup_load_sensors(setup)?))
     }
 }
 
@@ -38,9 +38,9 @@ impl Locator {
                     let (influence, offset, noise_sd) = channel?;
                     Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
                 });
-                Ok(LoadSensors { extent: self.bench.surface.extent(), channels: channels.collect() })
+                Ok(LoadSensors { extent: self.setup.surface.extent(), channels: channels.collect() })
             }
-            _ => bench_load_sensors(&self.bench),
+            _ => setup_load_sensors(&self.setup),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::gaussian_process::GaussianProcessLocator;
 use crate::influence::InfluenceLocator;
 use crate::neighbours::NeighboursLocator;
 use crate::network::{LevenbergMarquardtLocator, NetworkLocator, TrainingOutcome};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::Estimate;
 
 /// A locator of any estimator: what files hold.
@@ -63,8 +63,8 @@ impl Locate for Method {
         self.as_locate().locate(reading)
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.as_locate().check(bench)
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.as_locate().check(setup)
     }
 }
 
@@ -129,7 +129,7 @@ impl Locator {
     /// # Errors
     /// [`LeaveOutError`] when there is no such channel, or the method needs it.
     pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
-        let channels = self.bench.layout.len();
+        let channels = self.setup.layout.len();
         if channel >= channels {
             return Err(LeaveOutError::NoChannel { channel: channel + 1, channels });
         }
@@ -150,7 +150,7 @@ impl Locator {
             }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
-        self.bench.layout.sensors[channel].channel.dead = true;
+        self.setup.layout.sensors[channel].channel.dead = true;
         Ok(())
     }
 

@@ -18,9 +18,9 @@ pub use crate::load_profile::{
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use choice::{CHOICE_FOLDS, Choice, Comparison, choose, contenders};
-pub use config::EstimatorConfig;
+pub use config::Estimator;
 pub use error::FitError;
-pub use load_sensors::bench_load_sensors;
+pub use load_sensors::setup_load_sensors;
 pub use locator::{LeaveOutError, Locator, Method};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};

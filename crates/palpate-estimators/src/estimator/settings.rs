@@ -1,10 +1,10 @@
 //! An estimator's settings in words, so that a report can list those of any method.
 
-use super::EstimatorConfig;
-use crate::digit::{DigitConfig, DigitTheory};
-use crate::influence::{InfluenceConfig, InfluenceSource};
+use super::Estimator;
+use crate::digit::{DigitEstimator, DigitTheory};
+use crate::influence::{Influence, InfluenceSource};
 use crate::network::{
-    Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
+    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding,
     PresentationOrder,
 };
 use palpate_mechanics::units::format_count;
@@ -20,7 +20,7 @@ pub struct Setting {
     pub value: String,
 }
 
-impl EstimatorConfig {
+impl Estimator {
     /// Every setting of the estimator, in words.
     pub fn settings(&self) -> Vec<Setting> {
         match self {
@@ -39,7 +39,7 @@ impl EstimatorConfig {
     }
 }
 
-fn digit(config: DigitConfig) -> Vec<Setting> {
+fn digit(config: DigitEstimator) -> Vec<Setting> {
     let theory = match config.theory {
         DigitTheory::Exact => "exact: the finger bends as far as the force bends it",
         DigitTheory::Linear => "linear: strain is force times lever",
@@ -47,7 +47,7 @@ fn digit(config: DigitConfig) -> Vec<Setting> {
     vec![Setting { key: "theory", name: "theory of bending", value: theory.to_owned() }]
 }
 
-fn levenberg_marquardt(config: &LevenbergMarquardtConfig) -> Vec<Setting> {
+fn levenberg_marquardt(config: &LevenbergMarquardt) -> Vec<Setting> {
     let hidden: Vec<String> = config.hidden.iter().map(usize::to_string).collect();
     vec![
         Setting { key: "hidden", name: "nodes in the hidden layers", value: hidden.join(", ") },
@@ -60,7 +60,7 @@ fn levenberg_marquardt(config: &LevenbergMarquardtConfig) -> Vec<Setting> {
     ]
 }
 
-fn influence(config: InfluenceConfig) -> Vec<Setting> {
+fn influence(config: Influence) -> Vec<Setting> {
     let from = match config.from {
         InfluenceSource::Recording => "the recording alone",
         InfluenceSource::Mechanics => "the mechanics alone",
@@ -77,7 +77,7 @@ fn influence(config: InfluenceConfig) -> Vec<Setting> {
     ]
 }
 
-fn network(config: &NetworkConfig) -> Vec<Setting> {
+fn network(config: &Network) -> Vec<Setting> {
     let setting = |key, name, value| Setting { key, name, value };
     let BackPropagation { learning_rate, momentum, aggregate_error, max_epochs, order, initial_weights } =
         config.training;

@@ -42,7 +42,7 @@ impl Locator {
     /// # Errors
     /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.
     pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
-        if config.swing.is_some() && !matches!(self.bench.surface, SurfaceSpec::Beam(_)) {
+        if config.swing.is_some() && !matches!(self.setup.surface, SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
         match &self.method {

@@ -4,7 +4,7 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 
 use super::Evaluation;
-use crate::setup::Bench;
+use crate::setup::Setup;
 
 /// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.
 const ENDS: f64 = 1.0 / 80.0;
@@ -16,10 +16,10 @@ const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
 /// Mean error over the limit's mean error, for the bench's noise; `None` where there is no limit. Counted are contacts
 /// at least 1/80 of the length from both ends, on a plane also of the width from both sides, where the limit is at most
 /// 1/200 of the length, on a plane 1/20.
-pub fn limit_ratio(bench: &Bench, evaluation: &Evaluation) -> Option<f64> {
-    let limit = bench.cramer_rao_bound().ok()?;
-    let force = if bench.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let extent = bench.surface.extent();
+pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
+    let limit = setup.cramer_rao_bound().ok()?;
+    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let extent = setup.surface.extent();
     let within =
         |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
     let is_inner = |at: Position| {
@@ -28,7 +28,7 @@ pub fn limit_ratio(bench: &Bench, evaluation: &Evaluation) -> Option<f64> {
     let large = if extent.is_plane() { LARGE_LIMIT_ON_A_PLANE } else { LARGE_LIMIT };
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
-        let Some(force_n) = located.force_n.or(bench.force_n) else { continue };
+        let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
         let bound = limit.at(Contact { position: located.truth, force_n }, force);
         let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m) else {
             continue;

@@ -116,11 +116,11 @@ impl Evaluation {
                 truth: row.position,
                 force_n: row.force_n,
                 estimate: contact.position,
-                covered: covered(&contact, row.position, locator.bench.surface.extent()),
+                covered: covered(&contact, row.position, locator.setup.surface.extent()),
             })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { length_m: locator.bench.surface.extent().length_m, located })
+        Ok(Self { length_m: locator.setup.surface.extent().length_m, located })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.

@@ -6,7 +6,7 @@ use super::Evaluation;
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, ReadingError};
 use crate::recording::{Recording, TooFewPositions};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::{SimulateError, simulate_at};
 use palpate_numerics::watch::Watch;
 
@@ -50,20 +50,20 @@ impl Trial {
     /// # Errors
     /// [`SimulateError`] when the bench has no model or no force, or the positions cannot be laid out.
     pub fn by_simulation(
-        bench: &Bench,
+        setup: &Setup,
         training: &Training,
         count: u64,
         seed: u64,
     ) -> Result<Vec<Self>, SimulateError> {
-        let extent = bench.surface.extent();
+        let extent = setup.surface.extent();
         let positions = all_over(extent);
-        let bench = bench.pressed_by(training);
+        let setup = setup.pressed_by(training);
         let at = training.positions(extent)?;
         let trial = |k: u64| {
             // A calibration and its judgement share the bench's gains and offsets, which a seed's first draws decide.
             let pressed: Vec<Position> =
                 at.iter().copied().flat_map(|p| std::iter::repeat_n(p, training.repeats)).collect();
-            let both = simulate_at(&bench, &[pressed.clone(), positions.clone()].concat(), 1, seed + k)?;
+            let both = simulate_at(&setup, &[pressed.clone(), positions.clone()].concat(), 1, seed + k)?;
             let split = |range: std::ops::Range<usize>| both.subset(&range.collect::<Vec<_>>());
             Ok(Self { training: split(0..pressed.len()), judged: split(pressed.len()..both.rows.len()) })
         };
@@ -76,18 +76,18 @@ impl Trial {
 /// # Errors
 /// [`CrossValidationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
 pub fn try_estimator<E: Fit>(
-    bench: &Bench,
+    setup: &Setup,
     estimator: &E,
     trials: &[Trial],
     seed: u64,
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Tried, CrossValidationError<E::Error>> {
-    let mut evaluation = Evaluation { length_m: bench.surface.extent().length_m, located: Vec::new() };
+    let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m, located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for trial in trials {
         let start = clock();
-        let task = FitTask { bench, recording: &trial.training, seed, watch };
+        let task = FitTask { setup, recording: &trial.training, seed, watch };
         let locator = estimator.fit_task(task).map_err(CrossValidationError::Fit)?;
         let fitted = clock();
         let part = Evaluation::of(&locator, &trial.judged)?;
@@ -128,5 +128,5 @@ pub fn cross_validate<E: Fit>(
     folds: usize,
 ) -> Result<Evaluation, CrossValidationError<E::Error>> {
     let trials = Trial::by_folds(task.recording, folds)?;
-    Ok(try_estimator(task.bench, estimator, &trials, task.seed, &|| 0.0, task.watch)?.evaluation)
+    Ok(try_estimator(task.setup, estimator, &trials, task.seed, &|| 0.0, task.watch)?.evaluation)
 }

@@ -4,7 +4,7 @@ mod fitted;
 
 pub use fitted::{ChannelScale, Feature, FeatureSource, Features};
 
-use crate::setup::Bench;
+use crate::setup::Setup;
 
 /// Which numbers a reading becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -19,8 +19,8 @@ pub enum FeatureKind {
 
 impl FeatureKind {
     /// The readings where the force is known, and what the load does not change where it is not.
-    pub fn for_bench(bench: &Bench) -> Self {
-        if bench.force_n.is_some() { Self::Readings } else { Self::LoadInvariant }
+    pub fn for_setup(setup: &Setup) -> Self {
+        if setup.force_n.is_some() { Self::Readings } else { Self::LoadInvariant }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
+use super::{GaussianProcessEstimator, GaussianProcessError, GaussianProcessLocator};
 use crate::features::{FeatureKind, Features};
 use crate::fit::{Fit, FitTask};
 use palpate_numerics::regression::{Regression, Samples};
@@ -10,16 +10,16 @@ use palpate_numerics::regression::{Regression, Samples};
 /// Distinct positions without which a position cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
 
-impl Fit for GaussianProcessConfig {
+impl Fit for GaussianProcessEstimator {
     type Method = GaussianProcessLocator;
     type Error = GaussianProcessError;
 
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
-        let FitTask { bench, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let kind = self.features.unwrap_or_else(|| FeatureKind::for_bench(bench));
+        let kind = self.features.unwrap_or_else(|| FeatureKind::for_setup(setup));
         let features = Features::fit(kind, recording)?;
-        let extent = bench.surface.extent();
+        let extent = setup.surface.extent();
         let rows = recording.rows.len();
         let mut coordinates = Array2::zeros((rows, features.len()));
         for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
@@ -34,6 +34,6 @@ impl Fit for GaussianProcessConfig {
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let process = regression.fit(samples, watch)?;
-        Ok(GaussianProcessLocator { features, process, extent, force_n: bench.force_n })
+        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n })
     }
 }

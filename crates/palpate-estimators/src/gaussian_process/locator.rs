@@ -4,7 +4,7 @@ use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 
 use crate::features::Features;
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::normal_interval_95;
@@ -46,11 +46,11 @@ impl Locate for GaussianProcessLocator {
         Estimate::of_contact(contact, status)
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.features.check(bench.layout.len())?;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.features.check(setup.layout.len())?;
         let coordinates = self.process.coordinates();
         LocatorFault::check_count("coordinates of its Gaussian process", self.features.len(), coordinates)?;
-        let outputs = 1 + usize::from(bench.surface.extent().width_m.is_some());
+        let outputs = 1 + usize::from(setup.surface.extent().width_m.is_some());
         LocatorFault::check_count("outputs", outputs, self.process.outputs())?;
         let sizes = [self.extent.length_m].into_iter().chain(self.extent.width_m);
         LocatorFault::check_numbers("extent", sizes, |size| size > 0.0, "finite and greater than 0")?;

@@ -17,8 +17,8 @@ pub use locator::GaussianProcessLocator;
 
 /// How a Gaussian process is to be fitted to a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GaussianProcessConfig {
-    /// What it sees of a reading; `None` for [`FeatureKind::for_bench`].
+pub struct GaussianProcessEstimator {
+    /// What it sees of a reading; `None` for [`FeatureKind::for_setup`].
     pub features: Option<FeatureKind>,
     /// How smooth the position is as a function of the features.
     pub kernel: Kernel,
@@ -28,7 +28,7 @@ pub struct GaussianProcessConfig {
     pub search_points: usize,
 }
 
-impl Default for GaussianProcessConfig {
+impl Default for GaussianProcessEstimator {
     fn default() -> Self {
         Self { features: None, kernel: Kernel::Matern52, trend: Trend::Constant, search_points: 500 }
     }

@@ -5,10 +5,10 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{GaussianProcessConfig, GaussianProcessError, GaussianProcessLocator};
+use super::{GaussianProcessEstimator, GaussianProcessError, GaussianProcessLocator};
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -16,9 +16,9 @@ use palpate_testing::data::recording;
 
 const EXTENT: Extent = Extent { length_m: 0.4, width_m: None };
 
-fn bench(extent: Extent, channels: usize, force_n: Option<f64>) -> Bench {
+fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, channels, extent.length_m);
-    Bench { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
+    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
 }
 
 fn recording_of(rows: Vec<Row>) -> Recording {
@@ -31,9 +31,9 @@ fn recording_of(rows: Vec<Row>) -> Recording {
     }
 }
 
-fn fit(bench: &Bench, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
-    let task = FitTask::new(bench, recording).seed(1);
-    GaussianProcessConfig::default().fit_method(task)
+fn fit(setup: &Setup, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
+    let task = FitTask::new(setup, recording).seed(1);
+    GaussianProcessEstimator::default().fit_method(task)
 }
 
 /// Four bell-shaped sensors along 400 mm, and noise.
@@ -44,7 +44,7 @@ fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Ro
         force_n * (-off * off).exp() + noise * error
     };
     let reading = (0..4).map(&mut channel).collect();
-    Row { position: Position::along(x_m), force_n: None, hidden: None, reading }
+    Row { position: Position::along(x_m), force_n: None, nuisance: None, reading }
 }
 
 #[test]
@@ -56,10 +56,10 @@ fn it_locates_and_its_intervals_cover() {
             let x_m = rng.random_range(0.0..0.4);
             bells(x_m, force_n, 0.01, rng)
         };
-        let bench = bench(EXTENT, 4, force_n);
+        let setup = setup(EXTENT, 4, force_n);
         let recording = recording_of((0..200).map(|_| press(&mut rng)).collect());
-        let locator = fit(&bench, &recording).unwrap();
-        assert_eq!(locator.check(&bench), Ok(()));
+        let locator = fit(&setup, &recording).unwrap();
+        assert_eq!(locator.check(&setup), Ok(()));
         let (mut covered, mut square_m2) = (0, 0.0);
         for _ in 0..400 {
             let row = press(&mut rng);
@@ -82,11 +82,11 @@ fn a_pad_is_two_dimensional() {
         let (u, v) = (x_m / 0.2, y_m / 0.1);
         let mut reading = vec![(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v, 5.0];
         reading[..4].iter_mut().for_each(|value| *value *= 0.4 + 0.2 * f64::from(i % 4));
-        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading }
+        Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, reading }
     });
-    let bench = bench(extent, 5, None);
-    let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
-    assert_eq!(locator.check(&bench), Ok(()));
+    let setup = setup(extent, 5, None);
+    let locator = fit(&setup, &recording_of(rows.collect())).unwrap();
+    assert_eq!(locator.check(&setup), Ok(()));
     // Between the grid's points, with half a newton, and the dead channel reading otherwise.
     let estimate = locator.locate(&[0.375, 0.125, 0.375, 0.125, 0.0].map(|r: f64| 0.5 * r));
     assert!((estimate.contact.position.x_m - 0.05).abs() < 1e-3, "{estimate:?}");
@@ -101,10 +101,10 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
     // Presses as far as the edge, and a reading that a press beyond it would give.
     let rows = (0..41).map(|i| {
         let x_m = 0.01 * f64::from(i);
-        Row { position: Position::along(x_m), force_n: None, hidden: None, reading: vec![x_m, 1.0 - x_m] }
+        Row { position: Position::along(x_m), force_n: None, nuisance: None, reading: vec![x_m, 1.0 - x_m] }
     });
-    let bench = bench(EXTENT, 2, Some(1.0));
-    let locator = fit(&bench, &recording_of(rows.collect())).unwrap();
+    let setup = setup(EXTENT, 2, Some(1.0));
+    let locator = fit(&setup, &recording_of(rows.collect())).unwrap();
     assert_eq!(locator.locate(&[0.42, 0.58]).status, Status::OutsideSurface);
     assert_eq!(locator.locate(&[0.2, 0.8]).status, Status::Located);
 }
@@ -112,23 +112,23 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
 #[test]
 fn recordings_that_say_nothing_are_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
-    let bench = bench(EXTENT, 4, None);
+    let setup = setup(EXTENT, 4, None);
     let one_place = recording_of((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());
-    assert!(matches!(fit(&bench, &one_place), Err(GaussianProcessError::Positions(_))));
+    assert!(matches!(fit(&setup, &one_place), Err(GaussianProcessError::Positions(_))));
     let mut still = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
     still.rows[1].reading = still.rows[0].reading.clone();
-    assert!(matches!(fit(&bench, &still), Err(GaussianProcessError::Features(_))));
+    assert!(matches!(fit(&setup, &still), Err(GaussianProcessError::Features(_))));
     still.rows[1].reading[0] = f64::NAN;
-    assert!(fit(&bench, &still).is_err());
+    assert!(fit(&setup, &still).is_err());
     let two = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
-    assert!(fit(&bench, &two).is_ok());
+    assert!(fit(&setup, &two).is_ok());
 }
 
 #[test]
 fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let recording = recording_of((0..40).map(|i| bells(0.01 * f64::from(i), 1.0, 1e-3, &mut rng)).collect());
-    let bench_4 = bench(EXTENT, 4, Some(1.0));
+    let bench_4 = setup(EXTENT, 4, Some(1.0));
     let locator = fit(&bench_4, &recording).unwrap();
     let text = serde_json::to_string(&locator).unwrap();
     let back: GaussianProcessLocator = serde_json::from_str(&text).unwrap();
@@ -136,8 +136,8 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let reading = bells(0.123, 1.0, 0.0, &mut rng).reading;
     let (here, there) = (locator.locate(&reading), back.locate(&reading));
     assert!((here.contact.position.x_m - there.contact.position.x_m).abs() < 1e-9);
-    assert!(back.check(&bench(EXTENT, 2, Some(1.0))).is_err());
-    assert!(back.check(&bench(Extent { width_m: Some(0.1), ..EXTENT }, 4, Some(1.0))).is_err());
+    assert!(back.check(&setup(EXTENT, 2, Some(1.0))).is_err());
+    assert!(back.check(&setup(Extent { width_m: Some(0.1), ..EXTENT }, 4, Some(1.0))).is_err());
     let mut damaged = back;
     damaged.features.features.pop();
     assert!(damaged.check(&bench_4).is_err());
@@ -152,10 +152,10 @@ struct Pooled {
     coverage: f64,
 }
 
-fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
+fn five_folds(setup: &Setup, recording: &Recording) -> Pooled {
     let (mut errors_mm, mut covered) = (Vec::new(), 0);
     for fold in recording.folds(5).unwrap() {
-        let locator = fit(bench, &recording.subset(&fold.training)).unwrap();
+        let locator = fit(setup, &recording.subset(&fold.training)).unwrap();
         for row in fold.held_out.iter().map(|i| &recording.rows[*i]) {
             let contact = locator.locate(&row.reading).contact;
             errors_mm.push(1e3 * contact.position.distance_m(row.position));
@@ -182,15 +182,15 @@ fn numbers(file: &str) -> Option<Vec<Vec<f64>>> {
 }
 
 /// A strip of `tactile-fsi`: X in mm, two pressures, force, depth.
-fn strip(file: &str) -> Option<(Bench, Recording)> {
+fn strip(file: &str) -> Option<(Setup, Recording)> {
     let row = |cells: &Vec<f64>| Row {
         position: Position::along(1e-3 * cells[0]),
         force_n: None,
-        hidden: None,
+        nuisance: None,
         reading: cells[1..3].to_vec(),
     };
     let rows = numbers(&format!("tactile-fsi/{file}"))?.iter().map(row).collect();
-    Some((bench(Extent { length_m: 0.1, width_m: None }, 2, None), recording_of(rows)))
+    Some((setup(Extent { length_m: 0.1, width_m: None }, 2, None), recording_of(rows)))
 }
 
 /// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
@@ -199,8 +199,8 @@ const SLACK: f64 = 1.01;
 /// Fails when median and mean are beyond scikit-learn's. One error for the whole strip stands for noise that is not the
 /// same everywhere, so intervals cover what they promise only roughly: 90, 96 and 94 % over water, oil and air.
 fn check_strip(file: &str, median_mm: f64, mean_mm: f64) {
-    let Some((bench, recording)) = strip(file) else { return };
-    let found = five_folds(&bench, &recording);
+    let Some((setup, recording)) = strip(file) else { return };
+    let found = five_folds(&setup, &recording);
     let Pooled { median_mm: median, mean_mm: mean, rmse_mm: rmse, coverage } = found;
     eprintln!("{file}: median {median:.3} mean {mean:.3} rmse {rmse:.3} mm, coverage {coverage:.3}");
     let as_good = median <= SLACK * median_mm && mean <= SLACK * mean_mm;
@@ -233,11 +233,11 @@ fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     let (left, low) = (least(1), least(2));
     let rows = contacts.iter().zip(&readings).map(|(contact, reading)| {
         let (x_m, y_m) = (1e-3 * (contact[1].round() - left), 1e-3 * (contact[2].round() - low));
-        Row { position: Position { x_m, y_m }, force_n: None, hidden: None, reading: reading[1..].to_vec() }
+        Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, reading: reading[1..].to_vec() }
     });
     let recording = recording_of(rows.collect());
-    let bench = bench(Extent { length_m: 0.03, width_m: Some(0.03) }, 15, None);
-    let Pooled { median_mm, mean_mm, rmse_mm, coverage } = five_folds(&bench, &recording);
+    let setup = setup(Extent { length_m: 0.03, width_m: Some(0.03) }, 15, None);
+    let Pooled { median_mm, mean_mm, rmse_mm, coverage } = five_folds(&setup, &recording);
     eprintln!("eflesh: median {median_mm:.3} mean {mean_mm:.3} rmse {rmse_mm:.3} mm, coverage {coverage:.3}");
     assert!(median_mm <= SLACK * 0.312 && mean_mm <= SLACK * 0.343, "{median_mm} {mean_mm}");
 }

@@ -168,8 +168,8 @@ impl Coarse {
         let (mean, precision) = self.force.mean_and_precision();
         let constant = V::splat(square + mean * mean * precision);
         for b in 0..BLOCKS {
-            let pull = (products[b] + V::splat(mean * precision)).max(V::splat(0.0));
-            let explained = pull * pull * V::load(&self.inverse_norms[b]);
+            let score = (products[b] + V::splat(mean * precision)).max(V::splat(0.0));
+            let explained = score * score * V::load(&self.inverse_norms[b]);
             (constant - explained + V::load(&self.own[b])).store(&mut misfits[b]);
             products[b].store(&mut profile.products[b]);
         }

@@ -2,7 +2,7 @@
 
 /// The influence estimator: learn what each sensor reads as a function of the contact, and invert it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InfluenceConfig {
+pub struct Influence {
     /// Where the influence functions come from.
     pub from: InfluenceSource,
     /// The most contacts that may touch at once; 1 to 3.
@@ -23,7 +23,7 @@ pub enum InfluenceSource {
     Corrected,
 }
 
-impl Default for InfluenceConfig {
+impl Default for Influence {
     fn default() -> Self {
         Self { from: InfluenceSource::Corrected, contacts: 1, force_sd_n: None }
     }

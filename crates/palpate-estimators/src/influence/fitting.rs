@@ -2,13 +2,13 @@
 
 use super::belief::ForceBelief;
 use super::channels::Channels;
-use super::config::InfluenceConfig;
+use super::config::Influence;
 use super::learning::{Learnt, learn};
 use super::locator::{BeamLocator, BeamParts};
 use super::measured::MeasuredError;
 use super::table::InfluenceTable;
 use crate::fit::{ChannelMismatch, FitTask};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::Cancelled;
@@ -79,21 +79,21 @@ pub enum InfluenceFitError {
 }
 
 /// Fits the influence functions of a one-dimensional surface with a model.
-pub(super) fn fit_modelled(config: InfluenceConfig, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
-    let sensors = task.bench.layout.len();
-    let mut table = empty_table(sensors, task.bench.surface.extent().length_m);
+pub(super) fn fit_modelled(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
+    let sensors = task.setup.layout.len();
+    let mut table = empty_table(sensors, task.setup.surface.extent().length_m);
     let places = around_nodes(&table);
     let fill = &mut |s: usize, learnt: &Learnt| fill(&mut table, s, learnt, &places);
     let channels = learn(config.from, task, &places, fill)?;
     let Channels { offsets, noise_sd, reference_force_n } = channels;
     let parts = BeamParts { table, offsets, noise_sd };
-    let force = force_belief(config, task.bench);
-    Ok(BeamLocator::new(parts, dead(task.bench), force, reference_force_n, config.contacts))
+    let force = force_belief(config, task.setup);
+    Ok(BeamLocator::new(parts, dead(task.setup), force, reference_force_n, config.contacts))
 }
 
 /// What a bench and the settings say of the force.
-pub(super) fn force_belief(config: InfluenceConfig, bench: &Bench) -> ForceBelief {
-    match (bench.force_n, config.force_sd_n) {
+pub(super) fn force_belief(config: Influence, setup: &Setup) -> ForceBelief {
+    match (setup.force_n, config.force_sd_n) {
         (None, _) => ForceBelief::Unknown,
         (Some(force_n), None) => ForceBelief::Known(force_n),
         (Some(mean_n), Some(sd_n)) => ForceBelief::Normal { mean_n, sd_n },
@@ -101,8 +101,8 @@ pub(super) fn force_belief(config: InfluenceConfig, bench: &Bench) -> ForceBelie
 }
 
 /// Which channels are dead.
-pub(super) fn dead(bench: &Bench) -> Vec<bool> {
-    bench.layout.sensors.iter().map(|sensor| sensor.channel.dead).collect()
+pub(super) fn dead(setup: &Setup) -> Vec<bool> {
+    setup.layout.sensors.iter().map(|sensor| sensor.channel.dead).collect()
 }
 
 fn empty_table(sensors: usize, length_m: f64) -> InfluenceTable {

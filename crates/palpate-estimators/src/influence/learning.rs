@@ -42,8 +42,8 @@ pub(super) fn learn(
     places: &[Position],
     take: &mut dyn FnMut(usize, &Learnt),
 ) -> Result<Channels, InfluenceFitError> {
-    let surface = task.bench.surface.model().ok_or(InfluenceFitError::NoModel)?;
-    let layout = &task.bench.layout;
+    let surface = task.setup.surface.model().ok_or(InfluenceFitError::NoModel)?;
+    let layout = &task.setup.layout;
     check_sensors(layout)?;
     let presses = Presses::of(task.recording)?;
     let needed = match (from, surface.extent().is_plane()) {

@@ -10,7 +10,7 @@ use super::search::Search;
 use super::table::InfluenceTable;
 use super::table_function::FittedInfluence;
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 
@@ -141,8 +141,8 @@ impl Locate for BeamLocator {
         self.locate_with(reading, &mut Scratch::default())
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", bench.layout.len(), self.stored.parts.table.sensors)
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("channels", setup.layout.len(), self.stored.parts.table.sensors)
     }
 }
 

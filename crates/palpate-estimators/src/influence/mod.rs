@@ -29,7 +29,7 @@ mod table;
 mod table_function;
 
 pub use belief::ForceBelief;
-pub use config::{InfluenceConfig, InfluenceSource};
+pub use config::{Influence, InfluenceSource};
 pub use fitting::InfluenceFitError;
 pub use likelihood::BeamLikelihood;
 pub use locator::BeamLocator;
@@ -39,8 +39,8 @@ pub use table::InfluenceTable;
 pub use table_function::FittedInfluence;
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
-use crate::setup::Bench;
-use measured::{MeasuredConfig, MeasuredLocator};
+use crate::setup::Setup;
+use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 
@@ -56,24 +56,24 @@ pub enum InfluenceLocator {
     Measured(Box<MeasuredLocator>),
 }
 
-impl Fit for InfluenceConfig {
+impl Fit for Influence {
     type Method = InfluenceLocator;
     type Error = InfluenceFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<InfluenceLocator, InfluenceFitError> {
-        if task.bench.surface.model().is_none() {
+        if task.setup.surface.model().is_none() {
             self.check_measured()?;
-            let fitted = MeasuredConfig::default().fit_method(task)?;
+            let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
-        if task.bench.surface.extent().is_plane() {
+        if task.setup.surface.extent().is_plane() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));
         }
         Ok(InfluenceLocator::Beam(Box::new(self.fit_beam(task)?)))
     }
 }
 
-impl InfluenceConfig {
+impl Influence {
     /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
     /// correct.
     fn check_measured(&self) -> Result<(), InfluenceFitError> {
@@ -125,11 +125,11 @@ impl Locate for InfluenceLocator {
         }
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         match self {
-            Self::Beam(beam) => beam.check(bench),
-            Self::Plane(plane) => plane.check(bench),
-            Self::Measured(measured) => measured.check(bench),
+            Self::Beam(beam) => beam.check(setup),
+            Self::Plane(plane) => plane.check(setup),
+            Self::Measured(measured) => measured.check(setup),
         }
     }
 }

@@ -90,7 +90,7 @@ mod tests {
         let rows = rows.iter().map(|(x_m, force_n, value)| Row {
             position: Position::along(*x_m),
             force_n: (*force_n > 0.0).then_some(*force_n),
-            hidden: None,
+            nuisance: None,
             reading: vec![*value],
         });
         let provenance = Provenance { source: "test".into(), rows: 0, digests: vec![], seed: None };

@@ -60,9 +60,9 @@ impl<N: Number> Rays<N> {
         let at_end = if precision == 0.0 { norm.at_most(n(END) * other_norm) } else { 0 };
         let (here, there) = (n(0.75).or(at_end, here), n(0.25).or(at_end, there));
         let whole = here + there;
-        let pull = (here * p + there * q) + n(mean * precision) * whole;
+        let score = (here * p + there * q) + n(mean * precision) * whole;
         let norm = here * here * norm + n(2.0) * here * there * cross + there * there * other_norm;
         let square = (norm + n(precision) * whole * whole).max(n(f64::MIN_POSITIVE));
-        (towards * there / whole, (pull * whole).max(n(0.0)) / square)
+        (towards * there / whole, (score * whole).max(n(0.0)) / square)
     }
 }

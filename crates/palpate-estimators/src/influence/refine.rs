@@ -275,11 +275,11 @@ impl<N: Number> Normal<N> {
         let (zero, one, infinity) = (N::splat(0.0), N::splat(1.0), N::splat(f64::INFINITY));
         let (mean, precision) = belief.mean_and_precision();
         let (off, precision) = (some_n - N::splat(mean), N::splat(precision));
-        let (pull, ww) = (sums.ef - precision * off, sums.ff + precision);
+        let (score, ww) = (sums.ef - precision * off, sums.ff + precision);
         let inverse_ww = zero.or(ww.at_most(zero), one / ww);
-        let force_n = (some_n + pull * inverse_ww).max(zero);
+        let force_n = (some_n + score * inverse_ww).max(zero);
         let change = force_n - some_n;
-        let misfit = sums.square + precision * off * off - change * (N::splat(2.0) * pull - ww * change);
+        let misfit = sums.square + precision * off * off - change * (N::splat(2.0) * score - ww * change);
         // Information about the position, about both, and about the position when the force is not known.
         let (aa, aw) = (force_n * force_n * sums.gg, force_n * sums.fg);
         let along_w = aw * inverse_ww;

@@ -63,8 +63,8 @@ fn best_nodes<const K: usize>(
 ) -> Option<[usize; K]> {
     let column = |node: usize| search.table.at_node(STRIDE * node);
     let gram = Array2::from_shape_fn((COARSE, COARSE), |(i, j)| dot(column(i), column(j)));
-    let pull: Vec<f64> = (0..COARSE).map(|node| dot(column(node), whitened)).collect();
-    let gains = choices.filter_map(|chosen| Some((gain(&gram, &pull, chosen)?, chosen)));
+    let score: Vec<f64> = (0..COARSE).map(|node| dot(column(node), whitened)).collect();
+    let gains = choices.filter_map(|chosen| Some((gain(&gram, &score, chosen)?, chosen)));
     let best = gains.reduce(|best, next| if next.0 > best.0 { next } else { best });
     best.map(|(_, chosen)| chosen)
 }
@@ -79,10 +79,10 @@ fn triples() -> impl Iterator<Item = [usize; 3]> {
 
 /// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
 #[inline]
-fn gain<const K: usize>(gram: &Array2<f64>, pull: &[f64], chosen: [usize; K]) -> Option<f64> {
+fn gain<const K: usize>(gram: &Array2<f64>, score: &[f64], chosen: [usize; K]) -> Option<f64> {
     let (mut own_gram, mut own_pull) = ([[0.0; K]; K], [0.0; K]);
     for (k, i) in chosen.into_iter().enumerate() {
-        own_pull[k] = pull[i];
+        own_pull[k] = score[i];
         for (entry, j) in own_gram[k].iter_mut().zip(chosen) {
             *entry = gram[[i, j]];
         }
@@ -115,7 +115,7 @@ fn refine<const K: usize, const N: usize>(
         nodes.map(|node| Contact { position: Position::along(node as f64 * spacing_m), force_n: 0.0 });
     let start = fit(pressed_by_nothing);
     let forces = std::array::from_fn(|i| i > 0 && i % 2 == 0);
-    let step = Ldl::of_free(&start.information, forces)?.solve(start.pull);
+    let step = Ldl::of_free(&start.information, forces)?.solve(start.score);
     let mut contacts = moved(pressed_by_nothing, step, 1.0);
     let mut here = fit(contacts);
     let free = std::array::from_fn(|i| i > 0);
@@ -123,7 +123,7 @@ fn refine<const K: usize, const N: usize>(
         // Damped, where places and forces cannot be told apart.
         let mut damped = here.information;
         (0..N).for_each(|i| damped[i][i] *= 1.0 + 1e-9);
-        let step = Ldl::of_free(&damped, free)?.solve(here.pull);
+        let step = Ldl::of_free(&damped, free)?.solve(here.score);
         let mut share = 1.0;
         let next = loop {
             let candidate = moved(contacts, step, share);

@@ -5,7 +5,7 @@ use super::*;
 use crate::fit::Locate;
 use crate::fixtures::{faulty_paper, paper};
 use crate::recording::Recording;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::{clean_reading, displaced};
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Status};
@@ -18,33 +18,33 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 const SOURCES: [InfluenceSource; 2] = [InfluenceSource::Recording, InfluenceSource::Corrected];
 
-fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    config.fit_beam(FitTask::new(bench, recording)).unwrap()
+fn fit(config: Influence, setup: &Setup, recording: &Recording) -> BeamLocator {
+    config.fit_beam(FitTask::new(setup, recording)).unwrap()
 }
 
-fn clean(bench: &Bench, contacts: &[(f64, f64)]) -> Vec<f64> {
-    let surface: &dyn Surface = bench.surface.model().unwrap();
-    let mut sum = vec![0.0; bench.layout.len()];
+fn clean(setup: &Setup, contacts: &[(f64, f64)]) -> Vec<f64> {
+    let surface: &dyn Surface = setup.surface.model().unwrap();
+    let mut sum = vec![0.0; setup.layout.len()];
     for (x_m, force_n) in contacts {
         let contact = Contact { position: Position::along(*x_m), force_n: *force_n };
-        let reading = clean_reading(surface, &bench.layout, contact);
+        let reading = clean_reading(surface, &setup.layout, contact);
         sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
     }
     sum
 }
 
 /// Readings with the bench's noise.
-fn noisy(bench: &Bench, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-    measure(&bench.layout, &clean(bench, contacts), &ChannelErrors::none(&bench.layout), rng)
+fn noisy(setup: &Setup, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    measure(&setup.layout, &clean(setup, contacts), &ChannelErrors::none(&setup.layout), rng)
 }
 
 /// σ_limit of the position for 3 N at `x_m`, by finite differences: the Cramér–Rao bound without the module that has it.
-fn limit_m(bench: &Bench, x_m: f64, force_known: bool) -> f64 {
+fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
     let (h, force_n) = (1e-7, 3.0);
-    let (right, left) = (clean(bench, &[(x_m + h, force_n)]), clean(bench, &[(x_m - h, force_n)]));
-    let here = clean(bench, &[(x_m, force_n)]);
+    let (right, left) = (clean(setup, &[(x_m + h, force_n)]), clean(setup, &[(x_m - h, force_n)]));
+    let here = clean(setup, &[(x_m, force_n)]);
     let (mut aa, mut af, mut ff) = (0.0, 0.0, 0.0);
-    for (s, sensor) in bench.layout.sensors.iter().enumerate() {
+    for (s, sensor) in setup.layout.sensors.iter().enumerate() {
         let (noise, dead) = (sensor.channel.noise_sd, sensor.channel.dead);
         let (g, f) = ((right[s] - left[s]) / (2.0 * h * noise), here[s] / (force_n * noise));
         if !dead {
@@ -59,11 +59,11 @@ fn clean_presses_locate_to_a_thousandth_of_a_percent() {
     for from in SOURCES {
         let rig = paper(0.0, 1);
         let recording = rig.simulate(1);
-        let locator = fit(InfluenceConfig { from, ..InfluenceConfig::default() }, &rig.bench, &recording);
+        let locator = fit(Influence { from, ..Influence::default() }, &rig.setup, &recording);
         let errors: Vec<f64> = (1..400)
             .map(|mm| {
                 let x_m = f64::from(mm) / 1e3;
-                let estimate = locator.locate(&clean(&rig.bench, &[(x_m, 3.0)]));
+                let estimate = locator.locate(&clean(&rig.setup, &[(x_m, 3.0)]));
                 (estimate.contact.position.x_m - x_m).abs()
             })
             .collect();
@@ -87,34 +87,34 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
     let (mut error_m, mut limit, mut covered, mut count) = (0.0, 0.0, 0, 0);
     for seed in 0..40 {
         let mut rig = paper(5e-6, 10);
-        let known = rig.bench.clone();
+        let known = rig.setup.clone();
         if let Some(channel) = faults.channel {
             rig = faulty_paper(channel, 10);
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
-        rig.bench.layout = displaced(&rig.bench.layout, rig.bench.surface.extent(), &mut rng);
-        let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
+        rig.setup.layout = displaced(&rig.setup.layout, rig.setup.surface.extent(), &mut rng);
+        let errors = ChannelErrors::draw(&rig.setup.layout, &mut rng);
         let mut recording = rig.simulate(seed);
         for row in &mut recording.rows {
-            let truth = clean(&rig.bench, &[(row.position.x_m, 3.0)]);
-            row.reading = measure(&rig.bench.layout, &truth, &errors, &mut rng);
+            let truth = clean(&rig.setup, &[(row.position.x_m, 3.0)]);
+            row.reading = measure(&rig.setup.layout, &truth, &errors, &mut rng);
         }
-        let mut bench = known;
-        bench.force_n = force_known.then_some(3.0);
-        let mut locator = fit(InfluenceConfig { from, ..InfluenceConfig::default() }, &bench, &recording);
+        let mut setup = known;
+        setup.force_n = force_known.then_some(3.0);
+        let mut locator = fit(Influence { from, ..Influence::default() }, &setup, &recording);
         if let Some(channel) = faults.dead {
             assert!(locator.leave_out(channel));
-            rig.bench.layout.sensors[channel].channel.dead = true;
+            rig.setup.layout.sensors[channel].channel.dead = true;
         }
         for mm in (5..=395).step_by(3) {
             let x_m = f64::from(mm) / 1e3;
-            let limit_m = limit_m(&rig.bench, x_m, force_known);
+            let limit_m = limit_m(&rig.setup, x_m, force_known);
             if limit_m > 2e-3 {
                 continue;
             }
             for _ in 0..2 {
-                let truth = clean(&rig.bench, &[(x_m, 3.0)]);
-                let estimate = locator.locate(&measure(&rig.bench.layout, &truth, &errors, &mut rng));
+                let truth = clean(&rig.setup, &[(x_m, 3.0)]);
+                let estimate = locator.locate(&measure(&rig.setup.layout, &truth, &errors, &mut rng));
                 let (low, high) = estimate.contact.uncertainty.unwrap().x_95_m;
                 error_m += (estimate.contact.position.x_m - x_m).abs();
                 limit += limit_m * (2.0 / std::f64::consts::PI).sqrt();
@@ -165,11 +165,11 @@ fn unknown_gains_offsets_and_places_cost_little() {
 #[test]
 fn near_the_ends_left_and_right_are_ambiguous() {
     let rig = paper(5e-6, 10);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(3));
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(3));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     let (mut flips, mut ambiguous) = (0, 0);
     for _ in 0..400 {
-        let estimate = locator.locate(&noisy(&rig.bench, &[(1e-3, 3.0)], &mut rng));
+        let estimate = locator.locate(&noisy(&rig.setup, &[(1e-3, 3.0)], &mut rng));
         let flipped = estimate.contact.position.x_m > 0.2;
         flips += usize::from(flipped);
         ambiguous += usize::from(estimate.status == Status::Ambiguous);
@@ -190,12 +190,12 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
     let recording = rig.simulate(3);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(3.0), None] {
-        let bench = Bench { force_n, ..rig.bench.clone() };
-        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        let setup = Setup { force_n, ..rig.setup.clone() };
+        let locator = fit(Influence::default(), &setup, &recording);
         for _ in 0..100 {
-            let nothing = locator.locate(&noisy(&bench, &[], &mut rng));
+            let nothing = locator.locate(&noisy(&setup, &[], &mut rng));
             assert_eq!(nothing.status, Status::NoContact, "{force_n:?}: {nothing:?}");
-            let two = locator.locate(&noisy(&bench, &[(0.1, 3.0), (0.25, 2.0)], &mut rng));
+            let two = locator.locate(&noisy(&setup, &[(0.1, 3.0), (0.25, 2.0)], &mut rng));
             assert_eq!(two.status, Status::OutsideModel, "{force_n:?}: {two:?}");
         }
     }
@@ -204,21 +204,21 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 #[test]
 fn two_contacts_are_told_apart() {
     let rig = paper(5e-6, 10);
-    let config = InfluenceConfig { contacts: 3, ..InfluenceConfig::default() };
-    let bench = Bench { force_n: None, ..rig.bench.clone() };
-    let locator = fit(config, &bench, &rig.simulate(3));
+    let config = Influence { contacts: 3, ..Influence::default() };
+    let setup = Setup { force_n: None, ..rig.setup.clone() };
+    let locator = fit(config, &setup, &rig.simulate(3));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut right, mut near, mut count) = (0, 0, 0u32);
     for left_mm in (50..=250).step_by(25) {
         for right_mm in ((left_mm + 100)..=350).step_by(25) {
             let truth = [(f64::from(left_mm) / 1e3, 3.0), (f64::from(right_mm) / 1e3, 2.0)];
-            let estimate = locator.locate(&noisy(&bench, &truth, &mut rng));
+            let estimate = locator.locate(&noisy(&setup, &truth, &mut rng));
             count += 1;
             if let [further] = estimate.further.as_slice() {
                 right += 1;
-                near += usize::from(both_near(&bench, truth, [estimate.contact, *further]));
+                near += usize::from(both_near(&setup, truth, [estimate.contact, *further]));
             }
-            let alone = locator.locate(&noisy(&bench, &truth[..1], &mut rng));
+            let alone = locator.locate(&noisy(&setup, &truth[..1], &mut rng));
             assert!(alone.further.as_slice().is_empty(), "{truth:?}: {alone:?}");
         }
     }
@@ -228,8 +228,8 @@ fn two_contacts_are_told_apart() {
 }
 
 /// Whether both positions are within 3 × their limits, those of two places and two unknown forces at once.
-fn both_near(bench: &Bench, truth: [(f64, f64); 2], found: [ContactEstimate; 2]) -> bool {
-    let noise = bench.layout.sensors[0].channel.noise_sd;
+fn both_near(setup: &Setup, truth: [(f64, f64); 2], found: [ContactEstimate; 2]) -> bool {
+    let noise = setup.layout.sensors[0].channel.noise_sd;
     let columns: Vec<Vec<f64>> = (0..4)
         .map(|unknown| {
             let at = |side: f64| {
@@ -240,7 +240,7 @@ fn both_near(bench: &Bench, truth: [(f64, f64); 2], found: [ContactEstimate; 2])
                 } else {
                     contact.1 += side * 1e-6;
                 }
-                clean(bench, &contacts)
+                clean(setup, &contacts)
             };
             at(1.0).iter().zip(at(-1.0)).map(|(right, left)| (right - left) / (2e-6 * noise)).collect()
         })
@@ -256,7 +256,7 @@ fn both_near(bench: &Bench, truth: [(f64, f64); 2], found: [ContactEstimate; 2])
 #[test]
 fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let rig = paper(5e-6, 2);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<BeamLocator>(&json).unwrap(), locator);
     for (good, bad) in [("\"contacts\":1", "\"contacts\":9"), ("\"sensors\":8", "\"sensors\":7")] {
@@ -269,14 +269,14 @@ fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
 fn presses_that_say_too_little_are_refused() {
     let rig = paper(5e-6, 1);
     let mut recording = rig.simulate(1);
-    let refuse = |config: InfluenceConfig, bench: &Bench, recording: &Recording| {
-        config.fit_beam(FitTask::new(bench, recording)).unwrap_err()
+    let refuse = |config: Influence, setup: &Setup, recording: &Recording| {
+        config.fit_beam(FitTask::new(setup, recording)).unwrap_err()
     };
     let from = InfluenceSource::Recording;
     recording.rows.truncate(2);
-    let error = refuse(InfluenceConfig { from, ..InfluenceConfig::default() }, &rig.bench, &recording);
+    let error = refuse(Influence { from, ..Influence::default() }, &rig.setup, &recording);
     assert_eq!(error, InfluenceFitError::TooFewPositions { needed: 3, found: 2 });
     recording.rows[1].force_n = None;
-    let error = refuse(InfluenceConfig::default(), &rig.bench, &recording);
+    let error = refuse(Influence::default(), &rig.setup, &recording);
     assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
 }

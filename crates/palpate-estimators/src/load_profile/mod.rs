@@ -1,6 +1,6 @@
 //! Load profiles: how force is spread over a surface, from one reading.
 //!
-//! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. Few readings
+//! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. BoundedList readings
 //! do not tell a whole function, so p is sought among the non-negative ones that are as smooth as the reading allows:
 //!
 //! 1. p is a force in each of n cells ([`Cells`]); A holds each sensor's mean influence over each cell, in units of its noise.

@@ -12,13 +12,13 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
 /// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NeighboursConfig {
+pub struct Neighbours {
     /// Most neighbours to try, at least 1. Of k = 1, 2, … that which is nearest to the training rows in the root mean square
     /// is taken, each row located by the rows at other positions.
     pub most: usize,
 }
 
-impl Default for NeighboursConfig {
+impl Default for Neighbours {
     fn default() -> Self {
         Self { most: 64 }
     }
@@ -41,14 +41,14 @@ pub enum NeighboursFitError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Fit for NeighboursConfig {
+impl Fit for Neighbours {
     type Method = NeighboursLocator;
     type Error = NeighboursFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<NeighboursLocator, NeighboursFitError> {
         let recording = task.recording;
         recording.check_distinct_positions(2)?;
-        let features = Features::fit(FeatureKind::for_bench(task.bench), recording)?;
+        let features = Features::fit(FeatureKind::for_setup(task.setup), recording)?;
         let neighbour =
             |row: &Row| Neighbour { features: features.apply(&row.reading), position: row.position };
         let rows: Vec<Neighbour> = recording.rows.iter().map(neighbour).collect();
@@ -57,11 +57,11 @@ impl Fit for NeighboursConfig {
         let best = (0..errors.len()).min_by(|a, b| square(&errors[*a]).total_cmp(&square(&errors[*b])));
         let best = best.unwrap_or(0);
         Ok(NeighboursLocator {
-            extent: task.bench.surface.extent(),
+            extent: task.setup.surface.extent(),
             features,
             count: best + 1,
             rows,
-            force_n: task.bench.force_n,
+            force_n: task.setup.force_n,
             spread: errors.get(best).and_then(|errors| HeldOutSpread::of(errors)),
         })
     }

@@ -6,12 +6,12 @@ use super::search::{means, nearest};
 use crate::features::Features;
 use crate::fit::{Locate, LocatorFault};
 use crate::held_out::HeldOutSpread;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 
-/// Neighbours that locate; see [`NeighboursConfig`](super::NeighboursConfig).
+/// Neighbours that locate; see [`Neighbours`](super::Neighbours).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NeighboursLocator {
@@ -50,8 +50,8 @@ impl Locate for NeighboursLocator {
         Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.features.check(bench.layout.len())?;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.features.check(setup.layout.len())?;
         LocatorFault::check_numbers("count of neighbours", [self.count as f64], |k| k >= 1.0, "at least 1")?;
         LocatorFault::check_numbers("count of rows", [self.rows.len() as f64], |n| n >= 1.0, "at least 1")?;
         for row in &self.rows {

@@ -4,7 +4,7 @@ mod fitting;
 mod locator;
 mod search;
 
-pub use fitting::{NeighboursConfig, NeighboursFitError};
+pub use fitting::{Neighbours, NeighboursFitError};
 pub use locator::{Neighbour, NeighboursLocator};
 
 #[cfg(test)]

@@ -3,15 +3,15 @@
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
-fn bench(force_n: Option<f64>) -> Bench {
+fn setup(force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
     let surface = SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: Some(0.1) });
-    Bench { surface, layout, force_n, columns: None }
+    Setup { surface, layout, force_n, columns: None }
 }
 
 /// Readings turn with the position and grow with the force.
@@ -20,7 +20,7 @@ fn row(x_m: f64, y_m: f64, force_n: f64) -> Row {
     Row {
         position: Position { x_m, y_m },
         force_n: Some(force_n),
-        hidden: None,
+        nuisance: None,
         reading: vec![size * angle.cos(), size * angle.sin()],
     }
 }
@@ -31,22 +31,22 @@ fn grid(force_n: f64) -> Vec<Row> {
         .collect()
 }
 
-fn fit(bench: &Bench, rows: Vec<Row>) -> Result<NeighboursLocator, NeighboursFitError> {
+fn fit(setup: &Setup, rows: Vec<Row>) -> Result<NeighboursLocator, NeighboursFitError> {
     let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };
     let recording =
-        Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance };
-    let task = FitTask::new(bench, &recording);
-    let locator = NeighboursConfig::default().fit_method(task)?;
-    assert_eq!(locator.check(bench), Ok(()));
+        Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance };
+    let task = FitTask::new(setup, &recording);
+    let locator = Neighbours::default().fit_method(task)?;
+    assert_eq!(locator.check(setup), Ok(()));
     let text = serde_json::to_string(&locator).unwrap();
-    assert_eq!(serde_json::from_str::<NeighboursLocator>(&text).unwrap().check(bench), Ok(()));
+    assert_eq!(serde_json::from_str::<NeighboursLocator>(&text).unwrap().check(setup), Ok(()));
     Ok(locator)
 }
 
 #[test]
 fn a_training_reading_comes_back_exactly() {
-    let bench = bench(Some(1.0));
-    let locator = fit(&bench, grid(1.0)).unwrap();
+    let setup = setup(Some(1.0));
+    let locator = fit(&setup, grid(1.0)).unwrap();
     for row in grid(1.0) {
         assert_eq!(locator.locate(&row.reading).contact.position, row.position);
     }
@@ -54,7 +54,7 @@ fn a_training_reading_comes_back_exactly() {
 
 #[test]
 fn between_presses_it_is_within_a_pitch_and_its_interval_covers() {
-    let locator = fit(&bench(Some(1.0)), grid(1.0)).unwrap();
+    let locator = fit(&setup(Some(1.0)), grid(1.0)).unwrap();
     let mut covered = 0;
     for i in 0..100 {
         let truth = row(0.005 + 0.0009 * f64::from(i), 0.095 - 0.0009 * f64::from(i), 1.0);
@@ -70,7 +70,7 @@ fn between_presses_it_is_within_a_pitch_and_its_interval_covers() {
 fn at_unknown_force_only_the_direction_and_the_size_count() {
     let rows: Vec<Row> =
         (0..=20).map(|i| row(f64::from(i) * 0.005, 0.0, 1.0 + f64::from(i % 2) * 1e-9)).collect();
-    let locator = fit(&bench(None), rows).unwrap();
+    let locator = fit(&setup(None), rows).unwrap();
     for i in 0..=20 {
         let heavy = row(f64::from(i) * 0.005, 0.0, 1.0 + f64::from(i % 2) * 1e-9);
         let off_m = locator.locate(&heavy.reading).contact.position.distance_m(heavy.position);
@@ -83,27 +83,27 @@ fn at_unknown_force_only_the_direction_and_the_size_count() {
 fn repeats_do_not_vouch_for_their_own_position() {
     // Ten repeats a position: were a row judged by its repeats, one neighbour would look perfect.
     let rows: Vec<Row> = (0..10).flat_map(|i| vec![row(0.01 * f64::from(i), 0.0, 1.0); 10]).collect();
-    let locator = fit(&bench(Some(1.0)), rows).unwrap();
+    let locator = fit(&setup(Some(1.0)), rows).unwrap();
     assert!(locator.count > 10, "{}", locator.count);
     assert!(locator.spread.unwrap().rms_m[0] > 1e-3);
 }
 
 #[test]
 fn what_cannot_be_compared_is_named() {
-    let error = fit(&bench(None), vec![row(0.01, 0.0, 1.0); 5]).unwrap_err();
+    let error = fit(&setup(None), vec![row(0.01, 0.0, 1.0); 5]).unwrap_err();
     assert_eq!(error.to_string(), "the recording has 1 distinct positions; at least 2 are needed");
     let alike = Row { position: Position::along(0.05), ..row(0.01, 0.0, 1.0) };
-    let error = fit(&bench(None), vec![row(0.01, 0.0, 1.0), alike]).unwrap_err();
+    let error = fit(&setup(None), vec![row(0.01, 0.0, 1.0), alike]).unwrap_err();
     assert!(matches!(error, NeighboursFitError::Features(_)), "{error}");
 }
 
 #[test]
 fn a_file_with_the_wrong_numbers_is_refused() {
-    let bench = bench(Some(1.0));
-    let locator = fit(&bench, grid(1.0)).unwrap();
-    assert!(NeighboursLocator { count: 0, ..locator.clone() }.check(&bench).is_err());
-    assert!(NeighboursLocator { rows: vec![], ..locator.clone() }.check(&bench).is_err());
+    let setup = setup(Some(1.0));
+    let locator = fit(&setup, grid(1.0)).unwrap();
+    assert!(NeighboursLocator { count: 0, ..locator.clone() }.check(&setup).is_err());
+    assert!(NeighboursLocator { rows: vec![], ..locator.clone() }.check(&setup).is_err());
     let mut short = locator;
     short.rows[0].features.pop();
-    assert!(short.check(&bench).is_err());
+    assert!(short.check(&setup).is_err());
 }

@@ -5,7 +5,7 @@ use super::{Activation, Precision};
 /// A feed-forward network and how it is trained. The default is the founding paper's: one hidden layer of ten
 /// logistic nodes, a logistic output, and back-propagation with learning rate 0.7 and momentum 0.9.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NetworkConfig {
+pub struct Network {
     /// Nodes of each hidden layer, input side first.
     pub hidden: Vec<usize>,
     /// Activation of every hidden layer.
@@ -24,7 +24,7 @@ pub struct NetworkConfig {
     pub precision: Precision,
 }
 
-impl Default for NetworkConfig {
+impl Default for Network {
     fn default() -> Self {
         Self {
             hidden: vec![10],

@@ -1,7 +1,7 @@
 //! From a recording to training patterns, and from trained weights to a locator.
 
 use super::{
-    InputScale, InstructionSet, NetworkConfig, NetworkLocator, NetworkParts, OutputCoding, Patterns,
+    InputScale, InstructionSet, Network, NetworkLocator, NetworkParts, OutputCoding, Patterns,
     Topology, TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
 };
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
@@ -59,7 +59,7 @@ pub struct NetworkFitting {
     extent: Extent,
 }
 
-impl Fit for NetworkConfig {
+impl Fit for Network {
     type Method = NetworkLocator;
     type Error = NetworkFitError;
 
@@ -79,7 +79,7 @@ impl Fit for NetworkConfig {
     }
 }
 
-impl NetworkConfig {
+impl Network {
     /// [`Fit::fit_many`] by an instruction set of the caller's.
     ///
     /// # Errors
@@ -138,9 +138,9 @@ impl NetworkFitting {
     ///
     /// # Errors
     /// [`NetworkFitError`] as for [`NetworkFitting::prepare`].
-    pub fn of(config: &NetworkConfig, task: FitTask) -> Result<Self, NetworkFitError> {
-        let surface = &task.bench.surface;
-        Self::prepare(config, surface.extent(), surface.model(), task.bench.force_n, task.recording)
+    pub fn of(config: &Network, task: FitTask) -> Result<Self, NetworkFitError> {
+        let surface = &task.setup.surface;
+        Self::prepare(config, surface.extent(), surface.model(), task.setup.force_n, task.recording)
     }
 
     /// Codes a recording of a surface (with its model, where it has one, and its known force in newtons).
@@ -148,7 +148,7 @@ impl NetworkFitting {
     /// # Errors
     /// [`NetworkFitError`] when there are no rows, too many, or a channel whose scale is 0.
     pub fn prepare(
-        config: &NetworkConfig,
+        config: &Network,
         extent: Extent,
         model: Option<&dyn Surface>,
         force_n: Option<f64>,

@@ -2,7 +2,7 @@
 
 use super::{PreparedNetwork, Topology, TrainingOutcome};
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -124,7 +124,7 @@ impl Locate for NetworkLocator {
         Estimate::of_position(position, if on_surface { Status::Located } else { Status::OutsideSurface })
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.parts.check_numbers(bench.layout.len())
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.parts.check_numbers(setup.layout.len())
     }
 }

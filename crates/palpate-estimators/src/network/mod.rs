@@ -13,12 +13,12 @@ mod scalar;
 mod topology;
 mod train;
 
-pub use config::{BackPropagation, InputScale, NetworkConfig, OutputCoding, PresentationOrder};
+pub use config::{BackPropagation, InputScale, Network, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
 pub use forward::BatchNetwork;
 pub use lanes::{InstructionSet, Precision};
 pub use levenberg_marquardt::{
-    LevenbergMarquardtConfig, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
+    LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
 };
 pub use locator::{ChannelScaling, NetworkLocator, NetworkParts};

@@ -1,6 +1,6 @@
 //! The shape of a network: how many nodes each layer has and where their weights lie.
 
-use super::{Activation, NetworkConfig};
+use super::{Activation, Network};
 
 /// Layer sizes, activations and biases of a fully connected feed-forward network.
 ///
@@ -20,7 +20,7 @@ pub struct Topology {
 
 impl Topology {
     /// The topology that `config` asks for between `inputs` readings and `outputs` coordinates.
-    pub fn new(config: &NetworkConfig, inputs: usize, outputs: usize) -> Self {
+    pub fn new(config: &Network, inputs: usize, outputs: usize) -> Self {
         let sizes = std::iter::once(inputs).chain(config.hidden.iter().copied()).chain([outputs]).collect();
         Self {
             sizes,

@@ -25,9 +25,9 @@ pub struct Columns {
     pub channels: Vec<ValueColumn>,
     /// Where the contact force stands, if anywhere.
     pub force: Option<ForceColumn>,
-    /// Where the hidden coordinate stands, if anywhere; see [`Row::hidden`](super::Row::hidden).
+    /// Where the nuisance coordinate stands, if anywhere; see [`Row::nuisance`](super::Row::nuisance).
     #[serde(default)]
-    pub hidden: Option<ValueColumn>,
+    pub nuisance: Option<ValueColumn>,
 }
 
 /// How a file's coordinates become positions on the surface: rounded, then less the origin.
@@ -176,7 +176,7 @@ impl Columns {
             frame: Frame::default(),
             channels,
             force: None,
-            hidden: None,
+            nuisance: None,
         }
     }
 
@@ -187,10 +187,10 @@ impl Columns {
         Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
     }
 
-    /// The same with a hidden coordinate in this column and unit; see [`Row::hidden`](super::Row::hidden).
+    /// The same with a nuisance coordinate in this column and unit; see [`Row::nuisance`](super::Row::nuisance).
     #[must_use]
-    pub fn hidden(self, column: impl Into<Column>, unit: Unit) -> Self {
-        Self { hidden: Some(ValueColumn { column: column.into(), unit }), ..self }
+    pub fn nuisance(self, column: impl Into<Column>, unit: Unit) -> Self {
+        Self { nuisance: Some(ValueColumn { column: column.into(), unit }), ..self }
     }
 
     /// The same with coordinates of the file's own frame.
@@ -224,7 +224,7 @@ impl Columns {
             frame: Frame::default(),
             channels: channels.collect(),
             force: Some(ForceColumn { values: force, need: Need::Optional }),
-            hidden: None,
+            nuisance: None,
         }
     }
 }

@@ -38,8 +38,8 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         Ok((ContactFields::find(head, schema.columns)?, ChannelFields::find(head, schema.columns)?))
     };
     let rows = file.rows(schema.columns.header, find, |cells, (contact, channels)| {
-        let Touch { position, force_n, hidden } = contact.touch(cells, schema)?;
-        Ok(Row { position, force_n, hidden, reading: channels.reading(cells)? })
+        let Touch { position, force_n, nuisance } = contact.touch(cells, schema)?;
+        Ok(Row { position, force_n, nuisance, reading: channels.reading(cells)? })
     })?;
     Ok(schema.recording(source.to_owned(), rows, vec![file.digest]))
 }
@@ -75,7 +75,7 @@ pub fn read_pair(
         return Err(problem.of_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let row = |(reading, Touch { position, force_n, hidden })| Row { position, force_n, hidden, reading };
+    let row = |(reading, Touch { position, force_n, nuisance })| Row { position, force_n, nuisance, reading };
     let rows = rows.map(row).collect();
     Ok(schema.recording(source, rows, vec![readings.digest, contacts.digest]))
 }
@@ -154,7 +154,7 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
 pub(super) struct Touch {
     pub position: Position,
     pub force_n: Option<f64>,
-    hidden: Option<f64>,
+    nuisance: Option<f64>,
 }
 
 /// Which fields of a row say where and how hard the contact was.
@@ -165,7 +165,7 @@ pub(super) struct ContactFields {
     position_unit: Unit,
     frame: Frame,
     force: Option<(usize, Unit)>,
-    hidden: Option<(usize, Unit)>,
+    nuisance: Option<(usize, Unit)>,
 }
 
 impl ContactFields {
@@ -181,9 +181,9 @@ impl ContactFields {
             }
             _ => None,
         };
-        let hidden = columns.hidden.as_ref().map(|hidden| Ok((find(&hidden.column)?, hidden.unit)));
+        let nuisance = columns.nuisance.as_ref().map(|nuisance| Ok((find(&nuisance.column)?, nuisance.unit)));
         let (position_unit, frame) = (columns.position_unit, columns.frame);
-        Ok(Self { x, y, position_unit, frame, force, hidden: hidden.transpose()? })
+        Ok(Self { x, y, position_unit, frame, force, nuisance: nuisance.transpose()? })
     }
 
     pub fn touch(&self, cells: &Cells, schema: &Schema) -> Result<Touch, CsvError> {
@@ -196,7 +196,7 @@ impl ContactFields {
             return Err(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent }));
         }
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
-        let hidden = self.hidden.map(|(field, unit)| cells.number(field, unit)).transpose()?;
-        Ok(Touch { position, force_n: force_n.or(schema.known_force_n), hidden })
+        let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
+        Ok(Touch { position, force_n: force_n.or(schema.known_force_n), nuisance })
     }
 }

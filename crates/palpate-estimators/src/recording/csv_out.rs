@@ -7,7 +7,7 @@ use super::{Recording, Row};
 use palpate_mechanics::surface::Extent;
 
 /// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the force
-/// column is written where every row has a force, a hidden coordinate never. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes from, in a
+/// column is written where every row has a force, a nuisance coordinate never. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes from, in a
 /// first line that begins with `#`.
 ///
 /// # Errors

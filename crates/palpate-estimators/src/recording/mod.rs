@@ -49,7 +49,7 @@ pub struct Row {
     pub force_n: Option<f64>,
     /// Something else about the contact that shapes the reading, is known here, and is unknown when a reading is to be
     /// located: the depth of indentation, say. In the SI unit of its column; `None` where the recording has no such column.
-    pub hidden: Option<f64>,
+    pub nuisance: Option<f64>,
     /// One finite value per channel, in the SI unit of its kind (or raw).
     pub reading: Vec<f64>,
 }

@@ -27,7 +27,7 @@ fn foreign() -> Columns {
             need: Need::Required,
         }),
         frame: Frame::default(),
-        hidden: None,
+        nuisance: None,
     }
 }
 
@@ -54,7 +54,7 @@ fn columns_are_mapped_and_others_ignored() {
     let row = |x_m, force_n, reading: [f64; 2]| Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
-        hidden: None,
+        nuisance: None,
         reading: reading.to_vec(),
     };
     assert_eq!(recording.rows, [row(0.01, 1.0, [1.5, 2.5]), row(0.012, 3.0, [1.25, 2.25])]);
@@ -174,7 +174,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
     let rows = (0..50).map(|row| Row {
         position: Position::along(0.01 * (row % 10) as f64),
         force_n: None,
-        hidden: None,
+        nuisance: None,
         reading: vec![(row % 10) as f64 + 0.001 * ((row * 7919) % 13) as f64, reading(row % 10, row / 10)],
     });
     let provenance = Provenance { source: "sweeps".to_owned(), rows: 50, digests: Vec::new(), seed: None };
@@ -216,7 +216,7 @@ proptest! {
         let rows = rows.into_iter().map(|(x_m, force_n, reading)| Row {
             position: Position::along(x_m),
             force_n: Some(force_n),
-            hidden: None,
+            nuisance: None,
             reading: reading.to_vec(),
         });
         let rows: Vec<Row> = rows.collect();

@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{CleanSensors, SimulateError};
 use crate::recording::{Provenance, Recording, Row, TimedRecording};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 use palpate_mechanics::surface::Motion;
@@ -71,13 +71,13 @@ impl MovingContacts {
 /// # Errors
 /// [`SimulateError`] when the bench has no force or no model.
 pub fn simulate_moving(
-    bench: &Bench,
+    setup: &Setup,
     moving: &MovingContacts,
     seed: u64,
 ) -> Result<TimedRecording, SimulateError> {
-    let force_n = bench.force_n.ok_or(SimulateError::NoForce)?;
-    let surface = bench.surface.model().ok_or(SimulateError::NoModel)?;
-    let layout = &bench.layout;
+    let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
+    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
+    let layout = &setup.layout;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::draw(layout, &mut rng);
     let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;
@@ -93,7 +93,7 @@ pub fn simulate_moving(
         let clean = under.reading(layout, &contacts, since_s);
         let reading = measure(layout, &clean, &errors, &mut rng);
         let Contact { position, force_n } = contacts[0];
-        rows.push(Row { position, force_n: Some(force_n), hidden: None, reading });
+        rows.push(Row { position, force_n: Some(force_n), nuisance: None, reading });
         second.extend(contacts.get(1));
     }
     let provenance =

@@ -54,7 +54,7 @@ impl<L: ?Sized> Births<'_, L> {
 /// The force that fits a place, from a fit of one near it; its number is the third.
 pub(super) fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
     let information = fit.information[2][2];
-    if information > 0.0 { (near_n + fit.pull[2] / information).max(0.0) } else { near_n }
+    if information > 0.0 { (near_n + fit.score[2] / information).max(0.0) } else { near_n }
 }
 
 impl Births<'_, dyn LineLikelihood + '_> {

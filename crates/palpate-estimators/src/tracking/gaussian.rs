@@ -75,8 +75,8 @@ impl<const N: usize> Gaussian<N> {
         seen: &[usize; K],
     ) -> (Self, f64) {
         let delta: [f64; K] = std::array::from_fn(|k| self.mean[seen[k]] - about[k]);
-        let pull: [f64; K] = std::array::from_fn(|k| fit.pull[k] - dot(&fit.information[k], &delta));
-        let misfit = fit.misfit - (0..K).map(|k| delta[k] * (fit.pull[k] + pull[k])).sum::<f64>();
+        let score: [f64; K] = std::array::from_fn(|k| fit.score[k] - dot(&fit.information[k], &delta));
+        let misfit = fit.misfit - (0..K).map(|k| delta[k] * (fit.score[k] + score[k])).sum::<f64>();
         let root = Ldl::semidefinite(&fit.information).root();
         let mut y: [[f64; K]; N] = std::array::from_fn(|i| {
             std::array::from_fn(|c| (c..K).map(|k| self.covariance[i][seen[k]] * root[k][c]).sum())
@@ -96,9 +96,9 @@ impl<const N: usize> Gaussian<N> {
             }
         }
         let moved: [f64; N] =
-            std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][seen[k]] * pull[k]).sum());
+            std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][seen[k]] * score[k]).sum());
         after.mean.iter_mut().zip(&moved).for_each(|(mean, moved)| *mean += moved);
-        let explained: f64 = (0..K).map(|k| pull[k] * moved[seen[k]]).sum();
+        let explained: f64 = (0..K).map(|k| score[k] * moved[seen[k]]).sum();
         (after, -0.5 * (grown.log_determinant() + misfit - explained))
     }
 
@@ -149,8 +149,8 @@ impl<const N: usize> Gaussian<N> {
         let [own, before] = [self, other].map(|belief| Ldl::semidefinite(&belief.covariance).inverse());
         let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
         let information = std::array::from_fn(|i| std::array::from_fn(|j| own[i][j] - before[i][j]));
-        let pull = std::array::from_fn(|i| dot(&before[i], &moved));
-        (ContactFit { misfit: 0.0, pull, information }, self.mean)
+        let score = std::array::from_fn(|i| dot(&before[i], &moved));
+        (ContactFit { misfit: 0.0, score, information }, self.mean)
     }
 }
 
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_reading_of_the_position_alone_is_the_textbook_s_kalman_filter() {
-        let fit = ContactFit { misfit: 4.0, pull: [2e3, 0.0], information: [[1e6, 0.0], [0.0, 0.0]] };
+        let fit = ContactFit { misfit: 4.0, score: [2e3, 0.0], information: [[1e6, 0.0], [0.0, 0.0]] };
         // One measurement z of x with variance 1e-6, (z − 0.2)² / 1e-6 = 4: z = 0.202.
         let (after, evidence) = BELIEF.updated(&fit, &[0.2, 3.0], &[0, 2]);
         let (innovation, spread) = (2e-3, 5e-6);
@@ -181,11 +181,11 @@ mod tests {
 
     #[test]
     fn where_a_misfit_is_expanded_does_not_matter_while_it_is_a_parabola() {
-        let (information, pull, misfit) = ([[1e6, 2e2], [2e2, 50.0]], [7e2, -1.5], 9.0);
+        let (information, score, misfit) = ([[1e6, 2e2], [2e2, 50.0]], [7e2, -1.5], 9.0);
         let moved = |delta: [f64; 2]| {
             let by: [f64; 2] = std::array::from_fn(|k| dot(&information[k], &delta));
-            let misfit = misfit - 2.0 * dot(&pull, &delta) + dot(&delta, &by);
-            ContactFit { misfit, pull: [pull[0] - by[0], pull[1] - by[1]], information }
+            let misfit = misfit - 2.0 * dot(&score, &delta) + dot(&delta, &by);
+            ContactFit { misfit, score: [score[0] - by[0], score[1] - by[1]], information }
         };
         let (here, one) = BELIEF.updated(&moved([0.0; 2]), &[0.2, 3.0], &[0, 2]);
         let (there, other) = BELIEF.updated(&moved([1e-3, 0.1]), &[0.201, 3.1], &[0, 2]);

@@ -67,7 +67,7 @@ impl<'a> Tracker<'a> {
         let mut whitened = std::mem::take(&mut self.whitened);
         self.likelihood.whiten(reading, &mut whitened);
         let alone = self.likelihood.locate_alone(reading);
-        let newborn = self.let_time_pass(duration_s);
+        let newborn = self.predict(duration_s);
         let seen =
             Seen { likelihood: self.likelihood, whitened: &whitened, swings: self.config.swing.is_some() };
         let born = self.births(newborn, seen, &alone);
@@ -102,7 +102,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// Moves every hypothesis, and lets contacts come and go.
-    fn let_time_pass(&mut self, duration_s: Option<f64>) -> Newborn {
+    fn predict(&mut self, duration_s: Option<f64>) -> Newborn {
         // Before the first reading, any number of contacts is as probable.
         let Some(duration_s) = duration_s else {
             let each = -((1 + self.most_contacts()) as f64).ln();

@@ -53,7 +53,7 @@ impl Force {
 
 /// A surface with the sensors that are alive and the noise of each.
 #[derive(Clone)]
-pub struct Limit<'a> {
+pub struct CramerRaoBound<'a> {
     surface: &'a dyn Surface,
     channels: Vec<Channel<'a>>,
 }
@@ -68,7 +68,7 @@ struct Channel<'a> {
     range: Option<(f64, f64)>,
 }
 
-impl<'a> Limit<'a> {
+impl<'a> CramerRaoBound<'a> {
     /// The limit of a surface read by `layout`; dead channels are left out.
     ///
     /// # Errors

@@ -22,13 +22,13 @@ fn deflections(count: usize) -> Layout {
     with_noise(Layout::even(SensorKind::Deflection, count, BEAM.length_m), 5e-6)
 }
 
-fn sd_mm(limit: &Limit, a_mm: f64, force: Force) -> f64 {
+fn sd_mm(limit: &CramerRaoBound, a_mm: f64, force: Force) -> f64 {
     let contact = Contact { position: Position::along(a_mm * 1e-3), force_n: 3.0 };
     limit.at(contact, force).unwrap().sd_x_m * 1e3
 }
 
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
-    limit_warnings(&Limit::new(&BEAM, layout).unwrap(), 3.0, force).unwrap()
+    limit_warnings(&CramerRaoBound::new(&BEAM, layout).unwrap(), 3.0, force).unwrap()
 }
 
 /// The words of some warnings.
@@ -39,7 +39,7 @@ fn words(warnings: &[LimitWarning]) -> String {
 #[test]
 fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     let layout = deflections(8);
-    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
     // What physics allows at 5 µm and 3 N, from a calculation of its own.
     let known = [(1.0, 0.087), (50.0, 0.095), (100.0, 0.12), (200.0, 0.69)];
     let unknown = [(1.0, 8300.0), (20.0, 21.0), (50.0, 3.3), (200.0, 0.69)];
@@ -66,7 +66,7 @@ fn two_reactions_give_the_closed_form() {
     let mut layout = with_noise(Layout::even(SensorKind::Reaction, 2, BEAM.length_m), 0.01);
     layout.sensors[0].position = Position::along(0.0);
     layout.sensors[1].position = Position::along(0.4);
-    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
     for a_m in [0.0, 0.05, 0.2, 0.4] {
         let contact = Contact { position: Position::along(a_m), force_n: 3.0 };
         let known = limit.at(contact, Force::Known).unwrap();
@@ -127,7 +127,7 @@ fn pad_layout(positions: &[(f64, f64)]) -> Layout {
 fn a_plane_has_a_bound_in_both_directions() {
     let corners = [(0.01, 0.01), (0.05, 0.01), (0.01, 0.03), (0.05, 0.03)];
     let four = pad_layout(&corners);
-    let limit = Limit::new(&Pad, &four).unwrap();
+    let limit = CramerRaoBound::new(&Pad, &four).unwrap();
     let at = |x_m, y_m, force| limit.at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
     // In the centre of a symmetric layout x, y and force do not disturb each other: 1/√(Σ (∂y_i/∂x)²) each.
     let centre = at(0.03, 0.02, Force::Unknown).unwrap();
@@ -142,7 +142,7 @@ fn a_plane_has_a_bound_in_both_directions() {
     assert!(known.sd_x_m < unknown.sd_x_m && known.sd_position_m < unknown.sd_position_m);
     // Sensors on a line through the contact do not see it move across.
     let line = pad_layout(&corners.map(|(x_m, _)| (x_m, 0.02)));
-    let limit = Limit::new(&Pad, &line).unwrap();
+    let limit = CramerRaoBound::new(&Pad, &line).unwrap();
     let contact = Contact { position: Position { x_m: 0.03, y_m: 0.02 }, force_n: 2.0 };
     assert_eq!(limit.at(contact, Force::Known), None);
     let found = limit_warnings(&limit, 2.0, Force::Known).unwrap();
@@ -155,7 +155,7 @@ fn a_plane_has_a_bound_in_both_directions() {
 
 /// The position whose readings are nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around
 /// `near_m`: maximum likelihood, where the model is known. An unknown force is fitted along.
-fn most_likely(limit: &Limit, reading: &[f64], near_m: f64, step_m: f64, force: Force) -> f64 {
+fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64, force: Force) -> f64 {
     let cost = |a_m: f64| {
         let shape = limit.whitened_reading(Contact { position: Position::along(a_m), force_n: 3.0 });
         let scale = match force {
@@ -178,7 +178,7 @@ fn most_likely(limit: &Limit, reading: &[f64], near_m: f64, step_m: f64, force: 
 fn maximum_likelihood_spreads_as_the_limit_says() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(20);
     let layout = deflections(8);
-    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
     const DRAWS: usize = 4000;
     for (a_mm, force) in [
         (5.0, Force::Known),
@@ -211,7 +211,7 @@ proptest! {
     fn less_noise_more_force_and_more_sensors_lower_the_limit(a in 0.002..0.398_f64, factor in 1.5..10.0_f64) {
         let at = |layout: &Layout, force_n, force| {
             let contact = Contact { position: Position::along(a), force_n };
-            Limit::new(&BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
+            CramerRaoBound::new(&BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
         };
         let layout = deflections(8);
         for force in [Force::Known, Force::Unknown] {
@@ -221,7 +221,7 @@ proptest! {
             let mut more = layout.clone();
             more.sensors.extend(deflections(3).sensors);
             prop_assert!(at(&more, 3.0, force) < limit);
-            let mirrored = Limit::new(&BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
+            let mirrored = CramerRaoBound::new(&BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
             prop_assert!((mirrored.unwrap().sd_x_m / limit - 1.0).abs() < 1e-4);
         }
         prop_assert!(at(&layout, 3.0, Force::Known) <= at(&layout, 3.0, Force::Unknown) * (1.0 + 1e-9));
@@ -236,13 +236,13 @@ fn a_dead_channel_counts_as_if_it_were_not_there() {
     dead.sensors[2].channel.noise_sd = 0.0;
     let mut without = deflections(8);
     without.sensors.remove(2);
-    let (dead, without) = (Limit::new(&BEAM, &dead).unwrap(), Limit::new(&BEAM, &without).unwrap());
+    let (dead, without) = (CramerRaoBound::new(&BEAM, &dead).unwrap(), CramerRaoBound::new(&BEAM, &without).unwrap());
     assert_eq!(dead.alive(), 7);
     for force in [Force::Known, Force::Unknown] {
         assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));
     }
     let whole = deflections(8);
-    let whole = Limit::new(&BEAM, &whole).unwrap();
+    let whole = CramerRaoBound::new(&BEAM, &whole).unwrap();
     assert!(sd_mm(&dead, 130.0, Force::Known) > sd_mm(&whole, 130.0, Force::Known));
 }
 
@@ -250,13 +250,13 @@ fn a_dead_channel_counts_as_if_it_were_not_there() {
 fn quantisation_is_noise_of_a_twelfth_of_its_square() {
     let mut coarse = with_noise(deflections(8), 3e-6);
     coarse.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 4e-6 * 12f64.sqrt());
-    let (coarse, plain) = (Limit::new(&BEAM, &coarse).unwrap(), deflections(8));
-    let plain = Limit::new(&BEAM, &plain).unwrap();
+    let (coarse, plain) = (CramerRaoBound::new(&BEAM, &coarse).unwrap(), deflections(8));
+    let plain = CramerRaoBound::new(&BEAM, &plain).unwrap();
     let ratio = sd_mm(&coarse, 70.0, Force::Known) / sd_mm(&plain, 70.0, Force::Known);
     assert!((ratio - 1.0).abs() < 1e-12);
     let mut silent = with_noise(deflections(8), 0.0);
     silent.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 1e-6);
-    assert!(Limit::new(&BEAM, &silent).is_ok());
+    assert!(CramerRaoBound::new(&BEAM, &silent).is_ok());
 }
 
 #[test]
@@ -267,7 +267,7 @@ fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
     without.sensors.remove(3);
     let whole = deflections(8);
     let [saturating, without, whole] = [saturating, without, whole].map(|layout| {
-        let limit = Limit::new(&BEAM, &layout).unwrap();
+        let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
         [10.0, 200.0].map(|a_mm| sd_mm(&limit, a_mm, Force::Known))
     });
     assert_eq!(saturating[1], without[1], "3 N at mid-span lower sensor 4 by more than 1 mm");
@@ -282,10 +282,10 @@ fn what_has_no_limit_says_why() {
     one_clean.sensors[4].channel.noise_sd = 0.0;
     let mut dead = deflections(2);
     dead.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
-    let said = |layout: &Layout| Limit::new(&BEAM, layout).err().unwrap().to_string();
+    let said = |layout: &Layout| CramerRaoBound::new(&BEAM, layout).err().unwrap().to_string();
     let no_model = LimitError::NoModel.to_string();
     let layout = deflections(8);
-    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
     let force = |force_n| LimitCurve::over(&limit, force_n, Force::Known).unwrap_err().to_string();
     let every = |every_m| LimitCurve::every(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
     insta::assert_snapshot!(
@@ -306,7 +306,7 @@ fn what_has_no_limit_says_why() {
 #[test]
 fn no_information_is_none_and_never_infinite() {
     let layout = deflections(8);
-    let limit = Limit::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
     let at = |x_m, force_n, force| limit.at(Contact { position: Position::along(x_m), force_n }, force);
     assert_eq!(at(0.0, 3.0, Force::Unknown), None);
     assert_eq!(at(0.4, 3.0, Force::Unknown), None);
@@ -315,7 +315,7 @@ fn no_information_is_none_and_never_infinite() {
     assert!(at(0.0, 3.0, Force::Known).is_some(), "the beam tilts when a known force leaves its support");
     // One sensor cannot tell two numbers; nor can it see a small move of a force right above it.
     let one = deflections(1);
-    let one = Limit::new(&BEAM, &one).unwrap();
+    let one = CramerRaoBound::new(&BEAM, &one).unwrap();
     let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
     assert_eq!(one.at(contact(0.1), Force::Unknown), None);
     assert_eq!(one.at(contact(0.2), Force::Known), None);

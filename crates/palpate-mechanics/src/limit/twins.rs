@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use super::information::norm;
-use super::{Force, Limit};
+use super::{Force, CramerRaoBound};
 use crate::contact::{Contact, Position};
 use palpate_numerics::small::dot;
 
@@ -24,7 +24,7 @@ pub(super) struct Twin {
 /// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second one may have any force, and
 /// what is left is the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
 pub(super) struct TwinSearch<'a> {
-    limit: &'a Limit<'a>,
+    limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
     /// Two contacts further apart than this are told apart.
@@ -37,7 +37,7 @@ pub(super) struct TwinSearch<'a> {
 }
 
 impl<'a> TwinSearch<'a> {
-    pub fn new(limit: &'a Limit<'a>, force_n: f64, force: Force, bound: f64) -> Self {
+    pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force, bound: f64) -> Self {
         let grid = Grid::over(limit.surface.extent());
         let mut search = Self { limit, force_n, force, bound, grid, shapes: Vec::new(), spreads: Vec::new() };
         search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();

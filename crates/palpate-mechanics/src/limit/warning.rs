@@ -6,7 +6,7 @@ use super::curve::check_force;
 use super::grid::Grid;
 use super::twins::{Twin, TwinSearch};
 use super::zone::{Zone, zones};
-use super::{Force, Limit, LimitError};
+use super::{Force, CramerRaoBound, LimitError};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 
@@ -79,7 +79,7 @@ pub enum LimitWarning {
 ///
 /// # Errors
 /// [`LimitError::Force`] for a force that is not positive and finite.
-pub fn limit_warnings(limit: &Limit, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
+pub fn limit_warnings(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
     // A support that stands between the positions of the grid could be missed: next to it little may be told.
     let grid = Grid::over(limit.surface.extent()).with(&limit.surface.force_supports());
@@ -92,7 +92,7 @@ pub fn limit_warnings(limit: &Limit, force_n: f64, force: Force) -> Result<Vec<L
 
 /// One look all over the surface.
 struct Survey<'a> {
-    limit: &'a Limit<'a>,
+    limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
     grid: Grid,
@@ -140,7 +140,7 @@ impl Survey<'_> {
     /// Whether some support's reaction changes with a contact's position, or tells a force that is not known. That of a clamp
     /// which alone holds the surface is the force, wherever that acts.
     fn reactions_tell(&self, at: Position) -> bool {
-        let Limit { surface, .. } = self.limit;
+        let CramerRaoBound { surface, .. } = self.limit;
         let supports = surface.force_supports();
         let changes = |support: &Position| {
             let [along, across] = surface.influence_function(SensorKind::Reaction, *support).gradient(at);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, NothingToRead, Surface, first_not_positive};
+use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface, first_not_positive};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
@@ -211,10 +211,10 @@ impl Surface for Beam {
     }
 
     /// Supports hold the deflection, and leave nothing to bend.
-    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
+    fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
         let held =
             matches!(kind, SensorKind::Deflection | SensorKind::Strain) && self.is_supported_at(sensor);
-        held.then_some(NothingToRead::Held { kind })
+        held.then_some(InsensitiveSensor::Held { kind })
     }
 
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;

@@ -7,7 +7,7 @@ mod extent;
 mod load;
 pub mod modal;
 mod motion;
-mod nothing_to_read;
+mod insensitive_sensor;
 pub mod plate;
 mod response;
 mod supported_beam;
@@ -19,7 +19,7 @@ pub use elastica::{Elastica, ForceDirection};
 pub use extent::Extent;
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
-pub use nothing_to_read::NothingToRead;
+pub use insensitive_sensor::InsensitiveSensor;
 pub use plate::{Plate, PlateError};
 pub use response::{Proportional, ResponseFunction, ResponseGradient};
 pub use supported_beam::{
@@ -69,7 +69,7 @@ pub trait Surface: Send + Sync {
     }
 
     /// Why a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
-    fn nothing_to_read(&self, _kind: SensorKind, _sensor: Position) -> Option<NothingToRead> {
+    fn insensitive_sensor(&self, _kind: SensorKind, _sensor: Position) -> Option<InsensitiveSensor> {
         None
     }
 

@@ -49,11 +49,11 @@ struct Paper<'a> {
 
 impl Paper<'_> {
     fn sections(&self) -> Vec<Section> {
-        let bench = self.bench().and_then(|(rig, _, force_n)| {
-            bench_figure("The bench", &rig.bench.surface, &rig.bench.layout, force_n)
+        let setup = self.setup().and_then(|(rig, _, force_n)| {
+            bench_figure("The bench", &rig.setup.surface, &rig.setup.layout, force_n)
         });
         vec![
-            Section::new("sensor", "The sensor").text(self.sensor()).figure(bench),
+            Section::new("sensor", "The sensor").text(self.sensor()).figure(setup),
             Section::new("training", "How it learns")
                 .text(training())
                 .table(self.even_table())

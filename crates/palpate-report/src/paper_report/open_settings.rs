@@ -43,7 +43,7 @@ impl Paper<'_> {
 
     pub(super) fn open_table(&self) -> Table {
         let mut rows: Vec<Vec<Markup>> = Vec::new();
-        if let Some((rig, beam, force_n)) = self.bench() {
+        if let Some((rig, beam, force_n)) = self.setup() {
             rows.push(modulus_row(beam));
             rows.push(noise_row(rig));
             rows.push(cells("force", "3 N, known", &format!("{} N, known", stated(force_n))));
@@ -57,7 +57,7 @@ impl Paper<'_> {
 
     /// What the beam would do with the modulus as printed, unless the study uses it.
     fn why_not_the_printed_modulus(&self) -> Markup {
-        let Some((_, beam, force_n)) = self.bench() else { return Markup::default() };
+        let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
             return Markup::default();
         }
@@ -89,7 +89,7 @@ impl Paper<'_> {
         }
         let mut value = values.join(", or ");
         if key == "input_scale"
-            && let Some((_, beam, force_n)) = self.bench()
+            && let Some((_, beam, force_n)) = self.setup()
         {
             let full_scale_mm = force_n * beam.full_scale(SensorKind::Deflection) * 1e3;
             value += &format!("; the full scale of the deflection is {full_scale_mm:.4} mm");
@@ -108,7 +108,7 @@ fn modulus_row(beam: Beam) -> Vec<Markup> {
 }
 
 fn noise_row(rig: &Rig) -> Vec<Markup> {
-    let noisy = rig.bench.layout.sensors.iter().any(|sensor| sensor.channel != Default::default());
+    let noisy = rig.setup.layout.sensors.iter().any(|sensor| sensor.channel != Default::default());
     let study = if noisy {
         "the sensors have faults, as the study's file states"
     } else {

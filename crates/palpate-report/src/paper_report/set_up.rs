@@ -10,16 +10,16 @@ use palpate_rig::Rig;
 
 impl Paper<'_> {
     /// What is on the bench, where the surface is a beam. All arms of the paper share it.
-    pub(super) fn bench(&self) -> Option<(&Rig, Beam, f64)> {
+    pub(super) fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
-        let SurfaceSpec::Beam(beam) = rig.bench.surface else { return None };
-        Some((rig, beam, rig.bench.force_n?))
+        let SurfaceSpec::Beam(beam) = rig.setup.surface else { return None };
+        Some((rig, beam, rig.setup.force_n?))
     }
 
     /// Distance of neighbouring sensors in mm, where it is the same for all.
     pub(super) fn sensor_pitch_mm(&self) -> Option<String> {
-        let (rig, ..) = self.bench()?;
-        let positions: Vec<f64> = rig.bench.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+        let (rig, ..) = self.setup()?;
+        let positions: Vec<f64> = rig.setup.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
         let pitches: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let first = *pitches.first()?;
         pitches.iter().all(|pitch| (pitch - first).abs() < 1e-6).then(|| number(first * 1e3))
@@ -34,7 +34,7 @@ impl Paper<'_> {
                  how the pattern is interpreted more than of how many sensors there are, and there is no dead area between \
                  two of them."
             }
-            @if let Some((rig, beam, force_n)) = self.bench() { (bench_in_words(rig, beam, force_n)) }
+            @if let Some((rig, beam, force_n)) = self.setup() { (bench_in_words(rig, beam, force_n)) }
         }
     }
 
@@ -88,7 +88,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
             "The surface here is a beam, " (mm(beam.length_m)) " mm long, " (mm(beam.width_m)) " mm wide and "
             (mm(beam.thickness_m)) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa / 1e9))
             " GPa, on two wedges at its ends. "
-            (counted(rig.bench.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
+            (counted(rig.setup.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
             (stated(force_n)) " N, whose force is known, stands on it. With the load in the middle the beam sags by "
             (number(sag_mm)) " mm there."
         }
@@ -97,7 +97,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
 
 /// "deflection", or more where the sensors differ.
 fn kinds(rig: &Rig) -> String {
-    let mut names: Vec<&str> = rig.bench.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
+    let mut names: Vec<&str> = rig.setup.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();
     names.join(", ")
 }

@@ -29,7 +29,7 @@ impl Paper<'_> {
             let known = sets.iter_mut().find(|set| set.training == training);
             if let Some(set) = known {
                 set.arms.push(&arm.name);
-            } else if let Ok(positions) = training.positions(arm.rig.bench.surface.extent()) {
+            } else if let Ok(positions) = training.positions(arm.rig.setup.surface.extent()) {
                 sets.push(Set { arms: vec![&arm.name], training, positions });
             }
         }

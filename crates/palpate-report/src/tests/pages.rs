@@ -213,9 +213,9 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let rig =
         Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "50")).unwrap();
     let recording = rig.simulate(0).unwrap();
-    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
+    let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let positions: Vec<_> = recording.distinct_positions();
-    let other = simulate_at(&rig.bench, &positions, 3, 1).unwrap();
+    let other = simulate_at(&rig.setup, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
     for (recording, judged, said) in [
         (&recording, Judged::Locator(&locator), "this very recording"),
@@ -249,7 +249,7 @@ fn an_evaluation_of_nothing_has_a_report() {
     let rig =
         Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "5")).unwrap();
     let recording = rig.simulate(0).unwrap();
-    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
+    let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
         evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
@@ -263,12 +263,12 @@ fn an_evaluation_of_nothing_has_a_report() {
 
 /// The report of a rig's limit, for what is known of the force.
 fn limits(toml: &str, force: Force) -> Vec<ReportFile> {
-    let bench = Rig::from_toml(toml).unwrap().bench;
-    let limit = bench.cramer_rao_bound().unwrap();
+    let setup = Rig::from_toml(toml).unwrap().setup;
+    let limit = setup.cramer_rao_bound().unwrap();
     let curve = |force| LimitCurve::over(&limit, 3.0, force).unwrap();
     let files = limit_report(&LimitReport {
         title: "The limit of <paper>",
-        bench: &bench,
+        setup: &setup,
         limit: &limit,
         known: &curve(Force::Known),
         unknown: &curve(Force::Unknown),

@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use palpate_estimators::evaluation::Trial;
 use palpate_estimators::recording::{Provenance, Recording, Row};
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
@@ -41,12 +41,12 @@ impl ArraySensor {
     /// # Errors
     /// [`RigSimulationError`] for a rig without a model or training positions.
     pub fn like(rig: &Rig, count: usize, spread: Spread) -> Result<Self, RigSimulationError> {
-        let model = rig.bench.surface.model().ok_or(SimulateError::NoModel)?;
-        let force_n = rig.bench.force_n.ok_or(SimulateError::NoForce)?;
+        let model = rig.setup.surface.model().ok_or(SimulateError::NoModel)?;
+        let force_n = rig.setup.force_n.ok_or(SimulateError::NoForce)?;
         let training = rig.training()?;
         let length_m = model.length_m();
         let share = |sensor: &Sensor| sensor.channel.noise_sd / (force_n * model.full_scale(sensor.kind));
-        let noise_sd = rig.bench.layout.sensors.first().map_or(0.0, share);
+        let noise_sd = rig.setup.layout.sensors.first().map_or(0.0, share);
         let pitch_m = length_m / count as f64;
         let sensor = |i: usize| Sensor {
             kind: SensorKind::Raw,
@@ -54,7 +54,7 @@ impl ArraySensor {
             name: format!("raw_{}", i + 1),
             channel: ChannelModel { noise_sd, ..ChannelModel::default() },
         };
-        let bench = Bench {
+        let setup = Setup {
             surface: SurfaceSpec::Measured(Extent { length_m, width_m: None }),
             layout: Layout { sensors: (0..count).map(sensor).collect() },
             force_n: Some(force_n),
@@ -65,8 +65,8 @@ impl ArraySensor {
             Spread::Pitches(pitches) => pitches * pitch_m,
         };
         let (positions, repeats) =
-            (training.positions(bench.surface.extent()).map_err(SimulateError::from)?, training.repeats);
-        let rig = Rig { bench, loads: Vec::new(), ..rig.clone() };
+            (training.positions(setup.surface.extent()).map_err(SimulateError::from)?, training.repeats);
+        let rig = Rig { setup, loads: Vec::new(), ..rig.clone() };
         Ok(Self { rig, spread, spread_m, noise_sd, training: positions, repeats })
     }
 
@@ -85,7 +85,7 @@ impl ArraySensor {
 
     /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Trial> {
-        let length_m = self.rig.bench.surface.extent().length_m;
+        let length_m = self.rig.setup.surface.extent().length_m;
         let pressed: Vec<Position> =
             self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
         let judged: Vec<Position> =
@@ -99,7 +99,7 @@ impl ArraySensor {
     }
 
     fn recording(&self, positions: &[Position], seed: u64, rng: &mut Xoshiro256PlusPlus) -> Recording {
-        let layout = &self.rig.bench.layout;
+        let layout = &self.rig.setup.layout;
         let row = |position: &Position| {
             let reading = layout.sensors.iter().map(|sensor| {
                 let off = position.distance_m(sensor.position) / self.spread_m;
@@ -107,8 +107,8 @@ impl ArraySensor {
             });
             Row {
                 position: *position,
-                force_n: self.rig.bench.force_n,
-                hidden: None,
+                force_n: self.rig.setup.force_n,
+                nuisance: None,
                 reading: reading.collect(),
             }
         };

@@ -12,8 +12,8 @@ pub use folded::{FOLDS, Fold, FoldedErrors};
 
 use serde::Serialize;
 
-use palpate_estimators::centroid::CentroidConfig;
-use palpate_estimators::estimator::EstimatorConfig;
+use palpate_estimators::centroid::Centroid;
+use palpate_estimators::estimator::Estimator;
 use palpate_estimators::estimator::contenders;
 use palpate_estimators::evaluation::{Trial, try_estimator};
 use palpate_mechanics::sensing::{Layout, Sensor};
@@ -99,7 +99,7 @@ impl DeadAreas {
             for spread in [Spread::Metres(FIXED_SPREAD_M), Spread::Pitches(0.5)] {
                 let array = ArraySensor::like(&rig, count, spread)?;
                 let trials = array.trials(self.calibrations, self.seed);
-                let estimator = EstimatorConfig::Centroid(CentroidConfig);
+                let estimator = Estimator::Centroid(Centroid);
                 self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
             }
         }
@@ -110,7 +110,7 @@ impl DeadAreas {
     pub fn most_rounds(&self) -> u64 {
         let rounds = |count: &usize| {
             let estimators = self.estimators(&self.with_sensors(*count));
-            estimators.iter().map(EstimatorConfig::most_rounds).sum::<u64>()
+            estimators.iter().map(Estimator::most_rounds).sum::<u64>()
         };
         self.calibrations * self.counts.iter().map(rounds).sum::<u64>()
     }
@@ -118,20 +118,20 @@ impl DeadAreas {
     /// The rig with so many sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
-        let length_m = rig.bench.surface.extent().length_m;
-        if let Some(Sensor { kind, channel, .. }) = rig.bench.layout.sensors.first().cloned() {
-            rig.bench.layout = Layout::even(kind, count, length_m);
-            rig.bench.layout.sensors.iter_mut().for_each(|sensor| sensor.channel = channel);
+        let length_m = rig.setup.surface.extent().length_m;
+        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors.first().cloned() {
+            rig.setup.layout = Layout::even(kind, count, length_m);
+            rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel = channel);
         }
         rig
     }
 
-    fn estimators(&self, rig: &Rig) -> Vec<EstimatorConfig> {
+    fn estimators(&self, rig: &Rig) -> Vec<Estimator> {
         let rows = rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
-        let mut estimators = contenders(&rig.bench, &rig.estimator, rows);
+        let mut estimators = contenders(&rig.setup, &rig.estimator, rows);
         estimators.retain(|estimator| !self.without.contains(&estimator.kind()));
         for estimator in &mut estimators {
-            if let EstimatorConfig::Network(config) = estimator {
+            if let Estimator::Network(config) = estimator {
                 let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
                 config.training.max_epochs = config.training.max_epochs.min(most);
             }
@@ -144,13 +144,13 @@ impl DeadAreas {
         &self,
         sensing: &str,
         rig: &Rig,
-        estimator: &EstimatorConfig,
+        estimator: &Estimator,
         trials: &[Trial],
         findings: &mut DeadAreaFindings,
         watch: Watch,
     ) -> Result<(), Cancelled> {
-        let sensors = rig.bench.layout.len();
-        match try_estimator(&rig.bench, estimator, trials, self.seed, &|| 0.0, watch) {
+        let sensors = rig.setup.layout.len();
+        match try_estimator(&rig.setup, estimator, trials, self.seed, &|| 0.0, watch) {
             Ok(tried) => {
                 let evaluation = &tried.evaluation;
                 findings.rows.push(DeadAreaRow {
@@ -159,7 +159,7 @@ impl DeadAreas {
                     sensors,
                     effective_percent: evaluation.effective_percent(self.tolerance_m),
                     mean_error_m: evaluation.summary(None).map_or(f64::NAN, |summary| summary.average_m),
-                    folded: FoldedErrors::of(evaluation, &rig.bench.layout, self.tolerance_m),
+                    folded: FoldedErrors::of(evaluation, &rig.setup.layout, self.tolerance_m),
                 });
             }
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),

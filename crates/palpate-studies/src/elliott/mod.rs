@@ -12,12 +12,12 @@ pub use karhunen_loeve::KarhunenLoeve;
 use karhunen_loeve::{raw_layout, without_model};
 use serde::Serialize;
 
-use palpate_estimators::estimator::{EstimatorConfig, FitError, Locator, ReadingError, Track, TrackerConfig};
+use palpate_estimators::estimator::{Estimator, FitError, Locator, ReadingError, Track, TrackerConfig};
 use palpate_estimators::evaluation::{Evaluation, Spread, Trial};
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::network::{InputScale, NetworkConfig};
+use palpate_estimators::network::{InputScale, Network};
 use palpate_estimators::recording::TimedRecording;
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
 use palpate_estimators::track_errors::{FollowError, TrackErrors, follow};
 use palpate_mechanics::contact::{Contact, Position};
@@ -163,19 +163,19 @@ impl Elliott {
     /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
     /// are not there.
     pub fn run(&self, watch: Watch) -> Result<ElliottFindings, ElliottError> {
-        let sensors = self.rig.bench.layout.len();
+        let sensors = self.rig.setup.layout.len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
             return Err(ElliottError::Components { components, sensors });
         }
-        let noise_sd: Vec<f64> = self.rig.bench.layout.reading_sds()?.into_iter().flatten().collect();
+        let noise_sd: Vec<f64> = self.rig.setup.layout.reading_sds()?.into_iter().flatten().collect();
         let trials = self.rig.trials(self.calibrations, self.seed)?;
         let mut judged = vec![Vec::new(); self.chains().len()];
         let mut reductions = Vec::new();
         for (seed, trial) in (self.seed..).zip(&trials) {
             let moving = self.rig.simulate_moving(seed.wrapping_add(OTHER_NOISE))?;
             let reduction = KarhunenLoeve::of(&trial.training, &noise_sd);
-            let bench = TrialBench { trial, moving: &moving, reduction: &reduction, seed };
-            let every = self.judge(&bench, watch)?;
+            let setup = TrialSetup { trial, moving: &moving, reduction: &reduction, seed };
+            let every = self.judge(&setup, watch)?;
             for (judged, one) in judged.iter_mut().zip(every) {
                 judged.push(one);
             }
@@ -202,12 +202,12 @@ impl Elliott {
         components.chain(others).collect()
     }
 
-    fn network(&self) -> NetworkConfig {
+    fn network(&self) -> Network {
         let rows = self.rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
-        let mut network = NetworkConfig {
+        let mut network = Network {
             hidden: vec![HIDDEN],
             input_scale: InputScale::Standardized,
-            ..NetworkConfig::default()
+            ..Network::default()
         };
         network.training.learning_rate = LEARNING_RATE;
         network.training.max_epochs =
@@ -216,40 +216,40 @@ impl Elliott {
     }
 
     /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
-    fn judge(&self, bench: &TrialBench, watch: Watch) -> Result<Vec<Judged>, ElliottError> {
-        let whole = &self.rig.bench;
-        let network = EstimatorConfig::Network(self.network());
+    fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<Judged>, ElliottError> {
+        let whole = &self.rig.setup;
+        let network = Estimator::Network(self.network());
         let mut judged = Vec::new();
         for &count in &self.components {
-            let reduce = |recording| bench.reduction.reduced(recording, count);
+            let reduce = |recording| setup.reduction.reduced(recording, count);
             let trial =
-                Trial { training: reduce(&bench.trial.training), judged: reduce(&bench.trial.judged) };
-            let recording = reduce(&bench.moving.recording);
-            let moving = TimedRecording { recording, ..bench.moving.clone() };
-            let reduced = Bench {
+                Trial { training: reduce(&setup.trial.training), judged: reduce(&setup.trial.judged) };
+            let recording = reduce(&setup.moving.recording);
+            let moving = TimedRecording { recording, ..setup.moving.clone() };
+            let reduced = Setup {
                 surface: without_model(&whole.surface),
                 layout: raw_layout(count),
                 force_n: whole.force_n,
                 columns: None,
             };
-            let bench = TrialBench { trial: &trial, moving: &moving, ..*bench };
-            let locator = bench.fit(&reduced, &network, watch)?;
-            judged.push(self.judge_readings(&locator, &bench)?);
+            let setup = TrialSetup { trial: &trial, moving: &moving, ..*setup };
+            let locator = setup.fit(&reduced, &network, watch)?;
+            judged.push(self.judge_readings(&locator, &setup)?);
         }
-        let locator = bench.fit(whole, &network, watch)?;
-        judged.push(self.judge_readings(&locator, bench)?);
-        let locator = bench.fit(whole, &self.rig.estimator, watch)?;
-        judged.push(self.judge_readings(&locator, bench)?);
-        judged.extend(self.judge_tracks(&locator, bench)?);
+        let locator = setup.fit(whole, &network, watch)?;
+        judged.push(self.judge_readings(&locator, setup)?);
+        let locator = setup.fit(whole, &self.rig.estimator, watch)?;
+        judged.push(self.judge_readings(&locator, setup)?);
+        judged.extend(self.judge_tracks(&locator, setup)?);
         Ok(judged)
     }
 
     /// A locator's errors, reading by reading.
-    fn judge_readings(&self, locator: &Locator, bench: &TrialBench) -> Result<Judged, ElliottError> {
-        let mut pressed = Evaluation::of(locator, &bench.trial.judged)?;
-        let extent = self.rig.bench.surface.extent();
+    fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<Judged, ElliottError> {
+        let mut pressed = Evaluation::of(locator, &setup.trial.judged)?;
+        let extent = self.rig.setup.surface.extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
-        let moving = Evaluation::of(locator, &bench.moving.recording)?;
+        let moving = Evaluation::of(locator, &setup.moving.recording)?;
         let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
         Ok(Judged {
             pressed: Some((mean_m(&pressed), pressed.effective_percent(self.tolerance_m))),
@@ -258,9 +258,9 @@ impl Elliott {
     }
 
     /// The errors of a locator's tracker, as readings come and with all of them.
-    fn judge_tracks(&self, locator: &Locator, bench: &TrialBench) -> Result<[Judged; 2], ElliottError> {
-        let followed = follow(locator, TrackerConfig::default(), bench.moving)?;
-        let (truths, extent) = (bench.moving.truths(), self.rig.bench.surface.extent());
+    fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[Judged; 2], ElliottError> {
+        let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
+        let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface.extent());
         let judge = |tracks: &[Track]| -> Result<Judged, ElliottError> {
             let errors = TrackErrors::of(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
             Ok(Judged { pressed: None, moving_error_m: errors.track_m })
@@ -270,7 +270,7 @@ impl Elliott {
 
     /// The derivatives of all readings at each judged contact.
     fn gradients(&self, trials: &[Trial]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
-        let Bench { surface, layout, force_n, .. } = &self.rig.bench;
+        let Setup { surface, layout, force_n, .. } = &self.rig.setup;
         let model = surface.model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
         let force_n = force_n.ok_or(RigSimulationError::from(SimulateError::NoForce))?;
         let functions: Vec<_> = layout
@@ -296,7 +296,7 @@ impl Elliott {
         };
         let seen = match chain {
             Chain::Components(count) => count,
-            _ => self.rig.bench.layout.len(),
+            _ => self.rig.setup.layout.len(),
         };
         let bounds: Option<Vec<Bound>> =
             contacts.iter().map(|gradients| reduction.bound(gradients, seen)).collect();
@@ -316,16 +316,16 @@ impl Elliott {
 
 /// What the chains of one calibration share.
 #[derive(Clone, Copy)]
-struct TrialBench<'a> {
+struct TrialSetup<'a> {
     trial: &'a Trial,
     moving: &'a TimedRecording,
     reduction: &'a KarhunenLoeve,
     seed: u64,
 }
 
-impl TrialBench<'_> {
-    fn fit(&self, of: &Bench, estimator: &EstimatorConfig, watch: Watch) -> Result<Locator, FitError> {
-        estimator.fit_task(FitTask { bench: of, recording: &self.trial.training, seed: self.seed, watch })
+impl TrialSetup<'_> {
+    fn fit(&self, of: &Setup, estimator: &Estimator, watch: Watch) -> Result<Locator, FitError> {
+        estimator.fit_task(FitTask { setup: of, recording: &self.trial.training, seed: self.seed, watch })
     }
 }
 

@@ -80,12 +80,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::check_writable(path)?;
     }
     let files = RecordingFiles { data: arguments.data.clone(), contacts: arguments.contacts.clone() };
-    if let Some(recording) = files.read(&rig.bench)? {
+    if let Some(recording) = files.read(&rig.setup)? {
         return next::run(arguments, &rig, &recording);
     }
     let complain = |error: PositionError| complaint(&error, &arguments.rig);
     let problem = PositionProblem::new(
-        &rig.bench,
+        &rig.setup,
         rig.training.as_ref(),
         &rig.estimator,
         rig.design.as_ref(),
@@ -127,7 +127,7 @@ fn budget(arguments: &Arguments, rig: &Rig) -> Budget {
 fn write_report(outcome: &Outcome, rig: &Rig, out: &Path) -> Result<(), Failure> {
     let report = PositionDesignReport {
         title: &format!("Training positions for {}", outcome.rig.display()),
-        bench: &rig.bench,
+        setup: &rig.setup,
         estimator: outcome.estimator,
         problem: outcome.problem,
         placed: &outcome.placed,

@@ -15,7 +15,7 @@ use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
-use palpate_estimators::setup::Bench;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::LimitError;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{SensorDesignReport, sensor_design_report};
@@ -83,19 +83,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.output {
         output::check_writable(path)?;
     }
-    let (bench, design) = what_to_design(arguments, &rig)?;
+    let (setup, design) = what_to_design(arguments, &rig)?;
     let observer = Observer::of_stages();
     let observe = |progress| observer.observe(progress);
     let watch = Watch::new(&observe);
     let problem =
-        SensorProblem::new(&bench, &design, watch).map_err(|error| complaint(&error, &arguments.rig))?;
+        SensorProblem::new(&setup, &design, watch).map_err(|error| complaint(&error, &arguments.rig))?;
     let outcome = outcome(arguments, &rig, &problem, watch)?;
     drop(observer);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
         rig_file::write(path, &text, &best.layout)?;
     }
     if let Some(out) = &arguments.out {
-        write_report(&outcome, &bench, out)?;
+        write_report(&outcome, &setup, out)?;
     }
     if arguments.json {
         return output::say_json(&findings::findings(&outcome));
@@ -105,21 +105,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// The rig's bench and design, with what the command line says.
-fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Bench, SensorDesign), Failure> {
-    let force_n = arguments.force.or(rig.bench.force_n);
-    let bench = Bench { force_n, ..rig.bench.clone() };
-    let own = || SensorDesign::of(&bench.layout, bench.surface.extent());
+fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
+    let force_n = arguments.force.or(rig.setup.force_n);
+    let setup = Setup { force_n, ..rig.setup.clone() };
+    let own = || SensorDesign::of(&setup.layout, setup.surface.extent());
     let design = rig.design.clone().or_else(own);
     let mut design = design.ok_or_else(|| complaint(&LimitError::NoModel.into(), &arguments.rig))?;
     if arguments.unknown_force {
         design.force_is_known = Some(false);
     } else if design.force_is_known.is_none() {
-        design.force_is_known = Some(rig.bench.force_n.is_some());
+        design.force_is_known = Some(rig.setup.force_n.is_some());
     }
     if let Some(count) = arguments.count {
         design.count = usize::from(count);
     }
-    Ok((bench, design))
+    Ok((setup, design))
 }
 
 fn outcome<'a>(
@@ -163,10 +163,10 @@ fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
 
-fn write_report(outcome: &Outcome, bench: &Bench, out: &Path) -> Result<(), Failure> {
+fn write_report(outcome: &Outcome, setup: &Setup, out: &Path) -> Result<(), Failure> {
     let report = SensorDesignReport {
         title: &format!("Sensors for {}", outcome.rig.display()),
-        bench,
+        setup,
         problem: outcome.problem,
         designed: &outcome.designed,
         verified: &outcome.verified,

@@ -7,13 +7,13 @@ use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
 use palpate_numerics::watch::Cancelled;
 
-/// How readings are to be learnt as a function of position and hidden coordinate.
+/// How readings are to be learnt as a function of position and nuisance coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MeasuredConfig {
+pub struct MeasuredInfluence {
     /// On which scale readings are learnt; `None` for logarithms where every reading is greater than 0.
     pub readings: Option<Scale>,
-    /// On which scale the hidden coordinate is held; `None` for logarithms where every value is greater than 0.
-    pub hidden: Option<Scale>,
+    /// On which scale the nuisance coordinate is held; `None` for logarithms where every value is greater than 0.
+    pub nuisance: Option<Scale>,
     /// How smooth the readings are.
     pub kernel: Kernel,
     /// What the readings return to far from every press.
@@ -22,11 +22,11 @@ pub struct MeasuredConfig {
     pub search_points: usize,
 }
 
-impl Default for MeasuredConfig {
+impl Default for MeasuredInfluence {
     fn default() -> Self {
         Self {
             readings: None,
-            hidden: None,
+            nuisance: None,
             kernel: Kernel::Matern52,
             trend: Trend::Constant,
             search_points: 400,
@@ -43,17 +43,17 @@ pub enum MeasuredError {
     /// Logarithms were asked for, but a value has none.
     #[error("{what} of row {row} is {value}, which has no logarithm; it must be greater than 0")]
     NoLogarithm {
-        /// Reading or hidden coordinate.
+        /// Reading or nuisance coordinate.
         what: &'static str,
         /// Which row, from 1.
         row: usize,
         /// The value.
         value: f64,
     },
-    /// The hidden coordinate, or the force, is known in some rows but not in all.
+    /// The nuisance coordinate, or the force, is known in some rows but not in all.
     #[error("the {what} of row {row} is unknown, though others are known")]
-    HiddenMissing {
-        /// Force or hidden coordinate.
+    NuisanceMissing {
+        /// Force or nuisance coordinate.
         what: &'static str,
         /// Which row, from 1.
         row: usize,

@@ -8,16 +8,16 @@ use ndarray::{Array1, Array2};
 use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
-use super::{Axis, HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
+use super::{Axis, NuisanceRole, MeasuredInfluence, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
 use crate::fit::{Fit, FitTask};
 use crate::recording::Recording;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_numerics::chi_squared_bound;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
 
 /// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
-/// Most nodes along a one-dimensional surface, along either axis of a plane, and along the hidden coordinate.
+/// Most nodes along a one-dimensional surface, along either axis of a plane, and along the nuisance coordinate.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_HIDDEN: usize = 64;
@@ -25,15 +25,15 @@ const MOST_HIDDEN_OF_PLANE: usize = 16;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
-impl Fit for MeasuredConfig {
+impl Fit for MeasuredInfluence {
     type Method = MeasuredLocator;
     type Error = MeasuredError;
 
     fn fit_method(&self, task: FitTask) -> Result<MeasuredLocator, MeasuredError> {
-        let FitTask { bench, recording, seed, watch } = task;
+        let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let (role, hidden) = hidden_coordinate(bench, recording)?;
-        let presses = Presses::of(self, bench, recording, hidden.as_deref())?;
+        let (role, nuisance) = nuisance_coordinate(setup, recording)?;
+        let presses = Presses::of(self, setup, recording, nuisance.as_deref())?;
         let samples = Samples {
             coordinates: presses.coordinates.view(),
             outputs: presses.means.view(),
@@ -48,7 +48,7 @@ impl Fit for MeasuredConfig {
             Some(factor) => whitening.widened(factor),
             None => whitening,
         };
-        let axes = presses.axes(&process, bench);
+        let axes = presses.axes(&process, setup);
         let coarse = presses.table(axes, &process, &whitening, watch)?;
         let finer = presses.finer(axes, coarse.too_coarse());
         let table = if finer == axes { coarse } else { presses.table(finer, &process, &whitening, watch)? };
@@ -60,9 +60,9 @@ impl Fit for MeasuredConfig {
             whitening,
             table,
             role,
-            hidden: presses.hidden,
+            nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
-            force_n: bench.force_n,
+            force_n: setup.force_n,
         };
         locator.residual_limit = residual_limit(&locator, recording);
         Ok(locator)
@@ -70,10 +70,10 @@ impl Fit for MeasuredConfig {
 }
 
 /// What shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
-fn hidden_coordinate(
-    bench: &Bench,
+fn nuisance_coordinate(
+    setup: &Setup,
     recording: &Recording,
-) -> Result<(HiddenRole, Option<Vec<f64>>), MeasuredError> {
+) -> Result<(NuisanceRole, Option<Vec<f64>>), MeasuredError> {
     let all = |what, values: Vec<Option<f64>>| {
         if values.iter().all(Option::is_none) {
             return Ok(None);
@@ -81,28 +81,28 @@ fn hidden_coordinate(
         let known = values
             .iter()
             .enumerate()
-            .map(|(i, value)| value.ok_or(MeasuredError::HiddenMissing { what, row: i + 1 }));
+            .map(|(i, value)| value.ok_or(MeasuredError::NuisanceMissing { what, row: i + 1 }));
         known.collect::<Result<Vec<f64>, _>>().map(Some)
     };
-    let named = all("hidden coordinate", recording.rows.iter().map(|row| row.hidden).collect())?;
+    let named = all("nuisance coordinate", recording.rows.iter().map(|row| row.nuisance).collect())?;
     if named.is_some() {
-        return Ok((HiddenRole::Other, named));
+        return Ok((NuisanceRole::Other, named));
     }
     // A force that is known, or always the same, shapes nothing.
-    if bench.force_n.is_some() {
-        return Ok((HiddenRole::None, None));
+    if setup.force_n.is_some() {
+        return Ok((NuisanceRole::None, None));
     }
     let force = all("force", recording.rows.iter().map(|row| row.force_n).collect())?;
-    Ok((if force.is_some() { HiddenRole::Force } else { HiddenRole::None }, force))
+    Ok((if force.is_some() { NuisanceRole::Force } else { NuisanceRole::None }, force))
 }
 
-/// The recording as the process sees it: repeats of a press, at the same position and hidden coordinate, are one.
+/// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinate, are one.
 ///
 /// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
 /// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
 pub(super) struct Presses {
     readings: Scale,
-    hidden: Scale,
+    nuisance: Scale,
     /// Position along, across where the surface has a width, and hidden where there is one: n×d.
     pub coordinates: Array2<f64>,
     /// Mean scaled readings, n×m.
@@ -111,36 +111,36 @@ pub(super) struct Presses {
     pub places: Vec<usize>,
     /// Scaled readings, row by row.
     pub outputs: Array2<f64>,
-    pub has_hidden: bool,
+    pub has_nuisance: bool,
 }
 
 impl Presses {
     fn of(
-        config: &MeasuredConfig,
-        bench: &Bench,
+        config: &MeasuredInfluence,
+        setup: &Setup,
         recording: &Recording,
-        hidden: Option<&[f64]>,
+        nuisance: Option<&[f64]>,
     ) -> Result<Self, MeasuredError> {
         let rows = &recording.rows;
         let values = || rows.iter().flat_map(|row| row.reading.iter().copied());
         let readings = config.readings.unwrap_or_else(|| Scale::for_values(values()));
-        let hidden_values = || hidden.unwrap_or_default().iter().copied();
-        let hidden_scale = config.hidden.unwrap_or_else(|| Scale::for_values(hidden_values()));
+        let nuisance_values = || nuisance.unwrap_or_default().iter().copied();
+        let nuisance_scale = config.nuisance.unwrap_or_else(|| Scale::for_values(nuisance_values()));
 
         let channels = rows.first().map_or(0, |row| row.reading.len());
         let mut outputs = Array2::zeros((rows.len(), channels));
         for ((i, j), output) in outputs.indexed_iter_mut() {
             *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
         }
-        let wide = bench.surface.extent().width_m.is_some();
+        let wide = setup.surface.extent().width_m.is_some();
         let mut distinct: Vec<Vec<f64>> = Vec::new();
         let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
         let mut places = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
             let mut at = vec![row.position.x_m];
             at.extend(wide.then_some(row.position.y_m));
-            if let Some(hidden) = hidden {
-                at.push(scaled(hidden_scale, "the hidden coordinate", i, hidden[i])?);
+            if let Some(nuisance) = nuisance {
+                at.push(scaled(nuisance_scale, "the nuisance coordinate", i, nuisance[i])?);
             }
             let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
             places.push(*known.entry(bits).or_insert_with(|| {
@@ -161,14 +161,14 @@ impl Presses {
         for (mut mean, count) in means.outer_iter_mut().zip(counts) {
             mean /= count;
         }
-        let has_hidden = hidden.is_some();
-        Ok(Self { readings, hidden: hidden_scale, coordinates, means, places, outputs, has_hidden })
+        let has_nuisance = nuisance.is_some();
+        Ok(Self { readings, nuisance: nuisance_scale, coordinates, means, places, outputs, has_nuisance })
     }
 
     /// The noise from repeats, or what the process calls noise where there are too few; the signal from the process.
-    fn whitening(&self, process: &GaussianProcess, role: HiddenRole) -> Result<Whitening, MeasuredError> {
+    fn whitening(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Whitening, MeasuredError> {
         let channels = self.means.ncols();
-        let with_gain = role == HiddenRole::None && self.readings == Scale::Linear;
+        let with_gain = role == NuisanceRole::None && self.readings == Scale::Linear;
         let signal: Array1<f64> = (0..channels).map(|j| process.signal_variance(j)).collect();
         // A channel that is dead, or never errs, must not make the noise singular.
         let most = signal.iter().copied().fold(0.0, f64::max);
@@ -192,9 +192,9 @@ impl Presses {
         whitening: &Whitening,
         watch: Watch,
     ) -> Result<Table, Cancelled> {
-        let [x, y, hidden] = axes;
+        let [x, y, nuisance] = axes;
         let channels = self.means.ncols();
-        let nodes = x.count * y.count * hidden.count;
+        let nodes = x.count * y.count * nuisance.count;
         let (mut means, mut variances) = (Vec::with_capacity(nodes * channels), Vec::with_capacity(nodes));
         let mut scratch = process.scratch();
         let (mut mean, mut variance) = (vec![0.0; channels], vec![0.0; channels]);
@@ -204,13 +204,13 @@ impl Presses {
             if node % 64 == 0 {
                 watch.round()?;
             }
-            let place = node / hidden.count;
+            let place = node / nuisance.count;
             let mut at = vec![x.at((place / y.count) as f64)];
             at.extend(
-                (process.coordinates() - usize::from(self.has_hidden) == 2)
+                (process.coordinates() - usize::from(self.has_nuisance) == 2)
                     .then(|| y.at((place % y.count) as f64)),
             );
-            at.extend(self.has_hidden.then(|| hidden.at((node % hidden.count) as f64)));
+            at.extend(self.has_nuisance.then(|| nuisance.at((node % nuisance.count) as f64)));
             process.predict_into(&at, &mut mean, &mut variance, &mut scratch);
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
@@ -220,13 +220,13 @@ impl Presses {
     }
 
     /// The axes of position with about `factor` times the nodes, as far as there may be so many.
-    fn finer(&self, [x, y, hidden]: [Axis; 3], factor: f64) -> [Axis; 3] {
+    fn finer(&self, [x, y, nuisance]: [Axis; 3], factor: f64) -> [Axis; 3] {
         let most = if y.count > 1 { MOST_OF_PLANE } else { MOST_ALONG };
-        [x.finer(factor, most), y.finer(factor, most), hidden]
+        [x.finer(factor, most), y.finer(factor, most), nuisance]
     }
 
-    fn axes(&self, process: &GaussianProcess, bench: &Bench) -> [Axis; 3] {
-        let extent = bench.surface.extent();
+    fn axes(&self, process: &GaussianProcess, setup: &Setup) -> [Axis; 3] {
+        let extent = setup.surface.extent();
         let lengths = &process.hyperparameters().length_scales;
         let axis = |k: usize, bounds, most| {
             let values = self.coordinates.column(k).to_vec();
@@ -236,9 +236,9 @@ impl Presses {
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let along = axis(0, (0.0, extent.length_m), if plane { MOST_OF_PLANE } else { MOST_ALONG });
         let across = extent.width_m.map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
-        let most_hidden = if plane { MOST_HIDDEN_OF_PLANE } else { MOST_HIDDEN };
-        let hidden = self.has_hidden.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_hidden));
-        [along, across.unwrap_or(Axis::NONE), hidden.unwrap_or(Axis::NONE)]
+        let most_nuisance = if plane { MOST_HIDDEN_OF_PLANE } else { MOST_HIDDEN };
+        let nuisance = self.has_nuisance.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance));
+        [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
     }
 }
 
@@ -252,7 +252,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     /// Readings that are tried.
     const TRIED: usize = 400;
     let table = &locator.table;
-    let fitted = [table.x, table.y, table.hidden].iter().filter(|axis| axis.count > 1).count();
+    let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
     let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
     let every = recording.rows.len().div_ceil(TRIED);
     let tried = recording.rows.iter().step_by(every);

@@ -1,13 +1,13 @@
-//! One place of the surface: its mean readings along the hidden coordinate, and how well they explain a reading.
+//! One place of the surface: its mean readings along the nuisance coordinate, and how well they explain a reading.
 //!
-//! Between two nodes the mean is taken as straight, so the integral over the hidden coordinate is that of a normal
+//! Between two nodes the mean is taken as straight, so the integral over the nuisance coordinate is that of a normal
 //! density along a straight line through the space of readings: a density across it times a share along it.
 
 use std::f64::consts::{PI, SQRT_2};
 
 use super::Whitening;
 
-/// Nodes of one place along the hidden coordinate.
+/// Nodes of one place along the nuisance coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
     /// Whitened means, node by node.
@@ -16,13 +16,13 @@ pub(super) struct Line<'a> {
     pub variances: &'a [f64],
 }
 
-/// How probable a place is: the likelihood integrated over the hidden coordinate.
+/// How probable a place is: the likelihood integrated over the nuisance coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marginal {
-    /// ∫ exp(−(residual − reference)/2), over the hidden coordinate in nodes.
+    /// ∫ exp(−(residual − reference)/2), over the nuisance coordinate in nodes.
     pub weight: f64,
-    /// The same with the hidden coordinate, in nodes, as a factor; and with its square.
-    pub hidden: f64,
+    /// The same with the nuisance coordinate, in nodes, as a factor; and with its square.
+    pub nuisance: f64,
     pub hidden_square: f64,
 }
 
@@ -44,15 +44,15 @@ impl<'a> Line<'a> {
         residuals.fold(f64::INFINITY, f64::min)
     }
 
-    /// The integral over the hidden coordinate, relative to the likelihood of the residual `reference`.
+    /// The integral over the nuisance coordinate, relative to the likelihood of the residual `reference`.
     pub fn marginal(self, reading: &[f64], noise: &Whitening, reference: f64) -> Marginal {
         let mut sum = Marginal::default();
         for (i, stretch) in self.stretches(reading, noise).enumerate() {
             let Share { weight, middle, spread } = stretch.integral(reference);
-            let hidden = i as f64 + middle;
+            let nuisance = i as f64 + middle;
             sum.weight += weight;
-            sum.hidden += weight * hidden;
-            sum.hidden_square += weight * (hidden * hidden + spread);
+            sum.nuisance += weight * nuisance;
+            sum.hidden_square += weight * (nuisance * nuisance + spread);
         }
         sum
     }

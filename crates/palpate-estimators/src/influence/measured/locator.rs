@@ -5,13 +5,13 @@ use palpate_core::{Estimate, Status};
 use super::posterior::Posterior;
 use super::{Axis, Scale, Table, Whitening};
 use crate::fit::{Locate, LocatorFault};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 
-/// What the hidden coordinate is.
+/// What the nuisance coordinate is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum HiddenRole {
+pub enum NuisanceRole {
     /// Nothing: the reading depends on the position alone.
     None,
     /// The contact force in newtons, which the estimate then tells.
@@ -20,7 +20,7 @@ pub enum HiddenRole {
     Other,
 }
 
-/// Readings as a learnt function of position and hidden coordinate, and its inversion.
+/// Readings as a learnt function of position and nuisance coordinate, and its inversion.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredLocator {
@@ -30,10 +30,10 @@ pub struct MeasuredLocator {
     pub whitening: Whitening,
     /// The learnt readings.
     pub table: Table,
-    /// What the hidden coordinate is.
-    pub role: HiddenRole,
+    /// What the nuisance coordinate is.
+    pub role: NuisanceRole,
     /// On which scale it is held.
-    pub hidden: Scale,
+    pub nuisance: Scale,
     /// The squared residual, in variances, from which on no contact explains a reading.
     pub residual_limit: f64,
     /// The contact's force in newtons, where it is known.
@@ -43,18 +43,18 @@ pub struct MeasuredLocator {
 impl MeasuredLocator {
     /// Whether the estimate tells the force.
     pub(super) fn locates_force(&self) -> bool {
-        self.role == HiddenRole::Force
+        self.role == NuisanceRole::Force
     }
 
-    /// The hidden coordinate at `node`, off its scale.
+    /// The nuisance coordinate at `node`, off its scale.
     pub(super) fn force_at(&self, node: f64) -> f64 {
-        self.hidden.undo(self.table.hidden.at(node))
+        self.nuisance.undo(self.table.nuisance.at(node))
     }
 
-    /// The variance of the hidden coordinate, off its scale, when that of `node` is `variance`.
+    /// The variance of the nuisance coordinate, off its scale, when that of `node` is `variance`.
     pub(super) fn force_spread(&self, node: f64, variance: f64) -> f64 {
-        let slope = self.table.hidden.step
-            * match self.hidden {
+        let slope = self.table.nuisance.step
+            * match self.nuisance {
                 Scale::Linear => 1.0,
                 Scale::Logarithm => self.force_at(node),
             };
@@ -82,11 +82,11 @@ impl Locate for MeasuredLocator {
         }
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        let (table, channels) = (&self.table, bench.layout.len());
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        let (table, channels) = (&self.table, setup.layout.len());
         LocatorFault::check_count("whitened channels", channels, self.whitening.channels())?;
         LocatorFault::check_count("whitening weights", channels * channels, self.whitening.matrix.len())?;
-        let axes = [table.x, table.y, table.hidden];
+        let axes = [table.x, table.y, table.nuisance];
         let counts = axes.iter().map(|axis| axis.count as f64);
         LocatorFault::check_numbers("axis count", counts, |count| count >= 1.0, "at least 1")?;
         let starts = axes.iter().map(|axis| axis.start);
@@ -94,7 +94,7 @@ impl Locate for MeasuredLocator {
         let steps = axes.iter().map(|axis| axis.step);
         LocatorFault::check_numbers("axis step", steps, |step| step > 0.0, "finite and greater than 0")?;
         let places = table.x.count.saturating_mul(table.y.count);
-        let nodes = places.saturating_mul(table.hidden.count);
+        let nodes = places.saturating_mul(table.nuisance.count);
         LocatorFault::check_count("table variances", nodes, table.variances.len())?;
         LocatorFault::check_count("table means", nodes.saturating_mul(channels), table.means.len())?;
         LocatorFault::check_count("table reaches", places, table.reaches.len())?;

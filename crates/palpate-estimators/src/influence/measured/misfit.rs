@@ -18,7 +18,7 @@ const FACTORS: (f64, f64) = (1.0, 5.0);
 /// every fifth position is held out of the same process. `None` with too few positions to tell.
 ///
 /// It is what the smoothness that the process found does not know of: texture that repeats itself, presses a little
-/// off. For a residual r with covariance V, and the slopes J of the mean by position and hidden coordinate, the error is
+/// off. For a residual r with covariance V, and the slopes J of the mean by position and nuisance coordinate, the error is
 /// δ = (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r, its covariance (Jᵀ·V⁻¹·J)⁻¹, and the factor the root mean square of their positions' part.
 pub(super) fn misfit(
     presses: &Presses,
@@ -26,7 +26,7 @@ pub(super) fn misfit(
     process: &GaussianProcess,
     whitening: &Whitening,
 ) -> Result<Option<f64>, MeasuredError> {
-    let dimensions = presses.coordinates.ncols() - usize::from(presses.has_hidden);
+    let dimensions = presses.coordinates.ncols() - usize::from(presses.has_nuisance);
     let Some(held) = held_out(presses, dimensions) else { return Ok(None) };
     let kept: Vec<usize> = (0..held.len()).filter(|i| !held[*i]).collect();
     let coordinates = presses.coordinates.select(Axis(0), &kept);
@@ -100,16 +100,16 @@ impl Prediction {
         let mut residual = vec![0.0; output.len()];
         whitening.apply(output, &mut residual);
         residual.iter_mut().zip(&self.mean).for_each(|(r, mean)| *r -= mean);
-        let (mut information, mut pull) = ([[0.0; 3]; 3], [0.0; 3]);
+        let (mut information, mut score) = ([[0.0; 3]; 3], [0.0; 3]);
         for (i, slope) in self.slopes.iter().enumerate() {
-            pull[i] = self.product(slope, &residual, whitening);
+            score[i] = self.product(slope, &residual, whitening);
             for (j, other) in self.slopes.iter().enumerate() {
                 information[i][j] = self.product(slope, other, whitening);
             }
         }
         let factors = Ldl::of_free(&information, std::array::from_fn(|i| i < self.slopes.len()))?;
         let of_position = Ldl::of_free(&factors.inverse(), std::array::from_fn(|i| i < dimensions))?;
-        let score = of_position.quadratic(factors.solve(pull));
+        let score = of_position.quadratic(factors.solve(score));
         score.is_finite().then_some(score)
     }
 

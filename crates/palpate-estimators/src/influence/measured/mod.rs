@@ -2,7 +2,7 @@
 //!
 //! The forward way: reading = f(position, hidden) + noise, with f a Gaussian process, and *hidden* whatever else shapes
 //! the reading, is known while calibrating and unknown afterwards: the force, or how deep the surface is indented. A
-//! reading is located by its posterior over position and hidden coordinate, every value of both within the presses
+//! reading is located by its posterior over position and nuisance coordinate, every value of both within the presses
 //! that were made (and half a gap beyond) held as likely as any other before the reading is seen:
 //!
 //! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d hidden,
@@ -27,8 +27,8 @@ mod scale;
 mod table;
 
 pub use axis::Axis;
-pub use config::{MeasuredConfig, MeasuredError};
-pub use locator::{HiddenRole, MeasuredLocator};
+pub use config::{MeasuredInfluence, MeasuredError};
+pub use locator::{NuisanceRole, MeasuredLocator};
 pub use noise::Whitening;
 pub use scale::Scale;
 pub use table::Table;

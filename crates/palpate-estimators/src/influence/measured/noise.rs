@@ -13,7 +13,7 @@ pub struct Whitening {
     pub matrix: Vec<f64>,
     /// d: the signal's variance over the noise's in each whitened channel; at least 0.
     pub signal: Vec<f64>,
-    /// γ: the standard deviation of a gain about 1 that all channels of one reading share; 0 where a hidden coordinate
+    /// γ: the standard deviation of a gain about 1 that all channels of one reading share; 0 where a nuisance coordinate
     /// or a logarithm has taken its place.
     pub gain: f64,
 }

@@ -1,6 +1,6 @@
 //! Where a reading comes from: probabilities of places, gathered cell by cell.
 
-use palpate_core::{ContactEstimate, Estimate, Few, Mode, Status, Uncertainty};
+use palpate_core::{ContactEstimate, Estimate, BoundedList, Mode, Status, Uncertainty};
 
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};
@@ -94,7 +94,7 @@ impl<'a> Posterior<'a> {
             if marginal.weight > 0.0 {
                 self.residual = self.residual.min(line.residual(reading, noise));
                 let part = Part { x_m: table.x.at(x), y_m: table.y.at(y), weight: marginal.weight };
-                let node = marginal.hidden / marginal.weight;
+                let node = marginal.nuisance / marginal.weight;
                 let spread = (marginal.hidden_square / marginal.weight - node * node).max(0.0);
                 cell.moments.add(part.weight, [part.x_m, part.y_m, self.locator.force_at(node)]);
                 cell.moments.add_force_variance(part.weight, self.locator.force_spread(node, spread));
@@ -136,7 +136,7 @@ impl<'a> Posterior<'a> {
         // The most probable place, with the uncertainty of all.
         let most_probable = ContactEstimate { uncertainty: contact.uncertainty, ..self.contact(*first) };
         let mut estimate = Estimate::of_contact(most_probable, Status::Ambiguous);
-        estimate.modes = Few::none(Mode::default());
+        estimate.modes = BoundedList::none(Mode::default());
         for moments in others {
             let probability = moments.weight / total.weight;
             let mode = Mode { contact: self.contact(*moments), probability };

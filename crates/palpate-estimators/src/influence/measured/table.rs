@@ -1,4 +1,4 @@
-//! The learnt readings, tabulated over position and hidden coordinate.
+//! The learnt readings, tabulated over position and nuisance coordinate.
 
 use super::line::Line;
 use super::{Axis, Whitening};
@@ -13,8 +13,8 @@ pub struct Table {
     pub x: Axis,
     /// Across it, in metres; a single node on a one-dimensional surface.
     pub y: Axis,
-    /// The hidden coordinate on its scale; a single node where there is none.
-    pub hidden: Axis,
+    /// The nuisance coordinate on its scale; a single node where there is none.
+    pub nuisance: Axis,
     /// W·f̄, channel by channel, node by node.
     pub means: Vec<f64>,
     /// v: the process's variance over its signal's, 0 to 1, node by node.
@@ -34,12 +34,12 @@ const MOST_PARTS: usize = 12;
 impl Table {
     /// From means and variances at the nodes.
     pub(super) fn new(
-        [x, y, hidden]: [Axis; 3],
+        [x, y, nuisance]: [Axis; 3],
         means: Vec<f64>,
         variances: Vec<f64>,
         channels: usize,
     ) -> Self {
-        let mut table = Self { x, y, hidden, means, variances, reaches: Vec::new(), parts: 1 };
+        let mut table = Self { x, y, nuisance, means, variances, reaches: Vec::new(), parts: 1 };
         let unit = Whitening::unit(channels);
         table.reaches = (0..table.places()).map(|place| table.reach(place, &unit)).collect();
         table.parts = ((table.cell_length() / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
@@ -84,7 +84,7 @@ impl Table {
 
     /// The nodes of one place.
     pub(super) fn line(&self, place: usize) -> Line<'_> {
-        let nodes = self.hidden.count;
+        let nodes = self.nuisance.count;
         let width = nodes * self.channels();
         Line {
             means: &self.means[place * width..(place + 1) * width],
@@ -100,9 +100,9 @@ impl Table {
     /// The line at (x, y) between places, in nodes from the first, by cubic interpolation through four places each way.
     pub(super) fn line_between<'a>(&self, x: f64, y: f64, buffer: &'a mut LineBuffer) -> Line<'a> {
         buffer.means.clear();
-        buffer.means.resize(self.hidden.count * self.channels(), 0.0);
+        buffer.means.resize(self.nuisance.count * self.channels(), 0.0);
         buffer.variances.clear();
-        buffer.variances.resize(self.hidden.count, 0.0);
+        buffer.variances.resize(self.nuisance.count, 0.0);
         let (first_x, weights_x) = cubic(x, self.x.count);
         let (first_y, weights_y) = cubic(y, self.y.count);
         for (i, wx) in weights_x.iter().enumerate().filter(|(_, w)| **w != 0.0) {

@@ -9,12 +9,12 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{HiddenRole, MeasuredConfig, MeasuredError, MeasuredLocator, Scale};
+use super::{NuisanceRole, MeasuredInfluence, MeasuredError, MeasuredLocator, Scale};
 use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad, strip};
-use crate::influence::{InfluenceConfig, InfluenceSource};
+use crate::influence::{Influence, InfluenceSource};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -23,9 +23,9 @@ use palpate_testing::data::recording;
 const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
 const PAD: Extent = Extent { length_m: 0.03, width_m: Some(0.03) };
 
-fn bench(extent: Extent, channels: usize, force_n: Option<f64>) -> Bench {
+fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, channels, extent.length_m);
-    Bench { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
+    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
 }
 
 fn recording_of(rows: Vec<Row>) -> Recording {
@@ -38,14 +38,14 @@ fn recording_of(rows: Vec<Row>) -> Recording {
     }
 }
 
-fn try_fit(bench: &Bench, recording: &Recording) -> Result<MeasuredLocator, MeasuredError> {
-    let task = FitTask::new(bench, recording).seed(1);
-    MeasuredConfig::default().fit_method(task)
+fn try_fit(setup: &Setup, recording: &Recording) -> Result<MeasuredLocator, MeasuredError> {
+    let task = FitTask::new(setup, recording).seed(1);
+    MeasuredInfluence::default().fit_method(task)
 }
 
-fn fit(bench: &Bench, recording: &Recording) -> MeasuredLocator {
-    let locator = try_fit(bench, recording).unwrap();
-    assert_eq!(locator.check(bench), Ok(()));
+fn fit(setup: &Setup, recording: &Recording) -> MeasuredLocator {
+    let locator = try_fit(setup, recording).unwrap();
+    assert_eq!(locator.check(setup), Ok(()));
     locator
 }
 
@@ -58,7 +58,7 @@ fn squeeze(x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let u = x_m / 0.1;
     let clean = [force_n.powf(1.2) * (1.6 - u), force_n.powf(1.1) * (0.4 + u * u)];
     let reading = clean.map(|r| r * (1.0 + 0.01 * noise(rng))).to_vec();
-    Row { position: Position::along(x_m), force_n: Some(force_n), hidden: None, reading }
+    Row { position: Position::along(x_m), force_n: Some(force_n), nuisance: None, reading }
 }
 
 fn squeezes(seed: u64) -> Recording {
@@ -70,10 +70,10 @@ fn squeezes(seed: u64) -> Recording {
 #[test]
 fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
     let recording = squeezes(1);
-    let locator = fit(&bench(STRIP, 2, None), &recording);
+    let locator = fit(&setup(STRIP, 2, None), &recording);
     assert_eq!(
-        (locator.role, locator.readings, locator.hidden),
-        (HiddenRole::Force, Scale::Logarithm, Scale::Logarithm)
+        (locator.role, locator.readings, locator.nuisance),
+        (NuisanceRole::Force, Scale::Logarithm, Scale::Logarithm)
     );
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
     let (mut covered, mut scores, mut force_scores) = (0, 0.0, 0.0);
@@ -95,16 +95,16 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
 #[test]
 fn a_named_hidden_coordinate_comes_before_the_force_and_is_not_told() {
     let mut recording = squeezes(3);
-    recording.rows.iter_mut().for_each(|row| row.hidden = row.force_n.map(|force| force - 2.0));
-    let locator = fit(&bench(STRIP, 2, None), &recording);
-    assert_eq!((locator.role, locator.hidden), (HiddenRole::Other, Scale::Linear));
+    recording.rows.iter_mut().for_each(|row| row.nuisance = row.force_n.map(|force| force - 2.0));
+    let locator = fit(&setup(STRIP, 2, None), &recording);
+    assert_eq!((locator.role, locator.nuisance), (NuisanceRole::Other, Scale::Linear));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let estimate = locator.locate(&squeeze(0.033, 2.7, &mut rng).reading);
     assert!((estimate.contact.position.x_m - 0.033).abs() < 3e-3, "{estimate:?}");
     assert_eq!(estimate.contact.force_n, None);
-    recording.rows[7].hidden = None;
-    let error = try_fit(&bench(STRIP, 2, None), &recording).unwrap_err();
-    assert_eq!(error, MeasuredError::HiddenMissing { what: "hidden coordinate", row: 8 });
+    recording.rows[7].nuisance = None;
+    let error = try_fit(&setup(STRIP, 2, None), &recording).unwrap_err();
+    assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 8 });
 }
 
 /// Four sensors at a pad's corners, read with a common gain error and noise of their own.
@@ -114,7 +114,7 @@ fn corner(position: Position, gain: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let channel = |(a, b): (f64, f64)| (-(u - a).powi(2) - (v - b).powi(2)).exp() - 0.5;
     let gain = 1.0 + gain * noise(rng);
     let reading = corners.map(|at| gain * channel(at)).map(|clean| clean + 0.002 * noise(rng)).to_vec();
-    Row { position, force_n: None, hidden: None, reading }
+    Row { position, force_n: None, nuisance: None, reading }
 }
 
 #[test]
@@ -125,8 +125,8 @@ fn repeats_tell_a_pads_noise_and_gain_and_its_intervals_cover() {
         let (x_m, y_m) = (0.0025 * f64::from(i % 13), 0.0025 * f64::from(i % 169 / 13));
         rows.push(corner(Position { x_m, y_m }, 0.05, &mut rng));
     }
-    let locator = fit(&bench(PAD, 4, None), &recording_of(rows));
-    assert_eq!((locator.role, locator.readings), (HiddenRole::None, Scale::Linear));
+    let locator = fit(&setup(PAD, 4, None), &recording_of(rows));
+    assert_eq!((locator.role, locator.readings), (NuisanceRole::None, Scale::Linear));
     assert!((0.043..0.057).contains(&locator.whitening.gain), "{}", locator.whitening.gain);
     let (mut covered, mut scores) = (0, 0.0);
     for _ in 0..200 {
@@ -151,9 +151,9 @@ fn two_places_that_read_alike_are_both_told() {
     let rows = (0..123).map(|i| {
         let x_m = 0.0025 * f64::from(i % 41);
         let reading = read(x_m).iter().map(|r| r + 0.01 * noise(&mut rng)).collect();
-        Row { position: Position::along(x_m), force_n: None, hidden: None, reading }
+        Row { position: Position::along(x_m), force_n: None, nuisance: None, reading }
     });
-    let locator = fit(&bench(STRIP, 2, Some(1.0)), &recording_of(rows.collect()));
+    let locator = fit(&setup(STRIP, 2, Some(1.0)), &recording_of(rows.collect()));
     let estimate = locator.locate(&read(0.08));
     assert_eq!(estimate.status, Status::Ambiguous);
     let [mode] = estimate.modes.as_slice() else { panic!("{estimate:?}") };
@@ -167,7 +167,7 @@ fn two_places_that_read_alike_are_both_told() {
 
 #[test]
 fn what_no_contact_gives_is_outside_the_model() {
-    let locator = fit(&bench(STRIP, 2, None), &squeezes(7));
+    let locator = fit(&setup(STRIP, 2, None), &squeezes(7));
     for reading in [[-1.0, 1.0], [100.0, 1e-3], [f64::NAN, 1.0], [f64::INFINITY, 1.0], [1e-300, 1e300]] {
         assert_eq!(locator.locate(&reading).status, Status::OutsideModel, "{reading:?}");
     }
@@ -178,40 +178,40 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
     let row = |x_m: f64, reading: [f64; 2]| Row {
         position: Position::along(x_m),
         force_n: None,
-        hidden: None,
+        nuisance: None,
         reading: reading.to_vec(),
     };
-    let bench = bench(STRIP, 2, None);
-    let one = try_fit(&bench, &recording_of(vec![row(0.01, [1.0, 2.0]); 3])).unwrap_err();
+    let setup = setup(STRIP, 2, None);
+    let one = try_fit(&setup, &recording_of(vec![row(0.01, [1.0, 2.0]); 3])).unwrap_err();
     assert_eq!(one.to_string(), "the recording has 1 distinct positions; at least 2 are needed");
     for rows in [
         vec![row(0.01, [1.0, 2.0]), row(0.02, [1.5, 2.0])],
         vec![row(0.01, [0.0, 0.0]), row(0.02, [0.0, 0.0])],
         (0..40).map(|i| row(0.001 * f64::from(i % 4), [f64::from(i % 4), 7.0])).collect(),
     ] {
-        let estimate = fit(&bench, &recording_of(rows)).locate(&[1.0, 2.0]);
+        let estimate = fit(&setup, &recording_of(rows)).locate(&[1.0, 2.0]);
         assert!(estimate.contact.position.x_m.is_finite(), "{estimate:?}");
     }
-    let logarithms = MeasuredConfig { readings: Some(Scale::Logarithm), ..MeasuredConfig::default() };
+    let logarithms = MeasuredInfluence { readings: Some(Scale::Logarithm), ..MeasuredInfluence::default() };
     let recording = recording_of(vec![row(0.01, [1.0, 2.0]), row(0.02, [1.0, -2.0])]);
-    let task = FitTask::new(&bench, &recording);
+    let task = FitTask::new(&setup, &recording);
     let error = logarithms.fit_method(task).unwrap_err();
     assert_eq!(error, MeasuredError::NoLogarithm { what: "a reading", row: 2, value: -2.0 });
     let stop = |_| false;
-    let stopped = MeasuredConfig::default().fit_method(task.watch(Watch::new(&stop))).unwrap_err();
+    let stopped = MeasuredInfluence::default().fit_method(task.watch(Watch::new(&stop))).unwrap_err();
     assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
 #[test]
 fn it_comes_back_from_a_file() {
-    let locator = fit(&bench(STRIP, 2, None), &squeezes(8));
+    let locator = fit(&setup(STRIP, 2, None), &squeezes(8));
     let back: MeasuredLocator = serde_json::from_str(&serde_json::to_string(&locator).unwrap()).unwrap();
     let found = |locator: &MeasuredLocator| locator.locate(&[2.5, 1.5]).contact.position.x_m;
     assert!((found(&back) - found(&locator)).abs() < 1e-12);
     assert_eq!((back.role, back.table.means.len()), (locator.role, locator.table.means.len()));
     let mut damaged = locator;
     damaged.table.means.pop();
-    assert!(damaged.check(&bench(STRIP, 2, None)).is_err());
+    assert!(damaged.check(&setup(STRIP, 2, None)).is_err());
 }
 
 fn data(file: &str) -> Option<File> {
@@ -226,10 +226,10 @@ struct Pooled {
     coverage: f64,
 }
 
-fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
+fn five_folds(setup: &Setup, recording: &Recording) -> Pooled {
     let (mut errors_mm, mut covered, mut intervals) = (Vec::new(), 0, 0);
     for fold in recording.folds(5).unwrap() {
-        let locator = fit(bench, &recording.subset(&fold.training));
+        let locator = fit(setup, &recording.subset(&fold.training));
         let held_out = recording.subset(&fold.held_out);
         for row in &held_out.rows {
             let estimate = locator.locate(&row.reading);
@@ -238,7 +238,7 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
             let within = |(low, high): (f64, f64), value| usize::from(low <= value && value <= high);
             covered += within(uncertainty.x_95_m, row.position.x_m);
             intervals += 1;
-            if bench.surface.extent().width_m.is_some() {
+            if setup.surface.extent().width_m.is_some() {
                 covered += within(uncertainty.y_95_m, row.position.y_m);
                 intervals += 1;
             }
@@ -256,9 +256,9 @@ fn five_folds(bench: &Bench, recording: &Recording) -> Pooled {
 /// Held to the share by which scikit-learn's best, `median_mm` and `mean_mm`, must be undercut.
 fn check_strip(file: &str, (median_mm, mean_mm): (f64, f64), less: f64) {
     let Some(bytes) = data(&format!("tactile-fsi/{file}")) else { return };
-    let bench = strip();
-    let recording = bench.read_recording(file, bytes).unwrap();
-    check(file, &five_folds(&bench, &recording), (median_mm, mean_mm), less);
+    let setup = strip();
+    let recording = setup.read_recording(file, bytes).unwrap();
+    check(file, &five_folds(&setup, &recording), (median_mm, mean_mm), less);
 }
 
 fn check(name: &str, found: &Pooled, (median_mm, mean_mm): (f64, f64), less: f64) {
@@ -290,25 +290,25 @@ fn a_strip_over_oil_beats_scikit_learn() {
 fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
     let Some(readings) = data("eflesh/fixed-depth-readings.csv") else { return };
     let Some(contacts) = data("eflesh/fixed-depth-contacts.csv") else { return };
-    let bench = pad();
-    let recording = bench.read_recording_pair(("readings", readings), ("contacts", contacts)).unwrap();
+    let setup = pad();
+    let recording = setup.read_recording_pair(("readings", readings), ("contacts", contacts)).unwrap();
     assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
-    check("eflesh", &five_folds(&bench, &recording), (0.312, 0.343), 0.10);
+    check("eflesh", &five_folds(&setup, &recording), (0.312, 0.343), 0.10);
 }
 
 #[test]
 fn settings_that_need_mechanics_are_refused() {
-    let bench = pad();
+    let setup = pad();
     let provenance = Provenance { source: String::new(), rows: 0, digests: vec![], seed: None };
-    let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
+    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
     let recording = Recording { channels, kinds, rows: vec![], provenance };
-    let good = InfluenceConfig::default();
-    let refused = |config: InfluenceConfig| {
-        let task = FitTask::new(&bench, &recording);
+    let good = Influence::default();
+    let refused = |config: Influence| {
+        let task = FitTask::new(&setup, &recording);
         config.fit_method(task).unwrap_err().to_string()
     };
-    assert!(refused(InfluenceConfig { from: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
-    assert!(refused(InfluenceConfig { contacts: 2, ..good }).contains("several contacts"));
-    assert!(refused(InfluenceConfig { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
+    assert!(refused(Influence { from: InfluenceSource::Mechanics, ..good }).contains("no mechanics"));
+    assert!(refused(Influence { contacts: 2, ..good }).contains("several contacts"));
+    assert!(refused(Influence { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
     assert!(refused(good).contains("0 distinct positions"));
 }

@@ -150,9 +150,9 @@ impl Coarse {
         forces.resize(self.norms.len(), [0.0; 8]);
         for ((misfit, forces), norm) in misfits.iter_mut().zip(forces).zip(&self.norms) {
             for lane in 0..8 {
-                let pull = (misfit[lane] + mean * precision).max(0.0);
-                forces[lane] = pull / (norm[lane] + precision).max(f64::MIN_POSITIVE);
-                misfit[lane] = constant - pull * forces[lane];
+                let score = (misfit[lane] + mean * precision).max(0.0);
+                forces[lane] = score / (norm[lane] + precision).max(f64::MIN_POSITIVE);
+                misfit[lane] = constant - score * forces[lane];
             }
         }
     }

@@ -3,20 +3,20 @@
 use super::locator::PlaneLocator;
 use super::table::PlaneTable;
 use crate::fit::FitTask;
-use crate::influence::InfluenceConfig;
+use crate::influence::Influence;
 use crate::influence::fitting::{InfluenceFitError, dead, force_belief};
 use crate::influence::learning::{Learnt, learn};
 use palpate_mechanics::contact::Position;
 
 /// Fits the influence functions of a plane with a model.
 pub(in crate::influence) fn fit_plane(
-    config: InfluenceConfig,
+    config: Influence,
     task: FitTask,
 ) -> Result<PlaneLocator, InfluenceFitError> {
     if config.contacts > 1 {
         return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
     }
-    let mut table = PlaneTable::empty(task.bench.layout.len(), task.bench.surface.extent());
+    let mut table = PlaneTable::empty(task.setup.layout.len(), task.setup.surface.extent());
     let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();
     let fill = &mut |s: usize, learnt: &Learnt| {
         for node in 0..table.nodes() {
@@ -25,5 +25,5 @@ pub(in crate::influence) fn fit_plane(
         }
     };
     let channels = learn(config.from, task, &places, fill)?;
-    Ok(PlaneLocator::new(table, channels, dead(task.bench), force_belief(config, task.bench)))
+    Ok(PlaneLocator::new(table, channels, dead(task.setup), force_belief(config, task.setup)))
 }

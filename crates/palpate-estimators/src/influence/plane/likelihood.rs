@@ -32,7 +32,7 @@ impl PlaneLikelihood for PlateLikelihood {
     fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3> {
         let at = [contact.position.x_m, contact.position.y_m, contact.force_n];
         let equations = self.search.equations(whitened, at, None);
-        ContactFit { misfit: equations.misfit, pull: equations.right, information: equations.information }
+        ContactFit { misfit: equations.misfit, score: equations.right, information: equations.information }
     }
 }
 

@@ -6,7 +6,7 @@ use super::table::PlaneTable;
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::belief::ForceBelief;
 use crate::influence::channels::{self, Channels};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 
@@ -81,8 +81,8 @@ impl Locate for PlaneLocator {
         self.locate_with(reading, &mut PlaneScratch::default())
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", bench.layout.len(), self.stored.table.sensors)
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("channels", setup.layout.len(), self.stored.table.sensors)
     }
 }
 

@@ -214,9 +214,9 @@ impl Search {
             return (force_n, square + force_n * (force_n * norm - 2.0 * product));
         }
         let (mean, precision) = self.force.mean_and_precision();
-        let (pull, norm) = (product + mean * precision, norm + precision);
-        let force_n = if norm > 0.0 { (pull / norm).max(0.0) } else { 0.0 };
-        (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * pull))
+        let (score, norm) = (product + mean * precision, norm + precision);
+        let force_n = if norm > 0.0 { (score / norm).max(0.0) } else { 0.0 };
+        (force_n, square + mean * mean * precision + force_n * (force_n * norm - 2.0 * score))
     }
 
     /// Σ ln(1 + v) at a place, by which a reading is less likely where the calibration tells less.

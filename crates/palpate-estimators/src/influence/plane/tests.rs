@@ -4,9 +4,9 @@ use super::*;
 use crate::arrangement::cells;
 use crate::fit::{FitTask, Locate};
 use crate::fixtures::{Example, plate};
-use crate::influence::{ForceBelief, InfluenceConfig, InfluenceFitError, InfluenceSource};
+use crate::influence::{ForceBelief, Influence, InfluenceFitError, InfluenceSource};
 use crate::recording::Recording;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::simulate::CleanSensors;
 use palpate_core::Status;
 use palpate_mechanics::contact::{Contact, Position};
@@ -31,12 +31,12 @@ const NOISE: ChannelModel = ChannelModel {
     dead: false,
 };
 
-fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> PlaneLocator {
-    config.fit_plane(FitTask::new(bench, recording)).unwrap()
+fn fit(config: Influence, setup: &Setup, recording: &Recording) -> PlaneLocator {
+    config.fit_plane(FitTask::new(setup, recording)).unwrap()
 }
 
-fn sensors(bench: &Bench) -> CleanSensors<'_> {
-    CleanSensors::new(bench.surface.model().unwrap(), &bench.layout)
+fn sensors(setup: &Setup) -> CleanSensors<'_> {
+    CleanSensors::new(setup.surface.model().unwrap(), &setup.layout)
 }
 
 /// The middles of `side` × `side` cells of the inner 90 % of the area: the rectangle about the same centre with sides √0.9
@@ -57,8 +57,8 @@ const SIDE: usize = 28;
 
 /// Locators from [`CALIBRATIONS`] calibrations with 5 N.
 fn calibrated(rig: &Example, from: InfluenceSource) -> Vec<PlaneLocator> {
-    let config = InfluenceConfig { from, ..InfluenceConfig::default() };
-    (0..CALIBRATIONS).map(|seed| fit(config, &rig.bench, &rig.simulate(seed))).collect()
+    let config = Influence { from, ..Influence::default() };
+    (0..CALIBRATIONS).map(|seed| fit(config, &rig.setup, &rig.simulate(seed))).collect()
 }
 
 /// The same locator, to which nothing is known of the force.
@@ -81,15 +81,15 @@ struct Touch {
 
 /// Touches of 5 N all over the inner 90 % of the plate.
 fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
-    let limit = rig.bench.cramer_rao_bound().unwrap();
-    let (clean, errors) = (sensors(&rig.bench), ChannelErrors::none(&rig.bench.layout));
+    let limit = rig.setup.cramer_rao_bound().unwrap();
+    let (clean, errors) = (sensors(&rig.setup), ChannelErrors::none(&rig.setup.layout));
     let mut scratch = PlaneScratch::default();
     let mut touches = Vec::new();
     for (locator, seed) in locators.iter().zip(1000..) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        for position in inner_positions(rig.bench.surface.extent(), SIDE) {
+        for position in inner_positions(rig.setup.surface.extent(), SIDE) {
             let contact = Contact { position, force_n: 5.0 };
-            let reading = measure(&rig.bench.layout, &clean.reading(contact), &errors, &mut rng);
+            let reading = measure(&rig.setup.layout, &clean.reading(contact), &errors, &mut rng);
             let Some(bound) = limit.at(contact, force) else { continue };
             let found = locator.locate_with(&reading, &mut scratch).contact;
             let (dx, dy) = (found.position.x_m - position.x_m, found.position.y_m - position.y_m);
@@ -152,40 +152,40 @@ fn the_plate_is_located_at_the_limit_and_ellipses_hold_what_they_say() {
 
 /// Readings of contacts (x, y in mm and newtons) with the bench's noise.
 fn noisy(
-    bench: &Bench,
+    setup: &Setup,
     clean: &CleanSensors,
     contacts: &[(f64, f64, f64)],
     rng: &mut Xoshiro256PlusPlus,
 ) -> Vec<f64> {
-    let mut sum = vec![0.0; bench.layout.len()];
+    let mut sum = vec![0.0; setup.layout.len()];
     for &(x_mm, y_mm, force_n) in contacts {
         let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
         let reading = clean.reading(Contact { position, force_n });
         sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
     }
-    measure(&bench.layout, &sum, &ChannelErrors::none(&bench.layout), rng)
+    measure(&setup.layout, &sum, &ChannelErrors::none(&setup.layout), rng)
 }
 
 #[test]
 fn no_contact_and_two_contacts_are_no_single_contact() {
     let rig = rig();
     let recording = rig.simulate(3);
-    let clean = sensors(&rig.bench);
+    let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(5.0), None] {
-        let bench = Bench { force_n, ..rig.bench.clone() };
-        let locator = fit(InfluenceConfig::default(), &bench, &recording);
+        let setup = Setup { force_n, ..rig.setup.clone() };
+        let locator = fit(Influence::default(), &setup, &recording);
         for _ in 0..50 {
-            let nothing = locator.locate(&noisy(&rig.bench, &clean, &[], &mut rng));
+            let nothing = locator.locate(&noisy(&rig.setup, &clean, &[], &mut rng));
             assert_eq!(nothing.status, Status::NoContact, "{force_n:?}: {nothing:?}");
             let two = locator.locate(&noisy(
-                &rig.bench,
+                &rig.setup,
                 &clean,
                 &[(80.0, 90.0, 5.0), (220.0, 200.0, 5.0)],
                 &mut rng,
             ));
             assert_eq!(two.status, Status::OutsideModel, "{force_n:?}: {two:?}");
-            let one = locator.locate(&noisy(&rig.bench, &clean, &[(80.0, 90.0, 5.0)], &mut rng));
+            let one = locator.locate(&noisy(&rig.setup, &clean, &[(80.0, 90.0, 5.0)], &mut rng));
             assert_eq!(one.status, Status::Located);
             assert!((one.contact.force_n.unwrap() - 5.0).abs() < 0.5, "{force_n:?}: {one:?}");
         }
@@ -195,15 +195,15 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 #[test]
 fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
     let mut rig = rig();
-    rig.bench.layout.sensors.truncate(2);
-    for (sensor, y_m) in rig.bench.layout.sensors.iter_mut().zip([0.15, 0.075]) {
+    rig.setup.layout.sensors.truncate(2);
+    for (sensor, y_m) in rig.setup.layout.sensors.iter_mut().zip([0.15, 0.075]) {
         sensor.position = Position { x_m: 0.15, y_m };
     }
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
-    let clean = sensors(&rig.bench);
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
+    let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
     for _ in 0..20 {
-        let estimate = locator.locate(&noisy(&rig.bench, &clean, &[(60.0, 90.0, 5.0)], &mut rng));
+        let estimate = locator.locate(&noisy(&rig.setup, &clean, &[(60.0, 90.0, 5.0)], &mut rng));
         assert_eq!(estimate.status, Status::Ambiguous, "{estimate:?}");
         let all = estimate.modes.as_slice().iter().map(|mode| mode.contact).chain([estimate.contact]);
         let xs: Vec<f64> = all.map(|contact| contact.position.x_m).collect();
@@ -216,7 +216,7 @@ fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
 #[test]
 fn absurd_readings_are_outside_the_model() {
     let rig = rig();
-    let known = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(0));
+    let known = fit(Influence::default(), &rig.setup, &rig.simulate(0));
     for locator in [&known, &without_force(&known)] {
         for loud in [1e3, 1e9, -1e150, 1e300, f64::MAX, -f64::MAX] {
             let mut one = [0.0; 9];
@@ -240,11 +240,11 @@ fn absurd_readings_are_outside_the_model() {
 #[test]
 fn a_dead_channel_is_left_out_and_the_last_is_kept() {
     let rig = rig();
-    let mut locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
-    let clean = sensors(&rig.bench);
+    let mut locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
+    let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     assert!(locator.leave_out(4));
-    let mut reading = noisy(&rig.bench, &clean, &[(100.0, 170.0, 5.0)], &mut rng);
+    let mut reading = noisy(&rig.setup, &clean, &[(100.0, 170.0, 5.0)], &mut rng);
     reading[4] = 0.0;
     let estimate = locator.locate(&reading);
     assert_eq!(estimate.status, Status::Located);
@@ -256,21 +256,21 @@ fn a_dead_channel_is_left_out_and_the_last_is_kept() {
 fn faults_that_a_calibration_shows_are_corrected() {
     let mut rig =
         plate(PlateSpec::DEFAULT_ELEMENTS, ChannelModel { gain_error: 0.05, offset_error: 20e-6, ..NOISE });
-    let told = rig.bench.clone();
+    let told = rig.setup.clone();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
-    for sensor in &mut rig.bench.layout.sensors {
+    for sensor in &mut rig.setup.layout.sensors {
         sensor.position.x_m += 1e-3 * rng.random_range(-1.0..=1.0);
         sensor.position.y_m += 1e-3 * rng.random_range(-1.0..=1.0);
     }
     let limit = told.cramer_rao_bound().unwrap();
-    let errors = ChannelErrors::draw(&rig.bench.layout, &mut rng);
-    let clean = sensors(&rig.bench);
+    let errors = ChannelErrors::draw(&rig.setup.layout, &mut rng);
+    let clean = sensors(&rig.setup);
     let mut recording = rig.simulate(0);
     for row in &mut recording.rows {
         let reading = clean.reading(Contact { position: row.position, force_n: 5.0 });
-        row.reading = measure(&rig.bench.layout, &reading, &errors, &mut rng);
+        row.reading = measure(&rig.setup.layout, &reading, &errors, &mut rng);
     }
-    let locator = fit(InfluenceConfig::default(), &told, &recording);
+    let locator = fit(Influence::default(), &told, &recording);
     let (mut error_m, mut limit_m) = (0.0, 0.0);
     for position in inner_positions(told.surface.extent(), 12) {
         let contact = Contact { position, force_n: 5.0 };
@@ -278,7 +278,7 @@ fn faults_that_a_calibration_shows_are_corrected() {
             continue;
         };
         for _ in 0..5 {
-            let reading = measure(&rig.bench.layout, &clean.reading(contact), &errors, &mut rng);
+            let reading = measure(&rig.setup.layout, &clean.reading(contact), &errors, &mut rng);
             error_m += locator.locate(&reading).contact.position.distance_m(position);
             limit_m += bound.mean_error_m();
         }
@@ -290,7 +290,7 @@ fn faults_that_a_calibration_shows_are_corrected() {
 #[test]
 fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let rig = rig();
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<PlaneLocator>(&json).unwrap(), locator);
     let replaced = [
@@ -309,17 +309,17 @@ fn a_locator_file_gives_the_same_locator_and_bad_numbers_are_refused() {
 fn what_a_plane_cannot_do_is_refused_in_words() {
     let rig = rig();
     let mut recording = rig.simulate(1);
-    let refuse = |config: InfluenceConfig, recording: &Recording| {
-        let task = FitTask::new(&rig.bench, recording);
+    let refuse = |config: Influence, recording: &Recording| {
+        let task = FitTask::new(&rig.setup, recording);
         config.fit_plane(task).unwrap_err()
     };
-    let several = refuse(InfluenceConfig { contacts: 2, ..InfluenceConfig::default() }, &recording);
+    let several = refuse(Influence { contacts: 2, ..Influence::default() }, &recording);
     assert_eq!(
         several.to_string(),
         "the surface is a plane: telling several contacts apart works on a line, such as a beam, only"
     );
     recording.rows.truncate(25);
     let from = InfluenceSource::Recording;
-    let few = refuse(InfluenceConfig { from, ..InfluenceConfig::default() }, &recording);
+    let few = refuse(Influence { from, ..Influence::default() }, &recording);
     assert_eq!(few, InfluenceFitError::TooFewPositions { needed: 6, found: 5 });
 }

@@ -3,46 +3,46 @@
 use super::{fit, noisy};
 use crate::fit::Locate;
 use crate::fixtures::paper;
-use crate::influence::InfluenceConfig;
+use crate::influence::Influence;
 use crate::influence::answer::NOTHING;
 use crate::influence::batch::Rows;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::{InstructionSet, locate_rows_by};
 use crate::influence::scratch::Scratch;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Readings of every kind: nothing, one contact all along the beam and at its very ends, weak ones, and two at once.
-fn readings(bench: &Bench) -> Vec<Vec<f64>> {
+fn readings(setup: &Setup) -> Vec<Vec<f64>> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
     let mut readings = Vec::new();
     for i in 0..600 {
         let x_m = 0.4 * f64::from(i * 7 % 600) / 599.0;
-        readings.push(noisy(bench, &[(x_m, 3.0)], &mut rng));
+        readings.push(noisy(setup, &[(x_m, 3.0)], &mut rng));
         match i % 6 {
-            0 => readings.push(noisy(bench, &[], &mut rng)),
-            1 => readings.push(noisy(bench, &[(1e-3, 3.0)], &mut rng)),
-            2 => readings.push(noisy(bench, &[(0.399, 3.0)], &mut rng)),
-            3 => readings.push(noisy(bench, &[(x_m, 3.0), (0.4 - x_m, 2.0)], &mut rng)),
-            4 => readings.push(noisy(bench, &[(x_m, 0.02)], &mut rng)),
-            _ => readings.push(noisy(bench, &[(x_m, 7.0)], &mut rng)),
+            0 => readings.push(noisy(setup, &[], &mut rng)),
+            1 => readings.push(noisy(setup, &[(1e-3, 3.0)], &mut rng)),
+            2 => readings.push(noisy(setup, &[(0.399, 3.0)], &mut rng)),
+            3 => readings.push(noisy(setup, &[(x_m, 3.0), (0.4 - x_m, 2.0)], &mut rng)),
+            4 => readings.push(noisy(setup, &[(x_m, 0.02)], &mut rng)),
+            _ => readings.push(noisy(setup, &[(x_m, 7.0)], &mut rng)),
         }
     }
     readings
 }
 
 /// The paper's bench with what is known of the force, and up to how many contacts.
-fn benches() -> Vec<(Bench, InfluenceConfig)> {
-    let bench = paper(5e-6, 10).bench;
-    let unknown = Bench { force_n: None, ..bench.clone() };
-    let config = InfluenceConfig::default();
+fn benches() -> Vec<(Setup, Influence)> {
+    let setup = paper(5e-6, 10).setup;
+    let unknown = Setup { force_n: None, ..setup.clone() };
+    let config = Influence::default();
     vec![
-        (bench.clone(), config),
+        (setup.clone(), config),
         (unknown.clone(), config),
-        (bench, InfluenceConfig { force_sd_n: Some(0.5), ..config }),
-        (unknown, InfluenceConfig { contacts: 2, ..config }),
+        (setup, Influence { force_sd_n: Some(0.5), ..config }),
+        (unknown, Influence { contacts: 2, ..config }),
     ]
 }
 
@@ -50,9 +50,9 @@ fn benches() -> Vec<(Bench, InfluenceConfig)> {
 fn a_batch_answers_as_readings_one_by_one_do() {
     let recording = paper(5e-6, 10).simulate(3);
     let mut seen = Vec::new();
-    for (bench, config) in benches() {
-        let locator = fit(config, &bench, &recording);
-        let readings = readings(&bench);
+    for (setup, config) in benches() {
+        let locator = fit(config, &setup, &recording);
+        let readings = readings(&setup);
         let single: Vec<Estimate> = readings.iter().map(|reading| locator.locate(reading)).collect();
         // Twice, the second time over estimates of other readings.
         let mut estimates = vec![NOTHING; readings.len()];
@@ -71,11 +71,11 @@ fn a_batch_answers_as_readings_one_by_one_do() {
 #[test]
 fn every_instruction_set_answers_as_plain_arrays_do() {
     let recording = paper(5e-6, 10).simulate(3);
-    for (bench, config) in benches() {
+    for (setup, config) in benches() {
         for dead in [None, Some(2)] {
-            let mut locator = fit(config, &bench, &recording);
+            let mut locator = fit(config, &setup, &recording);
             assert!(dead.is_none_or(|channel| locator.leave_out(channel)));
-            let readings = readings(&bench);
+            let readings = readings(&setup);
             let flat = readings.concat();
             let rows = Rows { readings: &flat, channels: 8 };
             let by = |set| {
@@ -94,7 +94,7 @@ fn every_instruction_set_answers_as_plain_arrays_do() {
 #[test]
 fn a_batch_locates_as_many_as_there_are() {
     let rig = paper(5e-6, 2);
-    let locator = fit(InfluenceConfig::default(), &rig.bench, &rig.simulate(1));
+    let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     assert!(matches!(locator.force(), ForceBelief::Known(_)));
     let mut estimates = vec![NOTHING; 3];
     let mut scratch = Scratch::default();

@@ -2,13 +2,13 @@
 
 use super::{clean, fit, noisy};
 use crate::fixtures::paper;
-use crate::influence::InfluenceConfig;
+use crate::influence::Influence;
 use crate::influence::belief::ForceBelief;
 use crate::influence::lanes::Array;
 use crate::influence::scratch::Scratch;
 use crate::influence::search::{Minimum, Search};
 use crate::influence::table::InfluenceTable;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -22,7 +22,7 @@ const ROUGH: [&str; 2] = ["rough", "all noise"];
 type Odd = (&'static str, Vec<f64>);
 
 /// Readings that one contact does not explain, or hardly.
-fn odd_readings(bench: &Bench, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
+fn odd_readings(setup: &Setup, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
     let mut place = |low: f64, high: f64| rng.random_range(low..high);
     let contacts = [
         ("one", vec![(place(0.0, 0.4), place(0.5, 8.0))]),
@@ -36,9 +36,9 @@ fn odd_readings(bench: &Bench, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
         ("nothing", vec![]),
     ];
     let mut readings: Vec<Odd> =
-        contacts.iter().map(|(kind, contacts)| (*kind, noisy(bench, contacts, rng))).collect();
+        contacts.iter().map(|(kind, contacts)| (*kind, noisy(setup, contacts, rng))).collect();
     for (kind, size_m) in ROUGH.into_iter().zip([50e-6, 2e-3]) {
-        let mut reading = clean(bench, &[(rng.random_range(0.0..0.4), 3.0)]);
+        let mut reading = clean(setup, &[(rng.random_range(0.0..0.4), 3.0)]);
         reading.iter_mut().for_each(|value| *value += size_m * rng.random_range(-1.0..1.0));
         readings.push((kind, reading));
     }
@@ -52,16 +52,16 @@ fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f6
     let cell = table.cell(x_m);
     let node = cell.node as usize;
     let at = |force_n: f64| {
-        let (mut cost, mut pull, mut norm) = (0.0, 0.0, 0.0);
+        let (mut cost, mut score, mut norm) = (0.0, 0.0, 0.0);
         let scale = search.variance_scale(force_n);
         table.for_each(cell, |s, f, _| {
             let variance = |node: usize| table.variances[node * table.sensors + s];
             let weight = 1.0 / (1.0 + scale * 0.5 * (variance(node) + variance(node + 1)));
             cost += weight * (whitened[s] - force_n * f).powi(2) - weight.ln();
-            pull += weight * whitened[s] * f;
+            score += weight * whitened[s] * f;
             norm += weight * f * f;
         });
-        (cost, pull, norm)
+        (cost, score, norm)
     };
     let (mean, precision) = match search.force {
         ForceBelief::Known(known_n) => return at(known_n).0,
@@ -69,8 +69,8 @@ fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f6
     };
     let mut force = force_n.unwrap_or(reference_n);
     for _ in 0..if force_n.is_none() { 8 } else { 0 } {
-        let (_, pull, norm) = at(force);
-        force = if norm > 0.0 { ((pull + mean * precision) / (norm + precision)).max(0.0) } else { mean };
+        let (_, score, norm) = at(force);
+        force = if norm > 0.0 { ((score + mean * precision) / (norm + precision)).max(0.0) } else { mean };
     }
     at(force).0 + precision * (force - mean).powi(2)
 }
@@ -94,17 +94,17 @@ fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
 #[test]
 fn the_lowest_misfit_is_found_in_odd_readings() {
     let recording = paper(5e-6, 10).simulate(3);
-    let bench = paper(5e-6, 10).bench;
-    let unknown = Bench { force_n: None, ..bench.clone() };
-    let config = InfluenceConfig::default();
-    let believed = InfluenceConfig { force_sd_n: Some(0.5), ..config };
-    for (bench, config) in [(bench.clone(), config), (unknown, config), (bench, believed)] {
+    let setup = paper(5e-6, 10).setup;
+    let unknown = Setup { force_n: None, ..setup.clone() };
+    let config = Influence::default();
+    let believed = Influence { force_sd_n: Some(0.5), ..config };
+    for (setup, config) in [(setup.clone(), config), (unknown, config), (setup, believed)] {
         for dead in [&[][..], &[3], &[0, 5, 6]] {
-            let mut locator = fit(config, &bench, &recording);
+            let mut locator = fit(config, &setup, &recording);
             assert!(dead.iter().all(|channel| locator.leave_out(*channel)));
             let search = locator.search();
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
-            for (kind, reading) in (0..8).flat_map(|_| odd_readings(&bench, &mut rng)) {
+            for (kind, reading) in (0..8).flat_map(|_| odd_readings(&setup, &mut rng)) {
                 // Noise as large as a signal is best explained by an immense force next to a support, where the
                 // calibration says least; the search looks where the noise alone says.
                 if !matches!(search.force, ForceBelief::Known(_)) && ROUGH.contains(&kind) {

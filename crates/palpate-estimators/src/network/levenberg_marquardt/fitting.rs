@@ -9,14 +9,14 @@ use crate::features::NoFeatures;
 use crate::fit::{ChannelMismatch, Fit, FitTask};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, TooFewPositions};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_numerics::mean_and_variance;
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
 /// Outputs are the position and, where the bench does not know the force but every row of the recording does, the force.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LevenbergMarquardtConfig {
+pub struct LevenbergMarquardt {
     /// Nodes of each hidden layer, input side first; at least 1 each.
     pub hidden: Vec<usize>,
     /// Networks in the ensemble, at least 1: those with the greatest evidence of twice as many that are trained.
@@ -25,7 +25,7 @@ pub struct LevenbergMarquardtConfig {
     pub max_iterations: u32,
 }
 
-impl Default for LevenbergMarquardtConfig {
+impl Default for LevenbergMarquardt {
     fn default() -> Self {
         Self { hidden: vec![10], ensemble: 5, max_iterations: 200 }
     }
@@ -70,17 +70,17 @@ pub enum LevenbergMarquardtFitError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Fit for LevenbergMarquardtConfig {
+impl Fit for LevenbergMarquardt {
     type Method = LevenbergMarquardtLocator;
     type Error = LevenbergMarquardtFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
         self.check()?;
         task.recording.check_distinct_positions(2)?;
-        let inputs = NetworkInputs::of(&task.bench.layout, task.recording)?;
+        let inputs = NetworkInputs::of(&task.setup.layout, task.recording)?;
         let input_rows = input_rows(&inputs, task.recording)?;
-        let scales = output_scales(task.bench, task.recording);
-        let targets = target_rows(task.bench, task.recording, &scales);
+        let scales = output_scales(task.setup, task.recording);
+        let targets = target_rows(task.setup, task.recording, &scales);
         let topology = self.topology(inputs.axes.len(), scales.len());
         let training = Training {
             topology: &topology,
@@ -90,8 +90,8 @@ impl Fit for LevenbergMarquardtConfig {
         };
         let members = self.ensemble(&training, task.seed, task.watch)?;
         Ok(LevenbergMarquardtLocator {
-            extent: task.bench.surface.extent(),
-            force_n: task.bench.force_n,
+            extent: task.setup.surface.extent(),
+            force_n: task.setup.force_n,
             inputs,
             topology,
             scales,
@@ -100,7 +100,7 @@ impl Fit for LevenbergMarquardtConfig {
     }
 }
 
-impl LevenbergMarquardtConfig {
+impl LevenbergMarquardt {
     fn check(&self) -> Result<(), LevenbergMarquardtFitError> {
         let zero = |what| Err(LevenbergMarquardtFitError::Zero { what });
         match self {
@@ -158,30 +158,30 @@ fn input_rows(
 }
 
 /// x, y where the surface has one, and the force where it is an output.
-fn truths<'a>(bench: &Bench, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
+fn truths<'a>(setup: &Setup, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
     let rows = &recording.rows;
     let mut truths: Vec<Box<dyn Fn(usize) -> f64>> = vec![Box::new(|i| rows[i].position.x_m)];
-    if bench.surface.extent().width_m.is_some() {
+    if setup.surface.extent().width_m.is_some() {
         truths.push(Box::new(|i| rows[i].position.y_m));
     }
-    if bench.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
+    if setup.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
         truths.push(Box::new(|i| rows[i].force_n.unwrap_or_default()));
     }
     truths
 }
 
 /// Mean and standard deviation of every output over the recording.
-fn output_scales(bench: &Bench, recording: &Recording) -> Vec<OutputScale> {
+fn output_scales(setup: &Setup, recording: &Recording) -> Vec<OutputScale> {
     let count = recording.rows.len();
     let scale = |truth: &dyn Fn(usize) -> f64| {
         let (mean, variance) = mean_and_variance((0..count).map(truth));
         OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
     };
-    truths(bench, recording).iter().map(|truth| scale(truth.as_ref())).collect()
+    truths(setup, recording).iter().map(|truth| scale(truth.as_ref())).collect()
 }
 
-fn target_rows(bench: &Bench, recording: &Recording, scales: &[OutputScale]) -> Array2<f64> {
-    let truths = truths(bench, recording);
+fn target_rows(setup: &Setup, recording: &Recording, scales: &[OutputScale]) -> Array2<f64> {
+    let truths = truths(setup, recording);
     Array2::from_shape_fn((recording.rows.len(), scales.len()), |(i, k)| {
         (truths[k](i) - scales[k].mean) / scales[k].sd
     })

@@ -8,13 +8,13 @@ use super::perceptron::jacobians;
 use super::training::Trained;
 use crate::fit::{Locate, LocatorFault};
 use crate::network::Topology;
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::normal_interval_95;
 
-/// Networks that locate; see [`LevenbergMarquardtConfig`](super::LevenbergMarquardtConfig).
+/// Networks that locate; see [`LevenbergMarquardt`](super::LevenbergMarquardt).
 ///
 /// The estimate is the mean of the members. Its covariance is that of the mixture: the spread of the members, and the mean over
 /// them of g·A⁻¹·gᵀ, by which the weights are unsure (g an output's derivatives by the weights, A the curvature), and of
@@ -173,8 +173,8 @@ impl Locate for LevenbergMarquardtLocator {
         Estimate::of_contact(contact, if on_surface { Status::Located } else { Status::OutsideSurface })
     }
 
-    fn check(&self, bench: &Bench) -> Result<(), LocatorFault> {
-        self.inputs.check(bench.layout.len())?;
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.inputs.check(setup.layout.len())?;
         let sizes = &self.topology.sizes;
         LocatorFault::check_numbers(
             "layer",

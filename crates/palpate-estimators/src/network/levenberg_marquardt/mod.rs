@@ -8,7 +8,7 @@ mod locator;
 mod perceptron;
 mod training;
 
-pub use fitting::{LevenbergMarquardtConfig, LevenbergMarquardtFitError};
+pub use fitting::{LevenbergMarquardt, LevenbergMarquardtFitError};
 pub use inputs::NetworkInputs;
 pub use locator::{LevenbergMarquardtLocator, Member, OutputScale};
 

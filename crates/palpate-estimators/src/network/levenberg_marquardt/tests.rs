@@ -9,7 +9,7 @@ use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::network::{Activation, Topology};
 use crate::recording::{Provenance, Recording, Row};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, SensorKind, measure};
 use palpate_mechanics::surface::{Beam, SurfaceSpec};
@@ -66,35 +66,35 @@ fn effective_parameters_are_the_weights_that_the_data_determine() {
 }
 
 /// The paper's bench.
-fn bench(noise_sd: f64, force_n: Option<f64>) -> Bench {
+fn setup(noise_sd: f64, force_n: Option<f64>) -> Setup {
     let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     for sensor in &mut layout.sensors {
         sensor.channel = ChannelModel { noise_sd, ..ChannelModel::default() };
     }
-    Bench { surface: SurfaceSpec::Beam(beam), layout, force_n, columns: None }
+    Setup { surface: SurfaceSpec::Beam(beam), layout, force_n, columns: None }
 }
 
-fn reading(bench: &Bench, x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-    let model = bench.surface.model().unwrap();
+fn reading(setup: &Setup, x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+    let model = setup.surface.model().unwrap();
     let influence =
         |s: &palpate_mechanics::sensing::Sensor| model.influence(s.kind, s.position, Position::along(x_m));
-    let clean: Vec<f64> = bench.layout.sensors.iter().map(|s| force_n * influence(s)).collect();
-    measure(&bench.layout, &clean, &ChannelErrors::none(&bench.layout), rng)
+    let clean: Vec<f64> = setup.layout.sensors.iter().map(|s| force_n * influence(s)).collect();
+    measure(&setup.layout, &clean, &ChannelErrors::none(&setup.layout), rng)
 }
 
-fn recording(bench: &Bench, contacts: impl Iterator<Item = (f64, f64)>, seed: u64) -> Recording {
+fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u64) -> Recording {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let row = |(x_m, force_n)| Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
         hidden: None,
-        reading: reading(bench, x_m, force_n, &mut rng),
+        reading: reading(setup, x_m, force_n, &mut rng),
     };
     let rows: Vec<Row> = contacts.map(row).collect();
     let provenance =
         Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: Some(seed) };
-    Recording { channels: bench.layout.names(), kinds: bench.layout.kinds(), rows, provenance }
+    Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance }
 }
 
 fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {
@@ -104,7 +104,7 @@ fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {
 /// Mean error in metres and coverage of the 95 % interval at `from`…`to` mm.
 fn judge(
     locator: &LevenbergMarquardtLocator,
-    bench: &Bench,
+    setup: &Setup,
     (from, to): (u32, u32),
     force_n: f64,
 ) -> (f64, f64) {
@@ -112,7 +112,7 @@ fn judge(
     let (mut sum, mut covered) = (0.0, 0.0);
     for x_mm in from..=to {
         let x_m = f64::from(x_mm) * 1e-3;
-        let contact = locator.locate(&reading(bench, x_m, force_n, &mut rng)).contact;
+        let contact = locator.locate(&reading(setup, x_m, force_n, &mut rng)).contact;
         sum += (contact.position.x_m - x_m).abs();
         let (low, high) = contact.uncertainty.unwrap().x_95_m;
         covered += f64::from(u8::from(low <= x_m && x_m <= high));
@@ -121,20 +121,20 @@ fn judge(
     (sum / count, covered / count)
 }
 
-fn fit(bench: &Bench, recording: &Recording) -> LevenbergMarquardtLocator {
-    let task = FitTask::new(bench, recording).seed(1);
-    let locator = LevenbergMarquardtConfig::default().fit_method(task).unwrap();
-    assert_eq!(locator.check(bench), Ok(()));
+fn fit(setup: &Setup, recording: &Recording) -> LevenbergMarquardtLocator {
+    let task = FitTask::new(setup, recording).seed(1);
+    let locator = LevenbergMarquardt::default().fit_method(task).unwrap();
+    assert_eq!(locator.check(setup), Ok(()));
     locator
 }
 
 /// The paper's network is off by 2.46 % of the length here.
 #[test]
 fn ten_clean_presses_of_the_papers_beam() {
-    let bench = bench(0.0, Some(3.0));
-    let locator = fit(&bench, &recording(&bench, even(1), 0));
+    let setup = setup(0.0, Some(3.0));
+    let locator = fit(&setup, &recording(&setup, even(1), 0));
     for (portion, bound_percent) in [((1, 399), 0.9), ((20, 380), 0.2), ((60, 300), 0.1)] {
-        let (mean_m, _) = judge(&locator, &bench, portion, 3.0);
+        let (mean_m, _) = judge(&locator, &setup, portion, 3.0);
         let percent = 100.0 * mean_m / 0.4;
         eprintln!("clean, {portion:?} mm: {percent:.3} %");
         assert!(percent < bound_percent, "{portion:?}: {percent} %");
@@ -143,10 +143,10 @@ fn ten_clean_presses_of_the_papers_beam() {
 
 #[test]
 fn noisy_presses_of_the_papers_beam_and_their_intervals() {
-    let bench = bench(5e-6, Some(3.0));
-    let locator = fit(&bench, &recording(&bench, even(10), 0));
+    let setup = setup(5e-6, Some(3.0));
+    let locator = fit(&setup, &recording(&setup, even(10), 0));
     for (portion, bound_percent) in [((1, 399), 1.2), ((20, 380), 0.3)] {
-        let (mean_m, covered) = judge(&locator, &bench, portion, 3.0);
+        let (mean_m, covered) = judge(&locator, &setup, portion, 3.0);
         let percent = 100.0 * mean_m / 0.4;
         eprintln!("noisy, {portion:?} mm: {percent:.3} %, covered {covered:.3}");
         assert!(percent < bound_percent, "{portion:?}: {percent} %");
@@ -154,26 +154,26 @@ fn noisy_presses_of_the_papers_beam_and_their_intervals() {
     }
     let text = serde_json::to_string(&locator).unwrap();
     let mut read: LevenbergMarquardtLocator = serde_json::from_str(&text).unwrap();
-    assert_eq!(read.check(&bench), Ok(()));
+    assert_eq!(read.check(&setup), Ok(()));
     read.members[0].curvature_factor[2] = 0.0;
-    assert!(read.check(&bench).is_err());
+    assert!(read.check(&setup).is_err());
     read.members[0].weights.pop();
-    assert!(read.check(&bench).is_err());
+    assert!(read.check(&setup).is_err());
 }
 
 #[test]
 fn position_and_force_come_out_together() {
-    let bench = bench(0.0, None);
+    let setup = setup(0.0, None);
     let contacts = (0..10).flat_map(|i| [1.0, 2.0, 4.0].map(|force_n| (0.02 + 0.04 * f64::from(i), force_n)));
-    let recording = recording(&bench, contacts, 0);
-    let task = FitTask::new(&bench, &recording).seed(1);
-    let config = LevenbergMarquardtConfig { ensemble: 2, ..LevenbergMarquardtConfig::default() };
+    let recording = recording(&setup, contacts, 0);
+    let task = FitTask::new(&setup, &recording).seed(1);
+    let config = LevenbergMarquardt { ensemble: 2, ..LevenbergMarquardt::default() };
     let locator = config.fit_method(task).unwrap();
-    let (mean_m, _) = judge(&locator, &bench, (40, 360), 3.0);
+    let (mean_m, _) = judge(&locator, &setup, (40, 360), 3.0);
     assert!(mean_m < 2e-3, "{mean_m}");
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
     for x_m in [0.1, 0.23, 0.3] {
-        let contact = locator.locate(&reading(&bench, x_m, 3.0, &mut rng)).contact;
+        let contact = locator.locate(&reading(&setup, x_m, 3.0, &mut rng)).contact;
         assert!((contact.force_n.unwrap() - 3.0).abs() < 0.3, "{contact:?}");
         assert!(contact.uncertainty.unwrap().covariance[5] > 0.0);
     }
@@ -181,30 +181,30 @@ fn position_and_force_come_out_together() {
 
 #[test]
 fn what_cannot_be_trained_is_named() {
-    let bench = bench(0.0, Some(3.0));
-    let one = recording(&bench, std::iter::repeat_n((0.1, 3.0), 5), 0);
-    let two = recording(&bench, [(0.1, 3.0), (0.2, 3.0)].into_iter(), 0);
-    let message = |config: LevenbergMarquardtConfig, recording: &Recording| {
-        let task = FitTask::new(&bench, recording);
+    let setup = setup(0.0, Some(3.0));
+    let one = recording(&setup, std::iter::repeat_n((0.1, 3.0), 5), 0);
+    let two = recording(&setup, [(0.1, 3.0), (0.2, 3.0)].into_iter(), 0);
+    let message = |config: LevenbergMarquardt, recording: &Recording| {
+        let task = FitTask::new(&setup, recording);
         config.fit_method(task).unwrap_err().to_string()
     };
-    let good = LevenbergMarquardtConfig::default();
+    let good = LevenbergMarquardt::default();
     assert_eq!(message(good.clone(), &one), "the recording has 1 distinct positions; at least 2 are needed");
-    let hollow = LevenbergMarquardtConfig { hidden: vec![3, 0], ..good.clone() };
+    let hollow = LevenbergMarquardt { hidden: vec![3, 0], ..good.clone() };
     assert_eq!(
         message(hollow, &two),
         "a network with hidden nodes 0 cannot be trained; it must be at least 1"
     );
-    let none = LevenbergMarquardtConfig { ensemble: 0, ..good.clone() };
+    let none = LevenbergMarquardt { ensemble: 0, ..good.clone() };
     assert!(message(none, &two).contains("networks in its ensemble 0"));
-    let task = FitTask::new(&bench, &two);
+    let task = FitTask::new(&setup, &two);
     let stop = |_| false;
     let stopped = good.fit_method(task.watch(Watch::new(&stop))).unwrap_err();
     assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
 /// A soft strip's recording, by its path in the folder of real recordings; `None`, said in one line, where the folder is absent.
-fn strip(name: &str) -> Option<(Bench, Recording)> {
+fn strip(name: &str) -> Option<(Setup, Recording)> {
     use palpate_mechanics::surface::Extent;
     let path = data::recording(&format!("tactile-fsi/{name}"))?;
     let text = std::fs::read_to_string(path).unwrap();
@@ -216,22 +216,22 @@ fn strip(name: &str) -> Option<(Bench, Recording)> {
     let rows: Vec<Row> = text.lines().skip(1).map(row).collect();
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
     let surface = SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None });
-    let bench = Bench { surface, layout, force_n: None, columns: None };
+    let setup = Setup { surface, layout, force_n: None, columns: None };
     let provenance = Provenance { source: name.into(), rows: rows.len(), digests: vec![], seed: None };
-    let (channels, kinds) = (bench.layout.names(), bench.layout.kinds());
-    Some((bench, Recording { channels, kinds, rows, provenance }))
+    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
+    Some((setup, Recording { channels, kinds, rows, provenance }))
 }
 
 /// scikit-learn's best, a Gaussian process, has a median of 0.565 mm and a mean of 0.844 mm on these folds; one network a fold, of two
 /// trained, comes near, and the default ensemble nearer.
 #[test]
 fn a_real_strip_at_positions_held_out() {
-    let Some((bench, recording)) = strip("1d-water-1.5mm.csv") else { return };
+    let Some((setup, recording)) = strip("1d-water-1.5mm.csv") else { return };
     let mut errors_mm = Vec::new();
     for fold in recording.folds(5).unwrap() {
         let training = recording.subset(&fold.training);
-        let task = FitTask::new(&bench, &training).seed(1);
-        let config = LevenbergMarquardtConfig { ensemble: 1, ..LevenbergMarquardtConfig::default() };
+        let task = FitTask::new(&setup, &training).seed(1);
+        let config = LevenbergMarquardt { ensemble: 1, ..LevenbergMarquardt::default() };
         let locator = config.fit_method(task).unwrap();
         let error_mm = |i: &usize| {
             let row = &recording.rows[*i];

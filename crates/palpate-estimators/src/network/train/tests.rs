@@ -1,7 +1,7 @@
 //! Every arithmetic gives the scalar twin's networks, to the last bit.
 
 use super::*;
-use crate::network::{Activation, NetworkConfig, PresentationOrder, TrainingStatus};
+use crate::network::{Activation, Network, PresentationOrder, TrainingStatus};
 
 /// A queue of the seeds 0…n.
 struct Seeds {
@@ -45,7 +45,7 @@ fn networks(
     queue.networks.into_iter().map(|(_, network)| network).collect()
 }
 
-fn compare_with_twin(config: &NetworkConfig, patterns: &Patterns, seeds: u64) {
+fn compare_with_twin(config: &Network, patterns: &Patterns, seeds: u64) {
     let topology = Topology::new(config, patterns.inputs, patterns.outputs);
     let task = TrainingTask { topology: &topology, patterns, rule: &config.training };
     for precision in [Precision::F64, Precision::F32] {
@@ -57,8 +57,8 @@ fn compare_with_twin(config: &NetworkConfig, patterns: &Patterns, seeds: u64) {
     }
 }
 
-fn config(max_epochs: u32) -> NetworkConfig {
-    let mut config = NetworkConfig::default();
+fn config(max_epochs: u32) -> Network {
+    let mut config = Network::default();
     config.training.max_epochs = max_epochs;
     config
 }
@@ -79,7 +79,7 @@ fn every_shape_gives_the_twins_bits() {
             (Activation::Linear, Activation::Logistic),
         ] {
             for biases in [true, false] {
-                let mut config = NetworkConfig {
+                let mut config = Network {
                     hidden: hidden.clone(),
                     hidden_activation,
                     output_activation,
@@ -109,7 +109,7 @@ fn a_fixed_order_is_the_same_for_all() {
 
 #[test]
 fn a_wild_step_diverges_and_says_so() {
-    let mut config = NetworkConfig { output_activation: Activation::Linear, ..config(10_000) };
+    let mut config = Network { output_activation: Activation::Linear, ..config(10_000) };
     config.training.learning_rate = 1e6;
     config.hidden_activation = Activation::Linear;
     let patterns = patterns(5, 3, 1);
@@ -140,7 +140,7 @@ fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &Patterns,
 fn one_update_goes_down_the_gradient_of_finite_differences() {
     for activation in [Activation::Logistic, Activation::Tanh] {
         let mut config =
-            NetworkConfig { hidden: vec![4, 3], hidden_activation: activation, ..NetworkConfig::default() };
+            Network { hidden: vec![4, 3], hidden_activation: activation, ..Network::default() };
         let rule = &mut config.training;
         (rule.learning_rate, rule.aggregate_error, rule.order) = (1e-3, 1e-300, PresentationOrder::Fixed);
         let patterns = patterns(1, 3, 2);

@@ -2,9 +2,9 @@
 
 use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, moving_plate, over_the_plate};
-use crate::influence::{InfluenceConfig, InfluenceLocator, InfluenceSource, PlateLikelihood};
+use crate::influence::{Influence, InfluenceLocator, InfluenceSource, PlateLikelihood};
 use crate::likelihood::{Likelihood, PlaneLikelihood};
-use crate::setup::Bench;
+use crate::setup::Setup;
 use crate::tracking::tests::{Timed, timed_readings, wrongly_touching};
 use crate::tracking::{SmoothTracker, Tracker, TrackerConfig};
 use palpate_mechanics::contact::{Contact, Position};
@@ -15,14 +15,14 @@ fn rig() -> Example {
 }
 
 fn likelihood(rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
-    likelihood_from(InfluenceConfig::default().from, rig, force_n)
+    likelihood_from(Influence::default().from, rig, force_n)
 }
 
 fn likelihood_from(from: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
     let recording = rig.simulate(1);
-    let bench = Bench { force_n, ..rig.bench.clone() };
-    let task = FitTask::new(&bench, &recording);
-    let config = InfluenceConfig { from, ..InfluenceConfig::default() };
+    let setup = Setup { force_n, ..rig.setup.clone() };
+    let task = FitTask::new(&setup, &recording);
+    let config = Influence { from, ..Influence::default() };
     match config.fit_method(task).unwrap() {
         InfluenceLocator::Plane(plane) => PlateLikelihood::new(&plane),
         other => panic!("{other:?}"),
@@ -95,8 +95,8 @@ fn the_pulls_of_a_fit_on_a_plane_are_the_slopes_of_its_misfit() {
             fit(unknowns).misfit
         };
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        let pull = fit(unknowns).pull[k];
-        assert!((slope + 2.0 * pull).abs() < 1e-4 * pull.abs(), "{k}: {slope} {pull}");
+        let score = fit(unknowns).score[k];
+        assert!((slope + 2.0 * score).abs() < 1e-4 * score.abs(), "{k}: {slope} {pull}");
     }
 }
 

@@ -6,7 +6,7 @@ use super::mesh::{Mesh, NODE_DEGREES};
 use super::spec::{Edge, PlateSpec, PointSupport, PointSupportKind};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use crate::surface::{NothingToRead, first_not_positive};
+use crate::surface::{InsensitiveSensor, first_not_positive};
 
 /// The fewest and the most elements along the longer side.
 const FEWEST_ELEMENTS: usize = 4;
@@ -159,11 +159,11 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
 ///
 /// On an edge that is held w = 0, so its derivatives along the edge are zero too; on a clamped one the slope across it is
 /// zero, and on a simple one the bending moment across it, and with it the curvature.
-pub(super) fn nothing_to_read(
+pub(super) fn insensitive_sensor(
     spec: &PlateSpec,
     kind: SensorKind,
     position: Position,
-) -> Option<NothingToRead> {
+) -> Option<InsensitiveSensor> {
     let still = |(name, edge): &(&'static str, Edge)| {
         let across = matches!(*name, "left" | "right");
         match (kind, edge) {
@@ -175,10 +175,10 @@ pub(super) fn nothing_to_read(
     };
     if let Some((edge, how)) = edges_at(spec, position).find(still) {
         let held = if how == Edge::Clamped { "clamped" } else { "simply supported" };
-        return Some(NothingToRead::AtEdge { edge, held, kind });
+        return Some(InsensitiveSensor::AtEdge { edge, held, kind });
     }
     let support = support_at(spec, position).filter(|i| spec.supports[*i].is_rigid())?;
-    (kind == SensorKind::Deflection).then_some(NothingToRead::AtSupport { number: support + 1 })
+    (kind == SensorKind::Deflection).then_some(InsensitiveSensor::AtSupport { number: support + 1 })
 }
 
 /// The support at `position`, by its index.

@@ -23,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, NothingToRead, Surface};
+use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use full_scale::FullScales;
@@ -143,8 +143,8 @@ impl Surface for Plate {
         places
     }
 
-    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
-        check::nothing_to_read(&self.spec, kind, sensor)
+    fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
+        check::insensitive_sensor(&self.spec, kind, sensor)
     }
 
     /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force

@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, NothingToRead, Surface};
+use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use check::SAME_PLACE;
@@ -149,10 +149,10 @@ impl Surface for SupportedBeam {
         places
     }
 
-    fn nothing_to_read(&self, kind: SensorKind, sensor: Position) -> Option<NothingToRead> {
+    fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
         let negligible = ROUNDING * self.full_scale(kind);
         let held = kind != SensorKind::Raw && self.shape(kind, sensor).peak() <= negligible;
-        held.then_some(NothingToRead::Held { kind })
+        held.then_some(InsensitiveSensor::Held { kind })
     }
 
     /// Over contact positions exact, as the extremes of cubics; over sensor positions by a scan of every element and golden

@@ -42,13 +42,13 @@ pub fn run(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<()
     let contacts = rig.design.as_ref().map(|design| &design.contacts);
     let observer = Observer::of_stages();
     let observe = |progress| observer.observe(progress);
-    let advice = next_press(&rig.bench, contacts, recording, arguments.stop_below, Watch::new(&observe));
+    let advice = next_press(&rig.setup, contacts, recording, arguments.stop_below, Watch::new(&observe));
     drop(observer);
     let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?;
     if arguments.json {
         return output::say_json(&told(arguments, &advice));
     }
-    print(&advice, rig.bench.surface.extent().is_plane())
+    print(&advice, rig.setup.surface.extent().is_plane())
 }
 
 fn told(arguments: &Arguments, advice: &Advice) -> Findings {

@@ -16,7 +16,7 @@ pub fn write(path: &Path, text: &str, layout: &Layout) -> Result<(), Failure> {
         .map_err(|error| Complaint::new(format!("cannot put the layout into the rig: {error}")))?;
     // Whatever else the rig says must go with as many sensors.
     let rig = input::parse_rig(path, &written)?;
-    if rig.bench.layout.len() != layout.len() {
+    if rig.setup.layout.len() != layout.len() {
         return Err(Complaint::new("the rig does not take the layout").into());
     }
     output::write_file(path, written.as_bytes())

@@ -39,7 +39,7 @@ fn only_the_sensors_change() {
     let written = with_layout(RIG, &layout).unwrap();
     insta::assert_snapshot!(written);
     let rig = Rig::from_toml(&written).unwrap();
-    let places: Vec<f64> = rig.bench.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+    let places: Vec<f64> = rig.setup.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
     assert_eq!(places, [0.035, 0.26, 0.123457, 0.4]);
     let again = with_layout(&written, &layout).unwrap();
     assert_eq!(again, written);

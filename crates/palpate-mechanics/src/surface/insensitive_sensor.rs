@@ -4,7 +4,7 @@ use crate::sensing::SensorKind;
 
 /// Why a sensor reads nothing, wherever the surface is touched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NothingToRead {
+pub enum InsensitiveSensor {
     /// A support of a beam holds what it measures.
     #[error("{} there", held(*kind))]
     Held {
