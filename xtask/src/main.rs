@@ -31,7 +31,7 @@ enum Chore {
         #[arg(long)]
         strict: bool,
     },
-    /// Check the rules that a program can check: dependencies, invariants, links, file lengths
+    /// Check the rules that a program can check: dependencies, import circles, links
     Tidy,
     /// Run the benchmarks of the whole workspace
     Bench {

@@ -67,7 +67,7 @@ const NEEDS: [Need; 3] = [
         found: |root, named| named.map_or_else(|| root.join("../shared/data").is_dir(), Path::is_dir),
         install: None,
         without: Without::Skips {
-            tests: &["crates/palpate-cli/tests/recordings.rs", "every test that reads a real recording"],
+            tests: &["crates/palpate-cli/tests/cli/recordings.rs", "every test that reads a real recording"],
             remedy: "put it at ../shared/data beside the workspace, or name it in PALPATE_DATA",
         },
     },
@@ -77,7 +77,7 @@ const NEEDS: [Need; 3] = [
         found: |_, named| named.unwrap_or(Path::new("/usr/bin/chromium")).is_file(),
         install: Some(Install::Apt(&["chromium", "fonts-dejavu-core"])),
         without: Without::Skips {
-            tests: &["crates/palpate-cli/tests/browser.rs"],
+            tests: &["crates/palpate-cli/tests/cli/browser.rs"],
             remedy: "install Debian's chromium, or name the program in PALPATE_CHROMIUM",
         },
     },
@@ -205,7 +205,7 @@ mod tests {
     fn a_missing_prerequisite_names_the_tests_it_skips_and_the_remedy() {
         let chromium = NEEDS.iter().find(|need| need.name == "Chromium").unwrap();
         let text = chromium.describe();
-        assert!(text.contains("tests/browser.rs") && text.contains("PALPATE_CHROMIUM"), "{text}");
+        assert!(text.contains("tests/cli/browser.rs") && text.contains("PALPATE_CHROMIUM"), "{text}");
     }
 
     #[test]

@@ -4,16 +4,13 @@
 
 mod binary;
 mod changelog;
+mod circles;
 mod crates;
-mod length;
-mod library;
 mod links;
-mod modules;
 mod places;
 mod project;
 mod rust_text;
 mod unfinished;
-mod unsafe_code;
 mod used_paths;
 
 use std::path::Path;
@@ -50,12 +47,9 @@ impl Finding {
 
 type Rule = fn(&Project) -> Vec<Finding>;
 
-const RULES: [(&str, Rule); 10] = [
+const RULES: [(&str, Rule); 7] = [
     ("crates depend one way", crates::findings),
-    ("modules of palpate use those above them", modules::findings),
-    ("the library has no clock, files or terminal", library::findings),
-    ("unsafe only in lanes", unsafe_code::findings),
-    ("file length", length::findings),
+    ("no import circle between sibling files", circles::findings),
     ("documents name what exists", links::findings),
     ("no machine's paths or hosts", places::findings),
     ("nothing unfinished", unfinished::findings),

@@ -1,4 +1,8 @@
 //! From recordings to locators: recordings, estimators, tracking, load profiles, evaluation.
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 pub mod arrangement;
 pub mod centroid;

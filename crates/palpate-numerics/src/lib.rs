@@ -1,4 +1,8 @@
 //! Linear algebra, statistics and distribution functions that several modules need.
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 mod cholesky;
 mod distributions;

@@ -14,6 +14,11 @@
 //! ```
 //!
 //! The feature `png` adds copies of figures as PNG, drawn with a font of their own: `svg_to_png`, `with_png_copies`.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 mod beam_drawing;
 mod bench_figures;

@@ -1,4 +1,9 @@
 //! The rig file, one TOML document that says what is on the bench, and the study file, which varies one.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 mod design;
 mod document;

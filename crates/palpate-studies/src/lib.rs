@@ -3,6 +3,11 @@
 //! There are two ways to fit an arm. Networks on perfect sensors, as the founding paper has them, share one recording: what a seed
 //! changes is the network's random start, and many are trained at once, in lanes. Of every other arm each seed makes a recording of
 //! its own, with fresh noise, to which the estimator is fitted and by which it is judged.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 pub mod dead_areas;
 pub mod elliott;

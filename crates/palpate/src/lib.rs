@@ -27,6 +27,11 @@
 //!
 //! Lengths are in metres, forces in newtons, moduli in pascals; functions such as [`mm`](prelude::mm) say the unit where a
 //! number is written. The examples in the folder `examples` of this crate are complete programs.
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)
+)]
 
 pub mod prelude;
 

@@ -69,22 +69,12 @@ impl Project {
         let inside = |file: &File| file.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('/'));
         path.is_empty() || self.file(path).is_some() || self.files.iter().any(inside)
     }
-
-    /// The Rust files.
-    pub fn rust(&self) -> impl Iterator<Item = &File> {
-        self.files.iter().filter(|file| file.path.ends_with(".rs"))
-    }
 }
 
 impl File {
     /// The file as text.
     pub fn text(&self) -> Cow<'_, str> {
         String::from_utf8_lossy(&self.bytes)
-    }
-
-    /// Whether it holds tests alone.
-    pub fn is_test(&self) -> bool {
-        self.path.contains("/tests/") || self.path.ends_with("/tests.rs")
     }
 
     /// Whether it is one of the rules' own files, which must name what they forbid.

@@ -1,12 +1,14 @@
-//! The paths (`a::b::c`) and the macros that Rust code uses.
+//! The paths (`a::b::c`) that Rust code uses, and the modules that it declares.
 
 /// A path with its segments, groups such as `a::{b, c}` taken apart.
 #[derive(Debug, PartialEq, Eq)]
 pub struct UsedPath {
     /// Counted from 1.
     pub line: usize,
-    /// `*` and `self` included.
+    /// `*` included, a closing `self` left out.
     pub segments: Vec<String>,
+    /// The name that a `use` declaration brings in by it.
+    pub imported: Option<String>,
 }
 
 #[derive(Debug, PartialEq, Eq)]
@@ -18,40 +20,42 @@ enum Token {
 
 /// Every path in code without comments and literals.
 pub fn used_paths(code: &str) -> Vec<UsedPath> {
-    let mut reader = Reader { tokens: tokens(code), at: 0, found: Vec::new() };
-    while reader.at < reader.tokens.len() {
-        let before = reader.at;
-        reader.path(&[]);
-        if reader.at == before {
-            reader.at += 1;
+    let mut reader = Reader { tokens: tokens(code), at: 0, declares: false, found: Vec::new() };
+    while let Some(token) = reader.token_at(0) {
+        match token {
+            // `use<…>` is a bound of an opaque type.
+            Token::Word(word) if word == "use" && reader.token_at(1) != Some(&Token::Mark('<')) => {
+                reader.declares = true;
+            }
+            Token::Mark(';') => reader.declares = false,
+            Token::Word(_) | Token::Parting => {
+                reader.path(&[]);
+                continue;
+            }
+            Token::Mark(_) => {}
         }
+        reader.at += 1;
     }
     reader.found
 }
 
-/// Every macro that is called, with its line.
-pub fn used_macros(code: &str) -> Vec<(usize, String)> {
+/// The modules that code declares in files of their own: `mod name;`.
+pub fn declared_modules(code: &str) -> Vec<String> {
     let tokens = tokens(code);
-    let called = tokens.windows(3).filter_map(|three| match three {
-        [(line, Token::Word(name)), (_, Token::Mark('!')), (_, Token::Mark('(' | '[' | '{'))] => {
-            Some((*line, name.clone()))
+    let declared = tokens.windows(3).filter_map(|three| match three {
+        [(_, Token::Word(word)), (_, Token::Word(name)), (_, Token::Mark(';'))] if word == "mod" => {
+            Some(name.clone())
         }
         _ => None,
     });
-    called.collect()
-}
-
-/// Every word of the code, with its line.
-pub fn words(code: &str) -> impl Iterator<Item = (usize, String)> {
-    tokens(code).into_iter().filter_map(|(line, token)| match token {
-        Token::Word(word) => Some((line, word)),
-        _ => None,
-    })
+    declared.collect()
 }
 
 struct Reader {
     tokens: Vec<(usize, Token)>,
     at: usize,
+    /// Inside a `use` declaration.
+    declares: bool,
     found: Vec<UsedPath>,
 }
 
@@ -60,13 +64,16 @@ impl Reader {
     fn path(&mut self, group: &[String]) {
         let mut segments = group.to_vec();
         let line = self.tokens.get(self.at).map_or(0, |(line, _)| *line);
-        while let Some((_, token)) = self.tokens.get(self.at) {
+        while let Some(token) = self.token_at(0) {
             match token {
                 Token::Parting => self.at += 1,
                 Token::Word(word) => {
-                    segments.push(word.clone());
+                    // `{self, …}` names the group's own module.
+                    if word != "self" || segments.is_empty() {
+                        segments.push(word.clone());
+                    }
                     self.at += 1;
-                    if self.mark_here() != Some(&Token::Parting) {
+                    if self.token_at(0) != Some(&Token::Parting) {
                         break;
                     }
                 }
@@ -79,28 +86,45 @@ impl Reader {
                 Token::Mark(_) => break,
             }
         }
-        if segments.len() > group.len() {
-            self.found.push(UsedPath { line, segments });
+        if !segments.is_empty() {
+            let imported =
+                if self.declares { self.renamed().or_else(|| segments.last().cloned()) } else { None };
+            self.found.push(UsedPath { line, segments, imported });
         }
     }
 
     fn group(&mut self, segments: &[String]) {
         self.at += 1;
-        while let Some(token) = self.mark_here() {
-            if *token == Token::Mark('}') {
-                self.at += 1;
-                return;
-            }
-            let before = self.at;
-            self.path(segments);
-            if self.at == before {
-                self.at += 1;
+        while let Some(token) = self.token_at(0) {
+            match token {
+                Token::Mark('}') => {
+                    self.at += 1;
+                    return;
+                }
+                Token::Mark(',') => self.at += 1,
+                _ => {
+                    let before = self.at;
+                    self.path(segments);
+                    self.at = self.at.max(before + 1);
+                }
             }
         }
     }
 
-    fn mark_here(&self) -> Option<&Token> {
-        self.tokens.get(self.at).map(|(_, token)| token)
+    /// Reads `as name`.
+    fn renamed(&mut self) -> Option<String> {
+        match (self.token_at(0)?, self.token_at(1)?) {
+            (Token::Word(word), Token::Word(name)) if word == "as" => {
+                let name = name.clone();
+                self.at += 2;
+                Some(name)
+            }
+            _ => None,
+        }
+    }
+
+    fn token_at(&self, ahead: usize) -> Option<&Token> {
+        self.tokens.get(self.at + ahead).map(|(_, token)| token)
     }
 
     fn follows_parting(&self) -> bool {
@@ -165,12 +189,13 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_macros_are_told() {
-        assert_eq!(used_paths("\n\nuse a::b;").last().unwrap().line, 3);
-        assert_eq!(
-            used_macros("x != y;\nprintln!(\"\"); vec![1]"),
-            [(2, "println".into()), (2, "vec".into())]
-        );
+    fn lines_imported_names_and_declared_modules_are_told() {
+        let paths = used_paths("\n\nuse a::{self, b as c, d::{e, self}};\nlet f = a::b as u8;");
+        let told: Vec<_> = paths.iter().map(|path| (path.line, path.imported.as_deref())).collect();
+        let (a, c, e, d) = (Some("a"), Some("c"), Some("e"), Some("d"));
+        assert_eq!(told[..4], [(3, a), (3, c), (3, e), (3, d)]);
+        assert!(told[4..].iter().all(|(line, imported)| *line == 4 && imported.is_none()), "{told:?}");
+        assert_eq!(declared_modules("pub mod a;\nmod b { mod c; }\nlet model = d;"), ["a", "c"]);
     }
 
     #[test]

@@ -1,0 +1,146 @@
+//! Bad input: a message with the place and the bound, exit code 2, nothing written, no panic.
+
+use crate::support::command::{complained, run, said};
+use crate::support::examples::{FSI_WATER, PAPER, PAPER_STUDY, PLATE, SENSOR_KINDS_STUDY};
+use crate::support::toml::{Toml, replaced};
+use std::fs;
+use std::path::Path;
+
+/// Runs the command among some files and answers with its complaint; no file may have come or gone.
+fn complaint(files: &[(&str, &[u8])], arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let complaint = complained(&run(folder.path(), arguments), 2);
+    assert_eq!(names(folder.path()).len(), files.len(), "{:?}", names(folder.path()));
+    let panicked = complaint.contains("panicked") || complaint.contains("RUST_BACKTRACE");
+    assert!(!panicked, "{complaint}");
+    complaint
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect()
+}
+
+fn rig_complaint(from: &str, to: &str) -> String {
+    let rig = replaced(PAPER, from, to);
+    complaint(&[("rig.toml", rig.as_bytes())], &["fit", "rig.toml", "-o", "locator.json"])
+}
+
+fn csv_complaint(csv: &[u8]) -> String {
+    let files: &[(&str, &[u8])] = &[("rig.toml", FSI_WATER.as_bytes()), ("data.csv", csv)];
+    complaint(files, &["fit", "rig.toml", "--data", "data.csv", "-o", "locator.json"])
+}
+
+#[test]
+fn rigs_are_refused_at_the_place() {
+    let cases = [
+        ("a typo in a key", "length =", "lenght ="),
+        ("a wrong unit", "\"3 N\"", "\"3 mm\""),
+        ("an unknown unit", "\"1.2 mm\"", "\"1.2 furlong\""),
+        ("a sensor off the beam", "count = 8 ", "positions = [\"44 mm\", \"401 mm\"] "),
+        ("0 sensors", "count = 8 ", "count = 0 "),
+        ("0 training positions", "count = 10", "count = 0"),
+        ("a momentum of 1", "momentum = 0.9", "momentum = 1.0"),
+        ("a negative thickness", "\"1.2 mm\"", "\"-1.2 mm\""),
+        ("an estimator that does not exist", "\"network\"", "\"netwrok\""),
+        ("not TOML", "[surface]", "[surface"),
+    ];
+    let messages: Vec<String> =
+        cases.iter().map(|(what, from, to)| format!("{what}:\n{}", rig_complaint(from, to))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn recordings_are_refused_at_the_place() {
+    let cases: [(&str, &[u8]); 9] = [
+        ("a text cell", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n12,one,2,3,4\n"),
+        ("NaN", b"X,Pl,Pr,F,depth\n10,1,NaN,3,4\n"),
+        ("a short row", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n12,1\n"),
+        ("an empty file", b""),
+        ("a header alone", b"X,Pl,Pr,F,depth\n"),
+        ("a missing column", b"X,Pl,F,depth\n10,1,2,3\n"),
+        ("a position off the surface", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n101,1,2,3,4\n"),
+        ("not UTF-8", b"X,Pl,Pr,F,depth\n10,1,\xff,3,4\n"),
+        ("one position only", b"X,Pl,Pr,F,depth\n10,1,2,3,4\n10,1.5,2,3,4\n"),
+    ];
+    let messages: Vec<String> =
+        cases.iter().map(|(what, csv)| format!("{what}:\n{}", csv_complaint(csv))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn missing_files_are_named() {
+    let no_rig = complaint(&[], &["fit", "none.toml", "-o", "locator.json"]);
+    let rig = [("rig.toml", FSI_WATER.as_bytes())];
+    let no_data = complaint(&rig, &["fit", "rig.toml", "--data", "none.csv", "-o", "locator.json"]);
+    let no_model = complaint(&rig, &["fit", "rig.toml", "-o", "locator.json"]);
+    let no_locator = complaint(&[], &["locate", "none.json"]);
+    let no_folder =
+        complaint(&[("rig.toml", PAPER.as_bytes())], &["simulate", "rig.toml", "-o", "none/a.csv"]);
+    insta::assert_snapshot!([no_rig, no_data, no_model, no_locator, no_folder].join("\n"));
+}
+
+#[test]
+fn locators_of_another_kind_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("rig.toml"), PAPER).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let good = fs::read_to_string(folder.path().join("locator.json")).unwrap();
+    let inspect = |text: &str| complaint(&[("locator.json", text.as_bytes())], &["inspect", "locator.json"]);
+    let cases = [
+        ("another version", replaced(&good, "\"format_version\": 1", "\"format_version\": 2")),
+        ("another format", replaced(&good, "palpate-locator", "palpate-lock")),
+        ("a missing weight", replaced(&good, "\"weights\": [", "\"weights\": [], \"none\": [")),
+        ("cut off", good[..good.len() / 2].to_owned()),
+        ("empty", String::new()),
+    ];
+    let messages: Vec<String> =
+        cases.iter().map(|(what, text)| format!("{what}:\n{}", inspect(text))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn arms_are_refused_at_the_place() {
+    let kinds = |from: &str, to: &str| replaced(SENSOR_KINDS_STUDY, from, to);
+    let refined = "layout = \"refined\"";
+    let own = "layout = \"even\"\nsensors = { measure = \"deflection\", positions = [\"50 mm\"], noise = \"5 um\" }";
+    let cases = [
+        ("an unknown layout", kinds(refined, "layout = \"qr-pivotting\"")),
+        ("a layout and positions", kinds(refined, own)),
+        ("a layout without room", kinds("sites = \"5 mm\"", "sites = \"5 mm\"\nspacing = \"80 mm\"")),
+        (
+            "a layout without noise",
+            kinds("{ measure = \"strain\", noise = \"1 ue\" },", "{ measure = \"slope\" },"),
+        ),
+        ("no force at all", kinds("force = \"3 N\"", "")),
+        ("a force that is none", kinds("{ force = \"3 N\" }", "{ force = \"3 mm\" }")),
+        ("no readings", kinds("readings = 5", "readings = 0")),
+        ("an arm's key that no arm has", kinds(refined, "layuot = \"even\"")),
+        ("a plane", format!("name = \"plate\"\n{PLATE}\n[[arm]]\nname = \"only\"\n")),
+    ];
+    let run = |text: &str| complaint(&[("study.toml", text.as_bytes())], &["study", "study.toml"]);
+    let messages: Vec<String> = cases.iter().map(|(what, text)| format!("{what}:\n{}", run(text))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn studies_are_refused_at_the_place() {
+    let study = |from: &str, to: &str| replaced(PAPER_STUDY, from, to);
+    let cases = [
+        ("no arms", Toml::of(PAPER_STUDY).remove("arm").to_string()),
+        ("two arms of one name", study("position-20", "position-10")),
+        ("0 seeds", study("seeds = 100", "seeds = 0")),
+        ("a typo in an arm", study("training = {", "trainin = {")),
+        ("an odd rest", study("middle = 6, count = 10", "middle = 6, count = 11")),
+        ("a precision that does not exist", study("\"f64\"", "\"f16\"")),
+        ("a position off the beam", study("to = \"399 mm\"", "to = \"399 m\"")),
+    ];
+    let run = |text: &str| complaint(&[("study.toml", text.as_bytes())], &["study", "study.toml"]);
+    let messages: Vec<String> = cases.iter().map(|(what, text)| format!("{what}:\n{}", run(text))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}

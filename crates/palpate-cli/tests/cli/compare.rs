@@ -1,0 +1,158 @@
+//! `palpate compare`, and fitting with every estimator, from outside.
+
+use crate::support::command::{complained, folder, run, said};
+use crate::support::examples::{EFLESH, NOISY_BEAM};
+use crate::support::toml::Toml;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// Writes the same rig with another estimator, `other.toml`.
+fn with_estimator(folder: &Path, kind: &str) {
+    let rig = fs::read_to_string(folder.join("rig.toml")).unwrap();
+    fs::write(folder.join("other.toml"), Toml::of(&rig).estimator(kind).to_string()).unwrap();
+}
+
+#[test]
+fn every_estimator_is_held_against_the_limit() {
+    // The paper's network takes its time; a short training will do.
+    let folder = folder(Toml::of(NOISY_BEAM).estimator("network").add("estimator.max_epochs", 5_000));
+    let arguments = ["compare", "rig.toml", "--json", "--out", "report", "--calibrations", "2"];
+    let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
+    let estimators = found["estimators"].as_array().unwrap();
+    let mut names: Vec<&str> = estimators.iter().map(|row| row["name"].as_str().unwrap()).collect();
+    let means: Vec<f64> = estimators.iter().map(|row| row["error_mm"]["mean"].as_f64().unwrap()).collect();
+    assert!(means.is_sorted(), "{means:?}");
+    names.sort_unstable();
+    let all =
+        ["centroid", "closed-form", "gaussian-process", "influence", "neighbours", "network", "network-lm"];
+    assert_eq!(names, all);
+    for row in estimators {
+        for key in ["mean", "median", "p95", "rmse", "max"] {
+            assert!(row["error_mm"][key].as_f64().unwrap() > 0.0, "{row}");
+        }
+        assert!((0.0..=100.0).contains(&row["effective_percent"].as_f64().unwrap()), "{row}");
+        assert!(row["limit_ratio"].as_f64().unwrap() > 0.9, "{row}");
+        assert!(
+            row["fit_seconds"].as_f64().unwrap() > 0.0 && row["locate_ns"].as_f64().unwrap() > 0.0,
+            "{row}"
+        );
+    }
+    let influence = estimators.iter().find(|row| row["name"] == "influence").unwrap();
+    assert!(influence["limit_ratio"].as_f64().unwrap() < 1.2, "{influence}");
+    assert!((92.0..98.0).contains(&influence["coverage_95"].as_f64().unwrap()), "{influence}");
+    let report = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(all.iter().all(|name| report.contains(name)));
+}
+
+#[test]
+fn only_what_is_asked_for_is_compared() {
+    let folder = folder(NOISY_BEAM);
+    let arguments = ["compare", "rig.toml", "--json", "--only", "influence", "--only", "closed-form"];
+    let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
+    assert_eq!(found["estimators"].as_array().unwrap().len(), 2);
+    let complaint = complained(&run(folder.path(), &["compare", "rig.toml", "--only", "oracle"]), 2);
+    insta::assert_snapshot!(complaint);
+}
+
+#[test]
+fn every_estimator_is_fitted_inspected_and_locates() {
+    let folder = folder(NOISY_BEAM);
+    said(&run(folder.path(), &["simulate", "rig.toml", "-o", "presses.csv", "--every", "50 mm"]));
+    let mut words = Vec::new();
+    for kind in ["influence", "closed-form", "gaussian-process", "network-lm", "neighbours", "centroid"] {
+        with_estimator(folder.path(), kind);
+        said(&run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]));
+        let inspected = said(&run(folder.path(), &["inspect", "locator.json"]));
+        let described =
+            inspected.lines().find(|line| !line.starts_with("a locator") && !line.contains(": beam"));
+        assert!(described.is_some() && inspected.contains(kind), "{inspected}");
+        let judged = ["evaluate", "locator.json", "--data", "presses.csv", "--json"];
+        let found: Value = serde_json::from_str(&said(&run(folder.path(), &judged))).unwrap();
+        let mean_mm = found["errors"][0]["error_mm"]["mean"].as_f64().unwrap();
+        let bound_mm = match kind {
+            "influence" | "closed-form" => 1.0,
+            "network-lm" => 10.0,
+            // Ten positions are little for these.
+            _ => 100.0,
+        };
+        assert!(mean_mm < bound_mm, "{kind}: {mean_mm}");
+        words.push(inspected.lines().skip(4).take(1).collect::<String>());
+    }
+    // What counts and rounds differ by is not the snapshot's business.
+    let words = words.join("\n").replace(|c: char| c.is_ascii_digit(), "#");
+    insta::assert_snapshot!(words);
+}
+
+#[test]
+fn auto_takes_the_best_and_says_why() {
+    // Networks take their time; two presses at each position do.
+    let folder = folder(Toml::of(NOISY_BEAM).set("training.repeats", 2));
+    with_estimator(folder.path(), "auto");
+    let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]);
+    let why = String::from_utf8(fitted.stderr.clone()).unwrap();
+    let (_, errors) = why.split_once("(5 folds): ").unwrap();
+    let errors: Vec<(&str, f64)> = errors
+        .trim()
+        .split(", ")
+        .map(|error| {
+            let mut words = error.split(' ');
+            (words.next().unwrap(), words.next().unwrap().parse().unwrap())
+        })
+        .collect();
+    assert!(errors.len() == 7 && errors.is_sorted_by(|a, b| a.1 <= b.1), "{why}");
+    let (best, error_mm) = errors[0];
+    assert!(["influence", "closed-form"].contains(&best) && error_mm < 0.3, "{why}");
+    assert!(why.contains(&format!("auto: {best} has the least mean error at positions held out")), "{why}");
+    assert!(said(&fitted).starts_with(&format!("{best} fitted to 20 rows")), "{why}");
+}
+
+#[test]
+fn a_dead_channel_is_left_out_of_the_sums() {
+    let folder = folder(NOISY_BEAM);
+    with_estimator(folder.path(), "influence");
+    said(&run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["simulate", "other.toml", "-o", "presses.csv", "--every", "100 mm"]));
+    let csv = fs::read_to_string(folder.path().join("presses.csv")).unwrap();
+    let (mut positions_mm, mut stuck) = (Vec::new(), Vec::new());
+    for line in csv.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        positions_mm.push(cells[0].parse::<f64>().unwrap());
+        // Position and force come first; the third sensor is stuck.
+        cells[4] = "5";
+        stuck.push(cells[2..].join(","));
+    }
+    assert_eq!(positions_mm.len(), 30);
+    fs::write(folder.path().join("stuck.csv"), stuck.join("\n")).unwrap();
+    let located = said(&run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header"]));
+    assert!(located.lines().skip(1).all(|line| line.ends_with("outside_model")), "{located}");
+    let arguments = ["locate", "locator.json", "stuck.csv", "--no-header", "--dead", "3"];
+    let located = said(&run(folder.path(), &arguments));
+    for (line, x_mm) in located.lines().skip(1).zip(positions_mm) {
+        let cells: Vec<&str> = line.split(',').collect();
+        assert!((cells[0].parse::<f64>().unwrap() - x_mm).abs() < 4.0 && cells[4] == "located", "{line}");
+    }
+    complained(
+        &run(folder.path(), &["locate", "locator.json", "stuck.csv", "--no-header", "--dead", "9"]),
+        2,
+    );
+}
+
+#[test]
+fn rigs_and_recordings_that_cannot_be_compared_are_refused() {
+    let folder = folder(NOISY_BEAM);
+    with_estimator(folder.path(), "influence");
+    let contacts = complained(&run(folder.path(), &["compare", "rig.toml", "--contacts", "a.csv"]), 2);
+    assert!(contacts.contains("--data"), "{contacts}");
+    fs::write(folder.path().join("measured.toml"), EFLESH).unwrap();
+    let no_model = complained(&run(folder.path(), &["compare", "measured.toml"]), 2);
+    let no_contacts =
+        ["fit", "measured.toml", "--data", "readings.csv", "--contacts", "none.csv", "-o", "l.json"];
+    fs::write(folder.path().join("readings.csv"), format!("0{}\n", ",1".repeat(15))).unwrap();
+    let no_contacts = complained(&run(folder.path(), &no_contacts), 2);
+    fs::write(folder.path().join("contacts.csv"), "0,274,-115,1\n1,275,-115,1\n").unwrap();
+    let odd =
+        ["fit", "measured.toml", "--data", "readings.csv", "--contacts", "contacts.csv", "-o", "l.json"];
+    let odd = complained(&run(folder.path(), &odd), 2);
+    insta::assert_snapshot!([no_model, no_contacts, odd].join("\n"));
+}

@@ -1,0 +1,113 @@
+//! `palpate limit` from outside: what physics allows on the paper's bench, and what it refuses.
+
+use crate::support::command::{complained, folder, json, run, said};
+use crate::support::examples::{FSI_WATER, PAPER};
+use crate::support::toml::Toml;
+use serde_json::Value;
+use std::fmt::Display;
+use toml_edit::Array;
+
+fn limit(rig: impl Display, arguments: &[&str]) -> String {
+    said(&run(folder(rig).path(), &[&["limit", "rig.toml"], arguments].concat()))
+}
+
+fn curve(rig: impl Display, arguments: &[&str]) -> Value {
+    json(folder(rig).path(), &[&["limit", "rig.toml"], arguments].concat())
+}
+
+#[test]
+fn the_papers_bench_has_its_limit_and_its_warnings() {
+    insta::assert_snapshot!(limit(PAPER, &[]));
+}
+
+#[test]
+fn with_an_unknown_force_the_warnings_are_others() {
+    let unknown = curve(PAPER, &["--unknown-force"]);
+    assert_eq!(unknown["force"], "unknown");
+    let warnings = unknown["warnings"].as_array().unwrap();
+    assert_eq!(warnings.iter().map(|warning| &warning["kind"]).collect::<Vec<_>>(), ["blind", "blind"]);
+    assert_eq!(warnings[0]["bound"].as_f64().unwrap().round(), 40.0);
+    assert!(warnings[0]["value"].as_f64().unwrap() > 8000.0);
+    assert!(warnings[0]["help"].as_str().unwrap().contains("reaction sensors"));
+    // A rig without a force does not know it.
+    let without = Toml::of(PAPER).remove("contact");
+    assert_eq!(curve(without, &["--force", "3 N"])["warnings"], unknown["warnings"]);
+}
+
+#[test]
+fn the_json_has_the_papers_figures() {
+    let found = curve(PAPER, &["--every", "50 mm"]);
+    let positions = found["positions"].as_array().unwrap();
+    assert_eq!(positions.len(), 7);
+    let at = |i: usize, key: &str| positions[i][key].as_f64().unwrap();
+    assert_eq!(at(3, "x_mm").round(), 200.0);
+    assert!((at(0, "known_force_mm") - 0.095).abs() < 1e-3 && (at(3, "known_force_mm") - 0.69).abs() < 5e-3);
+    assert!((at(0, "unknown_force_mm") - 3.3).abs() < 0.05);
+    let mean_mm = found["known_force"]["mean_mm"].as_f64().unwrap();
+    assert!((mean_mm - 0.195).abs() < 5e-4, "{found}");
+    let mean_error_mm = found["known_force"]["mean_error_mm"].as_f64().unwrap();
+    assert!((mean_error_mm / mean_mm - 0.79788).abs() < 1e-4);
+    assert_eq!(found["warnings"][0]["kind"], "mirror");
+    // The limit goes with the noise, and against the force.
+    let louder = curve(PAPER, &["--noise", "10 um", "--force", "6 N"]);
+    let ratio = louder["known_force"]["mean_mm"].as_f64().unwrap() / mean_mm;
+    assert!((ratio - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_the_readings_do_not_tell_is_null() {
+    let one = Toml::of(PAPER).set("sensors.count", 1).to_string();
+    let found = curve(&one, &[]);
+    assert!(
+        found["unknown_force"].is_null() && found["positions"][0]["unknown_force_mm"].is_null(),
+        "{found}"
+    );
+    assert!(limit(&one, &[]).contains("read the same"));
+}
+
+#[test]
+fn a_dead_sensor_is_left_out() {
+    let dead = Toml::of(PAPER).add("sensors.dead", Array::from_iter([4]));
+    let (whole, rest) = (curve(PAPER, &[]), curve(dead, &[]));
+    assert_eq!((&rest["sensors"], &rest["sensors_alive"]), (&Value::from(8), &Value::from(7)));
+    let mean = |found: &Value| found["known_force"]["mean_mm"].as_f64().unwrap();
+    assert!(mean(&rest) > mean(&whole));
+}
+
+#[test]
+fn the_report_and_its_pictures_are_written() {
+    let folder = folder(PAPER);
+    let told = said(&run(folder.path(), &["limit", "rig.toml", "--out", "deep/report"]));
+    assert!(told.contains("Report: deep/report/report.html"), "{told}");
+    let written = |name: &str| folder.path().join("deep/report").join(name).is_file();
+    for name in ["report.html", "figure-1.svg", "figure-2.svg"] {
+        assert!(written(name), "{name}");
+    }
+    assert_eq!(["figure-1.png", "figure-2.png"].map(written), [cfg!(feature = "png"); 2]);
+}
+
+#[test]
+fn benches_without_a_limit_are_refused_in_words() {
+    let clean = Toml::of(PAPER).set("sensors.noise", "0 um").to_string();
+    let forceless = Toml::of(PAPER).remove("contact").to_string();
+    let dead =
+        Toml::of(PAPER).set("sensors.count", 2).add("sensors.dead", Array::from_iter([1, 2])).to_string();
+    let cases: [(&str, &str, &[&str]); 8] = [
+        ("clean sensors", &clean, &[]),
+        ("a surface without a model", FSI_WATER, &[]),
+        ("no force", &forceless, &[]),
+        ("nothing but dead sensors", &dead, &[]),
+        ("noise in a unit that nothing measures in", PAPER, &["--noise", "5 N"]),
+        ("a negative noise", PAPER, &["--noise=-5 um"]),
+        ("a force that is no force", PAPER, &["--force", "3 mm"]),
+        ("steps longer than the surface", PAPER, &["--every", "1 m"]),
+    ];
+    let complaint = |(what, rig, arguments): &(&str, &str, &[&str])| {
+        let folder = folder(rig);
+        let arguments = [&["limit", "rig.toml", "--out", "report"], *arguments].concat();
+        let complaint = complained(&run(folder.path(), &arguments), 2);
+        assert!(!folder.path().join("report").exists(), "{what}");
+        format!("{what}:\n{complaint}")
+    };
+    insta::assert_snapshot!(cases.iter().map(complaint).collect::<Vec<_>>().join("\n"));
+}

@@ -1,0 +1,19 @@
+//! The `palpate` command from outside, and the pages that it writes.
+#![forbid(unsafe_code)]
+
+mod bad_input;
+mod browser;
+mod compare;
+mod design;
+mod digit;
+mod limit;
+mod plane;
+mod positions;
+mod profile;
+mod recordings;
+mod report_page;
+mod study;
+mod support;
+mod supported_beams;
+mod track;
+mod verbs;

@@ -1,0 +1,242 @@
+//! No import circle between sibling files: at every level of a crate's module tree, what a file or folder imports
+//! imports nothing of it, directly or by way of others.
+//!
+//! A child that uses its parent's own items makes no circle, nor does a parent that uses its children. A name that the
+//! parent imports from a child belongs to that child.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use super::Finding;
+use super::project::{File, Project};
+use super::rust_text::RustText;
+use super::used_paths::{UsedPath, declared_modules, used_paths};
+
+/// A module's path from the crate's root, which is empty.
+type Name = Vec<String>;
+
+/// The modules of a crate that are files, without those of tests.
+type Modules<'a> = BTreeMap<Name, Module<'a>>;
+
+struct Module<'a> {
+    file: &'a File,
+    uses: Vec<UsedPath>,
+}
+
+/// What one sibling imports from another.
+struct Import<'a> {
+    file: &'a File,
+    line: usize,
+    item: String,
+}
+
+/// Imports between the children of one module, by importing and by imported child.
+type Siblings<'a> = BTreeMap<String, BTreeMap<String, Vec<Import<'a>>>>;
+
+/// A shortest circle through every file that lies on one.
+pub fn findings(project: &Project) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for root in project.crates.iter().flat_map(|krate| &krate.roots) {
+        let modules = modules(project, root);
+        let source = root.rsplit_once('/').map_or("", |(folder, _)| folder);
+        for siblings in by_level(&modules).values() {
+            found.extend(circles(siblings).iter().map(|circle| finding(source, siblings, circle)));
+        }
+    }
+    found
+}
+
+/// Follows `mod` declarations from the root file of a crate.
+fn modules<'a>(project: &'a Project, root: &str) -> Modules<'a> {
+    let mut modules = Modules::new();
+    let folder = root.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let mut open = Vec::from_iter(project.file(root).map(|file| (Name::new(), folder.to_owned(), file)));
+    while let Some((name, folder, file)) = open.pop() {
+        let code = RustText::of(&file.text()).code_without_tests();
+        for child in declared_modules(&code) {
+            let inside = format!("{folder}/{child}");
+            let files = [format!("{inside}.rs"), format!("{inside}/mod.rs")];
+            if let Some(file) = files.iter().find_map(|path| project.file(path)) {
+                open.push(([name.as_slice(), &[child]].concat(), inside, file));
+            }
+        }
+        modules.insert(name, Module { file, uses: used_paths(&code) });
+    }
+    modules
+}
+
+/// Every import between siblings, by the module that both are children of.
+fn by_level<'a>(modules: &Modules<'a>) -> BTreeMap<Name, Siblings<'a>> {
+    let mut levels = BTreeMap::<Name, Siblings>::new();
+    for (from, Module { file, uses }) in modules {
+        for path in uses {
+            let Some((to, rest)) = resolve(modules, from, &path.segments) else { continue };
+            let common = from.iter().zip(&to).take_while(|(one, other)| one == other).count();
+            if let (Some(importing), Some(imported)) = (from.get(common), to.get(common)) {
+                let item = rest.first().or(to.last()).cloned().unwrap_or_default();
+                let siblings = levels.entry(from[..common].to_vec()).or_default();
+                let imports =
+                    siblings.entry(importing.clone()).or_default().entry(imported.clone()).or_default();
+                imports.push(Import { file, line: path.line, item });
+            }
+        }
+    }
+    levels
+}
+
+/// The module that a path leads to from the module that uses it, and what of the path is left; `None` outside the crate.
+fn resolve<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option<(Name, &'p [String])> {
+    let (mut module, mut rest) = descend(modules, from, path)?;
+    while let Some((origin, is_module)) = rest.first().and_then(|name| origin(modules, &module, name)) {
+        rest = &rest[usize::from(is_module)..];
+        (module, rest) = walk(modules, origin, rest);
+    }
+    Some((module, rest))
+}
+
+/// The module that a path names, as if every name were defined where the path says.
+fn descend<'p>(modules: &Modules, from: &[String], path: &'p [String]) -> Option<(Name, &'p [String])> {
+    let up = path.iter().take_while(|segment| *segment == "super").count();
+    let (start, rest) = match path.first()?.as_str() {
+        "crate" => (Name::new(), &path[1..]),
+        "self" => (from.to_vec(), &path[1..]),
+        "super" => (from[..from.len().checked_sub(up)?].to_vec(), &path[up..]),
+        first => (child(modules, from, first)?, &path[1..]),
+    };
+    Some(walk(modules, start, rest))
+}
+
+/// Goes down from a module as far as a path's segments name modules.
+fn walk<'p>(modules: &Modules, mut module: Name, mut path: &'p [String]) -> (Name, &'p [String]) {
+    while let Some(child) = path.first().and_then(|name| child(modules, &module, name)) {
+        (module, path) = (child, &path[1..]);
+    }
+    (module, path)
+}
+
+fn child(modules: &Modules, parent: &[String], name: &str) -> Option<Name> {
+    let child = [parent, &[name.to_owned()]].concat();
+    modules.contains_key(&child).then_some(child)
+}
+
+/// The descendant from which a module imports a name, and whether the name is that descendant's own.
+fn origin(modules: &Modules, module: &Name, name: &str) -> Option<(Name, bool)> {
+    let mut imports = modules[module].uses.iter().filter(|path| path.imported.as_deref() == Some(name));
+    imports.find_map(|path| {
+        let (origin, rest) = descend(modules, module, &path.segments)?;
+        (origin.len() > module.len() && origin.starts_with(module)).then_some((origin, rest.is_empty()))
+    })
+}
+
+/// A shortest circle through each file that lies on one, each once.
+fn circles(siblings: &Siblings) -> BTreeSet<Vec<String>> {
+    siblings.keys().filter_map(|start| circle(siblings, start)).collect()
+}
+
+/// A shortest circle through one file, turned so that it begins with the first of its names.
+fn circle(siblings: &Siblings, start: &str) -> Option<Vec<String>> {
+    let mut seen = BTreeSet::new();
+    let mut open = VecDeque::from([vec![start.to_owned()]]);
+    while let Some(way) = open.pop_front() {
+        for next in siblings.get(way.last()?).into_iter().flat_map(BTreeMap::keys) {
+            if next == start {
+                let first = way.iter().enumerate().min_by_key(|(_, name)| *name).map_or(0, |(at, _)| at);
+                return Some([&way[first..], &way[..first]].concat());
+            }
+            if seen.insert(next) {
+                open.push_back([way.as_slice(), std::slice::from_ref(next)].concat());
+            }
+        }
+    }
+    None
+}
+
+/// Names the files of a circle, and what each imports from the next.
+fn finding(source: &str, siblings: &Siblings, circle: &[String]) -> Finding {
+    let next = circle.iter().cycle().skip(1);
+    let steps: Vec<_> = circle.iter().zip(next).map(|(from, to)| (from, to, &siblings[from][to])).collect();
+    let place = |import: &Import| {
+        let file = import.file.path.strip_prefix(source).unwrap_or_default().trim_start_matches('/');
+        format!("{} at {file}:{}", import.item, import.line)
+    };
+    let step = |&(from, to, imports): &(&String, &String, &Vec<Import>)| {
+        let items = imports.iter().map(place).collect::<Vec<_>>().join(", ");
+        format!("{from} imports from {to} ({items})")
+    };
+    let first = &steps[0].2[0];
+    let message = steps.iter().map(step).collect::<Vec<_>>().join("; ");
+    Finding::warning(&first.file.path, first.line, message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tidy::project::Crate;
+
+    fn messages(files: &[(&str, &str)]) -> Vec<String> {
+        let paths: Vec<String> = files.iter().map(|(path, _)| format!("crates/a/src/{path}")).collect();
+        let files: Vec<_> = paths.iter().zip(files).map(|(path, (_, text))| (path.as_str(), *text)).collect();
+        let mut project = Project::of(&files);
+        project.crates.push(Crate {
+            name: "a".into(),
+            version: String::new(),
+            manifest: String::new(),
+            roots: vec!["crates/a/src/lib.rs".into()],
+            dependencies: Vec::new(),
+        });
+        findings(&project).into_iter().map(|found| format!("{}: {}", found.line, found.message)).collect()
+    }
+
+    #[test]
+    fn files_that_import_from_each_other_are_named_with_what_they_import() {
+        let found = messages(&[
+            ("lib.rs", "mod beam;\nmod plate;"),
+            ("beam.rs", "\nuse crate::plate::{Plate, Mesh};"),
+            ("plate.rs", "fn f() { super::beam::bend() }"),
+        ]);
+        let expected = "2: beam imports from plate (Plate at beam.rs:2, Mesh at beam.rs:2); \
+                        plate imports from beam (bend at plate.rs:1)";
+        assert_eq!(found, [expected]);
+    }
+
+    #[test]
+    fn a_circle_below_the_root_and_of_folders_is_found() {
+        let found = messages(&[
+            ("lib.rs", "mod network;"),
+            ("network/mod.rs", "mod config; mod lanes; mod train;"),
+            ("network/config.rs", "use super::train;"),
+            ("network/train.rs", "use super::lanes::kernel::Kernel as K;"),
+            ("network/lanes.rs", "pub mod kernel;"),
+            ("network/lanes/kernel.rs", "use super::super::config::Config;"),
+        ]);
+        let expected = "1: config imports from train (train at network/config.rs:1); \
+                        train imports from lanes (Kernel at network/train.rs:1); \
+                        lanes imports from config (Config at network/lanes/kernel.rs:1)";
+        assert_eq!(found, [expected]);
+    }
+
+    #[test]
+    fn a_name_that_the_parent_imports_belongs_to_the_child_that_defines_it() {
+        let files = [
+            ("lib.rs", "mod a; mod b; pub use a::deep::{Deep as D, inner};"),
+            ("a/mod.rs", "pub mod deep; use crate::b::B;"),
+            ("a/deep.rs", "pub mod inner;"),
+            ("a/deep/inner.rs", ""),
+        ];
+        for user in ["use crate::D;", "use crate::inner::f;"] {
+            assert_eq!(messages(&[&files[..], &[("b.rs", user)]].concat()).len(), 1, "{user}");
+        }
+    }
+
+    #[test]
+    fn parents_children_tests_and_other_crates_are_clean() {
+        let found = messages(&[
+            ("lib.rs", "mod a; mod b; pub use a::A; struct Own;"),
+            ("a.rs", "mod child; use crate::Own; use b::other; use child::C;"),
+            ("a/child.rs", "use super::A;"),
+            ("b.rs", "use crate::A; // crate::a\n#[cfg(test)]\nmod tests;"),
+            ("b/tests.rs", "use super::super::a::A;"),
+            ("c.rs", "use super::super::super::a; use crate::b;"),
+        ]);
+        assert_eq!(found, [] as [&str; 0]);
+    }
+}
