@@ -14,5 +14,5 @@ mod network;
 
 pub use activation::{Activation, Logistic};
 pub use contact::{Contact, Position};
-pub use estimate::{ContactEstimate, Estimate, BoundedList, Mode, Status, Uncertainty};
+pub use estimate::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 pub use network::{BufferMismatch, Network};

@@ -168,7 +168,10 @@ impl Cholesky {
 }
 
 /// Factors the first `columns` of a matrix of which only the lower triangle is read, and takes L₂₁·L₂₁ᵀ off that of the rest.
-pub(super) fn factor_leading(matrix: ArrayViewMut2<'_, f64>, columns: usize) -> Result<(), NotPositiveDefinite> {
+pub(super) fn factor_leading(
+    matrix: ArrayViewMut2<'_, f64>,
+    columns: usize,
+) -> Result<(), NotPositiveDefinite> {
     let (mut left, right) = matrix.split_at(Axis(1), columns);
     factor_panel(left.view_mut())?;
     let (_, right) = right.split_at(Axis(0), columns);

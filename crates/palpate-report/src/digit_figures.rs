@@ -9,7 +9,7 @@ use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::digit::LinearTheory;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve};
+use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Digit, ForceDirection};
 

@@ -4,7 +4,7 @@ use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
 use palpate_estimators::evaluation::Spread;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::limit::{Bound, Force, CramerRaoBound, LimitCurve, LimitError};
+use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 
 /// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of

@@ -15,7 +15,7 @@ use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve, LimitWarning};
+use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::Sensor;
 use palpate_mechanics::surface::SurfaceSpec;
 

@@ -9,7 +9,7 @@ use palpate_estimators::estimator::Cells;
 use palpate_estimators::evaluation::{Evaluation, percentile};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::{Bound, Force, CramerRaoBound};
+use palpate_mechanics::limit::{Bound, CramerRaoBound, Force};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 

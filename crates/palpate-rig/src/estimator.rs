@@ -10,8 +10,8 @@ use palpate_estimators::gaussian_process::GaussianProcessEstimator;
 use palpate_estimators::influence::{Influence, InfluenceSource};
 use palpate_estimators::neighbours::Neighbours;
 use palpate_estimators::network::{
-    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding,
-    Precision, PresentationOrder,
+    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, Precision,
+    PresentationOrder,
 };
 use palpate_mechanics::sensing::Layout;
 

@@ -19,7 +19,7 @@ pub use palpate_estimators::recording::{Columns, Recording, Row};
 pub use palpate_estimators::setup::Setup;
 pub use palpate_estimators::simulate::{simulate_at, simulate_loads};
 pub use palpate_mechanics::contact::{Contact, Position};
-pub use palpate_mechanics::limit::{Force, CramerRaoBound, LimitCurve};
+pub use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve};
 pub use palpate_mechanics::sensing::SensorKind::{Deflection, Raw, Reaction, Slope, Strain};
 pub use palpate_mechanics::surface::{Beam, Digit, Extent, Plate, SupportedBeam, UniformLoad};
 pub use palpate_mechanics::units::{gpa, microstrain, mm, mpa, newtons, um};

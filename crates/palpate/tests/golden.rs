@@ -110,7 +110,10 @@ fn locators_of_version_1_are_read_and_answer_their_golden_vectors() {
             let answer = Vector::of(&locator, &vector.reading);
             assert_eq!(answer.status, vector.status, "{name}: {vector:?}");
             for (found, wanted) in answer.numbers().into_iter().zip(vector.numbers()) {
-                assert!((found - wanted).abs() <= TOLERANCE * wanted.abs().max(1e-3), "{name}: {answer:?} {vector:?}");
+                assert!(
+                    (found - wanted).abs() <= TOLERANCE * wanted.abs().max(1e-3),
+                    "{name}: {answer:?} {vector:?}"
+                );
             }
         }
     }
@@ -138,7 +141,12 @@ fn write() {
     }
     let (setup, presses) = beam();
     let mut csv = Vec::new();
-    palpate::estimators::recording::write(&presses, setup.surface.extent(), "palpate 0.1.0, a golden recording, seed 1", &mut csv)
-        .unwrap();
+    palpate::estimators::recording::write(
+        &presses,
+        setup.surface.extent(),
+        "palpate 0.1.0, a golden recording, seed 1",
+        &mut csv,
+    )
+    .unwrap();
     fs::write(golden("recording.csv"), csv).unwrap();
 }

@@ -7,7 +7,7 @@ use palpate_estimators::arrangement::Training;
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::InfluenceLocator;
-use palpate_estimators::influence::measured::{NuisanceRole, MeasuredLocator};
+use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
 use palpate_estimators::network::Topology;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -256,7 +256,7 @@ fn learnt(measured: &MeasuredLocator) -> String {
         NuisanceRole::Other => " and the nuisance coordinate",
     };
     format!(
-        "influence functions learnt from the recording, over position{hidden}: {} nodes",
+        "influence functions learnt from the recording, over position{nuisance}: {} nodes",
         nodes.join(" × ")
     )
 }

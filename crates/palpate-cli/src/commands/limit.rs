@@ -6,7 +6,7 @@ use crate::{input, output};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
-    Bound, Force, CramerRaoBound, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
+    Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
 };
 use palpate_mechanics::sensing::NoiseError;
 use palpate_mechanics::surface::Extent;
@@ -153,7 +153,11 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
     complaint.help(help).into()
 }
 
-fn limits<'a>(limit: &'a CramerRaoBound<'a>, setup: &Setup, arguments: &Arguments) -> Result<Limits<'a>, LimitError> {
+fn limits<'a>(
+    limit: &'a CramerRaoBound<'a>,
+    setup: &Setup,
+    arguments: &Arguments,
+) -> Result<Limits<'a>, LimitError> {
     let force_n = arguments.force.or(setup.force_n).ok_or(LimitError::NoForce)?;
     let unknown = arguments.unknown_force || setup.force_n.is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };

@@ -9,7 +9,7 @@ use crate::lines::Lines;
 use crate::{input, output};
 use findings::Findings;
 use palpate_estimators::estimator::{
-    LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, setup_load_sensors, patch_limits,
+    LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, patch_limits, setup_load_sensors,
 };
 use palpate_estimators::recording::ReadingParser;
 use palpate_estimators::setup::Setup;

@@ -4,8 +4,7 @@ use super::Estimator;
 use crate::digit::{DigitEstimator, DigitTheory};
 use crate::influence::{Influence, InfluenceSource};
 use crate::network::{
-    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding,
-    PresentationOrder,
+    Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, PresentationOrder,
 };
 use palpate_mechanics::units::format_count;
 

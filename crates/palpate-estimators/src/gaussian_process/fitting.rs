@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::{GaussianProcessEstimator, GaussianProcessError, GaussianProcessLocator};
+use super::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::features::{FeatureKind, Features};
 use crate::fit::{Fit, FitTask};
 use palpate_numerics::regression::{Regression, Samples};

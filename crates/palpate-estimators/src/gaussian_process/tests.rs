@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{GaussianProcessEstimator, GaussianProcessError, GaussianProcessLocator};
+use super::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Setup;

@@ -1,8 +1,8 @@
 //! From a recording to training patterns, and from trained weights to a locator.
 
 use super::{
-    InputScale, Network, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology,
-    TrainedNetwork, TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
+    InputScale, Network, NetworkLocator, NetworkParts, OutputCoding, Patterns, Topology, TrainedNetwork,
+    TrainingOutcome, TrainingQueue, TrainingTask, train_many, train_one,
 };
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, SeedQueue};
 use crate::network::locator::ChannelScaling;

@@ -1,7 +1,7 @@
 //! The limit over a whole surface.
 
 use super::grid::Grid;
-use super::{Bound, Force, CramerRaoBound, LimitError};
+use super::{Bound, CramerRaoBound, Force, LimitError};
 use crate::contact::{Contact, Position};
 use crate::surface::Extent;
 use palpate_numerics::{mean, percentile};
@@ -58,7 +58,12 @@ impl LimitCurve {
     ///
     /// # Errors
     /// [`LimitError::Positions`] where those are none or more than 100,000, and [`LimitError::Force`].
-    pub fn every(limit: &CramerRaoBound, force_n: f64, force: Force, every_m: f64) -> Result<Self, LimitError> {
+    pub fn every(
+        limit: &CramerRaoBound,
+        force_n: f64,
+        force: Force,
+        every_m: f64,
+    ) -> Result<Self, LimitError> {
         Self::at(limit, force_n, force, &Grid::every(limit.surface.extent(), every_m)?.positions)
     }
 
@@ -66,7 +71,12 @@ impl LimitCurve {
     ///
     /// # Errors
     /// [`LimitError::Force`] for a force that is not positive and finite.
-    pub fn at(limit: &CramerRaoBound, force_n: f64, force: Force, positions: &[Position]) -> Result<Self, LimitError> {
+    pub fn at(
+        limit: &CramerRaoBound,
+        force_n: f64,
+        force: Force,
+        positions: &[Position],
+    ) -> Result<Self, LimitError> {
         check_force(force_n)?;
         let point =
             |&position| LimitPoint { position, bound: limit.at(Contact { position, force_n }, force) };

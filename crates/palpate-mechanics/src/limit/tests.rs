@@ -236,7 +236,8 @@ fn a_dead_channel_counts_as_if_it_were_not_there() {
     dead.sensors[2].channel.noise_sd = 0.0;
     let mut without = deflections(8);
     without.sensors.remove(2);
-    let (dead, without) = (CramerRaoBound::new(&BEAM, &dead).unwrap(), CramerRaoBound::new(&BEAM, &without).unwrap());
+    let (dead, without) =
+        (CramerRaoBound::new(&BEAM, &dead).unwrap(), CramerRaoBound::new(&BEAM, &without).unwrap());
     assert_eq!(dead.alive(), 7);
     for force in [Force::Known, Force::Unknown] {
         assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));

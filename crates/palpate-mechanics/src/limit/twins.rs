@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use super::information::norm;
-use super::{Force, CramerRaoBound};
+use super::{CramerRaoBound, Force};
 use crate::contact::{Contact, Position};
 use palpate_numerics::small::dot;
 

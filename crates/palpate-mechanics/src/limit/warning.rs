@@ -6,7 +6,7 @@ use super::curve::check_force;
 use super::grid::Grid;
 use super::twins::{Twin, TwinSearch};
 use super::zone::{Zone, zones};
-use super::{Force, CramerRaoBound, LimitError};
+use super::{CramerRaoBound, Force, LimitError};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 
@@ -79,7 +79,11 @@ pub enum LimitWarning {
 ///
 /// # Errors
 /// [`LimitError::Force`] for a force that is not positive and finite.
-pub fn limit_warnings(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Vec<LimitWarning>, LimitError> {
+pub fn limit_warnings(
+    limit: &CramerRaoBound,
+    force_n: f64,
+    force: Force,
+) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
     // A support that stands between the positions of the grid could be missed: next to it little may be told.
     let grid = Grid::over(limit.surface.extent()).with(&limit.surface.force_supports());

@@ -10,7 +10,6 @@ use super::evidence::Evidence;
 use super::groups::Groups;
 use super::{GaussianProcess, Hyperparameters, Kernel, Regression, RegressionError, Samples, Trend};
 use crate::Cholesky;
-use crate::watch::{Cancelled, Watch};
 
 const TREND_VARIANCE: f64 = 1e8;
 

@@ -32,6 +32,7 @@
 //! Why vectors are instructions on x86, not arrays that the compiler may vectorise: with arrays under `#[target_feature]` training on a Xeon
 //! runs at 0.6 (f64) and 0.3 (f32) of its rate with AVX-512 and at 0.8 to 0.9 with AVX2, batches through a network at 0.07 and 0.46, and the
 //! influence estimator at 0.7. Where arrays do as well, loops over them are compiled for AVX2 by [`run_loops`].
+#![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 
 mod array;
 mod vector;

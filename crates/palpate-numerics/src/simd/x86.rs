@@ -2,6 +2,7 @@
 //!
 //! Safety of every block that calls instructions: [`super::InstructionSet`] hands these types to a kernel only after it has found that the
 //! machine has the instructions, and nothing else can name them.
+#![allow(unsafe_code, reason = "instructions that the machine was asked for")]
 
 use super::{Arithmetic, Eight, LOOK_UP, Number, Vector};
 use std::arch::x86_64::*;

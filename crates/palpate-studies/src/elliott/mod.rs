@@ -204,11 +204,8 @@ impl Elliott {
 
     fn network(&self) -> Network {
         let rows = self.rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
-        let mut network = Network {
-            hidden: vec![HIDDEN],
-            input_scale: InputScale::Standardized,
-            ..Network::default()
-        };
+        let mut network =
+            Network { hidden: vec![HIDDEN], input_scale: InputScale::Standardized, ..Network::default() };
         network.training.learning_rate = LEARNING_RATE;
         network.training.max_epochs =
             (self.presentations / u32::try_from(rows.max(1)).unwrap_or(u32::MAX)).max(1);

@@ -8,7 +8,7 @@ use ndarray::{Array1, Array2};
 use super::misfit::misfit;
 use super::noise::Noise;
 use super::posterior::Posterior;
-use super::{Axis, NuisanceRole, MeasuredInfluence, MeasuredError, MeasuredLocator, Scale, Table, Whitening};
+use super::{Axis, MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale, Table, Whitening};
 use crate::fit::{Fit, FitTask};
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -237,7 +237,8 @@ impl Presses {
         let along = axis(0, (0.0, extent.length_m), if plane { MOST_OF_PLANE } else { MOST_ALONG });
         let across = extent.width_m.map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
         let most_nuisance = if plane { MOST_HIDDEN_OF_PLANE } else { MOST_HIDDEN };
-        let nuisance = self.has_nuisance.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance));
+        let nuisance =
+            self.has_nuisance.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance));
         [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
     }
 }

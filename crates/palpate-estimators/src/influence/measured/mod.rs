@@ -27,8 +27,8 @@ mod scale;
 mod table;
 
 pub use axis::Axis;
-pub use config::{MeasuredInfluence, MeasuredError};
-pub use locator::{NuisanceRole, MeasuredLocator};
+pub use config::{MeasuredError, MeasuredInfluence};
+pub use locator::{MeasuredLocator, NuisanceRole};
 pub use noise::Whitening;
 pub use scale::Scale;
 pub use table::Table;

@@ -1,6 +1,6 @@
 //! Where a reading comes from: probabilities of places, gathered cell by cell.
 
-use palpate_core::{ContactEstimate, Estimate, BoundedList, Mode, Status, Uncertainty};
+use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 
 use super::table::LineBuffer;
 use super::{MeasuredLocator, Table};

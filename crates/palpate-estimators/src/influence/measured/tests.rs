@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{NuisanceRole, MeasuredInfluence, MeasuredError, MeasuredLocator, Scale};
+use super::{MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale};
 use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad, strip};
 use crate::influence::{Influence, InfluenceSource};

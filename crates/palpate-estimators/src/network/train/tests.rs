@@ -163,8 +163,7 @@ fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &Patterns,
 #[test]
 fn one_update_goes_down_the_gradient_of_finite_differences() {
     for activation in [Activation::Logistic, Activation::Tanh] {
-        let mut config =
-            Network { hidden: vec![4, 3], hidden_activation: activation, ..Network::default() };
+        let mut config = Network { hidden: vec![4, 3], hidden_activation: activation, ..Network::default() };
         let rule = &mut config.training;
         (rule.learning_rate, rule.aggregate_error, rule.order) = (1e-3, 1e-300, PresentationOrder::Fixed);
         let patterns = patterns(1, 3, 2);

@@ -64,7 +64,8 @@ fn a_sensor_that_would_read_nothing_is_told_so() {
     let mut table = String::new();
     for kind in [SensorKind::Deflection, SensorKind::Slope, SensorKind::Strain, SensorKind::Reaction] {
         for (name, place) in places {
-            let answer = plate.insensitive_sensor(kind, place).map_or("reads".to_owned(), |why| why.to_string());
+            let answer =
+                plate.insensitive_sensor(kind, place).map_or("reads".to_owned(), |why| why.to_string());
             table += &format!("{kind}, {name}: {answer}\n");
             // What is refused reads nothing, and what is not refused reads something.
             let largest = [at(0.11, 0.07), at(0.22, 0.13), at(0.28, 0.18)]
