@@ -7,32 +7,24 @@ mod support {
     pub mod skip;
 }
 
+use palpate_numerics::watch::Watch;
 use std::fs;
 
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
 use palpate_rig::Rig;
-use palpate_studies::{Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper};
+use palpate_studies::{PreparedStudy, RunFacts, RunOptions, Study, StudyResults, paper};
 use support::browser::measure;
 use tempfile::TempDir;
-
-struct Unwatched;
-
-impl Observer for Unwatched {
-    fn trained(&self, _: &Trained) {}
-    fn keep_going(&self) -> bool {
-        true
-    }
-}
 
 /// The pages of the paper's study, cut down to a few epochs: as the paper's, and as any study's.
 fn pages() -> [Vec<ReportFile>; 2] {
     let toml = paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 50");
-    let study = PreparedStudy::new(Study::from_toml(&toml).unwrap(), &mut |_, _| true).unwrap().unwrap();
+    let study = PreparedStudy::new(Study::from_toml(&toml).unwrap(), Watch::NONE).unwrap();
     let seeds = 2;
-    let options = RunOptions { seeds, threads: 1, set: InstructionSet::best() };
-    let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
+    let options = RunOptions { seeds, threads: 1 };
+    let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
     let results = StudyResults::of(&outcomes, &study);
     let run = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),

@@ -73,14 +73,17 @@ impl<const N: usize> Ldl<N> {
             let mut row = [0.0; N];
             let mut left = a[i][i];
             for j in 0..i {
-                row[j] = a[i][j] - (0..j).map(|m| row[m] * factors.lower[j][m]).sum::<f64>();
+                row[j] = a[i][j];
+                for m in 0..j {
+                    row[j] -= row[m] * factors.lower[j][m];
+                }
                 factors.lower[i][j] = row[j] * factors.inverse_pivots[j];
                 left -= row[j] * factors.lower[i][j];
             }
             let pivot = pivot_of(i, left, ROUNDING * a[i][i]);
-            if pivot != 0.0 {
-                (factors.pivots[i], factors.inverse_pivots[i]) = (pivot, 1.0 / pivot);
-            }
+            let inverse = 1.0 / pivot;
+            factors.pivots[i] = pivot;
+            factors.inverse_pivots[i] = if pivot == 0.0 { 0.0 } else { inverse };
         }
         factors
     }
@@ -107,7 +110,9 @@ impl<const N: usize> Ldl<N> {
     #[inline]
     pub fn solve_lower(&self, mut b: [f64; N]) -> [f64; N] {
         for i in 1..N {
-            b[i] -= (0..i).map(|j| self.lower[i][j] * b[j]).sum::<f64>();
+            for j in 0..i {
+                b[i] -= self.lower[i][j] * b[j];
+            }
         }
         b
     }
@@ -117,8 +122,10 @@ impl<const N: usize> Ldl<N> {
     pub fn solve(&self, b: [f64; N]) -> [f64; N] {
         let mut x = self.solve_lower(b);
         for i in (0..N).rev() {
-            let known: f64 = (i + 1..N).map(|j| self.lower[j][i] * x[j]).sum();
-            x[i] = x[i] * self.inverse_pivots[i] - known;
+            x[i] *= self.inverse_pivots[i];
+            for j in i + 1..N {
+                x[i] -= self.lower[j][i] * x[j];
+            }
         }
         x
     }
@@ -136,7 +143,9 @@ impl<const N: usize> Ldl<N> {
         for j in 0..N {
             undone[j][j] = 1.0;
             for i in j + 1..N {
-                undone[i][j] = -(j..i).map(|m| self.lower[i][m] * undone[m][j]).sum::<f64>();
+                for m in j..i {
+                    undone[i][j] -= self.lower[i][m] * undone[m][j];
+                }
             }
         }
         let mut inverse = [[0.0; N]; N];

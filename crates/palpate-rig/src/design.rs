@@ -53,7 +53,10 @@ pub(crate) struct DesignKeys {
 
 /// Candidate sites.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(rename = "by shape", expecting = "a distance such as \"5 mm\", a number of sites, or a list of positions")]
+#[serde(
+    rename = "by shape",
+    expecting = "a distance such as \"5 mm\", a number of sites, or a list of positions"
+)]
 pub(crate) enum SitesKeys {
     /// So far apart.
     Text(Positive<Length>),
@@ -134,7 +137,10 @@ impl At<DesignKeys> {
         Ok(SensorDesign {
             count: self.count.map_or(default.count, Count::get),
             sites: self.sites.as_ref().map_or(Ok(default.sites), |sites| sites.build(extent))?,
-            contacts: self.contacts.as_ref().map_or(Ok(default.contacts), |contacts| contacts.build(extent))?,
+            contacts: self
+                .contacts
+                .as_ref()
+                .map_or(Ok(default.contacts), |contacts| contacts.build(extent))?,
             force_is_known: self.force.map(|force| force == ForceKeys::Known),
             criterion: self.criterion.unwrap_or(default.criterion),
             tolerance_m: self.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),
@@ -182,9 +188,7 @@ impl At<OfferKeys> {
         if channel.noise_sd == 0.0 && channel.resolution == 0.0 {
             return Err(match &self.noise {
                 None => self.place.missing("noise"),
-                Some(noise) => {
-                    noise.place.refuse("greater than 0, or nothing limits what the sensor tells")
-                }
+                Some(noise) => noise.place.refuse("greater than 0, or nothing limits what the sensor tells"),
             });
         }
         Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si) })
@@ -198,7 +202,9 @@ impl At<SitesKeys> {
                 let along = |size_m: f64| (size_m / every.si).floor() + 1.0;
                 let sites = along(extent.length_m) * extent.width_m.map_or(1.0, along);
                 if sites > MOST_SITES as f64 {
-                    return Err(self.place.refuse(format!("a distance that makes at most {MOST_SITES} sites")));
+                    return Err(self
+                        .place
+                        .refuse(format!("a distance that makes at most {MOST_SITES} sites")));
                 }
                 Ok(Sites::Every(every.si))
             }
@@ -265,8 +271,8 @@ impl At<MustHaveKeys> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_mechanics::contact::Position;
     use crate::Rig;
+    use palpate_mechanics::contact::Position;
 
     const RIG: &str = include_str!("../../../examples/sensor-design.toml");
     const PLATE: &str = include_str!("../../../examples/plate.toml");

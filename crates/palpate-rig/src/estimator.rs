@@ -11,7 +11,7 @@ use palpate_estimators::influence::{InfluenceConfig, InfluenceSource};
 use palpate_estimators::neighbours::NeighboursConfig;
 use palpate_estimators::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardtConfig, NetworkConfig, OutputCoding,
-    PresentationOrder,
+    Precision, PresentationOrder,
 };
 use palpate_mechanics::sensing::Layout;
 
@@ -141,6 +141,7 @@ impl NetworkKeys {
                 order: self.order.unwrap_or(training.order),
                 initial_weights: number(self.initial_weights, training.initial_weights),
             },
+            precision: Precision::default(),
         })
     }
 }

@@ -78,7 +78,8 @@ impl RigFile {
             None => Default::default(),
         };
         let loads = self.load.iter().map(|load| load.build(&surface)).collect::<Result<_, _>>()?;
-        let columns = self.recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
+        let columns =
+            self.recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let moving = |keys| motion::build(keys, &surface, surface_keys.density(), force_n);
         let motion = self.motion.as_ref().map(moving).transpose()?;
         let bench = Bench { surface, layout, force_n, columns };

@@ -88,8 +88,7 @@ pub(crate) fn build(
 impl At<MotionKeys> {
     /// The beam that swings under this contact; its density is the surface's.
     fn modal_beam(&self, beam: Beam, density: Option<&At<Positive<Density>>>) -> Result<ModalBeam, RigError> {
-        let missing =
-            || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
+        let missing = || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
         let density = density.ok_or_else(|| missing().at(&self.place))?;
         let damping_ratio = self.damping.as_ref().map_or(ModalBeam::USUAL_DAMPING_RATIO, |ratio| ratio.si);
         let beam = ModalBeam { beam, density_kg_per_m3: density.si, damping_ratio };

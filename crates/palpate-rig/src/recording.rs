@@ -94,7 +94,9 @@ impl At<RecordingKeys> {
         match positions.clone().chain(values).chain(channels).find(named) {
             _ if self.header => Ok(()),
             Some(key) => Err(key.place.refuse("a column's number where `header = false`")),
-            None if positions.count() == 0 => Err(self.place.missing(if extent.is_plane() { "x" } else { "position" })),
+            None if positions.count() == 0 => {
+                Err(self.place.missing(if extent.is_plane() { "x" } else { "position" }))
+            }
             None if self.channels.is_none() => Err(self.place.missing("channels")),
             None => Ok(()),
         }
@@ -103,9 +105,7 @@ impl At<RecordingKeys> {
     fn positions(&self, extent: Extent) -> Result<Option<PositionColumns>, RigError> {
         match (&self.position, &self.x, &self.y) {
             (None, None, None) => Ok(None),
-            (Some(_), Some(other), _) | (Some(_), None, Some(other)) => {
-                Err(other.place.unused("`position`"))
-            }
+            (Some(_), Some(other), _) | (Some(_), None, Some(other)) => Err(other.place.unused("`position`")),
             (Some(x), None, None) if extent.is_plane() => {
                 Err(x.place.unused("a surface that has a width; use `x` and `y`"))
             }
@@ -169,9 +169,8 @@ impl At<RecordingKeys> {
             (None, None) => return Ok(None),
             (None, Some(unit)) => return Err(self.lacks("hidden", unit)),
             (Some(_), None) => Unit::NONE,
-            (Some(_), Some(symbol)) => Unit::from_symbol(symbol).ok_or_else(|| {
-                symbol.place.invalid(UnitError::UnknownUnit { unit: (**symbol).clone() })
-            })?,
+            (Some(_), Some(symbol)) => Unit::from_symbol(symbol)
+                .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: (**symbol).clone() }))?,
         };
         Ok(self.hidden.as_ref().map(|hidden| ValueColumn { column: hidden.column(), unit }))
     }
@@ -184,7 +183,8 @@ impl At<RecordingKeys> {
     /// Origin and rounding; as many coordinates as the surface has.
     fn frame(&self, extent: Extent) -> Result<Frame, RigError> {
         let round_m = self.round.map(|round| round.si);
-        let origin = match (self.origin.as_ref().map(|origin| (origin, origin.as_slice())), extent.is_plane()) {
+        let origin = match (self.origin.as_ref().map(|origin| (origin, origin.as_slice())), extent.is_plane())
+        {
             (None, _) => Position::default(),
             (Some((_, [x])), false) => Position::along(x.si),
             (Some((_, [x, y])), true) => Position { x_m: x.si, y_m: y.si },

@@ -7,7 +7,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
 use palpate_mechanics::surface::SurfaceSpec;
 
-use crate::document::{At, Place};
+use crate::document::At;
 use crate::error::{RigError, RigProblem};
 use crate::recording::{ColumnKey, RecordingKeys};
 use crate::values::{AtLeastZero, Count, Finite, Fraction, Grid, Length, NotNegative, OneOrMany, Point};
@@ -75,7 +75,8 @@ pub(crate) fn build(
     if sensors.is_empty() {
         return Err(sections.place.refuse("a list of at least 1"));
     }
-    for (sensor, channel) in sensors.iter_mut().zip(channels.into_iter().flat_map(|channels| channels.iter())) {
+    for (sensor, channel) in sensors.iter_mut().zip(channels.into_iter().flat_map(|channels| channels.iter()))
+    {
         if let ColumnKey::Text(name) = &**channel {
             sensor.name.clone_from(name);
         }
@@ -86,9 +87,9 @@ pub(crate) fn build(
 /// What a sensor of `surface` measures.
 pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result<SensorKind, RigError> {
     match **measure {
-        SensorKind::Raw if surface.model().is_some() => Err(measure
-            .place
-            .refuse("another kind: a raw channel has no model, and only a measured surface has raw channels")),
+        SensorKind::Raw if surface.model().is_some() => Err(measure.place.refuse(
+            "another kind: a raw channel has no model, and only a measured surface has raw channels",
+        )),
         SensorKind::Strain => Ok(SensorKind::Strain),
         _ if matches!(surface, SurfaceSpec::Digit(_)) => {
             Err(measure.place.refuse("strain on a digit, which is read by strain gauges"))

@@ -288,7 +288,10 @@ impl EvaluationKeys {
         // A rounding error of a millionth of a step does not lose the last position.
         let steps = ((to_m - from_m) / step_m + 1e-6).floor();
         if steps >= MOST as f64 {
-            return Err(self.step.place.refuse(format!("a distance that makes at most {MOST} contact positions")));
+            return Err(self
+                .step
+                .place
+                .refuse(format!("a distance that makes at most {MOST} contact positions")));
         }
         Ok((0..=steps as usize).map(|i| Position::along(from_m + i as f64 * step_m)).collect())
     }

@@ -126,7 +126,10 @@ pub(crate) struct PlateKeys {
 
 /// A word for all edges, or one for each.
 #[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename = "by shape", expecting = "a word such as \"simple\", or a table of left, right, bottom and top")]
+#[serde(
+    rename = "by shape",
+    expecting = "a word such as \"simple\", or a table of left, right, bottom and top"
+)]
 pub(crate) enum EdgesKeys {
     Text(Edge),
     Table(EachEdgeKeys),
@@ -261,8 +264,7 @@ impl BeamKeys {
         if let (None, None, [BeamSection { width_m, thickness_m, .. }]) =
             (supports, &self.sections, sections.as_slice())
         {
-            let beam =
-                Beam { length_m, width_m: *width_m, thickness_m: *thickness_m, youngs_modulus_pa };
+            let beam = Beam { length_m, width_m: *width_m, thickness_m: *thickness_m, youngs_modulus_pa };
             beam.validate().map_err(|error| RigProblem::Beam(error).at(place))?;
             return Ok(SurfaceSpec::Beam(beam));
         }
@@ -338,11 +340,14 @@ impl PlateKeys {
             youngs_modulus_pa: self.youngs_modulus.si,
             poissons_ratio: self.poissons_ratio.si,
             edges,
-            supports: self.supports().iter().map(|support| support.build(extent)).collect::<Result<_, _>>()?,
+            supports: self
+                .supports()
+                .iter()
+                .map(|support| support.build(extent))
+                .collect::<Result<_, _>>()?,
             elements: self.elements.as_ref().map_or(PlateSpec::DEFAULT_ELEMENTS, |elements| elements.get()),
         };
-        Plate::new(spec)
-            .map_err(|error| RigProblem::Plate(error).at(self.place_of(error).unwrap_or(place)))
+        Plate::new(spec).map_err(|error| RigProblem::Plate(error).at(self.place_of(error).unwrap_or(place)))
     }
 
     fn supports(&self) -> &[At<PointSupportKeys>] {
@@ -367,7 +372,9 @@ impl PlateKeys {
             }
             PlateError::Elements { .. } | PlateError::MeshTooLarge { .. } => place(&self.elements),
             PlateError::PoissonsRatio { .. } => Some(&self.poissons_ratio.place),
-            PlateError::NotPositive { .. } | PlateError::Compliance { .. } | PlateError::Unsolvable { .. } => None,
+            PlateError::NotPositive { .. }
+            | PlateError::Compliance { .. }
+            | PlateError::Unsolvable { .. } => None,
         }
     }
 }

@@ -154,14 +154,19 @@ impl At<TrainingKeys> {
 }
 
 /// Refuses a force beyond a digit's model, which goes as far as a load of [`Digit::MOST_LOAD`] at the tip.
-pub(crate) fn check_force(force: Option<&At<Positive<Force>>>, surface: &SurfaceSpec) -> Result<(), RigError> {
+pub(crate) fn check_force(
+    force: Option<&At<Positive<Force>>>,
+    surface: &SurfaceSpec,
+) -> Result<(), RigError> {
     let (Some(force), SurfaceSpec::Digit(digit)) = (force, surface) else { return Ok(()) };
     let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
     if force.si <= most_n {
         return Ok(());
     }
     let most = Digit::MOST_LOAD;
-    Err(force.place.refuse(format!("at most {most_n:.3} N on this digit, at its tip a load F·l²/(E·I) of {most}")))
+    Err(force
+        .place
+        .refuse(format!("at most {most_n:.3} N on this digit, at its tip a load F·l²/(E·I) of {most}")))
 }
 
 impl At<LoadKeys> {

@@ -136,7 +136,8 @@ impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, M
 }
 
 /// What a number of positions does not go with.
-pub(crate) const ON_A_PLANE: &str = "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
+pub(crate) const ON_A_PLANE: &str =
+    "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
 
 /// Columns and rows of a grid of at most `MOST` positions.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]

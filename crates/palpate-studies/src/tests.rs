@@ -1,10 +1,13 @@
 //! Arms with sensors, contacts, layouts and estimators of their own.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::*;
 use palpate_design::sensors::DesignError;
-use palpate_estimators::network::InstructionSet;
+use palpate_estimators::evaluation::Portion;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The paper's beam with noise and an influence locator; contacts of unknown force.
 fn beam(arms: &str) -> Study {
@@ -42,22 +45,13 @@ fn beam(arms: &str) -> Study {
     Study::from_toml(&text).unwrap()
 }
 
-struct Unwatched;
-
-impl Observer for Unwatched {
-    fn trained(&self, _: &Trained) {}
-    fn keep_going(&self) -> bool {
-        true
-    }
-}
-
 fn prepare(study: Study) -> PreparedStudy {
-    PreparedStudy::new(study, &mut |_, _| true).unwrap().unwrap()
+    PreparedStudy::new(study, Watch::NONE).unwrap()
 }
 
 fn run(study: &PreparedStudy, seeds: u64, threads: usize) -> Vec<ArmOutcome> {
-    let options = RunOptions { seeds, threads, set: InstructionSet::Portable };
-    study.run(options, Vec::new(), &Unwatched).unwrap()
+    let options = RunOptions { seeds, threads };
+    study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap()
 }
 
 const THREE: &str = r#"
@@ -121,18 +115,17 @@ fn layouts_are_found_once_for_arms_that_ask_alike() {
         layout = "qr-pivoting"
         estimator = { kind = "neighbours" }
     "#;
-    let mut asked = 0;
-    let prepared = PreparedStudy::new(beam(arms), &mut |_, _| {
-        asked += 1;
-        true
-    });
-    let prepared = prepared.unwrap().unwrap();
-    assert!(asked > 0);
+    let asked = AtomicUsize::new(0);
+    let count = |_| asked.fetch_add(1, Ordering::Relaxed) < usize::MAX;
+    let prepared = PreparedStudy::new(beam(arms), Watch::new(&count));
+    let prepared = prepared.unwrap();
+    assert!(asked.load(Ordering::Relaxed) > 0);
     let layout = |arm: usize| &prepared.study.arms[arm].rig.bench.layout;
     assert_ne!(layout(0), layout(1));
     assert_eq!(layout(1), layout(3));
     assert_eq!([layout(1).len(), layout(2).len()], [8, 4]);
-    assert!(PreparedStudy::new(beam(arms), &mut |_, _| false).unwrap().is_none());
+    let stopped = PreparedStudy::new(beam(arms), Watch::new(&|_| false)).unwrap_err();
+    assert_eq!(stopped, StudyRunError::Cancelled(Cancelled));
 }
 
 #[test]
@@ -140,7 +133,7 @@ fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
     let mut study = beam("[[arm]]\nname = \"tight\"\nlayout = \"genetic\"");
     study.arms[0].rig.design.as_mut().unwrap().spacing_m = 0.06;
     let place = study.arms[0].layout.as_ref().unwrap().place.clone();
-    let Err(StudyRunError::Design { arm, place: said, error }) = PreparedStudy::new(study, &mut |_, _| true)
+    let Err(StudyRunError::Design { arm, place: said, error }) = PreparedStudy::new(study, Watch::NONE)
     else {
         panic!()
     };
@@ -154,12 +147,9 @@ fn what_cannot_be_fitted_is_an_error_that_names_the_arm() {
         "[[arm]]\nname = \"few\"\ntraining = { count = 1, force = \"3 N\" }\nestimator = { kind = \"gaussian-process\" }",
     );
     let prepared = prepare(few);
-    let options = RunOptions { seeds: 2, threads: 2, set: InstructionSet::Portable };
-    let failed = prepared.run(options, Vec::new(), &Unwatched).unwrap_err();
+    let options = RunOptions { seeds: 2, threads: 2 };
+    let failed = prepared.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap_err();
     assert!(matches!(&failed, StudyRunError::Fit { arm, .. } if arm == "few"), "{failed}");
-    let auto = beam("[[arm]]\nname = \"any\"\nestimator = { kind = \"auto\" }");
-    let auto = PreparedStudy::new(auto, &mut |_, _| true);
-    assert!(auto.unwrap_err().to_string().contains("arm `any`: the estimator is `auto`"));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use palpate_estimators::setup::Bench;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_numerics::median;
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 
 const SITES: usize = 100_000;
@@ -45,12 +46,9 @@ fn timed<T>(work: impl Fn() -> T) -> (f64, T) {
 }
 
 fn by_limit(bench: &Bench, design: &SensorDesign) {
-    let go_on = &mut |_, _| true;
-    let (rows_s, _) = timed(|| SensorProblem::new(bench, design, &mut |_, _| true).expect("a sound design"));
-    let problem = SensorProblem::new(bench, design, go_on).expect("a sound design").expect("nobody stops it");
-    let (search_s, designed) = timed(|| {
-        problem.greedy_exchange(0, &mut |_, _| true).expect("it is judged").expect("nobody stops it")
-    });
+    let (rows_s, _) = timed(|| SensorProblem::new(bench, design, Watch::NONE).expect("a sound design"));
+    let problem = SensorProblem::new(bench, design, Watch::NONE).expect("a sound design");
+    let (search_s, designed) = timed(|| problem.greedy_exchange(0, Watch::NONE).expect("it is judged"));
     let limit_mm = designed.assessment.mean_limit_m.unwrap_or(f64::NAN) * 1e3;
     println!("{SENSORS} of {SITES} sites by the limit, {} contacts:", problem.contacts().len());
     println!(

@@ -4,6 +4,7 @@
 use cpu_time::ThreadTime;
 use ndarray::Array2;
 use palpate_numerics::regression::{Regression, Samples};
+use palpate_numerics::watch::Watch;
 use palpate_numerics::{Cholesky, median};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -19,7 +20,7 @@ fn main() {
         let samples =
             Samples { coordinates: readings.view(), outputs: positions.view(), noise_variance: None };
         let regression = Regression::default();
-        let fit = || regression.fit(samples, &mut || true).expect("the presses suit").expect("it goes on");
+        let fit = || regression.fit(samples, Watch::NONE).expect("the presses suit");
         let process = fit();
         let found = process.hyperparameters().clone();
         let fit_s = seconds(|| drop(std::hint::black_box(fit())));

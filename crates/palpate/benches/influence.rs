@@ -46,8 +46,8 @@ fn main() {
 }
 
 fn fit(config: InfluenceConfig, bench: &Bench, recording: &Recording) -> BeamLocator {
-    let fitted = config.fit_beam(FitTask { bench, recording, seed: 0 }, &mut || true);
-    fitted.expect("the presses suit the bench").expect("nobody stops it")
+    let fitted = config.fit_beam(FitTask::new(bench, recording));
+    fitted.expect("the presses suit the bench")
 }
 
 /// Nanoseconds a reading.

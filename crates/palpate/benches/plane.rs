@@ -7,7 +7,7 @@ use palpate_estimators::fit::FitTask;
 use palpate_estimators::influence::{InfluenceConfig, PlaneLocator, PlaneScratch};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Bench;
-use palpate_estimators::simulate::{CleanSensors, simulate};
+use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::median;
@@ -42,8 +42,8 @@ fn main() {
 }
 
 fn fit(bench: &Bench, recording: &Recording) -> PlaneLocator {
-    let fitted = InfluenceConfig::default().fit_plane(FitTask { bench, recording, seed: 0 }, &mut || true);
-    fitted.expect("the presses suit the bench").expect("nobody stops it")
+    let fitted = InfluenceConfig::default().fit_plane(FitTask::new(bench, recording));
+    fitted.expect("the presses suit the bench")
 }
 
 /// Median time of an estimate, readings being all alike.

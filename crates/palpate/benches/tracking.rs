@@ -2,7 +2,8 @@
 //! medians; and how much closer the track is than its readings, at several speeds, in the mean of several recordings.
 
 use cpu_time::ThreadTime;
-use palpate_estimators::estimator::{Fitting, Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::estimator::{Locator, Swing, Track, Tracker, TrackerConfig};
+use palpate_estimators::fit::Fit;
 use palpate_estimators::recording::TimedRecording;
 use palpate_estimators::setup::Bench;
 use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
@@ -35,8 +36,7 @@ fn main() {
 fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
     let bench = Bench { force_n, ..rig.bench.clone() };
     let recording = rig.simulate(1).expect("the example can be simulated");
-    let fitting = Fitting::prepare(&bench, &rig.estimator, &recording).expect("the presses suit the bench");
-    fitting.fit(0, &mut || true).expect("the presses suit the bench").expect("nobody stops it")
+    rig.estimator.fit(&bench, &recording).expect("the presses suit the bench")
 }
 
 fn measure(locator: &Locator, rig: &Rig) {

@@ -3,10 +3,11 @@
 
 use cpu_time::ThreadTime;
 use palpate_estimators::network::{
-    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, SeedQueue,
-    Topology, TrainedNetwork, TrainingTask, train_many, train_one,
+    BackPropagation, InstructionSet, NetworkConfig, Patterns, Precision, PresentationOrder, Topology,
+    TrainedNetwork, TrainingQueue, TrainingTask, train_many, train_one,
 };
 use palpate_numerics::median;
+use palpate_numerics::watch::Watch;
 
 const ROUNDS: usize = 9;
 const EPOCHS: u32 = 400;
@@ -37,7 +38,7 @@ fn price_of_shuffling(precision: Precision) {
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
             let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
             let start = ThreadTime::now();
-            train_many(set, precision, &task, &mut queue);
+            train_many(set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             start.elapsed().as_secs_f64()
         });
         shares.push(100.0 * (seconds[0] - seconds[1]) / seconds[0]);
@@ -58,13 +59,13 @@ fn compare(count: usize, precision: Precision) {
     for _ in 0..ROUNDS {
         let start = ThreadTime::now();
         for seed in 0..4 {
-            train_one(precision, &task, seed, &mut || true);
+            train_one(precision, &task, seed, Watch::NONE).expect("nobody stops it");
         }
         rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
         for (set, rates) in sets.iter().zip(&mut rates[1..]) {
             let mut queue = Seeds { left: 4 * set.lanes(precision) as u64 };
             let start = ThreadTime::now();
-            train_many(*set, precision, &task, &mut queue);
+            train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             let presentations = f64::from(EPOCHS) * (count * 4 * set.lanes(precision)) as f64;
             rates.push(presentations / start.elapsed().as_secs_f64());
         }
@@ -80,16 +81,13 @@ struct Seeds {
     left: u64,
 }
 
-impl SeedQueue for Seeds {
+impl TrainingQueue for Seeds {
     fn next_seed(&mut self) -> Option<u64> {
         self.left = self.left.checked_sub(1)?;
         Some(self.left)
     }
     fn finished(&mut self, _: u64, network: TrainedNetwork) {
         std::hint::black_box(network);
-    }
-    fn keep_going(&mut self) -> bool {
-        true
     }
 }
 

@@ -27,8 +27,8 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::watch::Watch;
 use palpate_numerics::mean;
+use palpate_numerics::watch::Watch;
 use search::{PatternSearch, evaluate};
 
 /// Readings that a calibration is judged by, about: while searching, and when verifying.

@@ -80,9 +80,15 @@ fn triples() -> impl Iterator<Item = [usize; 3]> {
 /// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
 #[inline]
 fn gain<const K: usize>(gram: &Array2<f64>, pull: &[f64], chosen: [usize; K]) -> Option<f64> {
-    let pull = chosen.map(|node| pull[node]);
-    let force = Ldl::new(&chosen.map(|i| chosen.map(|j| gram[[i, j]])))?.solve(pull);
-    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &pull))
+    let (mut own_gram, mut own_pull) = ([[0.0; K]; K], [0.0; K]);
+    for (k, i) in chosen.into_iter().enumerate() {
+        own_pull[k] = pull[i];
+        for (entry, j) in own_gram[k].iter_mut().zip(chosen) {
+            *entry = gram[[i, j]];
+        }
+    }
+    let force = Ldl::new(&own_gram)?.solve(own_pull);
+    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &own_pull))
 }
 
 /// Gauss–Newton on the places and forces of K contacts from the best forces at `nodes`, with steps halved until the misfit

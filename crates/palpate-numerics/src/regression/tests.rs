@@ -1,5 +1,6 @@
 //! Properties of the regression, against a dense computation on every row as it came.
 
+use crate::watch::{Cancelled, Watch};
 use ndarray::{Array1, Array2, array};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

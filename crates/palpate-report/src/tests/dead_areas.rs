@@ -1,6 +1,7 @@
 //! The report of dead areas has every arm in its figures and tables.
 
 use super::super::dead_areas_report;
+use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use palpate_studies::dead_areas::{DeadAreas, RIG_TOML};
 
@@ -14,7 +15,7 @@ fn dead_areas_have_their_page() {
         without: vec!["network", "network-lm", "gaussian-process", "influence"],
         seed: 0,
     };
-    let findings = study.run(&mut || true).unwrap().unwrap();
+    let findings = study.run(Watch::NONE).unwrap();
     let files = dead_areas_report(&study, &findings);
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     assert_eq!(names, ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg"]);

@@ -1,20 +1,19 @@
 //! Whole reports: what a reader and a browser need is there, whatever was run.
 
+use palpate_estimators::fit::Fit;
+use palpate_numerics::watch::Watch;
 use std::collections::BTreeSet;
 
 use crate::{
     EvaluationReport, Judged, LimitReport, ReportFile, StudyReport, evaluation_report, limit_report,
     paper_report, study_report,
 };
-use palpate_estimators::estimator::Fitting;
 use palpate_estimators::evaluation::{Evaluation, Portion};
-use palpate_estimators::network::{InstructionSet, Precision};
+use palpate_estimators::network::Precision;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_rig::Rig;
-use palpate_studies::{
-    ArmOutcome, Observer, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, Trained, paper,
-};
+use palpate_studies::{ArmOutcome, PreparedStudy, RunFacts, RunOptions, Study, StudyResults, paper};
 
 struct Run {
     study: PreparedStudy,
@@ -23,19 +22,10 @@ struct Run {
     facts: RunFacts,
 }
 
-struct Unwatched;
-
-impl Observer for Unwatched {
-    fn trained(&self, _: &Trained) {}
-    fn keep_going(&self) -> bool {
-        true
-    }
-}
-
 fn run(toml: &str, seeds: u64) -> Run {
-    let study = PreparedStudy::new(Study::from_toml(toml).unwrap(), &mut |_, _| true).unwrap().unwrap();
-    let options = RunOptions { seeds, threads: 1, set: InstructionSet::Portable };
-    let outcomes = study.run(options, Vec::new(), &Unwatched).unwrap();
+    let study = PreparedStudy::new(Study::from_toml(toml).unwrap(), Watch::NONE).unwrap();
+    let options = RunOptions { seeds, threads: 1 };
+    let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
     let results = StudyResults::of(&outcomes, &study);
     let facts = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
@@ -223,11 +213,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
     let rig =
         Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "50")).unwrap();
     let recording = rig.simulate(0).unwrap();
-    let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
-        .unwrap()
-        .fit(0, &mut || true)
-        .unwrap()
-        .unwrap();
+    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
     let positions: Vec<_> = recording.distinct_positions();
     let other = simulate_at(&rig.bench, &positions, 3, 1).unwrap();
     let portions = [Portion { from_m: 0.02, to_m: 0.38 }];
@@ -263,11 +249,7 @@ fn an_evaluation_of_nothing_has_a_report() {
     let rig =
         Rig::from_toml(&include_str!("../../../../examples/paper.toml").replace("1_000_000", "5")).unwrap();
     let recording = rig.simulate(0).unwrap();
-    let locator = Fitting::prepare(&rig.bench, &rig.estimator, &recording)
-        .unwrap()
-        .fit(0, &mut || true)
-        .unwrap()
-        .unwrap();
+    let locator = rig.estimator.fit(&rig.bench, &recording).unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
         evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },

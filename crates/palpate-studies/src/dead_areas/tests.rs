@@ -4,6 +4,7 @@ use super::*;
 use palpate_estimators::evaluation::{Evaluation, Located};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 fn study(counts: &[usize]) -> DeadAreaFindings {
     let study = DeadAreas {
@@ -14,7 +15,7 @@ fn study(counts: &[usize]) -> DeadAreaFindings {
         without: vec!["network", "network-lm", "gaussian-process", "neighbours"],
         seed: 0,
     };
-    study.run(&mut || true).unwrap().unwrap()
+    study.run(Watch::NONE).unwrap()
 }
 
 #[test]
@@ -69,5 +70,6 @@ fn a_stopped_study_finds_nothing() {
         without: vec!["influence", "gaussian-process", "closed-form", "neighbours", "network", "network-lm"],
         seed: 0,
     };
-    assert_eq!(study.run(&mut || false).unwrap(), None);
+    let stopped = study.run(Watch::new(&|_| false)).unwrap_err();
+    assert!(Cancelled::caused(&stopped), "{stopped}");
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use palpate_estimators::recording::Recording;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The bench of the study on a mesh that is solved at once.
 fn rig() -> Rig {
@@ -63,7 +64,7 @@ fn all_components_have_the_limit_of_the_readings_and_fewer_have_more() {
 
 #[test]
 fn the_chain_needs_a_few_components_and_the_influence_locator_beats_it() {
-    let found = study(&[2, 8], 150_000).run(&mut || true).unwrap().unwrap();
+    let found = study(&[2, 8], 150_000).run(Watch::NONE).unwrap();
     let row = |chain: Chain| found.rows.iter().find(|row| row.chain == chain).unwrap();
     let error_m = |chain: Chain| row(chain).error_m.unwrap().median;
     let (two, eight) = (Chain::Components(2), Chain::Components(8));
@@ -77,7 +78,8 @@ fn the_chain_needs_a_few_components_and_the_influence_locator_beats_it() {
 
 #[test]
 fn a_stopped_study_finds_nothing_and_components_must_be_there() {
-    assert_eq!(study(&[2], 1_000).run(&mut || false).unwrap(), None);
-    let told = study(&[26], 1_000).run(&mut || true).unwrap_err().to_string();
+    let stopped = study(&[2], 1_000).run(Watch::new(&|_| false)).unwrap_err();
+    assert!(Cancelled::caused(&stopped), "{stopped}");
+    let told = study(&[26], 1_000).run(Watch::NONE).unwrap_err().to_string();
     assert_eq!(told, "26 components are asked of 25 sensors; there are as many as sensors, and at least 1");
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::{ArmOutcome, PreparedStudy, Study, TrainedSeed};
+use palpate_numerics::watch::Watch;
 
 /// What a made-up arm shows: the error of every estimate in % of the length, and the epochs.
 type MadeUp = fn(&str, u32) -> (f64, u32);
@@ -9,7 +10,7 @@ type MadeUp = fn(&str, u32) -> (f64, u32);
 /// The paper's arms with three seeds each, whose locators are off by `made_up`.
 fn judged(made_up: MadeUp) -> Vec<Claim> {
     let text = crate::paper::STUDY_TOML.replace("max_epochs = 1_000_000", "max_epochs = 1");
-    let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), &mut |_, _| true).unwrap().unwrap();
+    let prepared = PreparedStudy::new(Study::from_toml(&text).unwrap(), Watch::NONE).unwrap();
     let mut outcomes = Vec::new();
     for (index, arm) in prepared.study.arms.iter().enumerate() {
         let (family, count) = arm.name.rsplit_once('-').unwrap();
