@@ -159,7 +159,10 @@ impl Queue<'_> {
     /// Fits many seeds of an arm side by side.
     fn fit_in_lanes(&mut self, prepared: &InLanes, watch: Watch) -> Result<(), StudyRunError> {
         let name = &self.study.study.arms[self.arm].name;
-        prepared.estimator.fit_many(prepared.task(watch), self).map_err(|error| unfitted(name, EvaluationError::Fit(error)))
+        prepared
+            .estimator
+            .fit_many(prepared.task(watch), self)
+            .map_err(|error| unfitted(name, EvaluationError::Fit(error)))
     }
 
     /// Fits seed after seed of an arm, until none is left.

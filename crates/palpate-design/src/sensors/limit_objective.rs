@@ -15,14 +15,13 @@
 //! which for P ≤ 3 is some twenty multiplications a contact, so that all candidates are judged in one pass over their rows.
 
 mod lanes;
-mod sums;
 
 use std::sync::Arc;
 
+use super::design::DesignCriterion;
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
-use crate::sensors::DesignCriterion;
+use lanes::{LargestVariance, LogDeterminant, MeanDeviation, Reduction, ShareAbove};
 use palpate_numerics::small::{Ldl, add_outer};
-use sums::{Mean, Shrinking, Sums, Without, Worst};
 
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
@@ -72,18 +71,18 @@ impl<const P: usize, const FIRST: usize> LimitObjective<P, FIRST> {
     }
 
     /// See [`lanes::folded`].
-    fn folded<S: Sums>(&self, state: &State, row: &[Block], sums: &S) -> [f64; 2] {
-        lanes::folded::<P, FIRST, S>(&state.values, row, &self.weights, sums)
+    fn folded<R: Reduction>(&self, state: &State, row: &[Block], reduction: &R) -> [f64; 2] {
+        lanes::folded::<P, FIRST, R>(&state.values, row, &self.weights, reduction)
     }
 
     /// The sums for a sensor, or for none.
     fn sums(&self, state: &State, row: &[Block]) -> [f64; 2] {
         match self.criterion {
-            DesignCriterion::MeanLimit => self.folded(state, row, &Mean),
-            DesignCriterion::WorstLimit => self.folded(state, row, &Worst),
-            DesignCriterion::WithinTolerance => self.folded(state, row, &Without(self.good_enough)),
+            DesignCriterion::MeanLimit => self.folded(state, row, &MeanDeviation),
+            DesignCriterion::WorstLimit => self.folded(state, row, &LargestVariance),
+            DesignCriterion::WithinTolerance => self.folded(state, row, &ShareAbove(self.good_enough)),
             DesignCriterion::DOptimality => {
-                let [sum, _] = self.folded(state, row, &Shrinking);
+                let [sum, _] = self.folded(state, row, &LogDeterminant);
                 [state.constant + sum, 0.0]
             }
         }

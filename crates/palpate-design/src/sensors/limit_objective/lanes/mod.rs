@@ -9,46 +9,45 @@
 //! nothing, as it divides eight numbers in twice the time of four. Rows that are in no cache cost another 1.2 ns to fetch, so
 //! whoever judges candidates for several states does so while their rows are at hand.
 
-use super::sums::Sums;
 use super::{Block, LANES, packed};
 
 /// Folds each contact's variance of the position, and the factor by which a sensor shrinks det C there, into sums.
 ///
 /// `covariances`: [entry of the lower triangle][block of contacts], `row`: [unknown][block], `weights`: [block].
-pub(super) fn folded<const P: usize, const FIRST: usize, S: Sums>(
+pub(super) fn folded<const P: usize, const FIRST: usize, R: Reduction>(
     covariances: &[Block],
     row: &[Block],
     weights: &[Block],
-    sums: &S,
+    reduction: &R,
 ) -> [f64; 2] {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
-        return unsafe { by_avx2::<P, FIRST, S>(covariances, row, weights, sums) };
+        return unsafe { by_avx2::<P, FIRST, R>(covariances, row, weights, reduction) };
     }
-    kernel::<P, FIRST, S>(covariances, row, weights, sums)
+    kernel::<P, FIRST, R>(covariances, row, weights, reduction)
 }
 
 /// # Safety
 /// The machine must have AVX2.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-unsafe fn by_avx2<const P: usize, const FIRST: usize, S: Sums>(
+unsafe fn by_avx2<const P: usize, const FIRST: usize, R: Reduction>(
     covariances: &[Block],
     row: &[Block],
     weights: &[Block],
-    sums: &S,
+    reduction: &R,
 ) -> [f64; 2] {
-    kernel::<P, FIRST, S>(covariances, row, weights, sums)
+    kernel::<P, FIRST, R>(covariances, row, weights, reduction)
 }
 
 /// [`folded`] with whatever instructions its caller is compiled for.
 #[inline(always)]
-fn kernel<const P: usize, const FIRST: usize, S: Sums>(
+fn kernel<const P: usize, const FIRST: usize, R: Reduction>(
     covariances: &[Block],
     row: &[Block],
     weights: &[Block],
-    sums: &S,
+    reduction: &R,
 ) -> [f64; 2] {
     let n = weights.len();
     let columns: [&[Block]; P] = std::array::from_fn(|k| &row[k * n..][..n]);
@@ -81,9 +80,69 @@ fn kernel<const P: usize, const FIRST: usize, S: Sums>(
         for lane in 0..LANES {
             variance[lane] = (variance[lane] - gain[lane] / shrink[lane]).max(0.0);
         }
-        sums.fold(&mut first, &mut second, &weights[at], &variance, &shrink);
+        reduction.fold(&mut first, &mut second, &weights[at], &variance, &shrink);
     }
-    [S::join(&first), second.iter().sum()]
+    [R::join(&first), second.iter().sum()]
+}
+
+/// What is summed, block by block. The second sum is the mean standard deviation, where ties are to be broken.
+pub(super) trait Reduction {
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
+
+    fn join(lanes: &Block) -> f64 {
+        lanes.iter().sum()
+    }
+}
+
+/// The mean standard deviation.
+pub(super) struct MeanDeviation;
+/// The largest variance.
+pub(super) struct LargestVariance;
+/// The share of contacts whose variance is above this one.
+pub(super) struct ShareAbove(pub f64);
+/// The mean of −½·ln of the factors by which det C shrinks.
+pub(super) struct LogDeterminant;
+
+impl Reduction for MeanDeviation {
+    #[inline(always)]
+    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] += weight[lane] * variance[lane].sqrt();
+        }
+    }
+}
+
+impl Reduction for LargestVariance {
+    #[inline(always)]
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] = first[lane].max(variance[lane]);
+            second[lane] += weight[lane] * variance[lane].sqrt();
+        }
+    }
+
+    fn join(lanes: &Block) -> f64 {
+        lanes.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+impl Reduction for ShareAbove {
+    #[inline(always)]
+    fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, _: &Block) {
+        for lane in 0..LANES {
+            first[lane] += if variance[lane] > self.0 { weight[lane] } else { 0.0 };
+            second[lane] += weight[lane] * variance[lane].sqrt();
+        }
+    }
+}
+
+impl Reduction for LogDeterminant {
+    #[inline(always)]
+    fn fold(&self, first: &mut Block, _: &mut Block, weight: &Block, _: &Block, shrink: &Block) {
+        for lane in 0..LANES {
+            first[lane] -= 0.5 * weight[lane] * shrink[lane].ln();
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 use super::*;
 use crate::sensors::limit_objective::padded;
-use crate::sensors::limit_objective::sums::{Mean, Shrinking, Without, Worst};
 
 /// Blocks without any pattern; the same for the same seed.
 fn blocks(count: usize, seed: usize) -> Vec<Block> {
@@ -9,7 +8,7 @@ fn blocks(count: usize, seed: usize) -> Vec<Block> {
 }
 
 /// What the machine's widest registers give and what plain Rust gives.
-fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [[u64; 2]; 2] {
+fn both<const P: usize, const FIRST: usize, R: Reduction>(reduction: &R, seed: usize) -> [[u64; 2]; 2] {
     let n = 5;
     let (mut covariances, row) = (blocks(packed(P, 0) * n, seed), blocks(P * n, seed + 1));
     // Dominant diagonals make them definite.
@@ -18,8 +17,8 @@ fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [
         diagonal.iter_mut().flatten().for_each(|value| *value = 200.0 + value.abs());
     }
     let weights = blocks(n, seed + 2);
-    let wide = folded::<P, FIRST, S>(&covariances, &row, &weights, sums);
-    let narrow = kernel::<P, FIRST, S>(&covariances, &row, &weights, sums);
+    let wide = folded::<P, FIRST, R>(&covariances, &row, &weights, reduction);
+    let narrow = kernel::<P, FIRST, R>(&covariances, &row, &weights, reduction);
     assert!(narrow.iter().all(|sum| sum.is_finite()) && narrow[0] != 0.0, "{narrow:?}");
     [wide, narrow].map(|sums| sums.map(f64::to_bits))
 }
@@ -27,10 +26,10 @@ fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [
 fn agree<const P: usize, const FIRST: usize>() {
     for seed in 0..20 {
         let pairs = [
-            both::<P, FIRST, _>(&Mean, seed),
-            both::<P, FIRST, _>(&Worst, seed),
-            both::<P, FIRST, _>(&Without(150.0), seed),
-            both::<P, FIRST, _>(&Shrinking, seed),
+            both::<P, FIRST, _>(&MeanDeviation, seed),
+            both::<P, FIRST, _>(&LargestVariance, seed),
+            both::<P, FIRST, _>(&ShareAbove(150.0), seed),
+            both::<P, FIRST, _>(&LogDeterminant, seed),
         ];
         for (criterion, [wide, narrow]) in pairs.into_iter().enumerate() {
             assert_eq!(wide, narrow, "{P} unknowns, {criterion}, {seed}");
