@@ -2,21 +2,19 @@
 
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
-use palpate_estimators::influence::Influence;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind::Deflection;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Beam, Plate};
 use palpate_mechanics::units::{gpa, mm, newtons, um};
 
+use crate::positions::PositionDesign;
 use crate::sensors::{ContactPrior, SensorDesign, Sites};
 
-/// A setup, how it is pressed to calibrate, and the estimator that is fitted.
+/// A setup and what is designed for it.
 pub(crate) struct Example {
     pub setup: Setup,
-    pub training: Option<Training>,
-    pub estimator: Estimator,
+    pub design: PositionDesign,
 }
 
 /// The founding paper's beam with eight deflection sensors and a known force.
@@ -28,13 +26,13 @@ pub(crate) fn beam(noise_m: f64) -> Setup {
 
 /// The beam with noise, pressed at twenty places, for the influence estimator.
 pub(crate) fn noisy() -> Example {
-    let estimator = Estimator::Influence(Influence::default());
-    Example { setup: beam(um(5.0)), training: Some(Training::even(20).repeated(5)), estimator }
+    Example { setup: beam(um(5.0)), design: PositionDesign::like(&Training::even(20).repeated(5)) }
 }
 
 /// The beam without noise, pressed at ten places, for the paper's network.
 pub(crate) fn paper() -> Example {
-    Example { setup: beam(0.0), training: Some(Training::even(10)), estimator: Estimator::default() }
+    let design = PositionDesign::like(&Training::even(10)).estimator(Estimator::default());
+    Example { setup: beam(0.0), design }
 }
 
 /// A simply supported plate over 3 × 3 deflection sensors.
@@ -51,21 +49,14 @@ pub(crate) fn plate(elements: usize) -> Example {
     });
     let setup = Setup::new(plate.unwrap()).sensors(Deflection.grid(3, 3).noise(um(5.0))).unwrap();
     let setup = setup.known_force(newtons(5.0)).unwrap();
-    let estimator = Estimator::Influence(Influence::default());
-    Example { setup, training: Some(Training::grid(6, 6).repeated(5)), estimator }
+    Example { setup, design: PositionDesign::like(&Training::grid(6, 6).repeated(5)) }
 }
 
 /// The beam with the task of placing eight deflection sensors every 5 mm for contacts of unknown force within 20–380 mm.
 pub(crate) fn sensor_design() -> (Setup, SensorDesign) {
     let setup = beam(um(5.0));
-    let contacts = ContactPrior {
-        from: Position::along(mm(20.0)),
-        to: Position::along(mm(380.0)),
-        every_m: mm(5.0),
-        weights: Vec::new(),
-    };
-    let design = SensorDesign::of(&setup.layout, setup.surface.extent()).unwrap();
-    let sites = Sites::Every(mm(5.0));
-    let design = SensorDesign { sites, contacts, force_is_known: Some(false), ..design };
+    let contacts = ContactPrior::along(mm(20.0), mm(380.0), mm(5.0));
+    let design =
+        SensorDesign::of(&setup).unwrap().sites(Sites::Every(mm(5.0))).contacts(contacts).unknown_force();
     (setup, design)
 }

@@ -23,7 +23,7 @@ pub struct PositionDesignReport<'a> {
     /// The estimator's kind.
     pub estimator: &'a str,
     /// What was designed.
-    pub problem: &'a PositionProblem<'a>,
+    pub problem: &'a PositionProblem,
     /// The arrangements.
     pub placed: &'a [Placed],
 }
@@ -43,7 +43,7 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
         lead: Markup::default(),
         summary: report.summary(),
         sections: vec![positions.table(report.places()), errors, meaning],
-        source: html! { ", seed " (report.problem.budget().seed) },
+        source: html! { ", seed " (report.problem.design().seed) },
     }
     .files()
 }
@@ -65,13 +65,13 @@ impl<'a> PositionDesignReport<'a> {
 
     fn summary(&self) -> Markup {
         let Some(best) = self.best() else { return html! {} };
-        let budget = self.problem.budget();
+        let design = self.problem.design();
         let median = |placed: &Placed| placed.verification.median_error_m * 1e3;
         html! {
             li {
                 "Best of " (counted(self.placed.len(), "arrangement", "arrangements")) " of "
-                (counted(budget.count, "training position", "training positions")) ", "
-                (counted(budget.repeats, "press", "presses")) " each: " b { (best.placement.name()) } "."
+                (counted(design.count, "training position", "training positions")) ", "
+                (counted(design.repeats, "press", "presses")) " each: " b { (best.placement.name()) } "."
             }
             li {
                 "Calibrated so, the locator (" (self.estimator) ") is off by " b { (number(median(best))) " mm" }
@@ -79,7 +79,7 @@ impl<'a> PositionDesignReport<'a> {
                     ", " (number(100.0 * (1.0 - median(best) / median(even)))) " % below the even arrangement's "
                     (number(median(even))) " mm"
                 }
-                "; medians of " (counted(budget.verifications, "calibration", "calibrations")) ", force "
+                "; medians of " (counted(design.verifications, "calibration", "calibrations")) ", force "
                 (self.problem.force().name()) "."
             }
         }
@@ -101,7 +101,7 @@ impl<'a> PositionDesignReport<'a> {
             numeric("median error, mm"),
             numeric("mean error, mm"),
             numeric("±, mm"),
-            numeric(format!("within {} mm, %", mm(self.problem.tolerance_m()))),
+            numeric(format!("within {} mm, %", mm(self.problem.design().tolerance_m))),
         ];
         let caption = html! {
             "Errors after calibrating, averaged over " (counted(self.problem.contacts().len(), "contact", "contacts"))
@@ -180,12 +180,12 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn meaning(&self) -> Markup {
-        let budget = self.problem.budget();
+        let design = self.problem.design();
         html! {
             p {
                 "Every arrangement is judged by the same calibrations: presses are simulated with noise, the estimator is fitted, and \
-                 readings of the contacts are located. The search judged by " (counted(budget.calibrations, "calibration", "calibrations"))
-                "; the figures here are of " (counted(budget.verifications, "other one", "other ones")) ", with noise that no search has seen."
+                 readings of the contacts are located. The search judged by " (counted(design.calibrations, "calibration", "calibrations"))
+                "; the figures here are of " (counted(design.verifications, "other one", "other ones")) ", with noise that no search has seen."
             }
             p {
                 b { "even" } " and " b { "edge-dense" } " are the founding paper's, " b { "chebyshev" } " are the nodes that polynomials are best \

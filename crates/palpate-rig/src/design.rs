@@ -6,6 +6,7 @@ use palpate_design::sensors::{
     ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
 };
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
 use palpate_mechanics::surface::Extent;
 
@@ -125,7 +126,7 @@ pub(crate) struct MustHaveKeys {
 impl At<DesignKeys> {
     pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
         let extent = setup.surface.extent();
-        let Some(default) = SensorDesign::of(&setup.layout, extent) else {
+        let Ok(default) = SensorDesign::of(setup) else {
             let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
             return Err(self.place.unused(with));
         };
@@ -141,7 +142,11 @@ impl At<DesignKeys> {
                 .contacts
                 .as_ref()
                 .map_or(Ok(default.contacts), |contacts| contacts.build(extent))?,
-            force_is_known: self.force.map(|force| force == ForceKeys::Known),
+            force: match self.force {
+                Some(ForceKeys::Known) => Force::Known,
+                Some(ForceKeys::Unknown) => Force::Unknown,
+                None => default.force,
+            },
             criterion: self.criterion.unwrap_or(default.criterion),
             tolerance_m: self.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),
             spacing_m: self.spacing.map_or(default.spacing_m, |spacing| spacing.si),
@@ -288,10 +293,7 @@ mod tests {
     #[test]
     fn the_example_says_what_it_says() {
         let design = Rig::from_toml(RIG).unwrap().design.unwrap();
-        assert_eq!(
-            (design.count, design.sites, design.force_is_known),
-            (8, Sites::Every(0.005), Some(false))
-        );
+        assert_eq!((design.count, design.sites, design.force), (8, Sites::Every(0.005), Force::Unknown));
         assert_eq!(design.contacts.from, Position::along(0.02));
         assert_eq!(design.offers.len(), 1);
         assert_eq!(design.offers[0].channel.noise_sd, 5e-6);
@@ -300,7 +302,7 @@ mod tests {
     #[test]
     fn a_silent_section_takes_the_rigs_sensors_all_over_the_surface() {
         let rig = designed("").unwrap();
-        assert_eq!(rig.design, SensorDesign::of(&rig.setup.layout, rig.setup.surface.extent()));
+        assert_eq!(rig.design, SensorDesign::of(&rig.setup).ok());
     }
 
     #[test]

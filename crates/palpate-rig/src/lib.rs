@@ -24,7 +24,7 @@ pub use study::{Arm, AskedLayout, Judging, Study};
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
-use palpate_estimators::evaluation::Trial;
+use palpate_estimators::evaluation::{Calibration, Trial};
 use palpate_estimators::recording::{Recording, TimedRecording};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
@@ -61,12 +61,22 @@ impl Rig {
         Ok(self.setup.simulate(self.training()?, seed)?)
     }
 
-    /// Simulated calibrations at the training positions; see [`Trial::by_simulation`].
+    /// The calibration at the training positions, to be simulated.
+    ///
+    /// # Errors
+    /// [`RigSimulationError`] when the rig has no training positions, or they cannot be laid out.
+    pub fn calibration(&self) -> Result<Calibration, RigSimulationError> {
+        Ok(Calibration::of(&self.setup, self.training()?).map_err(SimulateError::from)?)
+    }
+
+    /// Simulated calibrations with `count` seeds from the first on, each judged by one contact at each position of
+    /// [`all_over`](palpate_estimators::arrangement::all_over).
     ///
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Trial>, RigSimulationError> {
-        Ok(Trial::by_simulation(&self.setup, self.training()?, count, seed)?)
+        let calibration = self.calibration()?;
+        (0..count).map(|k| Ok(calibration.simulate(seed + k)?)).collect()
     }
 
     /// The training positions.

@@ -1,8 +1,7 @@
 //! The layouts that arms ask for by method.
 
 use super::{Arm, AskedLayout, Study, StudyRunError};
-use palpate_design::sensors::SensorDesign;
-use palpate_design::sensors::{DesignError, Method, SensorProblem};
+use palpate_design::sensors::{DesignError, Method, SensorDesign, SensorProblem};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::watch::Watch;
@@ -49,9 +48,7 @@ impl Wish {
 fn wish(arm: &Arm) -> Option<(AskedLayout, Wish)> {
     let asked = arm.layout.clone()?;
     let setup = arm.rig.pressed_setup();
-    let own = || SensorDesign::of(&setup.layout, setup.surface.extent());
-    let mut design = arm.rig.design.clone().or_else(own)?;
-    design.force_is_known.get_or_insert(arm.rig.setup.force_n.is_some());
+    let design = arm.rig.design.clone().or_else(|| SensorDesign::of(&arm.rig.setup).ok())?;
     let method = asked.method;
     Some((asked, Wish { method, setup, design }))
 }

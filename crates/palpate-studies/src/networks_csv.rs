@@ -62,7 +62,7 @@ impl<'a> NetworksCsv<'a> {
 
     /// The row of a fit.
     pub fn row(&self, trained: &Trained) -> String {
-        let outcome = trained.fit.outcome();
+        let outcome = trained.fit.locator.training_outcome().unwrap_or_default();
         let weights: Vec<String> = trained.fit.locator.weights().iter().map(f64::to_string).collect();
         let mut cells = vec![
             self.study.study.arms[trained.arm].name.clone(),

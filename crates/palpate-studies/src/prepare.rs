@@ -4,16 +4,14 @@ use std::ops::Range;
 
 use super::layouts::lay_out;
 use super::run::{Trained, TrainedSeed};
-use super::seed_by_seed::{SeedBySeed, touched_setup};
+use super::seed_by_seed::SeedBySeed;
 use super::{Arm, Judging, Study};
 use palpate_design::sensors::DesignError;
-use palpate_estimators::estimator::{Estimator, FitError, Locator, Method, ReadingError};
-use palpate_estimators::evaluation::Evaluation;
+use palpate_estimators::estimator::{Estimator, FitError, Locator, Method};
+use palpate_estimators::evaluation::{Evaluation, EvaluationError, Trial};
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::network::{Network, TrainingOutcome};
-use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
-use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::RigSimulationError;
@@ -39,21 +37,13 @@ pub enum StudyRunError {
         /// Why.
         error: RigSimulationError,
     },
-    /// An arm's estimator cannot be fitted.
+    /// An arm's estimator cannot be fitted, or evaluated.
     #[error("arm `{arm}`: {error}")]
     Fit {
         /// The arm.
         arm: String,
         /// Why.
-        error: FitError,
-    },
-    /// An arm's locator does not take its readings.
-    #[error("arm `{arm}`: {error}")]
-    Reading {
-        /// The arm.
-        arm: String,
-        /// Why.
-        error: ReadingError,
+        error: EvaluationError<FitError>,
     },
     /// The run was stopped; what was finished has been observed.
     #[error("{0}")]
@@ -83,13 +73,12 @@ pub(super) struct InLanes {
     /// What is fitted: networks.
     pub estimator: Estimator,
     pub setup: Setup,
-    pub recording: Recording,
-    pub judged: Recording,
+    pub trial: Trial,
 }
 
 impl InLanes {
     pub fn task<'a>(&'a self, watch: Watch<'a>) -> FitTask<'a> {
-        FitTask::new(&self.setup, &self.recording).watch(watch)
+        FitTask::new(&self.setup, &self.trial.training).watch(watch)
     }
 }
 
@@ -113,7 +102,7 @@ impl PreparedStudy {
     /// Patterns that an epoch of each arm presents; 0 for an estimator that is not trained by epochs.
     pub fn patterns(&self, arm: usize) -> usize {
         match &self.arms[arm] {
-            PreparedArm::InLanes(arm) => arm.recording.rows.len(),
+            PreparedArm::InLanes(arm) => arm.trial.training.rows.len(),
             PreparedArm::SeedBySeed(arm) => arm.patterns,
         }
     }
@@ -121,7 +110,7 @@ impl PreparedStudy {
     /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
     pub(super) fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
-        let evaluation = Evaluation::of(&locator, &prepared.judged).ok()?;
+        let evaluation = Evaluation::of(&locator, &prepared.trial.judged).ok()?;
         Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
     }
 
@@ -155,12 +144,11 @@ impl PreparedArm {
         let perfect = setup.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
             Estimator::Network(network) if perfect => {
-                let judged = simulate_at(&touched_setup(&arm.rig), &judging.positions, 1, 0)
-                    .map_err(|error| simulated(error.into()))?;
-                let recording = arm.rig.simulate(0).map_err(simulated)?;
+                let calibration = arm.rig.calibration().map_err(simulated)?.judged_at(&judging.positions, 1);
+                let trial = calibration.simulate(0).map_err(|error| simulated(error.into()))?;
                 let network = Network { precision: study.precision, ..network.clone() };
                 let estimator = Estimator::Network(network);
-                Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), recording, judged })))
+                Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), trial })))
             }
             _ => Ok(Self::SeedBySeed(SeedBySeed::of(&arm.rig, judging).map_err(simulated)?)),
         }

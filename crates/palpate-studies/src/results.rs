@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use super::limits::expected_errors_m;
-use super::seed_by_seed::touched_setup;
 use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error,
@@ -242,7 +241,7 @@ impl ArmResults {
 
 /// Positions where locators are judged, with the mean error there of an estimator at the limit, in metres.
 fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
-    let force_n = touched_setup(&arm.rig).force_n?;
+    let force_n = arm.rig.setup.force_n.or(arm.rig.pressed_setup().force_n)?;
     let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }

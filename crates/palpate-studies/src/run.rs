@@ -7,28 +7,12 @@ use super::prepare::{InLanes, PreparedArm};
 use super::seed_by_seed::SeedBySeed;
 use super::{PreparedStudy, StudyRunError};
 use palpate_estimators::estimator::{FitError, Locator, Method};
-use palpate_estimators::evaluation::{Evaluation, Located, Spread};
+use palpate_estimators::evaluation::{Calibrated, EvaluationError, Located, Spread};
 use palpate_estimators::fit::{Fit, SeedQueue};
-use palpate_estimators::network::TrainingOutcome;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// One fitted seed of an arm.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainedSeed {
-    /// The seed.
-    pub seed: u64,
-    /// What was fitted.
-    pub locator: Locator,
-    /// Its answers where the study judges.
-    pub evaluation: Evaluation,
-}
-
-impl TrainedSeed {
-    /// How its training ended.
-    pub fn outcome(&self) -> TrainingOutcome {
-        self.locator.training_outcome().unwrap_or_default()
-    }
-}
+pub type TrainedSeed = Calibrated<Method>;
 
 /// A fitted seed with the place of its arm in the study.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,7 +159,10 @@ impl Queue<'_> {
     /// Fits many seeds of an arm side by side.
     fn fit_in_lanes(&mut self, prepared: &InLanes, watch: Watch) -> Result<(), StudyRunError> {
         let name = &self.study.study.arms[self.arm].name;
-        prepared.estimator.fit_many(prepared.task(watch), self).map_err(|error| unfitted(name, error))
+        prepared
+            .estimator
+            .fit_many(prepared.task(watch), self)
+            .map_err(|error| unfitted(name, EvaluationError::Fit(error)))
     }
 
     /// Fits seed after seed of an arm, until none is left.
@@ -196,7 +183,7 @@ impl Queue<'_> {
 }
 
 /// Why an arm cannot be fitted, or that it was stopped.
-pub(super) fn unfitted(arm: &str, error: FitError) -> StudyRunError {
+pub(super) fn unfitted(arm: &str, error: EvaluationError<FitError>) -> StudyRunError {
     if Cancelled::caused(&error) {
         return Cancelled.into();
     }

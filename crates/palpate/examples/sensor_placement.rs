@@ -11,19 +11,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 pub fn gain() -> Result<f64, Box<dyn std::error::Error>> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
     let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
-    let design = SensorDesign::of(&setup.layout, setup.surface.extent());
-    let mut design = design.ok_or("no model explains the sensors")?;
-    design.sites = Sites::Every(mm(5.0));
-    design.contacts.from = Position::along(mm(20.0));
-    design.contacts.to = Position::along(mm(380.0));
-    design.contacts.every_m = mm(5.0);
-    design.force_is_known = Some(false);
+    let contacts = ContactPrior::along(mm(20.0), mm(380.0), mm(5.0));
+    let design = SensorDesign::of(&setup)?.sites(Sites::Every(mm(5.0))).contacts(contacts).unknown_force();
     let problem = SensorProblem::new(&setup, &design, Watch::NONE)?;
-    let even = problem.even()?.ok_or("no room for the even layout")?;
-    let best = problem.greedy_exchange(0, Watch::NONE)?;
+    let (even, best) = (problem.even()?, problem.greedy_exchange(0, Watch::NONE)?);
     for sensor in &best.layout.sensors {
         println!("{}: {:.0} mm", sensor.name, 1e3 * sensor.position.x_m);
     }
-    let limit = |designed: &palpate::design::sensors::Designed| designed.assessment.mean_limit_m;
-    Ok(1.0 - limit(&best).ok_or("blind")? / limit(&even).ok_or("blind")?)
+    let limit = |designed: &Designed| designed.assessment.mean_limit_m.ok_or("some contact is not told");
+    Ok(1.0 - limit(&best)? / limit(&even)?)
 }

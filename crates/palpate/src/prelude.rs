@@ -1,7 +1,7 @@
 //! Everything that an afternoon with palpate needs: `use palpate::prelude::*;`
 
-pub use palpate_design::positions::{Advice, Budget, PositionProblem, best_placed, next_press};
-pub use palpate_design::sensors::{SensorDesign, SensorProblem, Sites};
+pub use palpate_design::positions::{Advice, PositionDesign, PositionProblem, best_placed, next_press};
+pub use palpate_design::sensors::{ContactPrior, Designed, SensorDesign, SensorProblem, Sites};
 pub use palpate_estimators::arrangement::{Arrangement, Training, all_over};
 pub use palpate_estimators::centroid::Centroid;
 pub use palpate_estimators::closed_form::ClosedForm;
@@ -9,7 +9,7 @@ pub use palpate_estimators::digit::DigitEstimator;
 pub use palpate_estimators::estimator::{
     ContactEstimate, Estimate, Estimator, Locator, Profiler, Status, Tracker, TrackerConfig,
 };
-pub use palpate_estimators::evaluation::{Evaluation, Portion, cross_validate};
+pub use palpate_estimators::evaluation::{Calibration, Evaluation, Portion, cross_validate};
 pub use palpate_estimators::fit::{Fit, FitTask, Fitted, Locate};
 pub use palpate_estimators::gaussian_process::GaussianProcessEstimator;
 pub use palpate_estimators::influence::Influence;

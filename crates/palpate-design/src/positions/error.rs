@@ -1,11 +1,14 @@
 //! Why training positions cannot be designed.
 
-use crate::calibration::CalibrationError;
 use palpate_estimators::arrangement::ArrangementError;
+use palpate_estimators::estimator::FitError;
+use palpate_estimators::evaluation::EvaluationError;
 use palpate_numerics::regression::RegressionError;
 use palpate_numerics::watch::Cancelled;
 
-/// A rig, a budget or a recording that no training positions can be designed for.
+use crate::range::OutOfRange;
+
+/// A setup, a design or a recording that no training positions can be found for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PositionError {
     /// The design was stopped.
@@ -15,7 +18,7 @@ pub enum PositionError {
     #[error("a measured surface has no model to simulate calibrations with")]
     NoModel,
     /// The force of the presses is not given.
-    #[error("the force of the presses is not known; there is no force in [contact] or [training]")]
+    #[error("the force of the presses is not known")]
     NoForce,
     /// The estimator is not decided on.
     #[error("the estimator is `auto`; positions are designed for one estimator")]
@@ -30,21 +33,24 @@ pub enum PositionError {
         /// The estimator's kind.
         kind: &'static str,
     },
-    /// The rig's own training positions cannot be laid out.
+    /// The existing training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
     /// A calibration cannot be simulated.
     #[error(transparent)]
-    Calibration(#[from] CalibrationError),
+    Calibration(#[from] EvaluationError<FitError>),
+    /// A number that is not in its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// The influence functions cannot be learnt.
     #[error("the influence functions cannot be learnt: {0}")]
     Regression(#[from] RegressionError),
-    /// The recording has other channels than the rig.
-    #[error("the recording has {found} channels, the rig {needed}")]
+    /// The recording has other channels than the setup has sensors.
+    #[error("the recording has {found} channels; the setup has {needed} sensors")]
     Channels {
-        /// How many the rig has.
+        /// Sensors of the setup.
         needed: usize,
-        /// How many the recording has.
+        /// Channels of the recording.
         found: usize,
     },
     /// Too few places pressed to see how smooth the influence functions are.
@@ -57,33 +63,10 @@ pub enum PositionError {
     },
     /// Nothing says how noisy a channel is.
     #[error(
-        "nothing says how noisy channel {channel} is: no position was pressed twice, and the rig states no noise"
+        "nothing says how noisy channel {channel} is: no position was pressed twice, and the setup states no noise"
     )]
     NoNoise {
         /// Which channel, from 1.
         channel: usize,
     },
-}
-
-impl PositionError {
-    /// What to do about it.
-    pub const fn help(&self) -> &'static str {
-        match self {
-            Self::Cancelled(_) => "start it again",
-            Self::NoModel => {
-                "give a surface with a model, such as `kind = \"beam\"`; or --data with a recording begun, for the next press"
-            }
-            Self::NoForce => {
-                "add `force = \"3 N\"` to [contact], or to [training] where it is not known afterwards"
-            }
-            Self::Auto => "say which: `kind = \"influence\"` in [estimator]",
-            Self::TooFew { .. } => "--count takes a larger number",
-            Self::Arrangement(_) | Self::Calibration(_) | Self::Regression(_) => {
-                "check [training], [sensors] and [estimator] of the rig"
-            }
-            Self::Channels { .. } => "check `channels` in [recording], or the rig's sensors",
-            Self::TooFewPresses { .. } => "begin with evenly spaced presses, ends included",
-            Self::NoNoise { .. } => "press some positions twice, or add `noise = \"5 um\"` to [sensors]",
-        }
-    }
 }

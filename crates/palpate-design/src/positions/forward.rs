@@ -2,7 +2,7 @@
 
 use ndarray::Array2;
 
-use super::PositionError;
+use super::error::PositionError;
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -25,7 +25,7 @@ const NOMINAL_NOISE: f64 = 1e-4;
 const FEWEST_POSITIONS: usize = 4;
 
 /// Whitened readings as functions of position.
-pub(super) struct Forward {
+pub(super) struct ForwardModel {
     process: GaussianProcess,
     /// The variance of the functions before any press, the sensors' mean.
     signal_variance: f64,
@@ -39,14 +39,14 @@ struct Whitened {
     readings: Array2<f64>,
 }
 
-impl Forward {
+impl ForwardModel {
     /// Of a bench with a model, from its clean readings.
     pub fn of_model(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
         let surface = setup.surface.model().ok_or(PositionError::NoModel)?;
         let force_n = setup.force_n.ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
         let side = if extent.is_plane() { ASKED_ON_A_PLANE } else { ASKED };
-        let positions = cells(extent, side, if extent.is_plane() { side } else { 1 });
+        let positions = cells(extent, side, side);
         let sensors = CleanSensors::new(surface, &setup.layout);
         let clean: Vec<Vec<f64>> =
             positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
@@ -164,8 +164,9 @@ fn living(layout: &Layout) -> Vec<usize> {
 }
 
 fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
-    let d = if extent.is_plane() { 2 } else { 1 };
-    Array2::from_shape_fn((positions.len(), d), |(row, k)| [positions[row].x_m, positions[row].y_m][k])
+    Array2::from_shape_fn((positions.len(), extent.sides_m().count()), |(row, k)| {
+        [positions[row].x_m, positions[row].y_m][k]
+    })
 }
 
 /// Readings brought to the mean force, where forces are known.

@@ -1,27 +1,46 @@
 //! Where to press: training positions for an estimator and a budget of presses.
 //!
+//! ```
+//! use palpate_design::positions::{PositionDesign, PositionProblem, best_placed};
+//! use palpate_estimators::setup::Setup;
+//! use palpate_mechanics::sensing::SensorKind::Deflection;
+//! use palpate_mechanics::surface::Beam;
+//! use palpate_mechanics::units::{gpa, mm, newtons, um};
+//! use palpate_numerics::watch::Watch;
+//!
+//! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+//! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+//! let design = PositionDesign { trials: 20, calibrations: 2, verifications: 4, ..PositionDesign::default() };
+//! let problem = PositionProblem::new(&setup, &design.count(6).repeats(2))?;
+//! let placed = problem.all(Watch::NONE)?;
+//! let best = best_placed(&placed).expect("there are several arrangements");
+//! assert_eq!(best.positions.len(), 6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Rules (even, edge-dense, Chebyshev's nodes) stand beside two optima: positions that leave the least variance of
 //! influence functions learnt as Gaussian processes, and positions that give the least error after simulated calibrations of
 //! the estimator itself. All are judged alike, by calibrations with noise that no search has seen. With a recording begun,
 //! [`next_press`] says where to press next, and when to stop.
 
+mod design;
 mod error;
 mod forward;
-mod knowledge;
 mod next;
 mod search;
 mod variance;
 
-pub use super::calibration::{CalibrationError, Verification};
+pub use crate::verification::Verification;
+pub use design::{Placement, PositionDesign};
 pub use error::PositionError;
 pub use next::{Advice, NextPress, next_press};
 
-use crate::calibration::{Seeds, Trial};
-use crate::sensors::ContactPrior;
-use crate::sensors::{SensorDesign, WeightedContacts};
-use forward::Forward;
-use palpate_estimators::arrangement::{Arrangement, Training, cells, chebyshev, squarest, warped_cells};
+use crate::contacts::WeightedContacts;
+use crate::verification::errors_by_contact;
+use forward::ForwardModel;
+use palpate_estimators::arrangement::{Arrangement, cells, chebyshev, squarest, warped_cells};
 use palpate_estimators::estimator::Estimator;
+use palpate_estimators::evaluation::{Calibration, Evaluation};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
@@ -31,6 +50,8 @@ use palpate_numerics::mean;
 use palpate_numerics::watch::Watch;
 use search::{PatternSearch, evaluate};
 
+/// What the search is called where its progress is told.
+const SEARCHING: &str = "search by calibrations";
 /// Readings that a calibration is judged by, about: while searching, and when verifying.
 const READINGS_IN_SEARCH: usize = 1000;
 const READINGS: usize = 4000;
@@ -40,60 +61,6 @@ const IN_THE_MIDDLE: usize = 4;
 const DENSITIES: [f64; 4] = [0.4, 0.8, 1.2, 1.6];
 /// The seeds of searches lie so far from those that verify.
 const SEARCH_SEEDS: u64 = 1 << 32;
-
-/// What a design of training positions is busy with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// How smooth the influence functions are, and the positions that leave the least variance.
-    Variance,
-    /// Simulated calibrations of positions that are moved about.
-    Search,
-    /// Calibrations with noise that the search has not seen.
-    Verification,
-}
-
-impl Stage {
-    /// As people are told of it.
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Self::Variance => "least variance",
-            Self::Search => "calibrating in search",
-            Self::Verification => "verifying",
-        }
-    }
-}
-
-/// How training positions came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Placement {
-    /// As the rig has them.
-    Rig,
-    /// Evenly: what the others are compared with.
-    Even,
-    /// More of them towards the ends, as the founding paper has it.
-    EdgeDense,
-    /// Chebyshev's nodes; on a plane a grid of them.
-    Chebyshev,
-    /// The least variance of influence functions that are learnt as Gaussian processes.
-    VarianceOptimal,
-    /// The least error of the estimator after simulated calibrations.
-    Optimal,
-}
-
-impl Placement {
-    /// Its name in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rig => "rig",
-            Self::Even => "even",
-            Self::EdgeDense => "edge-dense",
-            Self::Chebyshev => "chebyshev",
-            Self::VarianceOptimal => "variance-optimal",
-            Self::Optimal => "optimal",
-        }
-    }
-}
 
 /// Training positions and what they are worth.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,93 +75,75 @@ pub struct Placed {
     pub errors_m: Vec<f64>,
 }
 
-/// How much may be pressed, and how long is searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Budget {
-    /// Training positions; at least 1.
-    pub count: usize,
-    /// Presses at each; at least 1.
-    pub repeats: usize,
-    /// Simulated calibrations that an arrangement is judged by while searching; at least 1.
-    pub calibrations: usize,
-    /// Arrangements that the search may try.
-    pub trials: usize,
-    /// Calibrations with fresh noise that verify each arrangement; at least 1.
-    pub verifications: usize,
-    /// Fixes all noise and every network's first weights.
-    pub seed: u64,
+/// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that
+/// noise decides nothing.
+pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
+    let error = |placed: &Placed| placed.verification.mean_error_m;
+    let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
+    let as_good = |one: &&Placed| {
+        let apart = one.verification.standard_error_m.hypot(least.verification.standard_error_m);
+        error(one) - error(least) <= 2.0 * apart
+    };
+    placed.iter().find(as_good)
 }
 
-/// A bench whose training positions are designed.
-pub struct PositionProblem<'a> {
-    setup: &'a Setup,
-    training: Option<&'a Training>,
-    estimator: &'a Estimator,
-    budget: Budget,
+/// A setup whose training positions are designed, checked.
+pub struct PositionProblem {
+    design: PositionDesign,
+    /// The setup with the force of the presses.
+    pressed: Setup,
+    /// What is simulated, but for where to press.
+    calibration: Calibration,
     extent: Extent,
     force: Force,
     contacts: WeightedContacts,
-    tolerance_m: f64,
 }
 
-impl<'a> PositionProblem<'a> {
-    /// Checks that the bench can be simulated and the estimator fitted with so many presses. `training` tells the force of
-    /// the presses, and the positions that are compared with where their number is the budget's; `design` tells which contacts
-    /// matter, and what the locator will know of their force.
+impl PositionProblem {
+    /// Checks that the setup can be simulated and the estimator fitted with so many presses.
     ///
     /// # Errors
     /// [`PositionError`], with what is missing.
-    pub fn new(
-        setup: &'a Setup,
-        training: Option<&'a Training>,
-        estimator: &'a Estimator,
-        design: Option<&SensorDesign>,
-        budget: Budget,
-    ) -> Result<Self, PositionError> {
+    pub fn new(setup: &Setup, design: &PositionDesign) -> Result<Self, PositionError> {
         if setup.surface.model().is_none() {
             return Err(PositionError::NoModel);
         }
-        if pressed(setup, training).force_n.is_none() {
+        design.check()?;
+        let press_force_n = design.existing.as_ref().and_then(|training| training.force_n);
+        let pressed = Setup { force_n: press_force_n.or(setup.force_n), ..setup.clone() };
+        if pressed.force_n.is_none() {
             return Err(PositionError::NoForce);
         }
-        if *estimator == Estimator::Auto {
+        if design.estimator == Estimator::Auto {
             return Err(PositionError::Auto);
         }
-        let needed = estimator.positions_needed();
-        if budget.count < needed {
-            return Err(PositionError::TooFew { count: budget.count, needed, kind: estimator.kind() });
+        let (count, needed) = (design.count, design.estimator.positions_needed());
+        if count < needed {
+            return Err(PositionError::TooFew { count, needed, kind: design.estimator.kind() });
         }
         let extent = setup.surface.extent();
-        let prior = design.map(|design| design.contacts.clone());
-        let contacts = WeightedContacts::of(&prior.unwrap_or_else(|| ContactPrior::all_over(extent)), extent);
-        let tolerance_m = design.map_or(Self::TOLERANCE_M, |design| design.tolerance_m);
-        let known =
-            design.and_then(|design| design.force_is_known).unwrap_or(true) && setup.force_n.is_some();
-        let force = if known { Force::Known } else { Force::Unknown };
-        Ok(Self { setup, training, estimator, budget, extent, force, contacts, tolerance_m })
+        let contacts = design.weighted_contacts(extent)?;
+        let calibration = Calibration::new(setup, press_force_n);
+        let (force, calibration) = match design.force {
+            Force::Known if setup.force_n.is_some() => (Force::Known, calibration),
+            _ => (Force::Unknown, calibration.unknown_force()),
+        };
+        Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
     }
 
-    /// An error up to this is good enough unless the design says otherwise.
-    const TOLERANCE_M: f64 = 2e-3;
+    /// What is designed.
+    pub fn design(&self) -> &PositionDesign {
+        &self.design
+    }
 
     /// The contacts that are located after calibrating.
     pub fn contacts(&self) -> &WeightedContacts {
         &self.contacts
     }
 
-    /// What the locator knows of their force: as the design says, or else the bench.
+    /// What the locator knows of their force: as the design says, if the setup knows it.
     pub fn force(&self) -> Force {
         self.force
-    }
-
-    /// An error up to this is good enough, in metres.
-    pub fn tolerance_m(&self) -> f64 {
-        self.tolerance_m
-    }
-
-    /// What may be pressed.
-    pub fn budget(&self) -> Budget {
-        self.budget
     }
 
     /// Whether contacts have two coordinates.
@@ -205,7 +154,7 @@ impl<'a> PositionProblem<'a> {
     /// Every arrangement, by rule and by search, each verified.
     ///
     /// # Errors
-    /// [`PositionError`] when the estimator cannot be fitted to such presses.
+    /// [`PositionError`] when the estimator cannot be fitted to such presses, or the watch stopped it.
     pub fn all(&self, watch: Watch) -> Result<Vec<Placed>, PositionError> {
         let mut arrangements = self.by_rule()?;
         arrangements.push((Placement::VarianceOptimal, self.variance_optimal(watch)?));
@@ -213,23 +162,23 @@ impl<'a> PositionProblem<'a> {
         let starts: Vec<_> = by_rule.chain(self.densities()).collect();
         arrangements.push((Placement::Optimal, self.search(&starts, watch)?));
         let of = arrangements.len() as f64;
-        let mut placed = Vec::new();
-        for (done, (placement, positions)) in arrangements.into_iter().enumerate() {
-            placed.push(self.verified(placement, positions, done as f64 / of, watch)?);
-        }
-        Ok(placed)
+        let verified = arrangements.into_iter().enumerate().map(|(done, (placement, positions))| {
+            watch.stage("verifying", done as f64 / of)?;
+            self.verified(placement, positions, watch)
+        });
+        verified.collect()
     }
 
     /// The arrangements that rules give, the even one first.
     fn by_rule(&self) -> Result<Vec<(Placement, Vec<Position>)>, PositionError> {
-        let (extent, count) = (self.extent, self.budget.count);
+        let (extent, count) = (self.extent, self.design.count);
         let (columns, rows) = squarest(extent, count);
         let even = cells(extent, columns, rows);
         let mut arrangements = Vec::new();
-        if let Some(training) = self.training.filter(|training| training.count == count) {
-            let own = training.positions(extent)?;
-            if own != even {
-                arrangements.push((Placement::Rig, own));
+        if let Some(training) = self.design.existing.as_ref().filter(|training| training.count == count) {
+            let existing = training.positions(extent)?;
+            if existing != even {
+                arrangements.push((Placement::Existing, existing));
             }
         }
         arrangements.insert(0, (Placement::Even, even));
@@ -243,7 +192,7 @@ impl<'a> PositionProblem<'a> {
 
     /// Between even positions and Chebyshev's, and denser yet towards the ends.
     fn densities(&self) -> impl Iterator<Item = Vec<Position>> {
-        let (extent, (columns, rows)) = (self.extent, squarest(self.extent, self.budget.count));
+        let (extent, (columns, rows)) = (self.extent, squarest(self.extent, self.design.count));
         DENSITIES.into_iter().map(move |density| {
             warped_cells(extent, columns, rows, |share| {
                 let once = chebyshev(share);
@@ -257,36 +206,35 @@ impl<'a> PositionProblem<'a> {
     }
 
     fn variance_optimal(&self, watch: Watch) -> Result<Vec<Position>, PositionError> {
-        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
-        let forward = Forward::of_model(&self.pressed(), self.force, watch)?;
-        Ok(variance::least(&forward, &self.contacts, self.extent, &self.budget, watch)?)
+        watch.stage("least variance", f64::NAN)?;
+        let forward = ForwardModel::of_model(&self.pressed, self.force, watch)?;
+        Ok(variance::least(&forward, &self.contacts, self.extent, &self.design, watch)?)
     }
 
     /// The best of some arrangements by simulated calibrations, and then with its positions moved about.
     fn search(&self, starts: &[Vec<Position>], watch: Watch) -> Result<Vec<Position>, PositionError> {
-        let trial = self.trial(READINGS_IN_SEARCH);
-        let seeds =
-            Seeds { first: self.budget.seed.wrapping_add(SEARCH_SEEDS), count: self.budget.calibrations };
+        let (design, first) = (&self.design, self.design.seed.wrapping_add(SEARCH_SEEDS));
         let score = |positions: &[Position], share: f64| -> Result<f64, PositionError> {
-            watch.stage(Stage::Search.in_words(), share)?;
-            let calibrated = trial.calibrate(positions, self.budget.repeats, seeds, watch)?;
-            Ok(Verification::of(&calibrated, &self.contacts).mean_error_m)
+            watch.stage(SEARCHING, share)?;
+            let judged =
+                self.calibrate(positions, READINGS_IN_SEARCH, (first, design.calibrations), watch)?;
+            Ok(Verification::of(&judged, &self.contacts, design.tolerance_m).mean_error_m)
         };
         let scores = evaluate(&score, starts, 0.0)?;
         let best = (0..starts.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
         let search = PatternSearch {
             extent: self.extent,
             mirrored: self.is_mirrored(),
-            most_trials: self.budget.trials.saturating_sub(starts.len()),
+            most_trials: design.trials.saturating_sub(starts.len()),
         };
         search.run(&score, starts[best].clone(), scores[best])
     }
 
-    /// Whether the bench reads the same, sensors in reverse, when the contact is mirrored.
+    /// Whether the setup reads the same, sensors in reverse, when the contact is mirrored.
     fn is_mirrored(&self) -> bool {
-        let setup = self.pressed();
-        let (Some(surface), Some(force_n)) = (setup.surface.model(), setup.force_n) else { return false };
-        !self.extent.is_plane() && search::reads_mirrored(surface, &setup.layout, force_n)
+        let Setup { surface, layout, force_n, .. } = &self.pressed;
+        let (Some(surface), Some(force_n)) = (surface.model(), *force_n) else { return false };
+        !self.extent.is_plane() && search::reads_mirrored(surface, layout, force_n)
     }
 
     /// What calibrations with fresh noise give.
@@ -294,59 +242,41 @@ impl<'a> PositionProblem<'a> {
         &self,
         placement: Placement,
         positions: Vec<Position>,
-        share: f64,
         watch: Watch,
     ) -> Result<Placed, PositionError> {
-        let trial = self.trial(READINGS);
-        let seeds = Seeds { first: self.budget.seed, count: self.budget.verifications };
-        watch.stage(Stage::Verification.in_words(), share)?;
-        let all = trial.calibrate(&positions, self.budget.repeats, seeds, watch)?;
-        let mean_error_m = |contact: usize| mean(all.iter().map(|one| one.errors_m[contact]));
+        let seeds = (self.design.seed, self.design.verifications);
+        let judged = self.calibrate(&positions, READINGS, seeds, watch)?;
+        let errors: Vec<Vec<f64>> = judged.iter().map(|one| errors_by_contact(one, &self.contacts)).collect();
+        let mean_error_m = |contact: usize| mean(errors.iter().map(|errors_m| errors_m[contact]));
         Ok(Placed {
             placement,
             positions,
-            verification: Verification::of(&all, &self.contacts),
+            verification: Verification::of(&judged, &self.contacts, self.design.tolerance_m),
             errors_m: (0..self.contacts.len()).map(mean_error_m).collect(),
         })
     }
 
-    /// The bench with the force of the presses.
-    fn pressed(&self) -> Setup {
-        pressed(self.setup, self.training)
+    /// Simulated calibrations at some positions, a seed each from the first on, judged by about so many readings of the contacts. A
+    /// seed has the same noise whatever the positions.
+    fn calibrate(
+        &self,
+        positions: &[Position],
+        readings: usize,
+        (first, count): (u64, usize),
+        watch: Watch,
+    ) -> Result<Vec<Evaluation>, PositionError> {
+        let channels = self.pressed.layout.sensors.iter().map(|sensor| sensor.channel);
+        let faultless = channels.into_iter().all(|channel| channel == ChannelModel::default());
+        let readings = if faultless { 1 } else { readings.div_ceil(self.contacts.len()) };
+        let calibration = self.calibration.clone().pressed_at(positions, self.design.repeats);
+        let seeds = (0..count as u64).map(|k| first.wrapping_add(k));
+        let calibrated = calibration.judged_at(&self.contacts.positions, readings).run_many(
+            &self.design.estimator,
+            seeds,
+            watch,
+        )?;
+        Ok(calibrated.into_iter().map(|one| one.evaluation).collect())
     }
-
-    fn trial(&self, readings: usize) -> Trial<'_> {
-        let pressed = self.pressed();
-        let touched = Setup { force_n: self.setup.force_n.or(pressed.force_n), ..pressed.clone() };
-        let clean = pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
-        let draws = if clean { 1 } else { readings.div_ceil(self.contacts.len()) };
-        let known_n = self.setup.force_n.filter(|_| self.force() == Force::Known);
-        Trial {
-            pressed,
-            touched,
-            used: Setup { force_n: known_n, ..self.setup.clone() },
-            estimator: self.estimator,
-            contacts: &self.contacts,
-            draws,
-            tolerance_m: self.tolerance_m,
-        }
-    }
-}
-
-fn pressed(setup: &Setup, training: Option<&Training>) -> Setup {
-    training.map_or_else(|| setup.clone(), |training| setup.pressed_by(training))
-}
-
-/// The arrangement with the least mean error; of those that are as good within twice the standard error, the first, so that
-/// noise decides nothing.
-pub fn best_placed(placed: &[Placed]) -> Option<&Placed> {
-    let error = |placed: &Placed| placed.verification.mean_error_m;
-    let least = placed.iter().min_by(|a, b| error(a).total_cmp(&error(b)))?;
-    let as_good = |one: &&Placed| {
-        let apart = one.verification.standard_error_m.hypot(least.verification.standard_error_m);
-        error(one) - error(least) <= 2.0 * apart
-    };
-    placed.iter().find(as_good)
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! The next press of a recording begun, and when to stop.
 
-use super::PositionError;
-use super::forward::Forward;
-use super::knowledge::Knowledge;
-use super::variance::Expectation;
-use crate::sensors::ContactPrior;
-use crate::sensors::WeightedContacts;
+use super::design::PositionDesign;
+use super::error::PositionError;
+use super::forward::ForwardModel;
+use super::variance::{ExpectedError, Posterior};
+use crate::range::OutOfRange;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -71,39 +70,55 @@ impl Advice {
     }
 }
 
-/// Where to press next.
+/// Where to press next, for the contacts of a design and until its rule says to stop.
 ///
-/// Influence functions are Gaussian processes whose smoothness and noise the recording tells; the contacts are those of
-/// `contacts`, or come from all over the surface.
+/// Influence functions are Gaussian processes whose smoothness and noise the recording tells; no model of the surface is needed.
+///
+/// ```
+/// use palpate_design::positions::{PositionDesign, next_press};
+/// use palpate_estimators::arrangement::Training;
+/// use palpate_estimators::setup::Setup;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, newtons, um};
+/// use palpate_numerics::watch::Watch;
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let begun = setup.simulate(&Training::even(6).repeated(2), 0)?;
+/// let advice = next_press(&setup, &begun, &PositionDesign::default(), Watch::NONE)?;
+/// assert!(!advice.is_enough() && advice.next[0].error_m < advice.error_m);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`PositionError`] when the recording is not the bench's, or too short to learn from.
+/// [`PositionError`] when the recording is not the setup's, or too short to learn from, or the watch stopped it.
 pub fn next_press(
     setup: &Setup,
-    contacts: Option<&ContactPrior>,
     recording: &Recording,
-    stop_percent: f64,
+    design: &PositionDesign,
     watch: Watch,
 ) -> Result<Advice, PositionError> {
-    let extent = setup.surface.extent();
-    let prior = contacts.cloned().unwrap_or_else(|| ContactPrior::all_over(extent));
-    let contacts = WeightedContacts::of(&prior, extent);
+    let (extent, stop_percent) = (setup.surface.extent(), design.stop_percent);
+    let stop = [("the gain in % that is worth a press", stop_percent)];
+    OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
+    let contacts = design.weighted_contacts(extent)?;
     let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let forward = Forward::of_recording(recording, &setup.layout, extent, force, watch)?;
-    let mut expectation = Expectation::new(&forward, &contacts, extent);
+    let forward = ForwardModel::of_recording(recording, &setup.layout, extent, force, watch)?;
+    let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
-    let first = expectation.places.len();
-    expectation.places.extend(&pressed);
-    let mut knowledge = Knowledge::before(&forward, &expectation.places);
+    let first = expected.places.len();
+    expected.places.extend(&pressed);
+    let mut posterior = Posterior::prior(&forward, &expected.places);
     for (i, position) in pressed.iter().enumerate() {
         let rows = recording.rows.iter().filter(|row| row.position == *position).count();
-        knowledge.press(first + i, 1.0 / rows as f64);
+        posterior.condition(first + i, 1.0 / rows as f64);
     }
     let mut advice = Advice {
         presses: recording.rows.len(),
         positions: pressed.len(),
-        error_m: expectation.error_m(|place| knowledge.variance(place)),
-        endless_error_m: expectation.error_m(|_| 0.0),
+        error_m: expected.error_m(|place| posterior.variance(place)),
+        endless_error_m: expected.error_m(|_| 0.0),
         next: Vec::new(),
         stop_percent,
     };
@@ -112,9 +127,9 @@ pub fn next_press(
     }
     while advice.next.len() < MOST_AHEAD && !advice.gets_there() {
         watch.round()?;
-        let (site, error_m) = expectation.best(&knowledge, 1.0);
-        knowledge.press(site, 1.0);
-        advice.next.push(NextPress { position: expectation.places[site], error_m });
+        let (site, error_m) = expected.best(&posterior, 1.0);
+        posterior.condition(site, 1.0);
+        advice.next.push(NextPress { position: expected.places[site], error_m });
     }
     Ok(advice)
 }

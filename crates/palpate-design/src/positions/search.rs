@@ -1,6 +1,6 @@
 //! Positions moved about while simulated calibrations get better.
 
-use super::PositionError;
+use super::error::PositionError;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::Layout;
@@ -108,12 +108,8 @@ impl PatternSearch {
         group: &(usize, Option<usize>),
         step_m: f64,
     ) -> Vec<Vec<Position>> {
-        let steps: &[(f64, f64)] = if self.extent.is_plane() {
-            &[(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
-        } else {
-            &[(1.0, 0.0), (-1.0, 0.0)]
-        };
-        let moved = steps.iter().map(|(x, y)| {
+        let steps = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+        let moved = steps.into_iter().take(2 * self.extent.sides_m().count()).map(|(x, y)| {
             let mut moved = positions.to_vec();
             moved[group.0].x_m += x * step_m;
             moved[group.0].y_m += y * step_m;

@@ -1,7 +1,7 @@
-use super::knowledge::Knowledge;
 use super::search::reads_mirrored;
-use super::variance::Expectation;
+use super::variance::{ExpectedError, Posterior};
 use super::*;
+use crate::contacts::ContactPrior;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::PlateSpec;
@@ -9,12 +9,13 @@ use palpate_numerics::watch::{Cancelled, Progress};
 
 use crate::fixtures::{Example, noisy, paper, plate};
 
-fn budget(count: usize) -> Budget {
-    Budget { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, seed: 0 }
+/// So many positions, pressed once each, in a short search.
+fn short(design: PositionDesign, count: usize) -> PositionDesign {
+    PositionDesign { count, repeats: 1, calibrations: 2, trials: 20, verifications: 4, ..design }
 }
 
-fn problem(example: &Example, budget: Budget) -> Result<PositionProblem<'_>, PositionError> {
-    PositionProblem::new(&example.setup, example.training.as_ref(), &example.estimator, None, budget)
+fn problem(example: Example, count: usize) -> Result<PositionProblem, PositionError> {
+    PositionProblem::new(&example.setup, &short(example.design, count))
 }
 
 /// The score of a layout of positions by themselves: how far each is from where it should be.
@@ -71,19 +72,19 @@ fn a_bench_is_mirrored_or_not() {
     assert!(!reads_mirrored(surface, &moved, 3.0));
 }
 
-fn forward(setup: &Setup) -> Forward {
-    Forward::of_model(setup, Force::Known, Watch::NONE).unwrap()
+fn forward(setup: &Setup) -> ForwardModel {
+    ForwardModel::of_model(setup, Force::Known, Watch::NONE).unwrap()
 }
 
 #[test]
 fn presses_at_one_place_add_up_and_tell_their_neighbours() {
     let forward = forward(&noisy().setup);
     let places: Vec<Position> = [0.1, 0.12, 0.3].map(Position::along).into();
-    let before = Knowledge::before(&forward, &places);
+    let before = Posterior::prior(&forward, &places);
     let (mut twice, mut once) = (before.clone(), before.clone());
-    twice.press(0, 1.0);
-    twice.press(0, 1.0);
-    once.press(0, 0.5);
+    twice.condition(0, 1.0);
+    twice.condition(0, 1.0);
+    once.condition(0, 0.5);
     for place in 0..3 {
         // What is left is the small difference of large numbers.
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-6 * before.variance(place);
@@ -113,15 +114,22 @@ fn the_least_variance_is_less_than_the_even_positions() {
     for (setup, count) in [(noisy().setup, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).setup, 9)] {
         let forward = forward(&setup);
         let extent = setup.surface.extent();
-        let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent);
-        let found = variance::least(&forward, &contacts, extent, &budget(count), Watch::NONE).unwrap();
+        let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent).unwrap();
+        let found = variance::least(
+            &forward,
+            &contacts,
+            extent,
+            &short(PositionDesign::default(), count),
+            Watch::NONE,
+        )
+        .unwrap();
         let error_m = |positions: &[Position]| {
-            let mut expectation = Expectation::new(&forward, &contacts, extent);
-            let first = expectation.places.len();
-            expectation.places.extend(positions);
-            let mut knowledge = Knowledge::before(&forward, &expectation.places);
-            (first..first + positions.len()).for_each(|place| knowledge.press(place, 1.0));
-            expectation.error_m(|place| knowledge.variance(place))
+            let mut expected = ExpectedError::new(&forward, &contacts, extent);
+            let first = expected.places.len();
+            expected.places.extend(positions);
+            let mut posterior = Posterior::prior(&forward, &expected.places);
+            (first..first + positions.len()).for_each(|place| posterior.condition(place, 1.0));
+            expected.error_m(|place| posterior.variance(place))
         };
         let (columns, rows) = squarest(extent, count);
         assert!(error_m(&found) < error_m(&cells(extent, columns, rows)), "{found:?}");
@@ -130,11 +138,10 @@ fn the_least_variance_is_less_than_the_even_positions() {
 
 #[test]
 fn the_papers_network_is_better_calibrated_near_the_ends() {
-    let rig = paper();
-    let problem = problem(&rig, budget(10)).unwrap();
+    let problem = problem(paper(), 10).unwrap();
     let error = |placement: Placement| {
         let (_, positions) = problem.by_rule().unwrap().into_iter().find(|(of, _)| *of == placement).unwrap();
-        let placed = problem.verified(placement, positions, 0.0, Watch::NONE).unwrap();
+        let placed = problem.verified(placement, positions, Watch::NONE).unwrap();
         placed.verification.mean_error_m
     };
     assert!(error(Placement::Chebyshev) < 0.7 * error(Placement::Even));
@@ -142,10 +149,8 @@ fn the_papers_network_is_better_calibrated_near_the_ends() {
 
 #[test]
 fn an_interrupted_design_is_cancelled() {
-    let example = noisy();
-    let problem = problem(&example, budget(4)).unwrap();
-    let is_searching =
-        |progress| matches!(progress, Progress::Stage { name, .. } if name == Stage::Search.in_words());
+    let problem = problem(noisy(), 4).unwrap();
+    let is_searching = |progress| matches!(progress, Progress::Stage { name, .. } if name == SEARCHING);
     for watch in [Watch::new(&|progress| !is_searching(progress)), Watch::new(&|_| false)] {
         let stopped = problem.all(watch).unwrap_err();
         assert!(Cancelled::caused(&stopped), "{stopped}");
@@ -154,8 +159,7 @@ fn an_interrupted_design_is_cancelled() {
 
 #[test]
 fn a_design_has_every_arrangement_once_and_is_the_same_again() {
-    let rig = noisy();
-    let problem = problem(&rig, budget(6)).unwrap();
+    let problem = problem(noisy(), 6).unwrap();
     let placed = problem.all(Watch::NONE).unwrap();
     let names: Vec<&str> = placed.iter().map(|placed| placed.placement.name()).collect();
     assert_eq!(names, ["even", "edge-dense", "chebyshev", "variance-optimal", "optimal"]);
@@ -165,18 +169,18 @@ fn a_design_has_every_arrangement_once_and_is_the_same_again() {
 
 #[test]
 fn what_cannot_be_designed_is_refused() {
-    let refusal = |example: &Example, count: usize| {
-        problem(example, budget(count)).map(|_| ()).unwrap_err().to_string()
-    };
+    let refusal =
+        |example: Example, count: usize| problem(example, count).map(|_| ()).unwrap_err().to_string();
     let network = "an estimator of kind `network` needs at least 2";
-    assert_eq!(refusal(&paper(), 1), format!("1 training position(s); {network}"));
-    let auto = Example { estimator: Estimator::Auto, ..noisy() };
-    assert!(refusal(&auto, 5).contains("positions are designed for one estimator"));
-    let mut unknown = Example { training: None, ..noisy() };
+    assert_eq!(refusal(paper(), 1), format!("1 training position(s); {network}"));
+    assert!(refusal(noisy(), 0).contains("the number of training positions is 0"));
+    let auto = PositionDesign::default().estimator(Estimator::Auto);
+    assert!(refusal(Example { design: auto, ..noisy() }, 5).contains("designed for one estimator"));
+    let mut unknown = noisy();
     unknown.setup.force_n = None;
-    assert!(refusal(&unknown, 5).contains("the force of the presses is not known"));
+    assert!(refusal(unknown, 5).contains("the force of the presses is not known"));
     let measured = Example { setup: Setup::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
-    assert!(refusal(&measured, 5).contains("has no model"));
+    assert!(refusal(measured, 5).contains("has no model"));
 }
 
 fn begun(positions_m: &[f64], repeats: usize) -> (Setup, palpate_estimators::recording::Recording) {
@@ -188,7 +192,7 @@ fn begun(positions_m: &[f64], repeats: usize) -> (Setup, palpate_estimators::rec
 
 fn advised(positions_m: &[f64], repeats: usize) -> Advice {
     let (setup, recording) = begun(positions_m, repeats);
-    next_press(&setup, None, &recording, 5.0, Watch::NONE).unwrap()
+    next_press(&setup, &recording, &PositionDesign::default(), Watch::NONE).unwrap()
 }
 
 #[test]
@@ -214,7 +218,7 @@ fn enough_is_said_when_little_is_left_to_gain() {
 fn a_recording_that_tells_too_little_is_refused() {
     let (setup, recording) = begun(&[0.1, 0.2, 0.3], 2);
     let refused = |setup: &Setup, recording: &palpate_estimators::recording::Recording| {
-        next_press(setup, None, recording, 5.0, Watch::NONE).unwrap_err().to_string()
+        next_press(setup, recording, &PositionDesign::default(), Watch::NONE).unwrap_err().to_string()
     };
     assert!(refused(&setup, &recording).contains("3 distinct positions; at least 4"));
     let (mut setup, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
@@ -223,6 +227,6 @@ fn a_recording_that_tells_too_little_is_refused() {
     }
     assert!(refused(&setup, &recording).contains("how noisy channel 1 is"));
     setup.layout.sensors.pop();
-    assert!(refused(&setup, &recording).contains("8 channels, the rig 7"));
+    assert!(refused(&setup, &recording).contains("8 channels; the setup has 7"));
     assert_eq!(setup.layout.kinds()[0], SensorKind::Deflection);
 }

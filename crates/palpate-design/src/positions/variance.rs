@@ -4,10 +4,11 @@
 //! limit times that. The mean over the contacts is made small by greedy choice and exchange (Krause, Singh and Guestrin, *Journal
 //! of Machine Learning Research* 9, 2008, choose sensors of fields so).
 
-use super::forward::Forward;
-use super::knowledge::Knowledge;
-use super::{Budget, Stage};
-use crate::sensors::WeightedContacts;
+use ndarray::Array2;
+
+use super::design::PositionDesign;
+use super::forward::ForwardModel;
+use crate::contacts::WeightedContacts;
 use palpate_estimators::arrangement::cells;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -22,7 +23,7 @@ const MOST_CONTACTS: usize = 400;
 const MOST_ROUNDS: usize = 50;
 
 /// Sites to press at, contacts to locate, and what is expected of the error there.
-pub(super) struct Expectation {
+pub(super) struct ExpectedError {
     /// The sites, then the contacts.
     pub places: Vec<Position>,
     sites: usize,
@@ -30,10 +31,10 @@ pub(super) struct Expectation {
     limits_m: Vec<f64>,
 }
 
-impl Expectation {
-    pub fn new(forward: &Forward, contacts: &WeightedContacts, extent: Extent) -> Self {
+impl ExpectedError {
+    pub fn new(forward: &ForwardModel, contacts: &WeightedContacts, extent: Extent) -> Self {
         let side = if extent.is_plane() { SITES_ON_A_PLANE } else { SITES };
-        let mut places = cells(extent, side, if extent.is_plane() { side } else { 1 });
+        let mut places = cells(extent, side, side);
         let sites = places.len();
         let step = contacts.len().div_ceil(MOST_CONTACTS);
         let kept: Vec<usize> = (0..contacts.len()).step_by(step).collect();
@@ -61,48 +62,85 @@ impl Expectation {
     }
 
     /// The site at which presses help most, and the error that is then expected.
-    pub fn best(&self, knowledge: &Knowledge, noise: f64) -> (usize, f64) {
-        let after = |site: usize| self.error_m(|place| knowledge.variance_after(place, site, noise));
+    pub fn best(&self, posterior: &Posterior, noise: f64) -> (usize, f64) {
+        let after = |site: usize| self.error_m(|place| posterior.variance_after(place, site, noise));
         let all = self.sites().map(|site| (site, after(site)));
         all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::INFINITY))
     }
 }
 
-/// The positions;
+/// Covariances of a whitened reading's function at some places, given the presses so far.
+#[derive(Clone)]
+pub(super) struct Posterior {
+    covariance: Array2<f64>,
+}
+
+impl Posterior {
+    /// Before any press.
+    pub fn prior(forward: &ForwardModel, places: &[Position]) -> Self {
+        let covariance = Array2::from_shape_fn((places.len(), places.len()), |(a, b)| {
+            forward.covariance(places[a], places[b])
+        });
+        Self { covariance }
+    }
+
+    /// After the mean of presses at a place, whose noise has this `variance` in units of one press's:
+    /// C − c·cᵀ/(C_pp + variance), c = C's column of the place.
+    pub fn condition(&mut self, place: usize, variance: f64) {
+        let column = self.covariance.column(place).to_owned();
+        let scale = 1.0 / (column[place] + variance);
+        for (mut row, c) in self.covariance.outer_iter_mut().zip(&column) {
+            row.scaled_add(-scale * c, &column);
+        }
+    }
+
+    /// The variance that is left at a place.
+    pub fn variance(&self, place: usize) -> f64 {
+        self.covariance[[place, place]].max(0.0)
+    }
+
+    /// The variance that would be left at `place` after presses at another.
+    pub fn variance_after(&self, place: usize, pressed: usize, variance: f64) -> f64 {
+        let c = self.covariance[[place, pressed]];
+        (self.variance(place) - c * c / (self.variance(pressed) + variance)).max(0.0)
+    }
+}
+
+/// The positions that leave the least expected error: greedy choice, then exchange until nothing improves.
 pub(super) fn least(
-    forward: &Forward,
+    forward: &ForwardModel,
     contacts: &WeightedContacts,
     extent: Extent,
-    budget: &Budget,
+    design: &PositionDesign,
     watch: Watch,
 ) -> Result<Vec<Position>, Cancelled> {
-    let expectation = Expectation::new(forward, contacts, extent);
-    let before = Knowledge::before(forward, &expectation.places);
-    let noise = 1.0 / budget.repeats as f64;
+    let expected = ExpectedError::new(forward, contacts, extent);
+    let prior = Posterior::prior(forward, &expected.places);
+    let noise = 1.0 / design.repeats as f64;
     let after = |sites: &[usize]| {
-        let mut knowledge = before.clone();
-        sites.iter().for_each(|site| knowledge.press(*site, noise));
-        knowledge
+        let mut posterior = prior.clone();
+        sites.iter().for_each(|site| posterior.condition(*site, noise));
+        posterior
     };
-    let (mut chosen, mut knowledge) = (Vec::new(), before.clone());
+    let (mut chosen, mut posterior) = (Vec::new(), prior.clone());
     let mut error_m = f64::INFINITY;
-    while chosen.len() < budget.count {
-        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
-        let (site, left_m) = expectation.best(&knowledge, noise);
-        knowledge.press(site, noise);
+    while chosen.len() < design.count {
+        watch.round()?;
+        let (site, left_m) = expected.best(&posterior, noise);
+        posterior.condition(site, noise);
         chosen.push(site);
         error_m = left_m;
     }
     let mut unchanged = 0;
-    for step in 0..MOST_ROUNDS * budget.count {
-        if unchanged == budget.count {
+    for step in 0..MOST_ROUNDS * design.count {
+        if unchanged == design.count {
             break;
         }
-        watch.stage(Stage::Variance.in_words(), f64::NAN)?;
-        let slot = step % budget.count;
+        watch.round()?;
+        let slot = step % design.count;
         let mut others = chosen.clone();
         let leaving = others.remove(slot);
-        let (site, left_m) = expectation.best(&after(&others), noise);
+        let (site, left_m) = expected.best(&after(&others), noise);
         let improves = site != leaving && left_m < error_m * (1.0 - 1e-9);
         if improves {
             (chosen[slot], error_m) = (site, left_m);
@@ -110,5 +148,5 @@ pub(super) fn least(
         unchanged = if improves { 0 } else { unchanged + 1 };
     }
     chosen.sort_unstable();
-    Ok(chosen.into_iter().map(|site| expectation.places[site]).collect())
+    Ok(chosen.into_iter().map(|site| expected.places[site]).collect())
 }

@@ -1,12 +1,33 @@
-//! What a layout is worth, whoever placed its sensors.
+//! What a layout is worth, whoever placed its sensors: by the limit, by simulated calibrations, and against fewer sensors.
+
+use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
+use super::SensorProblem;
+use super::candidates::{PlacedSensor, exclusion, mirrored};
+use super::design::Symmetry;
 use super::error::DesignError;
 use super::objective::{Block, ForceBelief};
-use super::{SensorProblem, candidates::PlacedSensor, pool::exclusion};
-use palpate_mechanics::limit::{CramerRaoBound, LimitCurve};
+use super::sensitivity::Sensitivity;
+use crate::verification::Verification;
+use palpate_estimators::arrangement::cells;
+use palpate_estimators::estimator::{Estimator, FitError};
+use palpate_estimators::evaluation::{Calibration, EvaluationError};
+use palpate_estimators::setup::Setup;
+use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_numerics::watch::Watch;
+
+/// Training positions along a line, and along each side of a plane, of the calibrations that verify a layout; each is pressed as
+/// often.
+const TRAINING_ALONG_A_LINE: usize = 30;
+const TRAINING_ALONG_A_PLANE: usize = 8;
+const PRESSES: usize = 20;
+/// Readings that a calibration is judged by, about.
+const READINGS: usize = 4000;
+/// The score of so many sensors is good enough when it lies within this share of the score of the most.
+const ENOUGH: f64 = 0.1;
 
 /// How good a layout is for the contacts of a design.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -35,12 +56,11 @@ impl SensorProblem<'_> {
     /// # Errors
     /// [`DesignError::CramerRaoBound`] where a sensor has no noise or all are dead.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
-        let touches = &self.touches;
-        let limit = CramerRaoBound::new(touches.surface, layout)?;
-        let contacts = &touches.contacts;
-        let curve = LimitCurve::at(&limit, touches.force_n, touches.force, &contacts.positions)?;
+        let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
+        let limit = CramerRaoBound::new(*surface, layout)?;
+        let curve = LimitCurve::at(&limit, *force_n, *force, &contacts.positions)?;
         let bounds: Option<Vec<_>> = curve.points.iter().map(|point| point.bound).collect();
-        let good = |bound: Option<palpate_mechanics::limit::Bound>| {
+        let good = |bound: Option<Bound>| {
             bound.is_some_and(|bound| bound.sd_position_m <= self.pool.design.tolerance_m)
         };
         let within = curve.points.iter().map(|point| if good(point.bound) { 1.0 } else { 0.0 });
@@ -66,8 +86,9 @@ impl SensorProblem<'_> {
     /// The criterion's value, and the worst when one sensor is dead.
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
         let live = || layout.sensors.iter().filter(|sensor| !sensor.channel.dead);
-        let rows: Vec<Vec<Block>> =
-            live().map(|sensor| self.touches.row(sensor.kind, sensor.position, &sensor.channel)).collect();
+        let rows: Vec<Vec<Block>> = live()
+            .map(|sensor| self.sensitivity.row(sensor.kind, sensor.position, &sensor.channel))
+            .collect();
         let value = |dead: Option<usize>| {
             let left: Vec<&[Block]> = rows
                 .iter()
@@ -119,12 +140,94 @@ impl SensorProblem<'_> {
             let wanted = PlacedSensor { offer: wanted.offer, position: wanted.position };
             placed.iter().any(|sensor| same(sensor, &wanted))
         });
-        let symmetric = design.symmetry != crate::sensors::Symmetry::Wanted
+        let symmetric = design.symmetry != Symmetry::Wanted
             || placed.iter().all(|sensor| {
-                let position = super::candidates::mirrored(sensor.position, extent);
+                let position = mirrored(sensor.position, extent);
                 placed.iter().any(|other| same(other, &PlacedSensor { position, ..*sensor }))
             });
         let paid = design.budget.is_none_or(|budget| self.cost(layout) <= budget * (1.0 + 1e-12));
         placed.len() == design.count && apart && free && complete && symmetric && paid
     }
+}
+
+impl SensorProblem<'_> {
+    /// Calibrates the layout at even training positions with the design's force, `calibrations` times with fresh noise, and
+    /// locates readings of the design's contacts, whose force the locator knows or does not as the design says. The estimator is
+    /// `estimator` where that inverts influence functions, else the best guess for the surface.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] when the locator cannot be fitted, or the watch stopped it.
+    pub fn verify(
+        &self,
+        layout: &Layout,
+        estimator: &Estimator,
+        calibrations: usize,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Verification, EvaluationError<FitError>> {
+        let Sensitivity { contacts, force_n, force, .. } = &self.sensitivity;
+        let known = (*force == Force::Known).then_some(*force_n);
+        let setup = Setup {
+            surface: self.setup.surface.clone(),
+            layout: layout.clone(),
+            force_n: known,
+            columns: None,
+        };
+        let guess = Estimator::contenders(&setup).into_iter().next();
+        let estimator = match (estimator, &guess) {
+            (Estimator::Influence(_), _) | (_, None) => estimator,
+            (_, Some(guess)) => guess,
+        };
+        let extent = self.pool.extent;
+        let side = if extent.is_plane() { TRAINING_ALONG_A_PLANE } else { TRAINING_ALONG_A_LINE };
+        let calibration = Calibration::new(&setup, Some(*force_n))
+            .pressed_at(&cells(extent, side, side), PRESSES)
+            .judged_at(&contacts.positions, READINGS.div_ceil(contacts.len()));
+        let mut judged = Vec::new();
+        for k in 0..calibrations as u64 {
+            watch.stage("verifying", k as f64 / calibrations as f64)?;
+            judged.push(calibration.run(estimator, seed.wrapping_add(k), watch)?.evaluation);
+        }
+        Ok(Verification::of(&judged, contacts, self.pool.design.tolerance_m))
+    }
+
+    /// Even and designed layouts for each number of sensors.
+    ///
+    /// # Errors
+    /// [`DesignError`] for the largest number or else the first that no layout can have.
+    pub fn counts(
+        &self,
+        range: RangeInclusive<usize>,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Vec<CountPoint>, DesignError> {
+        // What no layout can have is told before the work, not in its midst.
+        if !range.is_empty() {
+            self.with_count(*range.end())?;
+        }
+        let point = |count| {
+            let problem = self.with_count(count)?;
+            let even = problem.even_if_any()?.map(|even| even.assessment);
+            Ok(CountPoint { count, even, designed: problem.greedy_exchange(seed, watch)?.assessment })
+        };
+        range.map(point).collect()
+    }
+}
+
+/// Layouts of one number of sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CountPoint {
+    /// How many.
+    pub count: usize,
+    /// The even layout; `None` where there is none.
+    pub even: Option<Assessment>,
+    /// The layout by greedy choice and exchange.
+    pub designed: Assessment,
+}
+
+/// The least number of sensors whose score lies within 10 % of the score of the most; `None` of no points.
+pub fn enough(points: &[CountPoint]) -> Option<usize> {
+    let least = points.last()?.designed.score;
+    let bound = least + ENOUGH * least.abs();
+    points.iter().find(|point| point.designed.score <= bound).map(|point| point.count)
 }

@@ -1,10 +1,9 @@
-//! The sensors that a layout may be put together from.
+//! What searches choose from: the sensors that a layout may have, one or two at a time, and which go together.
 
 use std::collections::HashMap;
 
+use super::design::{MustHave, SensorDesign, Sites, Symmetry};
 use super::error::{DesignError, Exclusion};
-use super::pool::exclusion;
-use crate::sensors::{MustHave, SensorDesign, Sites, Symmetry};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};
@@ -62,13 +61,12 @@ impl Candidates {
     ) -> Result<(), DesignError> {
         let MustHave { offer, position } = *wanted;
         let (kind, extent) = (design.offers[offer].kind, surface.extent());
-        let plane = extent.is_plane();
         if !reads_something(surface, kind, position) {
-            return Err(DesignError::MustHaveReadsNothing { kind, position, plane });
+            return Err(DesignError::MustHaveReadsNothing { kind, position, extent });
         }
         let kept_out = design.keep_out.iter().any(|zone| zone.holds(position, extent));
         if kept_out && kind != SensorKind::Reaction {
-            return Err(DesignError::MustHaveKeptOut { kind, position, plane });
+            return Err(DesignError::MustHaveKeptOut { kind, position, extent });
         }
         let index = self.add(offer, position, extent);
         self.must_have.push(index);
@@ -130,12 +128,9 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     match sites {
         Sites::At(positions) => positions.clone(),
         Sites::Count(count) => even_positions(*count, extent.length_m).collect(),
-        Sites::Every(every_m) => match extent.width_m {
-            None => every(*every_m, extent.length_m).map(Position::along).collect(),
-            Some(width_m) => every(*every_m, width_m)
-                .flat_map(|y_m| every(*every_m, extent.length_m).map(move |x_m| Position { x_m, y_m }))
-                .collect(),
-        },
+        Sites::Every(every_m) => every(*every_m, extent.width_m.unwrap_or(0.0))
+            .flat_map(|y_m| every(*every_m, extent.length_m).map(move |x_m| Position { x_m, y_m }))
+            .collect(),
     }
 }
 
@@ -152,7 +147,6 @@ fn check_must_haves(
     design: &SensorDesign,
     extent: Extent,
 ) -> Result<(), DesignError> {
-    let plane = extent.is_plane();
     for (i, first) in candidates.must_have.iter().enumerate() {
         for second in &candidates.must_have[..i] {
             let [a, b] = [first, second].map(|index| candidates.sensors[*index]);
@@ -160,9 +154,225 @@ fn check_must_haves(
                 if first == second { Some(Exclusion::Same) } else { exclusion(&a, &b, design, extent) };
             if let Some(reason) = reason {
                 let (first, second) = (b.position, a.position);
-                return Err(DesignError::MustHavesExclude { first, second, reason, plane });
+                return Err(DesignError::MustHavesExclude { first, second, reason, extent });
             }
         }
     }
     Ok(())
+}
+
+/// One sensor, or two that mirror each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Unit {
+    pub first: usize,
+    pub twin: Option<usize>,
+}
+
+impl Unit {
+    pub fn size(&self) -> usize {
+        if self.twin.is_some() { 2 } else { 1 }
+    }
+
+    pub fn members(&self) -> impl Iterator<Item = usize> {
+        [Some(self.first), self.twin].into_iter().flatten()
+    }
+}
+
+/// Candidates with the constraints that layouts of them keep.
+pub(super) struct Pool {
+    pub design: SensorDesign,
+    pub extent: Extent,
+    pub sensors: Vec<PlacedSensor>,
+    /// What can be chosen.
+    pub units: Vec<Unit>,
+    /// Units that every layout has.
+    pub fixed: Vec<usize>,
+    /// The least that a sensor costs.
+    cheapest: f64,
+}
+
+impl Pool {
+    /// The units of some candidates.
+    pub fn new(candidates: Candidates, design: &SensorDesign, extent: Extent) -> Result<Self, DesignError> {
+        let sites = candidates.sensors.len();
+        if sites < design.count {
+            return Err(DesignError::TooFewSites { count: design.count, sites });
+        }
+        let units = match design.symmetry {
+            Symmetry::Wanted => mirrored_units(&candidates, design, extent),
+            Symmetry::Any | Symmetry::Forbidden => {
+                (0..sites).map(|first| Unit { first, twin: None }).collect()
+            }
+        };
+        let fixed = fixed_units(&candidates, &units, design, extent)?;
+        let cost = |sensor: &PlacedSensor| design.offers[sensor.offer].cost;
+        let cheapest = candidates.sensors.iter().map(cost).fold(f64::INFINITY, f64::min);
+        let pool =
+            Self { design: design.clone(), extent, sensors: candidates.sensors, units, fixed, cheapest };
+        pool.check_symmetry()?;
+        Ok(pool)
+    }
+
+    /// The candidates of a selection of units.
+    pub fn candidates(&self, selection: &[usize]) -> Vec<usize> {
+        selection.iter().flat_map(|unit| self.units[*unit].members()).collect()
+    }
+
+    /// How many sensors a selection has.
+    pub fn size(&self, selection: &[usize]) -> usize {
+        selection.iter().map(|unit| self.units[*unit].size()).sum()
+    }
+
+    /// What a selection costs.
+    pub fn cost(&self, selection: &[usize]) -> f64 {
+        selection.iter().map(|unit| self.unit_cost(*unit)).sum()
+    }
+
+    fn unit_cost(&self, unit: usize) -> f64 {
+        let cost = |candidate: usize| self.design.offers[self.sensors[candidate].offer].cost;
+        self.units[unit].members().map(cost).sum()
+    }
+
+    /// Whether a layout may have both units.
+    pub fn go_together(&self, a: usize, b: usize) -> bool {
+        // Of very many candidates this is asked very often.
+        if a == b || excludes_nothing(&self.design) {
+            return a != b;
+        }
+        let (first, second) = (self.units[a], self.units[b]);
+        first.members().all(|i| {
+            second
+                .members()
+                .all(|j| exclusion(&self.sensors[i], &self.sensors[j], &self.design, self.extent).is_none())
+        })
+    }
+
+    /// Whether a unit may join a selection that is to become a whole layout.
+    pub fn may_join(&self, selection: &[usize], unit: usize) -> bool {
+        let room = self.design.count - self.size(selection);
+        self.leaves_pairs(room, unit)
+            && self.is_affordable(self.cost(selection), room, unit)
+            && selection.iter().all(|other| self.go_together(*other, unit))
+    }
+
+    /// The same of many units at once; `selection` lacks sensors of `size` only, or of any.
+    pub fn joinable(&self, selection: &[usize], among: &[usize], size: Option<usize>) -> Vec<usize> {
+        let room = self.design.count - self.size(selection);
+        let cost = self.cost(selection);
+        let fits = |unit: &usize| {
+            self.leaves_pairs(room, *unit)
+                && size.is_none_or(|size| size == self.units[*unit].size())
+                && self.is_affordable(cost, room, *unit)
+                && selection.iter().all(|other| self.go_together(*other, *unit))
+        };
+        among.iter().copied().filter(|unit| fits(unit)).collect()
+    }
+
+    /// Whether there is room for a unit. Layouts that mirror themselves are pairs, and one in the middle where their count
+    /// is odd.
+    fn leaves_pairs(&self, room: usize, unit: usize) -> bool {
+        let alone = self.units[unit].twin.is_none();
+        room >= self.units[unit].size()
+            && (self.design.symmetry != Symmetry::Wanted || !alone || !room.is_multiple_of(2))
+    }
+
+    /// Whether the budget lasts for a unit and for the cheapest sensors besides.
+    fn is_affordable(&self, spent: f64, room: usize, unit: usize) -> bool {
+        let Some(budget) = self.design.budget else { return true };
+        let rest = (room - self.units[unit].size()) as f64 * self.cheapest;
+        spent + self.unit_cost(unit) + rest <= budget * (1.0 + 1e-12)
+    }
+
+    /// Whether as many sensors as are wanted come in pairs and from the middle.
+    fn check_symmetry(&self) -> Result<(), DesignError> {
+        if self.design.symmetry != Symmetry::Wanted {
+            return Ok(());
+        }
+        let count = self.design.count;
+        let pairs = self.units.iter().filter(|unit| unit.twin.is_some()).count();
+        let middle = self.units.len() - pairs;
+        let possible = (0..=middle)
+            .any(|alone| alone <= count && (count - alone).is_multiple_of(2) && (count - alone) / 2 <= pairs);
+        if possible { Ok(()) } else { Err(DesignError::Symmetry { count, pairs, middle }) }
+    }
+}
+
+/// Whether any two different sensors may be in one layout.
+fn excludes_nothing(design: &SensorDesign) -> bool {
+    design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden
+}
+
+/// Why two different sensors cannot both be there, if so.
+pub(super) fn exclusion(
+    a: &PlacedSensor,
+    b: &PlacedSensor,
+    design: &SensorDesign,
+    extent: Extent,
+) -> Option<Exclusion> {
+    if excludes_nothing(design) {
+        return None;
+    }
+    let takes_room = |sensor: &PlacedSensor| design.offers[sensor.offer].kind != SensorKind::Reaction;
+    let slack_m = 1e-9 * extent.length_m;
+    let (spacing_m, distance_m) = (design.spacing_m, a.position.distance_m(b.position));
+    if distance_m < spacing_m - slack_m && takes_room(a) && takes_room(b) {
+        return Some(Exclusion::Spacing { distance_m, spacing_m });
+    }
+    if design.symmetry == Symmetry::Forbidden && a.offer == b.offer {
+        let apart_m = mirrored(a.position, extent).distance_m(b.position);
+        if apart_m < mirror_distance(design, extent) - slack_m {
+            return Some(Exclusion::Mirror);
+        }
+    }
+    None
+}
+
+/// How close a sensor may come to the mirror image of another where symmetry is forbidden: the spacing, or more than half
+/// the distance of sites, so that sites next to each other are told apart.
+fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
+    let pitch_m = match &design.sites {
+        Sites::Every(every_m) => *every_m,
+        Sites::Count(count) => extent.length_m / (*count + 1) as f64,
+        Sites::At(_) => 0.0,
+    };
+    design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m)
+}
+
+/// Pairs of candidates that mirror each other, and those in the middle alone.
+fn mirrored_units(candidates: &Candidates, design: &SensorDesign, extent: Extent) -> Vec<Unit> {
+    let twins = candidates.twins(extent);
+    let unit = |(first, twin): (usize, &Option<usize>)| match *twin {
+        Some(twin) if twin == first => Some(Unit { first, twin: None }),
+        Some(twin) if twin > first => {
+            let [a, b] = [first, twin].map(|i| candidates.sensors[i]);
+            exclusion(&a, &b, design, extent).is_none().then_some(Unit { first, twin: Some(twin) })
+        }
+        _ => None,
+    };
+    twins.iter().enumerate().filter_map(unit).collect()
+}
+
+/// The units of what every layout has.
+fn fixed_units(
+    candidates: &Candidates,
+    units: &[Unit],
+    design: &SensorDesign,
+    extent: Extent,
+) -> Result<Vec<usize>, DesignError> {
+    let mut fixed: Vec<usize> = Vec::new();
+    for candidate in &candidates.must_have {
+        let PlacedSensor { offer, position } = candidates.sensors[*candidate];
+        let unit = units.iter().position(|unit| unit.members().any(|member| member == *candidate));
+        let without = DesignError::MustHaveWithoutTwin { kind: design.offers[offer].kind, position, extent };
+        let unit = unit.ok_or(without)?;
+        if !fixed.contains(&unit) {
+            fixed.push(unit);
+        }
+    }
+    let listed = fixed.iter().map(|unit| units[*unit].size()).sum();
+    if listed > design.count {
+        let mirrored = listed > candidates.must_have.len();
+        return Err(DesignError::TooManyMustHaves { listed, count: design.count, mirrored });
+    }
+    Ok(fixed)
 }

@@ -3,10 +3,13 @@
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitError;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
 use palpate_numerics::watch::Cancelled;
 
-/// A constraint that cannot be met, or a bench that nothing can be designed for.
+use crate::range::OutOfRange;
+
+/// A constraint that cannot be met, or a setup that nothing can be designed for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// There is no limit to design by.
@@ -15,6 +18,9 @@ pub enum DesignError {
     /// The design was stopped.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
+    /// A number that is not in its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A kind without noise.
     #[error(
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
@@ -74,27 +80,27 @@ pub enum DesignError {
         mirrored: bool,
     },
     /// A sensor that every layout has, where it would read nothing.
-    #[error("the {kind} sensor of `must_have` at {} would read nothing there", place(*position, *plane))]
+    #[error("the {kind} sensor of `must_have` at {} would read nothing there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
         /// What it measures.
         kind: SensorKind,
         /// Where it is.
         position: Position,
-        /// Whether the surface is a plane.
-        plane: bool,
+        /// The surface.
+        extent: Extent,
     },
     /// A sensor that every layout has, where none may sit.
-    #[error("the {kind} sensor of `must_have` at {} lies in a `keep_out` zone", place(*position, *plane))]
+    #[error("the {kind} sensor of `must_have` at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
     MustHaveKeptOut {
         /// What it measures.
         kind: SensorKind,
         /// Where it is.
         position: Position,
-        /// Whether the surface is a plane.
-        plane: bool,
+        /// The surface.
+        extent: Extent,
     },
     /// Two sensors that every layout has, and that exclude each other.
-    #[error("the sensors of `must_have` at {} and {} exclude each other: {}", place(*first, *plane), place(*second, *plane), reason)]
+    #[error("the sensors of `must_have` at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
     MustHavesExclude {
         /// Where one is.
         first: Position,
@@ -102,18 +108,18 @@ pub enum DesignError {
         second: Position,
         /// Why.
         reason: Exclusion,
-        /// Whether the surface is a plane.
-        plane: bool,
+        /// The surface.
+        extent: Extent,
     },
     /// A sensor that every layout has, without a place for its twin.
-    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of `must_have` at {} is no place for one", place(*position, *plane))]
+    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of `must_have` at {} is no place for one", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
         /// What it measures.
         kind: SensorKind,
         /// Where it is.
         position: Position,
-        /// Whether the surface is a plane.
-        plane: bool,
+        /// The surface.
+        extent: Extent,
     },
     /// No site has its mirror image among the sites.
     #[error(
@@ -175,49 +181,5 @@ impl std::fmt::Display for Exclusion {
             ),
             Self::Mirror => f.write_str("they mirror each other, and `symmetry` is forbidden"),
         }
-    }
-}
-
-impl DesignError {
-    /// What would help.
-    pub fn help(&self) -> &'static str {
-        match self {
-            Self::Limit(LimitError::NoModel) => "give a surface with a model, such as `kind = \"beam\"`",
-            Self::Limit(LimitError::NoForce | LimitError::Force { .. }) => {
-                "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
-            }
-            Self::Limit(LimitError::Noise(error)) => error.help(),
-            Self::Cancelled(_) => "start it again",
-            Self::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
-            Self::SingularNoise { .. } => {
-                "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
-            }
-            Self::TooFewSites { .. } => {
-                "lower `count`, bring `sites` closer together, or make `keep_out` smaller"
-            }
-            Self::Spacing { .. } => "lower `count` or `spacing`, or make `keep_out` smaller",
-            Self::NoMirror { .. } => "lower `count`, bring `sites` closer together, or allow symmetry",
-            Self::Budget { .. } => "raise `budget`, lower `count`, or offer cheaper `kinds`",
-            Self::TooManyMustHaves { .. } => "raise `count`, or take some from `must_have`",
-            Self::MustHaveReadsNothing { .. } => "move it, or leave it out",
-            Self::MustHaveKeptOut { .. } => "move it, or change the zone",
-            Self::MustHavesExclude { .. } => "move one of them, or relax the constraint",
-            Self::MustHaveWithoutTwin { .. } => "move it, or leave `symmetry` out",
-            Self::Symmetry { .. } => {
-                "choose `sites` that mirror each other, such as a distance that divides the length, or an even `count`"
-            }
-            Self::NoLayout { .. } => {
-                "ask for another method, relax the constraints, or offer sensors other than reactions"
-            }
-            Self::TooLarge { .. } => "set `sites` or the contacts' `every` wider apart",
-        }
-    }
-}
-
-fn place(position: Position, plane: bool) -> String {
-    if plane {
-        format!("{}, {}", format_length_mm(position.x_m), format_length_mm(position.y_m))
-    } else {
-        format_length_mm(position.x_m)
     }
 }

@@ -9,10 +9,9 @@
 //! layout is exchanged among the neighbours of its sites, which settles it to the last site, and among all units, which finds
 //! what the samples missed; these two again and again, until the latter finds nothing that matters.
 
+use super::candidates::Pool;
 use super::objective::{ForceBelief, Objective, State, score_of, state_of};
-use super::pool::Pool;
 use super::starts;
-use crate::sensors::Stage;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// With more units than this, searches begin in samples of them: coarse ones from every start, of this size from the best.
@@ -52,20 +51,20 @@ impl Found {
     }
 }
 
-/// The best layout of several starts; `packed` is one that keeps all constraints.
+/// The best layout of several starts; `feasible` is one that keeps all constraints.
 pub(super) fn search(
     pool: &Pool,
     objective: &dyn Objective,
-    packed: &[usize],
+    feasible: &[usize],
     seed: u64,
     watch: Watch,
 ) -> Result<Found, Cancelled> {
     if pool.units.len() <= SAMPLE {
         let all: Vec<usize> = (0..pool.units.len()).collect();
-        return from_starts(pool, objective, &all, packed, seed, watch);
+        return from_starts(pool, objective, &all, feasible, seed, watch);
     }
-    let coarse = sample(pool, COARSE_SAMPLE, packed);
-    let found = from_starts(pool, objective, &coarse, packed, seed, watch)?;
+    let coarse = sample(pool, COARSE_SAMPLE, feasible);
+    let found = from_starts(pool, objective, &coarse, feasible, seed, watch)?;
     let fine = sample(pool, SAMPLE, &found.selection);
     let found = exchange(pool, objective, &fine, found.selection, watch)?;
     exchange_among_many(pool, objective, found, watch)
@@ -76,16 +75,16 @@ fn from_starts(
     pool: &Pool,
     objective: &dyn Objective,
     among: &[usize],
-    packed: &[usize],
+    feasible: &[usize],
     seed: u64,
     watch: Watch,
 ) -> Result<Found, Cancelled> {
-    let starts = [greedy(pool, objective, among), starts::spread(pool, among), Some(packed.to_vec())];
+    let starts = [greedy(pool, objective, among), starts::spread(pool, among), Some(feasible.to_vec())];
     let random = (0..RANDOM_STARTS).map(|k| starts::random(pool, among, seed.wrapping_add(k)));
     let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
-    let mut best = Found::of(pool, objective, packed.to_vec());
+    let mut best = Found::of(pool, objective, feasible.to_vec());
     for (done, start) in starts.iter().enumerate() {
-        watch.stage(Stage::Exchange.in_words(), done as f64 / starts.len() as f64)?;
+        watch.stage("greedy choice and exchange", done as f64 / starts.len() as f64)?;
         let found = exchange(pool, objective, among, start.clone(), watch)?;
         best = found.or_better(Some(best));
     }
@@ -133,7 +132,7 @@ fn best_of_each_slot(
     let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
     let all: Vec<usize> = (0..pool.units.len()).collect();
     for chunk in all.chunks(CHUNK) {
-        watch.stage(Stage::Exchange.in_words(), f64::NAN)?;
+        watch.round()?;
         for (best, without) in bests.iter_mut().zip(&without) {
             let better = without.best(pool, objective, chunk);
             if better.is_some_and(|(_, score)| best.is_none_or(|(_, least)| score < least)) {
@@ -198,7 +197,7 @@ pub(super) fn exchange(
         if unchanged == slots {
             break;
         }
-        watch.stage(Stage::Exchange.in_words(), f64::NAN)?;
+        watch.round()?;
         let slot = fixed + step % slots;
         let improved = exchange_one(pool, objective, among, &mut found, slot, LEAST_GAIN);
         unchanged = if improved { 0 } else { unchanged + 1 };

@@ -1,9 +1,8 @@
 //! Every layout there is, where they are few.
 
-use super::Stage;
+use super::candidates::Pool;
 use super::exchange::{Found, score_with};
 use super::objective::{ForceBelief, Objective, state_of};
-use super::pool::Pool;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// More layouts than this are not gone through.
@@ -51,7 +50,7 @@ impl Search<'_> {
         }
         for unit in joinable {
             if chosen == 0 {
-                watch.stage(Stage::Exhaustive.in_words(), unit as f64 / count as f64)?;
+                watch.stage("all layouts", unit as f64 / count as f64)?;
             }
             self.selection.push(unit);
             self.from(unit + 1, watch)?;

@@ -7,12 +7,14 @@
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::candidates::Pool;
 use super::exchange::Found;
 use super::objective::Objective;
-use super::pool::Pool;
-use super::{Stage, starts};
+use super::starts;
 use palpate_numerics::watch::{Cancelled, Watch};
 
+/// What the search is called where its progress is told.
+pub(super) const STAGE: &str = "genetic search";
 const POPULATION: usize = 60;
 const GENERATIONS: usize = 120;
 /// Layouts that live on unchanged.
@@ -22,11 +24,11 @@ const TOURNAMENT: usize = 3;
 /// How likely a child loses one of its units for any other.
 const MUTATION: f64 = 0.4;
 
-/// The best layout after so many generations; `packed` is one that keeps all constraints.
+/// The best layout after so many generations; `feasible` is one that keeps all constraints.
 pub(super) fn search(
     pool: &Pool,
     objective: &dyn Objective,
-    packed: &[usize],
+    feasible: &[usize],
     seed: u64,
     watch: Watch,
 ) -> Result<Found, Cancelled> {
@@ -34,12 +36,12 @@ pub(super) fn search(
     let all: Vec<usize> = (0..pool.units.len()).collect();
     let mut population: Vec<Found> = (0..POPULATION)
         .map(|_| {
-            let layout = starts::random(pool, &all, rng.random()).unwrap_or_else(|| packed.to_vec());
+            let layout = starts::random(pool, &all, rng.random()).unwrap_or_else(|| feasible.to_vec());
             Found::of(pool, objective, layout)
         })
         .collect();
     for generation in 0..GENERATIONS {
-        watch.stage(Stage::Genetic.in_words(), generation as f64 / GENERATIONS as f64)?;
+        watch.stage(STAGE, generation as f64 / GENERATIONS as f64)?;
         population.sort_by(|a, b| a.score.total_cmp(&b.score));
         let mut next: Vec<Found> = population[..ELITE].to_vec();
         while next.len() < POPULATION {

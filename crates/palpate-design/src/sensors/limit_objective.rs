@@ -19,7 +19,7 @@ mod sums;
 use std::sync::Arc;
 
 use super::objective::{Block, ForceBelief, LANES, Objective, State};
-use crate::sensors::DesignCriterion;
+use super::design::DesignCriterion;
 use palpate_numerics::small::{Ldl, add_outer};
 use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 

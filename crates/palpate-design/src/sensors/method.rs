@@ -1,18 +1,30 @@
-//! The ways in which layouts come about.
+//! The ways in which layouts come about, and the layouts that each gives.
+
+use std::sync::Arc;
+
+use super::design::DesignCriterion;
+use super::error::DesignError;
+use super::exchange::Found;
+use super::objective::Objective;
+use super::principal::{PrincipalComponents, Reconstruction};
+use super::{Assessment, PlacedSensor, SensorProblem, exchange, exhaustive, genetic, pivoting, refine};
+use palpate_estimators::arrangement::{inner_grid, squarest};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{self, ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// How a layout came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Evenly, whatever the constraints: what the others are compared with.
     Even,
-    /// As the rig has it.
-    #[serde(skip_deserializing)]
-    Rig,
+    /// As the setup has it.
+    Existing,
     /// Greedy choice, then exchange until nothing improves.
     GreedyExchange,
     /// The best of all layouts.
-    #[serde(skip_deserializing)]
     Exhaustive,
     /// A genetic search.
     Genetic,
@@ -31,7 +43,7 @@ impl Method {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Even => "even",
-            Self::Rig => "rig",
+            Self::Existing => "existing",
             Self::GreedyExchange => "greedy-exchange",
             Self::Exhaustive => "exhaustive",
             Self::Genetic => "genetic",
@@ -57,4 +69,194 @@ impl Method {
     pub const fn is_search(self) -> bool {
         matches!(self, Self::GreedyExchange | Self::Exhaustive | Self::Genetic | Self::Refined)
     }
+}
+
+/// A layout and its worth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Designed {
+    /// How it came about.
+    pub method: Method,
+    /// The sensors, kind by kind as they are offered, from left to right.
+    pub layout: Layout,
+    /// How good it is.
+    pub assessment: Assessment,
+}
+
+/// The best of the layouts that searches by the criterion found.
+pub fn best_design(designed: &[Designed]) -> Option<&Designed> {
+    let searched = designed.iter().filter(|designed| designed.method.is_search());
+    searched.min_by(|a, b| a.assessment.score.total_cmp(&b.assessment.score))
+}
+
+impl SensorProblem<'_> {
+    /// Every layout: even, the setup's own, by all searches that suit, by the historical methods.
+    ///
+    /// # Errors
+    /// As [`SensorProblem::assess`], or when the watch stopped it.
+    pub fn all(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
+        let even = self.even_if_any()?;
+        let is_even = |existing: &Designed| {
+            let places = |layout: &Layout| -> Vec<_> {
+                layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
+            };
+            even.as_ref().is_some_and(|even| places(&even.layout) == places(&existing.layout))
+        };
+        let existing = Some(self.existing()?).filter(|existing| !is_even(existing));
+        let mut designed: Vec<Designed> = even.into_iter().chain(existing).collect();
+        let mut best = self.exchanged(&*self.objective, seed, watch)?;
+        designed.push(self.designed(Method::GreedyExchange, &best.selection)?);
+        if exhaustive::layouts(&self.pool, self.free_slots()) <= exhaustive::MOST_LAYOUTS {
+            if let Some(found) = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)? {
+                designed.push(self.designed(Method::Exhaustive, &found.selection)?);
+                best = best.or_better(Some(found));
+            }
+        }
+        let found = self.genetic(seed, watch)?;
+        designed.push(self.designed(Method::Genetic, &found.selection)?);
+        best = best.or_better(Some(found));
+        designed.push(self.judged(Method::Refined, refine::refine(self, &best.selection, watch)?)?);
+        designed.extend(self.historical(seed, watch)?);
+        Ok(designed)
+    }
+
+    /// The layout by one method; a refined one starts from the better of exchange and genetic search.
+    ///
+    /// # Errors
+    /// As [`SensorProblem::all`], and [`DesignError::NoLayout`] where the method has none: even layouts of reaction sensors, QR
+    /// layouts that constraints leave no room for.
+    pub fn by_method(&self, method: Method, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
+        let none = || DesignError::NoLayout { method: method.name() };
+        let found = match method {
+            Method::Even => return self.even(),
+            Method::Existing => return self.existing(),
+            Method::GreedyExchange => self.exchanged(&*self.objective, seed, watch)?,
+            // Then it is what the criterion asks for.
+            Method::DOptimal if self.pool.design.criterion == DesignCriterion::DOptimality => {
+                self.exchanged(&*self.objective, seed, watch)?
+            }
+            Method::DOptimal | Method::PrincipalComponents | Method::QrPivoting => {
+                let others = self.historical(seed, watch)?;
+                return others.into_iter().find(|designed| designed.method == method).ok_or_else(none);
+            }
+            Method::Exhaustive => {
+                let found = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)?;
+                found.ok_or_else(none)?
+            }
+            Method::Genetic => self.genetic(seed, watch)?,
+            Method::Refined => {
+                let exchanged = self.exchanged(&*self.objective, seed, watch)?;
+                let best = exchanged.or_better(Some(self.genetic(seed, watch)?));
+                return self.judged(method, refine::refine(self, &best.selection, watch)?);
+            }
+        };
+        self.designed(method, &found.selection)
+    }
+
+    /// The layout by greedy choice and exchange, the search that is nearly always the best and by far the fastest.
+    ///
+    /// # Errors
+    /// As [`SensorProblem::all`].
+    pub fn greedy_exchange(&self, seed: u64, watch: Watch) -> Result<Designed, DesignError> {
+        self.by_method(Method::GreedyExchange, seed, watch)
+    }
+
+    /// The even layout, of the first kind that is not tied to supports: at i·l/(k+1), on a plane the grid whose cells are
+    /// closest to squares.
+    ///
+    /// # Errors
+    /// As [`SensorProblem::assess`], and [`DesignError::NoLayout`] where only reactions are offered.
+    pub fn even(&self) -> Result<Designed, DesignError> {
+        self.even_if_any()?.ok_or(DesignError::NoLayout { method: Method::Even.name() })
+    }
+
+    /// The even layout, where one kind is not tied to supports.
+    pub(super) fn even_if_any(&self) -> Result<Option<Designed>, DesignError> {
+        let design = &self.pool.design;
+        let Some(offer) = design.offers.iter().position(|offer| offer.kind != SensorKind::Reaction) else {
+            return Ok(None);
+        };
+        let sensors = even_positions(design.count, self.pool.extent)
+            .into_iter()
+            .map(|position| PlacedSensor { offer, position })
+            .collect();
+        self.judged(Method::Even, sensors).map(Some)
+    }
+
+    /// The setup's own layout.
+    fn existing(&self) -> Result<Designed, DesignError> {
+        let layout = self.setup.layout.clone();
+        let assessment = self.assess(&layout)?;
+        Ok(Designed { method: Method::Existing, layout, assessment })
+    }
+
+    fn exchanged(&self, objective: &dyn Objective, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
+        exchange::search(&self.pool, objective, &self.feasible, seed, watch)
+    }
+
+    fn genetic(&self, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
+        genetic::search(&self.pool, &*self.objective, &self.feasible, seed, watch)
+    }
+
+    /// How many units of a layout are free to be chosen.
+    fn free_slots(&self) -> usize {
+        self.feasible.len() - self.pool.fixed.len()
+    }
+
+    /// Layouts by other people's criteria.
+    fn historical(&self, seed: u64, watch: Watch) -> Result<Vec<Designed>, DesignError> {
+        let design = &self.pool.design;
+        let mut designed = Vec::new();
+        if design.criterion != DesignCriterion::DOptimality {
+            let table = Arc::clone(&self.table);
+            let objective =
+                self.sensitivity.objective(table, DesignCriterion::DOptimality, design.tolerance_m);
+            let found = self.exchanged(&*objective, seed, watch)?;
+            designed.push(self.designed(Method::DOptimal, &found.selection)?);
+        }
+        let components = PrincipalComponents::of(&self.sensitivity.readings(&self.pool.sensors, design));
+        let found = self.exchanged(&Reconstruction::new(&components), seed, watch)?;
+        designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);
+        if let Some(selection) = pivoting::search(&self.pool, &components.modes) {
+            designed.push(self.designed(Method::QrPivoting, &selection)?);
+        }
+        Ok(designed)
+    }
+
+    fn designed(&self, method: Method, selection: &[usize]) -> Result<Designed, DesignError> {
+        let candidates = self.pool.candidates(selection);
+        self.judged(method, candidates.into_iter().map(|candidate| self.pool.sensors[candidate]).collect())
+    }
+
+    fn judged(&self, method: Method, sensors: Vec<PlacedSensor>) -> Result<Designed, DesignError> {
+        let layout = self.layout(sensors);
+        let assessment = self.assess(&layout)?;
+        Ok(Designed { method, layout, assessment })
+    }
+
+    /// Kind by kind, from left to right.
+    fn layout(&self, mut placed: Vec<PlacedSensor>) -> Layout {
+        placed.sort_by(|a, b| {
+            let by_offer = a.offer.cmp(&b.offer);
+            let by_row = a.position.y_m.total_cmp(&b.position.y_m);
+            by_offer.then(by_row).then(a.position.x_m.total_cmp(&b.position.x_m))
+        });
+        let mut sensors: Vec<Sensor> = Vec::new();
+        for PlacedSensor { offer, position } in placed {
+            let offer = &self.pool.design.offers[offer];
+            let number = sensors.iter().filter(|sensor| sensor.kind == offer.kind).count() + 1;
+            let channel = ChannelModel { dead: false, ..offer.channel };
+            let name = format!("{}_{number}", offer.kind);
+            sensors.push(Sensor { kind: offer.kind, position, name, channel });
+        }
+        Layout { sensors }
+    }
+}
+
+/// i·l/(k+1) on a line; on a plane the inner crossings of the grid whose cells are closest to squares.
+fn even_positions(count: usize, extent: Extent) -> Vec<Position> {
+    if extent.width_m.is_none() {
+        return sensing::even_positions(count, extent.length_m).collect();
+    }
+    let (columns, rows) = squarest(extent, count);
+    inner_grid(extent, columns, rows)
 }

@@ -7,7 +7,7 @@
 
 use ndarray::Array2;
 
-use super::pool::Pool;
+use super::candidates::Pool;
 use palpate_numerics::symmetric_eigen;
 
 /// Columns that are worked on at once, so that their distances stay in the nearest cache.

@@ -1,10 +1,9 @@
 //! Positions between the candidate sites.
 
-use super::candidates::{PlacedSensor, mirrored, reads_something};
+use super::SensorProblem;
+use super::candidates::{PlacedSensor, exclusion, mirrored, reads_something};
+use super::design::{Sites, Symmetry};
 use super::objective::{Block, ForceBelief, State};
-use super::pool::exclusion;
-use super::{SensorProblem, Stage};
-use crate::sensors::Sites;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -34,7 +33,7 @@ pub(super) fn refine(
     let halvings = if pool.extent.is_plane() { HALVINGS_ON_A_PLANE } else { HALVINGS };
     for halving in 0..halvings {
         for _ in 0..MOST_ROUNDS {
-            watch.stage(Stage::Refinement.in_words(), halving as f64 / halvings as f64)?;
+            watch.stage("refining", halving as f64 / halvings as f64)?;
             let mut moved = false;
             for group in pool.fixed.len()..groups.len() {
                 moved |= improve(problem, &mut groups, group, step_m);
@@ -70,10 +69,8 @@ fn improve(problem: &SensorProblem, groups: &mut [Vec<PlacedSensor>], index: usi
         problem.objective.state(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>(), ForceBelief::Vague);
     let mut least = score(problem, &state, &groups[index]);
     let mut moved = false;
-    for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-        if y != 0.0 && !pool.extent.is_plane() {
-            continue;
-        }
+    let directions = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+    for [x, y] in directions.into_iter().take(2 * pool.extent.sides_m().count()) {
         let group = shifted(problem, &groups[index], [x * step_m, y * step_m]);
         if !is_allowed(problem, &group, &others) {
             continue;
@@ -91,7 +88,7 @@ fn improve(problem: &SensorProblem, groups: &mut [Vec<PlacedSensor>], index: usi
 /// there along the length.
 fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]) -> Vec<PlacedSensor> {
     let extent = problem.pool.extent;
-    let is_mirrored = problem.pool.design.symmetry == crate::sensors::Symmetry::Wanted;
+    let is_mirrored = problem.pool.design.symmetry == Symmetry::Wanted;
     let x_m = if is_mirrored && group.len() == 1 { 0.0 } else { x_m };
     let Position { x_m: at_m, y_m: beside_m } = group[0].position;
     let position = Position {
@@ -114,7 +111,7 @@ fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedS
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
     group.iter().enumerate().all(|(i, sensor)| {
         pool.design.keep_out.iter().all(|zone| !zone.holds(sensor.position, pool.extent))
-            && reads_something(problem.touches.surface, kind(sensor), sensor.position)
+            && reads_something(problem.sensitivity.surface, kind(sensor), sensor.position)
             && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
     })
 }

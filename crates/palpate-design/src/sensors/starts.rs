@@ -1,15 +1,15 @@
 //! Layouts that keep all constraints, for searches to start from; and the complaint when there is none.
 
+use super::candidates::Pool;
+use super::design::Symmetry;
 use super::error::DesignError;
-use super::pool::Pool;
-use crate::sensors::Symmetry;
 use palpate_numerics::random_order;
 
-/// A layout packed from the left, the cheapest kinds first.
+/// A layout that is filled from the left, the cheapest kinds first.
 ///
 /// # Errors
 /// The constraint that leaves no room for as many sensors as are wanted.
-pub(super) fn packed(pool: &Pool, among: &[usize]) -> Result<Vec<usize>, DesignError> {
+pub(super) fn feasible(pool: &Pool, among: &[usize]) -> Result<Vec<usize>, DesignError> {
     let mut order = among.to_vec();
     let cost = |unit: &usize| pool.cost(&[*unit]) / pool.units[*unit].size() as f64;
     let place = |unit: &usize| pool.sensors[pool.units[*unit].first].position;
@@ -36,7 +36,7 @@ fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     selection
 }
 
-/// The constraint that a packed layout fails by: the budget, when without it there is one.
+/// The constraint that such a layout fails by: the budget, when without it there is one.
 fn why_not(pool: &Pool, order: &[usize], count: usize) -> DesignError {
     let mut most = pool.fixed.clone();
     for unit in order {

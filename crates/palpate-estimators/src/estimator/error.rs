@@ -5,7 +5,7 @@ use palpate_numerics::watch::Cancelled;
 use crate::centroid::CentroidFitError;
 use crate::closed_form::ClosedFormFitError;
 use crate::digit::DigitFitError;
-use crate::evaluation::CrossValidationError;
+use crate::evaluation::EvaluationError;
 use crate::fit::ChannelMismatch;
 use crate::gaussian_process::GaussianProcessError;
 use crate::influence::InfluenceFitError;
@@ -47,5 +47,5 @@ pub enum FitError {
     Centroid(#[from] CentroidFitError),
     /// No estimator suits the recording; the last one's complaint.
     #[error("no estimator suits the recording: {0}")]
-    Choice(Box<CrossValidationError<FitError>>),
+    Choice(Box<EvaluationError<FitError>>),
 }

@@ -1,13 +1,15 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
+mod calibration;
 mod limit_ratio;
 mod statistics;
 mod trial;
 
+pub use calibration::{Calibrated, Calibration};
 pub use limit_ratio::limit_ratio;
 pub use palpate_numerics::{median, percentile};
 pub use statistics::Spread;
-pub use trial::{CrossValidationError, Trial, Tried, cross_validate, try_estimator};
+pub use trial::{EvaluationError, Trial, Tried, cross_validate, try_estimator};
 
 use crate::fit::{Fitted, Locate, ReadingError};
 use crate::load_profile::Cells;

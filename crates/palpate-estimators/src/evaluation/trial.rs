@@ -1,14 +1,11 @@
-//! Trials: what is fitted, and what it is then judged by; cross-validation.
-
-use palpate_mechanics::contact::Position;
+//! Trials: a recording to fit and another to judge by; cross-validation.
 
 use super::Evaluation;
-use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, ReadingError};
-use crate::recording::{Recording, TooFewPositions};
+use crate::recording::{Fold, Recording, TooFewPositions};
 use crate::setup::Setup;
-use crate::simulate::{SimulateError, simulate_at};
-use palpate_numerics::watch::Watch;
+use crate::simulate::SimulateError;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// A recording to fit, and one to judge by, whose contacts the fit has not seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,44 +34,18 @@ impl Trial {
     /// [`TooFewPositions`] as for [`Recording::folds`].
     pub fn by_folds(recording: &Recording, folds: usize) -> Result<Vec<Self>, TooFewPositions> {
         let folds = recording.folds(folds)?;
-        let trial = |fold: &crate::recording::Fold| Self {
+        let trial = |fold: &Fold| Self {
             training: recording.subset(&fold.training),
             judged: recording.subset(&fold.held_out),
         };
         Ok(folds.iter().map(trial).collect())
-    }
-
-    /// Simulated calibrations of a bench at training positions, `count` of them, each judged by one press at each
-    /// position of [`all_over`].
-    ///
-    /// # Errors
-    /// [`SimulateError`] when the bench has no model or no force, or the positions cannot be laid out.
-    pub fn by_simulation(
-        setup: &Setup,
-        training: &Training,
-        count: u64,
-        seed: u64,
-    ) -> Result<Vec<Self>, SimulateError> {
-        let extent = setup.surface.extent();
-        let positions = all_over(extent);
-        let setup = setup.pressed_by(training);
-        let at = training.positions(extent)?;
-        let trial = |k: u64| {
-            // A calibration and its judgement share the bench's gains and offsets, which a seed's first draws decide.
-            let pressed: Vec<Position> =
-                at.iter().copied().flat_map(|p| std::iter::repeat_n(p, training.repeats)).collect();
-            let both = simulate_at(&setup, &[pressed.clone(), positions.clone()].concat(), 1, seed + k)?;
-            let split = |range: std::ops::Range<usize>| both.subset(&range.collect::<Vec<_>>());
-            Ok(Self { training: split(0..pressed.len()), judged: split(pressed.len()..both.rows.len()) })
-        };
-        (0..count).map(trial).collect()
     }
 }
 
 /// Fits an estimator to each trial and locates what the trial judges by. `clock` tells seconds since any fixed moment.
 ///
 /// # Errors
-/// [`CrossValidationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
+/// [`EvaluationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
 pub fn try_estimator<E: Fit>(
     setup: &Setup,
     estimator: &E,
@@ -82,13 +53,13 @@ pub fn try_estimator<E: Fit>(
     seed: u64,
     clock: &dyn Fn() -> f64,
     watch: Watch,
-) -> Result<Tried, CrossValidationError<E::Error>> {
+) -> Result<Tried, EvaluationError<E::Error>> {
     let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m, located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for trial in trials {
         let start = clock();
         let task = FitTask { setup, recording: &trial.training, seed, watch };
-        let locator = estimator.fit_task(task).map_err(CrossValidationError::Fit)?;
+        let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
         let part = Evaluation::of(&locator, &trial.judged)?;
         (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
@@ -102,9 +73,12 @@ pub fn try_estimator<E: Fit>(
     })
 }
 
-/// Why a recording cannot be cross-validated.
+/// Why an estimator cannot be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CrossValidationError<E: std::error::Error + 'static> {
+pub enum EvaluationError<E: std::error::Error + 'static> {
+    /// The setup cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
     /// Too few positions for the folds.
     #[error(transparent)]
     Positions(#[from] TooFewPositions),
@@ -116,17 +90,23 @@ pub enum CrossValidationError<E: std::error::Error + 'static> {
     Reading(#[from] ReadingError),
 }
 
+impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for EvaluationError<E> {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Fit(cancelled.into())
+    }
+}
+
 /// Fits an estimator to each fold's training rows and locates the held-out ones; the answers of all folds together. Folds
 /// are by position, see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others
 /// chooses without the held-out rows.
 ///
 /// # Errors
-/// [`CrossValidationError`] when a fold cannot be fitted, or the watch stopped it.
+/// [`EvaluationError`] when a fold cannot be fitted, or the watch stopped it.
 pub fn cross_validate<E: Fit>(
     estimator: &E,
     task: FitTask,
     folds: usize,
-) -> Result<Evaluation, CrossValidationError<E::Error>> {
+) -> Result<Evaluation, EvaluationError<E::Error>> {
     let trials = Trial::by_folds(task.recording, folds)?;
     Ok(try_estimator(task.setup, estimator, &trials, task.seed, &|| 0.0, task.watch)?.evaluation)
 }

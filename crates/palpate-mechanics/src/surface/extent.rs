@@ -20,6 +20,11 @@ impl Extent {
         self.width_m.is_some()
     }
 
+    /// Its sides, in metres: the length, and the width of a plane; as many as a contact has coordinates.
+    pub fn sides_m(&self) -> impl Iterator<Item = f64> + use<> {
+        std::iter::once(self.length_m).chain(self.width_m)
+    }
+
     /// A position in words: "75 mm", or "75 mm, 40 mm" on a plane, and of what is beside a line.
     pub fn place_in_words(&self, position: Position) -> String {
         let x = format_length_mm(position.x_m);

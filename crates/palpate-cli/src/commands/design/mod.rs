@@ -1,5 +1,6 @@
 //! `palpate design`: what to build before it is built, and where to press before it is pressed.
 
+pub mod help;
 mod positions;
 mod sensors;
 

@@ -5,12 +5,12 @@ mod next;
 mod rig_file;
 mod tables;
 
-use super::say_files;
+use super::{help, say_files};
 use crate::failure::{Complaint, Failure};
 use crate::progress::Observer;
 use crate::recording_files::RecordingFiles;
 use crate::{input, output};
-use palpate_design::positions::{Budget, Placed, PositionError, PositionProblem, best_placed};
+use palpate_design::positions::{Placed, PositionDesign, PositionError, PositionProblem, best_placed};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{PositionDesignReport, position_design_report};
 use palpate_rig::Rig;
@@ -62,14 +62,11 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Training positions without a rig's word or --count: the founding paper's first set.
-const COUNT: usize = 10;
-
 /// Everything that was found out.
 pub struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
-    problem: &'a PositionProblem<'a>,
+    problem: &'a PositionProblem,
     placed: Vec<Placed>,
 }
 
@@ -84,21 +81,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return next::run(arguments, &rig, &recording);
     }
     let complain = |error: PositionError| complaint(&error, &arguments.rig);
-    let problem = PositionProblem::new(
-        &rig.setup,
-        rig.training.as_ref(),
-        &rig.estimator,
-        rig.design.as_ref(),
-        budget(arguments, &rig),
-    )
-    .map_err(complain)?;
+    let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(complain)?;
     let observer = Observer::of_stages();
     let observe = |progress| observer.observe(progress);
     let placed = problem.all(Watch::new(&observe)).map_err(complain)?;
     drop(observer);
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
-        rig_file::write(path, &text, best, problem.budget().repeats, problem.is_plane())?;
+        rig_file::write(path, &text, best, problem.design().repeats, problem.is_plane())?;
     }
     if let Some(out) = &arguments.out {
         write_report(&outcome, &rig, out)?;
@@ -110,17 +100,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
-fn budget(arguments: &Arguments, rig: &Rig) -> Budget {
-    let own = rig.training.as_ref();
-    let count = arguments.count.map(usize::from).or(own.map(|training| training.count));
-    let repeats = arguments.repeats.map(usize::from).or(own.map(|training| training.repeats));
-    Budget {
-        count: count.unwrap_or(COUNT),
-        repeats: repeats.unwrap_or(1),
+/// What the rig and the command line say.
+fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
+    let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::like);
+    let design = rig.design.iter().fold(design, PositionDesign::contacts_of);
+    PositionDesign {
+        estimator: rig.estimator.clone(),
+        count: arguments.count.map_or(design.count, usize::from),
+        repeats: arguments.repeats.map_or(design.repeats, usize::from),
         calibrations: usize::from(arguments.calibrations),
         trials: arguments.trials as usize,
         verifications: usize::from(arguments.verify),
+        stop_percent: arguments.stop_below,
         seed: arguments.seed,
+        ..design
     }
 }
 
@@ -146,5 +139,5 @@ fn complaint(error: &PositionError, rig: &Path) -> Failure {
     if Cancelled::caused(error) {
         return Failure::stopped();
     }
-    Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
+    Complaint::new(format!("{}: {error}", rig.display())).help(help::for_positions(error)).into()
 }

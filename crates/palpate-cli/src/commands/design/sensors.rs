@@ -5,18 +5,18 @@ mod findings;
 mod rig_file;
 mod tables;
 
-use super::say_files;
+use super::{help, say_files};
 use crate::failure::{Complaint, Failure};
 use crate::progress::Observer;
 use crate::{input, output};
 use counts::{Counts, counts};
-use palpate_design::sensors::CalibrationError;
 use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{
     CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
 };
+use palpate_estimators::estimator::FitError;
+use palpate_estimators::evaluation::EvaluationError;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::limit::LimitError;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{SensorDesignReport, sensor_design_report};
 use palpate_rig::Rig;
@@ -108,13 +108,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
     let force_n = arguments.force.or(rig.setup.force_n);
     let setup = Setup { force_n, ..rig.setup.clone() };
-    let own = || SensorDesign::of(&setup.layout, setup.surface.extent());
-    let design = rig.design.clone().or_else(own);
-    let mut design = design.ok_or_else(|| complaint(&LimitError::NoModel.into(), &arguments.rig))?;
+    let mut design = match &rig.design {
+        Some(design) => design.clone(),
+        None => SensorDesign::of(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,
+    };
     if arguments.unknown_force {
-        design.force_is_known = Some(false);
-    } else if design.force_is_known.is_none() {
-        design.force_is_known = Some(rig.setup.force_n.is_some());
+        design = design.unknown_force();
     }
     if let Some(count) = arguments.count {
         design.count = usize::from(count);
@@ -145,7 +144,7 @@ fn outcome<'a>(
                 arguments.seed,
                 watch,
             );
-            let complain = |error: CalibrationError| match Failure::of(&error) {
+            let complain = |error: EvaluationError<FitError>| match Failure::of(&error) {
                 Failure::BadInput(_) => {
                     Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
                 }
@@ -181,5 +180,5 @@ fn complaint(error: &DesignError, rig: &Path) -> Failure {
     if Cancelled::caused(error) {
         return Failure::stopped();
     }
-    Complaint::new(format!("{}: {error}", rig.display())).help(error.help()).into()
+    Complaint::new(format!("{}: {error}", rig.display())).help(help::for_sensors(error)).into()
 }

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 /// Patterns that were presented to a network.
 pub fn presentations(prepared: &PreparedStudy, arm: usize, fit: &TrainedSeed) -> u64 {
-    u64::from(fit.outcome().epochs) * prepared.patterns(arm) as u64
+    u64::from(fit.locator.training_outcome().unwrap_or_default().epochs) * prepared.patterns(arm) as u64
 }
 
 /// Called by every training thread.

@@ -38,16 +38,16 @@ pub(super) struct Place {
 }
 
 pub fn findings(outcome: &Outcome) -> Findings {
-    let (problem, budget) = (outcome.problem, outcome.problem.budget());
+    let (problem, design) = (outcome.problem, outcome.problem.design());
     Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         rig: outcome.rig.display().to_string(),
-        seed: budget.seed,
+        seed: design.seed,
         estimator: outcome.estimator,
         force: problem.force(),
-        count: budget.count,
-        repeats: budget.repeats,
-        tolerance_mm: problem.tolerance_m() * 1e3,
+        count: design.count,
+        repeats: design.repeats,
+        tolerance_mm: design.tolerance_m * 1e3,
         contacts: problem.contacts().len(),
         designs: outcome.placed.iter().map(design).collect(),
     }

@@ -1,6 +1,6 @@
 //! The next press of a recording begun.
 
-use super::{Arguments, complaint, findings};
+use super::{Arguments, complaint, findings, what_to_design};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Observer;
@@ -39,10 +39,10 @@ struct Next {
 }
 
 pub fn run(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
-    let contacts = rig.design.as_ref().map(|design| &design.contacts);
+    let design = what_to_design(arguments, rig);
     let observer = Observer::of_stages();
     let observe = |progress| observer.observe(progress);
-    let advice = next_press(&rig.setup, contacts, recording, arguments.stop_below, Watch::new(&observe));
+    let advice = next_press(&rig.setup, recording, &design, Watch::new(&observe));
     drop(observer);
     let advice = advice.map_err(|error| complaint(&error, &arguments.rig))?;
     if arguments.json {

@@ -9,17 +9,17 @@ use palpate_mechanics::contact::in_words;
 use palpate_mechanics::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
-    let (problem, budget) = (outcome.problem, outcome.problem.budget());
+    let (problem, design) = (outcome.problem, outcome.problem.design());
     output::say(format!(
         "{}: {} training positions, {} press{} each, for the `{}` estimator; {} contacts, force {}; {} calibrations verify\n",
         outcome.rig.display(),
-        budget.count,
-        format_count(budget.repeats as u64),
-        if budget.repeats == 1 { "" } else { "es" },
+        design.count,
+        format_count(design.repeats as u64),
+        if design.repeats == 1 { "" } else { "es" },
         outcome.estimator,
         problem.contacts().len(),
         problem.force().name(),
-        budget.verifications,
+        design.verifications,
     ))?;
     output::say(errors(outcome))?;
     output::say("")?;
@@ -34,7 +34,7 @@ pub fn print(outcome: &Outcome) -> Result<(), Failure> {
 }
 
 fn errors(outcome: &Outcome) -> String {
-    let tolerance = format!("within {}, %", format_length_mm(outcome.problem.tolerance_m()));
+    let tolerance = format!("within {}, %", format_length_mm(outcome.problem.design().tolerance_m));
     let heading = ["positions", "mean error, mm", "median, mm", &tolerance, "less than even, %"];
     let even_m = even(outcome).map(|even| even.verification.median_error_m);
     let rows = outcome.placed.iter().map(|placed| {

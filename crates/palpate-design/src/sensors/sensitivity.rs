@@ -1,20 +1,19 @@
-//! What a sensor tells of each contact: the rows that criteria work on.
+//! Sensitivities of sensors to contacts: the rows that criteria work on.
 
 use std::sync::Arc;
 
 use ndarray::Array2;
 
-use super::Stage;
 use super::candidates::PlacedSensor;
-use super::contacts::WeightedContacts;
+use super::design::{DesignCriterion, SensorDesign};
 use super::error::DesignError;
 use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
-use crate::sensors::{DesignCriterion, SensorDesign};
+use crate::contacts::WeightedContacts;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::{ChannelModel, SensorKind};
-use palpate_mechanics::surface::{Extent, ResponseGradient, Surface};
+use palpate_mechanics::surface::{ResponseGradient, Surface};
 use palpate_numerics::watch::Watch;
 
 /// More bytes than the rows of all candidates may take.
@@ -24,23 +23,19 @@ const ASK_EVERY: usize = 64;
 /// Contacts that principal components are taken over, at most.
 const MOST_SNAPSHOTS: usize = 64;
 
-/// The contacts with their force: what rows are made for.
+/// The contacts of a design on its surface: what sensitivities are to.
 #[derive(Clone)]
-pub(super) struct Touches<'a> {
+pub(super) struct Sensitivity<'a> {
     pub surface: &'a dyn Surface,
     pub contacts: WeightedContacts,
     pub force_n: f64,
     pub force: Force,
 }
 
-impl Touches<'_> {
-    fn extent(&self) -> Extent {
-        self.surface.extent()
-    }
-
+impl Sensitivity<'_> {
     /// How many unknowns a contact has.
     fn unknowns(&self) -> usize {
-        usize::from(self.force == Force::Unknown) + if self.extent().is_plane() { 2 } else { 1 }
+        usize::from(self.force == Force::Unknown) + self.surface.extent().sides_m().count()
     }
 
     /// How many blocks the row of a sensor has.
@@ -94,7 +89,7 @@ impl Touches<'_> {
         let mut table = vec![[0.0; LANES]; sites * size];
         for (done, (sensor, row)) in sensors.iter().zip(table.chunks_exact_mut(size.max(1))).enumerate() {
             if done.is_multiple_of(ASK_EVERY) {
-                watch.stage(Stage::Candidates.in_words(), done as f64 / sites as f64)?;
+                watch.stage("sensitivities of the sites", done as f64 / sites as f64)?;
             }
             let offer = &design.offers[sensor.offer];
             self.fill(row, offer.kind, sensor.position, &offer.channel);
@@ -109,21 +104,20 @@ impl Touches<'_> {
         criterion: DesignCriterion,
         tolerance_m: f64,
     ) -> Box<dyn Objective> {
-        let Extent { length_m, width_m } = self.extent();
-        let sides: Vec<f64> = [Some(length_m), width_m].into_iter().flatten().collect();
+        let sides_m: Vec<f64> = self.surface.extent().sides_m().collect();
         let weights = &self.contacts.weights;
-        match (self.force, width_m) {
-            (Force::Known, None) => {
-                Box::new(LimitObjective::<1, 0>::new(table, weights, &sides, criterion, tolerance_m))
+        match (self.force, sides_m.len()) {
+            (Force::Known, 1) => {
+                Box::new(LimitObjective::<1, 0>::new(table, weights, &sides_m, criterion, tolerance_m))
             }
-            (Force::Unknown, None) => {
-                Box::new(LimitObjective::<2, 1>::new(table, weights, &sides, criterion, tolerance_m))
+            (Force::Unknown, 1) => {
+                Box::new(LimitObjective::<2, 1>::new(table, weights, &sides_m, criterion, tolerance_m))
             }
-            (Force::Known, Some(_)) => {
-                Box::new(LimitObjective::<2, 0>::new(table, weights, &sides, criterion, tolerance_m))
+            (Force::Known, _) => {
+                Box::new(LimitObjective::<2, 0>::new(table, weights, &sides_m, criterion, tolerance_m))
             }
-            (Force::Unknown, Some(_)) => {
-                Box::new(LimitObjective::<3, 1>::new(table, weights, &sides, criterion, tolerance_m))
+            (Force::Unknown, _) => {
+                Box::new(LimitObjective::<3, 1>::new(table, weights, &sides_m, criterion, tolerance_m))
             }
         }
     }

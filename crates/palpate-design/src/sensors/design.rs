@@ -1,20 +1,23 @@
 //! What a sensor design may choose from, and what it must keep to.
 
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
+use palpate_mechanics::limit::{Force, LimitError};
+use palpate_mechanics::sensing::{ChannelModel, SensorKind};
 use palpate_mechanics::surface::Extent;
 
-/// Candidate sites a line has unless the rig says otherwise: every millimetre of the paper's beam.
-const SITES_ALONG: f64 = 400.0;
+use super::error::DesignError;
+use crate::contacts::{ContactPrior, spacing};
+use crate::range::OutOfRange;
+
+/// Candidate sites that a line has where a design does not say: every millimetre of the paper's beam.
+const SITES_ALONG_A_LINE: f64 = 400.0;
 /// The same along the longer side of a plane, where each site is a solution of the plate.
 const SITES_ALONG_A_PLANE: f64 = 30.0;
-/// Contact positions along a line, and along the longer side of a plane, unless the rig says otherwise.
-const CONTACTS_ALONG: f64 = 400.0;
-const CONTACTS_ALONG_A_PLANE: f64 = 30.0;
 /// An error up to this is good enough, as for the effective length.
-const TOLERANCE_M: f64 = 2e-3;
+pub(crate) const TOLERANCE_M: f64 = 2e-3;
 
-/// `[design]`: where sensors may sit, which and how many, for which contacts.
+/// Where sensors may sit, which and how many, for which contacts. [`SensorProblem::new`](super::SensorProblem::new) checks it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorDesign {
     /// Sensors to place, those that the layout must have included; at least 1.
@@ -25,8 +28,8 @@ pub struct SensorDesign {
     pub sites: Sites,
     /// Where the surface will be touched.
     pub contacts: ContactPrior,
-    /// Whether the contact's force will be known; `None` for what `[contact]` says.
-    pub force_is_known: Option<bool>,
+    /// Whether the locator will know the force of its contacts.
+    pub force: Force,
     /// What makes a layout good.
     pub criterion: DesignCriterion,
     /// A limit up to this is good enough, in metres; greater than 0.
@@ -63,19 +66,6 @@ pub enum Sites {
     Count(usize),
     /// These, each on the surface.
     At(Vec<Position>),
-}
-
-/// Where the surface will be touched: every so far from one place to the other, both included.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactPrior {
-    /// The left end, or lower left corner.
-    pub from: Position,
-    /// The right end, or upper right corner.
-    pub to: Position,
-    /// The distance of neighbours, in metres; greater than 0.
-    pub every_m: f64,
-    /// How often contacts fall into equal stretches along the length, from left to right; empty where they do so evenly.
-    pub weights: Vec<f64>,
 }
 
 /// Part of the surface where no sensor may sit, its boundary excluded.
@@ -124,7 +114,7 @@ impl DesignCriterion {
     /// Every criterion, in the order that messages list them.
     pub const ALL: [Self; 4] = [Self::MeanLimit, Self::WorstLimit, Self::WithinTolerance, Self::DOptimality];
 
-    /// Its name in a rig.
+    /// Its name in files and tables.
     pub const fn name(self) -> &'static str {
         match self {
             Self::MeanLimit => "mean-limit",
@@ -157,27 +147,28 @@ pub enum Symmetry {
 }
 
 impl SensorDesign {
-    /// Whether costs tell layouts apart: sensors differ in theirs, or a budget limits them.
-    pub fn has_costs(&self) -> bool {
-        self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
-    }
-
-    /// What is designed when a rig does not say: as many sensors of the kinds of `layout`, for contacts all over the surface.
-    /// `None` where no model explains the sensors.
-    pub fn of(layout: &Layout, extent: Extent) -> Option<Self> {
+    /// As many sensors as a setup has, of its kinds, for contacts all over its surface whose force is as known as the setup's.
+    ///
+    /// # Errors
+    /// [`LimitError::NoModel`] where no model explains the sensors.
+    pub fn of(setup: &Setup) -> Result<Self, DesignError> {
         let mut offers: Vec<SensorOffer> = Vec::new();
-        for sensor in &layout.sensors {
+        for sensor in &setup.layout.sensors {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {
                 let channel = ChannelModel { dead: false, ..sensor.channel };
                 offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0 });
             }
         }
-        let design = Self {
-            count: layout.len(),
+        if offers.is_empty() {
+            return Err(LimitError::NoModel.into());
+        }
+        let extent = setup.surface.extent();
+        Ok(Self {
+            count: setup.layout.len(),
             offers,
-            sites: Sites::Every(pitch(extent, SITES_ALONG, SITES_ALONG_A_PLANE)),
+            sites: Sites::Every(spacing(extent, SITES_ALONG_A_LINE, SITES_ALONG_A_PLANE)),
             contacts: ContactPrior::all_over(extent),
-            force_is_known: None,
+            force: if setup.force_n.is_some() { Force::Known } else { Force::Unknown },
             criterion: DesignCriterion::MeanLimit,
             tolerance_m: TOLERANCE_M,
             spacing_m: 0.0,
@@ -185,29 +176,65 @@ impl SensorDesign {
             must_have: Vec::new(),
             budget: None,
             symmetry: Symmetry::Any,
-        };
-        (!design.offers.is_empty()).then_some(design)
+        })
     }
-}
 
-impl ContactPrior {
-    /// Contacts all over a surface, but not on its edge: on a line 1/400 of its length apart.
-    pub fn all_over(extent: Extent) -> Self {
-        let every_m = pitch(extent, CONTACTS_ALONG, CONTACTS_ALONG_A_PLANE);
-        let last = |size_m: f64| (size_m - every_m).max(0.5 * size_m);
-        let first = |size_m: f64| every_m.min(0.5 * size_m);
-        Self {
-            from: Position { x_m: first(extent.length_m), y_m: extent.width_m.map_or(0.0, first) },
-            to: Position { x_m: last(extent.length_m), y_m: extent.width_m.map_or(0.0, last) },
-            every_m,
-            weights: Vec::new(),
+    /// The same with another number of sensors.
+    #[must_use]
+    pub fn count(self, count: usize) -> Self {
+        Self { count, ..self }
+    }
+
+    /// The same with other candidate sites.
+    #[must_use]
+    pub fn sites(self, sites: Sites) -> Self {
+        Self { sites, ..self }
+    }
+
+    /// The same for other contacts.
+    #[must_use]
+    pub fn contacts(self, contacts: ContactPrior) -> Self {
+        Self { contacts, ..self }
+    }
+
+    /// The same for contacts whose force the locator will not know.
+    #[must_use]
+    pub fn unknown_force(self) -> Self {
+        Self { force: Force::Unknown, ..self }
+    }
+
+    /// Whether costs tell layouts apart: sensors differ in theirs, or a budget limits them.
+    pub fn has_costs(&self) -> bool {
+        self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
+    }
+
+    /// Checks every number against its bound and every position against the surface; the contacts check themselves.
+    pub(super) fn check(&self, extent: Extent) -> Result<(), OutOfRange> {
+        OutOfRange::check_positive([
+            ("the number of sensors", self.count as f64),
+            ("the number of kinds to choose from", self.offers.len() as f64),
+            ("the tolerance in m", self.tolerance_m),
+        ])?;
+        let costs = self.offers.iter().map(|offer| ("the cost of a sensor", offer.cost));
+        let budget = self.budget.map(|budget| ("the budget", budget));
+        let spacing = [("the spacing in m", self.spacing_m)];
+        let numbers = costs.chain(budget).chain(spacing);
+        OutOfRange::check("at least 0", numbers, |value| value.is_finite() && value >= 0.0)?;
+        let offers =
+            self.must_have.iter().map(|wanted| ("the offer of a `must_have` sensor", wanted.offer as f64));
+        OutOfRange::check("less than the number of offers", offers, |offer| {
+            offer < self.offers.len() as f64
+        })?;
+        let must_have = self.must_have.iter().map(|wanted| wanted.position);
+        OutOfRange::check_positions("the position of a `must_have` sensor, in m,", must_have, extent)?;
+        match &self.sites {
+            Sites::Every(every_m) => {
+                OutOfRange::check_positive([("the distance of sites in m", *every_m)])?;
+                let count = extent.sides_m().map(|size_m| size_m / every_m + 1.0).product();
+                OutOfRange::check_count("the number of sites", count)
+            }
+            Sites::At(sites) => OutOfRange::check_positions("a site, in m,", sites.iter().copied(), extent),
+            Sites::Count(count) => OutOfRange::check_count("the number of sites", *count as f64),
         }
-    }
-}
-
-fn pitch(extent: Extent, along: f64, along_a_plane: f64) -> f64 {
-    match extent.width_m {
-        None => extent.length_m / along,
-        Some(width_m) => extent.length_m.max(width_m) / along_a_plane,
     }
 }

@@ -1,0 +1,113 @@
+//! The contacts that a design is for.
+
+use crate::range::OutOfRange;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+
+/// Contact positions along a line, and along the longer side of a plane, where a design does not say.
+const ALONG_A_LINE: f64 = 400.0;
+const ALONG_A_PLANE: f64 = 30.0;
+
+/// Where a surface will be touched: every so far from one place to another, both included.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactPrior {
+    /// The left end, or lower left corner.
+    pub from: Position,
+    /// The right end, or upper right corner.
+    pub to: Position,
+    /// The distance of neighbours, in metres; greater than 0.
+    pub every_m: f64,
+    /// How often contacts fall into equal stretches along the length, from left to right; empty where they do so evenly.
+    pub weights: Vec<f64>,
+}
+
+impl ContactPrior {
+    /// Contacts all over a surface, but not on its edge: on a line 1/400 of its length apart.
+    pub fn all_over(extent: Extent) -> Self {
+        let every_m = spacing(extent, ALONG_A_LINE, ALONG_A_PLANE);
+        let last = |size_m: f64| (size_m - every_m).max(0.5 * size_m);
+        let first = |size_m: f64| every_m.min(0.5 * size_m);
+        Self {
+            from: Position { x_m: first(extent.length_m), y_m: extent.width_m.map_or(0.0, first) },
+            to: Position { x_m: last(extent.length_m), y_m: extent.width_m.map_or(0.0, last) },
+            every_m,
+            weights: Vec::new(),
+        }
+    }
+
+    /// Contacts along a line, as often everywhere: every `every_m` from `from_m` to `to_m`, in metres.
+    pub fn along(from_m: f64, to_m: f64, every_m: f64) -> Self {
+        let (from, to) = (Position::along(from_m), Position::along(to_m));
+        Self { from, to, every_m, weights: Vec::new() }
+    }
+}
+
+/// The distance that so many make along a line, or along the longer side of a plane.
+pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> f64 {
+    match extent.width_m {
+        None => extent.length_m / along_a_line,
+        Some(width_m) => extent.length_m.max(width_m) / along_a_plane,
+    }
+}
+
+/// Contact positions, and how often the surface is touched there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightedContacts {
+    /// Where; on a line from left to right, on a plane row by row from the lower left.
+    pub positions: Vec<Position>,
+    /// The share of contacts there, as many; their sum is 1.
+    pub weights: Vec<f64>,
+}
+
+impl WeightedContacts {
+    /// The positions of a prior with the share of each; those that are never touched are left out.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a prior that does not lie on the surface or has no contacts.
+    pub fn of(prior: &ContactPrior, extent: Extent) -> Result<Self, OutOfRange> {
+        let ContactPrior { from, to, every_m, weights } = prior;
+        OutOfRange::check_positive([("the distance of contacts in m", *every_m)])?;
+        OutOfRange::check_positions("an end of the contacts, in m,", [*from, *to], extent)?;
+        let sizes =
+            [to.x_m - from.x_m, to.y_m - from.y_m].map(|size_m| ("the range of contacts in m", size_m));
+        OutOfRange::check("at least 0", sizes, |value| value >= 0.0)?;
+        let count: f64 = sizes.iter().map(|(_, size_m)| size_m / every_m + 1.0).product();
+        OutOfRange::check_count("the number of contacts", count)?;
+        let shares = weights.iter().map(|weight| ("a weight of contacts", *weight));
+        OutOfRange::check("at least 0", shares, |value| value.is_finite() && value >= 0.0)?;
+        let along = |from_m: f64, to_m: f64| {
+            // A rounding error must not cost the last one.
+            let steps = ((to_m - from_m) / *every_m + 1e-6).floor() as usize;
+            (0..=steps).map(move |i| from_m + i as f64 * *every_m)
+        };
+        let weight = |position: &Position| {
+            let at = (position.x_m - from.x_m) / (to.x_m - from.x_m) * weights.len() as f64;
+            let stretch = (at.max(0.0) as usize).min(weights.len().saturating_sub(1));
+            weights.get(stretch).copied().unwrap_or(1.0)
+        };
+        let touched: Vec<(Position, f64)> = along(from.y_m, to.y_m)
+            .flat_map(|y_m| along(from.x_m, to.x_m).map(move |x_m| Position { x_m, y_m }))
+            .map(|position| (position, weight(&position)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect();
+        let sum: f64 = touched.iter().map(|(_, weight)| weight).sum();
+        OutOfRange::check_positive([("the sum of the weights of contacts", sum)])?;
+        let (positions, weights): (Vec<_>, Vec<_>) = touched.into_iter().unzip();
+        Ok(Self { positions, weights: weights.iter().map(|weight| weight / sum).collect() })
+    }
+
+    /// How many there are, at least one.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// The weighted mean of a figure of each position.
+    pub fn mean(&self, figures: impl IntoIterator<Item = f64>) -> f64 {
+        self.weights.iter().zip(figures).map(|(weight, figure)| weight * figure).sum()
+    }
+}

@@ -1,0 +1,57 @@
+//! What locators achieve after simulated calibrations.
+
+use palpate_estimators::evaluation::{Evaluation, Located, median};
+use palpate_numerics::{mean, standard_error};
+use serde::Serialize;
+
+use crate::contacts::WeightedContacts;
+
+/// How far calibrated locators were off, on average over the contacts of a design.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Verification {
+    /// The mean error, in metres, over all calibrations.
+    pub mean_error_m: f64,
+    /// Its standard error, in metres, from how the calibrations differ.
+    pub standard_error_m: f64,
+    /// The median of the calibrations' mean errors, in metres.
+    pub median_error_m: f64,
+    /// Share of the contacts located within the tolerance, in %.
+    pub within_tolerance_percent: f64,
+    /// Calibrations.
+    pub calibrations: usize,
+}
+
+impl Verification {
+    /// Sums up calibrations, at least one, each judged by as many readings of each contact, one contact after the other.
+    pub(crate) fn of(calibrations: &[Evaluation], contacts: &WeightedContacts, tolerance_m: f64) -> Self {
+        let errors: Vec<f64> =
+            calibrations.iter().map(|one| contacts.mean(errors_by_contact(one, contacts))).collect();
+        let within = calibrations.iter().map(|one| share_within(one, contacts, tolerance_m));
+        Self {
+            mean_error_m: mean(errors.iter().copied()),
+            standard_error_m: standard_error(&errors),
+            within_tolerance_percent: 100.0 * mean(within),
+            calibrations: errors.len(),
+            median_error_m: median(errors).unwrap_or(f64::NAN),
+        }
+    }
+}
+
+/// One calibration's mean error at each contact, in metres.
+pub(crate) fn errors_by_contact(calibration: &Evaluation, contacts: &WeightedContacts) -> Vec<f64> {
+    let readings = calibration.located.len() / contacts.len();
+    let error_m =
+        |located: &[Located]| -> f64 { located.iter().map(|one| one.error_m() / readings as f64).sum() };
+    calibration.located.chunks_exact(readings).map(error_m).collect()
+}
+
+/// Share of the contacts that one calibration locates within the tolerance, by their weights.
+fn share_within(calibration: &Evaluation, contacts: &WeightedContacts, tolerance_m: f64) -> f64 {
+    let readings = calibration.located.len() / contacts.len();
+    let of_contacts = calibration.located.chunks_exact(readings).zip(&contacts.weights);
+    let good = of_contacts.flat_map(|(located, weight)| {
+        let good = located.iter().filter(|one| one.error_m() <= tolerance_m);
+        good.map(move |_| weight / readings as f64)
+    });
+    good.sum()
+}

@@ -1,0 +1,194 @@
+//! Simulated calibrations: press a setup with faulty sensors, fit, touch it, locate.
+
+use std::collections::VecDeque;
+
+use super::{Evaluation, EvaluationError, Trial};
+use crate::arrangement::{ArrangementError, Training, all_over};
+use crate::fit::{Fit, FitTask, Fitted, SeedQueue};
+use crate::setup::Setup;
+use crate::simulate::{SimulateError, simulate_at};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::ChannelModel;
+use palpate_numerics::watch::Watch;
+
+/// A calibration to simulate: where a setup is pressed and how hard, what the locator is told of the force, and the contacts
+/// that it is judged by.
+///
+/// ```
+/// use palpate_estimators::arrangement::Training;
+/// use palpate_estimators::evaluation::Calibration;
+/// use palpate_estimators::influence::Influence;
+/// use palpate_estimators::setup::Setup;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, newtons, um};
+/// use palpate_numerics::watch::Watch;
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let calibration = Calibration::of(&setup, &Training::even(10).repeated(10))?;
+/// let judged = calibration.run(&Influence::default(), 0, Watch::NONE)?;
+/// let errors = judged.evaluation.summary(None).expect("399 contacts");
+/// assert!(errors.median_m < mm(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// The setup with the force of the presses.
+    pressed: Setup,
+    /// The setup with the force of the contacts that are located afterwards.
+    touched: Setup,
+    /// The setup as the locator knows it.
+    known: Setup,
+    /// Where it is pressed; a position as often as it is pressed.
+    presses: Vec<Position>,
+    /// Where it is touched afterwards; a position as often as it is read.
+    contacts: Vec<Position>,
+}
+
+/// A locator from a simulated calibration, and how it located.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibrated<M> {
+    /// The seed of the simulation and of the fit.
+    pub seed: u64,
+    /// The locator.
+    pub locator: Fitted<M>,
+    /// Its answers to the contacts.
+    pub evaluation: Evaluation,
+}
+
+impl Calibration {
+    /// A calibration by presses of `press_force_n`, or else of the setup's force, nowhere yet. Contacts have the setup's force, or
+    /// that of the presses where the setup does not know it; there is one at each position of [`all_over`].
+    pub fn new(setup: &Setup, press_force_n: Option<f64>) -> Self {
+        let with = |force_n| Setup { force_n, ..setup.clone() };
+        let press_force_n = press_force_n.or(setup.force_n);
+        Self {
+            pressed: with(press_force_n),
+            touched: with(setup.force_n.or(press_force_n)),
+            known: setup.clone(),
+            presses: Vec::new(),
+            contacts: all_over(setup.surface.extent()),
+        }
+    }
+
+    /// A calibration at training positions, with the force of these presses.
+    ///
+    /// # Errors
+    /// [`ArrangementError`] when the positions cannot be laid out on the surface.
+    pub fn of(setup: &Setup, training: &Training) -> Result<Self, ArrangementError> {
+        let positions = training.positions(setup.surface.extent())?;
+        Ok(Self::new(setup, training.force_n).pressed_at(&positions, training.repeats))
+    }
+
+    /// The same by presses at other positions, `repeats` at each.
+    #[must_use]
+    pub fn pressed_at(self, positions: &[Position], repeats: usize) -> Self {
+        Self { presses: repeated(positions, repeats), ..self }
+    }
+
+    /// The same judged by other contacts, with `readings` of each.
+    #[must_use]
+    pub fn judged_at(self, contacts: &[Position], readings: usize) -> Self {
+        Self { contacts: repeated(contacts, readings), ..self }
+    }
+
+    /// The same for a locator that is not told the force of its contacts.
+    #[must_use]
+    pub fn unknown_force(mut self) -> Self {
+        self.known.force_n = None;
+        self
+    }
+
+    /// Where it is pressed; a position as often as it is pressed.
+    pub fn presses(&self) -> &[Position] {
+        &self.presses
+    }
+
+    /// What is pressed to fit and touched to judge. Both are read by the same faulty channels: their gains and offsets are the first
+    /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
+    ///
+    /// # Errors
+    /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
+    pub fn simulate(&self, seed: u64) -> Result<Trial, SimulateError> {
+        let all = [self.presses.as_slice(), &self.contacts].concat();
+        let rows: Vec<usize> = (0..all.len()).collect();
+        let (pressed, touched) = rows.split_at(self.presses.len());
+        let recording = simulate_at(&self.touched, &all, 1, seed)?;
+        let training = if self.pressed.force_n == self.touched.force_n {
+            recording.subset(pressed)
+        } else {
+            simulate_at(&self.pressed, &self.presses, 1, seed)?
+        };
+        Ok(Trial { training, judged: recording.subset(touched) })
+    }
+
+    /// Simulates, fits and judges.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] when the setup cannot be simulated or the estimator not be fitted, or the watch stopped it.
+    pub fn run<E: Fit>(
+        &self,
+        estimator: &E,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Calibrated<E::Method>, EvaluationError<E::Error>> {
+        let Trial { training, judged } = self.simulate(seed)?;
+        let task = FitTask { setup: &self.known, recording: &training, seed, watch };
+        let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
+        let evaluation = Evaluation::of(&locator, &judged)?;
+        Ok(Calibrated { seed, locator, evaluation })
+    }
+
+    /// The same for some rising seeds. Without faults all seeds press alike, and the estimator fits them all at once, side by side where it
+    /// can.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] as for [`Calibration::run`].
+    pub fn run_many<E: Fit>(
+        &self,
+        estimator: &E,
+        seeds: impl IntoIterator<Item = u64>,
+        watch: Watch,
+    ) -> Result<Vec<Calibrated<E::Method>>, EvaluationError<E::Error>> {
+        let seeds: VecDeque<u64> = seeds.into_iter().collect();
+        let (Some(&seed), true) = (seeds.front(), self.is_faultless()) else {
+            return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
+        };
+        let Trial { training, judged } = self.simulate(seed)?;
+        let mut queue = Queue { seeds, fitted: Vec::new() };
+        let task = FitTask { setup: &self.known, recording: &training, seed, watch };
+        estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
+        queue.fitted.sort_by_key(|(seed, _)| *seed);
+        let judge = |(seed, locator)| {
+            let evaluation = Evaluation::of(&locator, &judged)?;
+            Ok(Calibrated { seed, locator, evaluation })
+        };
+        queue.fitted.into_iter().map(judge).collect()
+    }
+
+    /// Whether every channel reports what its sensor reads.
+    fn is_faultless(&self) -> bool {
+        self.pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default())
+    }
+}
+
+fn repeated(positions: &[Position], times: usize) -> Vec<Position> {
+    positions.iter().flat_map(|at| std::iter::repeat_n(*at, times)).collect()
+}
+
+/// The seeds of some fits, and the locators that they gave, in any order.
+struct Queue<M> {
+    seeds: VecDeque<u64>,
+    fitted: Vec<(u64, Fitted<M>)>,
+}
+
+impl<M> SeedQueue<M> for Queue<M> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.seeds.pop_front()
+    }
+
+    fn fitted(&mut self, seed: u64, locator: Fitted<M>) {
+        self.fitted.push((seed, locator));
+    }
+}
