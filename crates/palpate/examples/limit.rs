@@ -3,7 +3,7 @@
 use palpate::prelude::*;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("at mid-span no unbiased estimator is better than {:.1} µm (1 σ)", 1e6 * mid_span_m()?);
+    println!("at mid-span no unbiased estimator is better than {:.3} mm (1 σ)", 1e3 * mid_span_m()?);
     Ok(())
 }
 
@@ -15,7 +15,7 @@ pub fn mid_span_m() -> Result<f64, Box<dyn std::error::Error>> {
     for x_m in [mm(20.0), mm(100.0), mm(200.0)] {
         let contact = Contact { position: Position::along(x_m), force_n: newtons(3.0) };
         let unknown = bound.at(contact, Force::Unknown).ok_or("nothing tells the position there")?;
-        println!("{:3.0} mm, unknown force: {:.1} µm", 1e3 * x_m, 1e6 * unknown.sd_position_m);
+        println!("{:3.0} mm, unknown force: {:.3} mm", 1e3 * x_m, 1e3 * unknown.sd_position_m);
     }
     let contact = Contact { position: Position::along(mm(200.0)), force_n: newtons(3.0) };
     Ok(bound.at(contact, Force::Known).ok_or("nothing tells the position there")?.sd_position_m)

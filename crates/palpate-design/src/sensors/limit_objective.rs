@@ -18,8 +18,8 @@ mod sums;
 
 use std::sync::Arc;
 
-use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use super::design::DesignCriterion;
+use super::objective::{Block, ForceBelief, LANES, Objective, State};
 use palpate_numerics::small::{Ldl, add_outer};
 use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 

@@ -15,16 +15,18 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// How a layout came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Evenly, whatever the constraints: what the others are compared with.
     Even,
     /// As the setup has it.
+    #[serde(skip_deserializing)]
     Existing,
     /// Greedy choice, then exchange until nothing improves.
     GreedyExchange,
     /// The best of all layouts.
+    #[serde(skip_deserializing)]
     Exhaustive,
     /// A genetic search.
     Genetic,

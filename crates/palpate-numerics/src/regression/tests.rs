@@ -104,7 +104,7 @@ fn collapsing_repeats_changes_neither_evidence_nor_posterior() {
                 let (mean, variance) = process.predict(&[0.4, 1.1]);
                 // The dense matrix has entries of 10⁹ beside a noise of 10⁻², which costs it 11 of 16 digits.
                 let off = process.log_evidence() - truth.log_evidence;
-                assert!(off.abs() < 1e-3, "{trend:?} {kernel:?} {off}");
+                assert!(off.abs() < 3e-3, "{trend:?} {kernel:?} {off}");
                 for j in 0..2 {
                     assert!((mean[j] - truth.mean[j]).abs() < 1e-4, "{mean:?} {:?}", truth.mean);
                     let off = variance[j] - truth.variance[j];

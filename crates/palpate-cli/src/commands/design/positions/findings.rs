@@ -38,16 +38,16 @@ pub(super) struct Place {
 }
 
 pub fn findings(outcome: &Outcome) -> Findings {
-    let (problem, design) = (outcome.problem, outcome.problem.design());
+    let (problem, asked) = (outcome.problem, outcome.problem.design());
     Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         rig: outcome.rig.display().to_string(),
-        seed: design.seed,
+        seed: asked.seed,
         estimator: outcome.estimator,
         force: problem.force(),
-        count: design.count,
-        repeats: design.repeats,
-        tolerance_mm: design.tolerance_m * 1e3,
+        count: asked.count,
+        repeats: asked.repeats,
+        tolerance_mm: asked.tolerance_m * 1e3,
         contacts: problem.contacts().len(),
         designs: outcome.placed.iter().map(design).collect(),
     }
