@@ -1,4 +1,5 @@
-//! The forward pass of a fully connected network.
+//! The forward pass of a fully connected network: the one for a chip, which reads the weights row by row where they lie, and the one that
+//! faster passes are tested against.
 
 use crate::Activation;
 

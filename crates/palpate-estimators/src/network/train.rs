@@ -1,4 +1,4 @@
-//! The trainer's two doors: one network, or many side by side.
+//! Training by back-propagation: one network, or many side by side.
 
 mod kernel;
 mod order;

@@ -1,5 +1,7 @@
 //! A network's outputs and how they change with its weights.
 //!
+//! It is a pass by itself because the derivatives need the outputs of every layer, which the faster passes do not keep.
+//!
 //! Symbols: x inputs of a layer, a = f(W·x + b) its outputs, δ = ∂output/∂z for one of the network's outputs, sent back by
 //! δ_below = f′ ∘ Wᵀ·δ; ∂output/∂w_ij = δ_i·x_j.
 
