@@ -2,7 +2,7 @@
 
 use crate::support::command::{complained, folder, json, run, said};
 use crate::support::examples::{FSI_WATER, PAPER, PLATE, SENSOR_DESIGN};
-use crate::support::toml::Toml;
+use crate::support::toml::{Toml, replaced};
 use serde_json::Value;
 use std::fmt::Display;
 use std::fs;
@@ -128,7 +128,7 @@ fn a_plate_has_maps() {
 
 #[test]
 fn what_cannot_be_designed_is_refused_in_words() {
-    let forceless = Toml::of(SENSOR_DESIGN).remove("contact.force").to_string();
+    let forceless = replaced(SENSOR_DESIGN, "force = \"3 N\"", "");
     let clean = Toml::of(SENSOR_DESIGN).set("sensors.noise", "0 um").to_string();
     let cases: [(&str, &str, &[&str]); 11] = [
         ("a spacing that leaves no room", &with("spacing = \"60 mm\""), &[]),

@@ -30,7 +30,7 @@ fn with_an_unknown_force_the_warnings_are_others() {
     assert!(warnings[0]["value"].as_f64().unwrap() > 8000.0);
     assert!(warnings[0]["help"].as_str().unwrap().contains("reaction sensors"));
     // A rig without a force does not know it.
-    let without = Toml::of(PAPER).remove("contact");
+    let without = Toml::of(PAPER).remove("contact").remove("training");
     assert_eq!(curve(without, &["--force", "3 N"])["warnings"], unknown["warnings"]);
 }
 
@@ -89,7 +89,7 @@ fn the_report_and_its_pictures_are_written() {
 #[test]
 fn benches_without_a_limit_are_refused_in_words() {
     let clean = Toml::of(PAPER).set("sensors.noise", "0 um").to_string();
-    let forceless = Toml::of(PAPER).remove("contact").to_string();
+    let forceless = Toml::of(PAPER).remove("contact").remove("training").to_string();
     let dead =
         Toml::of(PAPER).set("sensors.count", 2).add("sensors.dead", Array::from_iter([1, 2])).to_string();
     let cases: [(&str, &str, &[&str]); 8] = [
