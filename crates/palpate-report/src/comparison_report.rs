@@ -42,18 +42,12 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
     } else {
         ("Errors along the surface", report.along_figure())
     };
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections: vec![
-            Section::new("table", "The estimators").table(report.table()).text(report.left_out_in_words()),
-            Section::new("along", heading).figure(errors),
-            Section::new("share", "How many readings are how good").figure(report.share_figure()),
-        ],
-        source: html! { " from " (report.trials) "; seed " (report.seed) ". Times are of this machine and this run" },
-    }
-    .files()
+    let sections = vec![
+        Section::new("table", "The estimators").table(report.table()).text(report.left_out_in_words()),
+        Section::new("along", heading).figure(errors),
+        Section::new("share", "How many readings are how good").figure(report.share_figure()),
+    ];
+    Page::new(report.title, report.summary(), sections).with_source(html! { " from " (report.trials) "; seed " (report.seed) ". Times are of this machine and this run" }).files()
 }
 
 impl ComparisonReport<'_> {

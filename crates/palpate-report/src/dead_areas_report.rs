@@ -12,20 +12,17 @@ use palpate_studies::dead_areas::{DeadAreaFindings, DeadAreaRow, DeadAreas};
 pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Vec<ReportFile> {
     let report = DeadAreasReport { study, findings };
     let folded = study.counts.iter().map(|count| report.folded_figure(*count));
-    Page {
-        title: "Dead areas between sensors".to_owned(),
-        lead: report.lead(),
-        summary: report.summary(),
-        sections: vec![
-            Section::new("counts", "How much is located, by the number of sensors")
-                .figure(report.effective_figure())
-                .table(report.effective_table()),
-            Section::new("between", "Errors between sensors").figures(folded).table(report.folded_table()),
-            Section::new("how", "How it was done").text(report.how()),
-        ],
-        source: html! { ", seed " (study.seed) },
-    }
-    .files()
+    let sections = vec![
+        Section::new("counts", "How much is located, by the number of sensors")
+            .figure(report.effective_figure())
+            .table(report.effective_table()),
+        Section::new("between", "Errors between sensors").figures(folded).table(report.folded_table()),
+        Section::new("how", "How it was done").text(report.how()),
+    ];
+    Page::new("Dead areas between sensors", report.summary(), sections)
+        .with_lead(report.lead())
+        .with_source(html! { ", seed " (study.seed) })
+        .files()
 }
 
 struct DeadAreasReport<'a> {

@@ -60,14 +60,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
     }));
     sections.push(Section::new("given", "What was given").text(report.given()));
     sections.push(Section::new("meaning", "How layouts are found and judged").text(meaning()));
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections,
-        source: html! { ", seed " (report.seed) },
-    }
-    .files()
+    Page::new(report.title, report.summary(), sections).with_source(html! { ", seed " (report.seed) }).files()
 }
 
 impl<'a> SensorDesignReport<'a> {

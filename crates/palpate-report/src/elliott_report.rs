@@ -11,20 +11,16 @@ use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, INNER}
 /// Reports the study: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn elliott_report(study: &Elliott, findings: &ElliottFindings) -> Vec<ReportFile> {
     let report = ElliottReport { study, findings };
-    Page {
-        title: "Elliott’s chain: components of readings, and a network".to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections: vec![
-            Section::new("components", "Errors by the number of components").figure(report.pressed_figure()),
-            Section::new("moving", "A load that moves").figure(report.moving_figure()),
-            Section::new("variance", "What the components carry").figure(report.variance_figure()),
-            Section::new("table", "All chains").table(report.table()),
-            Section::new("how", "How it was done").text(report.how()),
-        ],
-        source: html! { ", seed " (study.seed) },
-    }
-    .files()
+    let sections = vec![
+        Section::new("components", "Errors by the number of components").figure(report.pressed_figure()),
+        Section::new("moving", "A load that moves").figure(report.moving_figure()),
+        Section::new("variance", "What the components carry").figure(report.variance_figure()),
+        Section::new("table", "All chains").table(report.table()),
+        Section::new("how", "How it was done").text(report.how()),
+    ];
+    Page::new("Elliott’s chain: components of readings, and a network", report.summary(), sections)
+        .with_source(html! { ", seed " (study.seed) })
+        .files()
 }
 
 struct ElliottReport<'a> {

@@ -60,18 +60,12 @@ pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
     } else {
         ("Errors along the surface", report.error_figure())
     };
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections: vec![
-            Section::new("errors", heading).figure(errors).figure(report.estimate_figure()),
-            Section::new("table", "Errors in numbers").table(report.errors_table()),
-            Section::new("judged", report.judged_heading()).table(report.facts_table()),
-        ],
-        source: report.source_in_words(),
-    }
-    .files()
+    let sections = vec![
+        Section::new("errors", heading).figure(errors).figure(report.estimate_figure()),
+        Section::new("table", "Errors in numbers").table(report.errors_table()),
+        Section::new("judged", report.judged_heading()).table(report.facts_table()),
+    ];
+    Page::new(report.title, report.summary(), sections).with_source(report.source_in_words()).files()
 }
 
 impl EvaluationReport<'_> {

@@ -50,8 +50,8 @@ pub use comparison_report::{ComparisonReport, comparison_report};
 pub use dead_areas_report::dead_areas_report;
 pub use design_report::{SensorDesignReport, sensor_design_report};
 pub use drawing::{
-    Axis, AxisRange, BandPoint, Chart, ErrorPoint, HeatMap, HeatPanel, Mark, Marker, Scale, Series,
-    SeriesKind, Stroke, Ticks, chart_to_svg, heat_map_to_svg,
+    Axis, BandPoint, Chart, ErrorPoint, HeatMap, HeatPanel, Mark, Marker, Scale, Series, SeriesKind, Stroke,
+    chart_to_svg, heat_map_to_svg,
 };
 pub use elliott_report::elliott_report;
 pub use evaluation_report::{EvaluationReport, Judged, evaluation_report};

@@ -18,14 +18,11 @@ pub struct ReportFile {
 
 /// A page. Its figures and its tables are numbered as they come.
 pub(crate) struct Page {
-    pub title: String,
-    /// What stands beneath the title; may be empty.
-    pub lead: Markup,
-    /// What was found, as the items of a list.
-    pub summary: Markup,
-    pub sections: Vec<Section>,
-    /// What the page was made from, as it goes on after "Made by palpate 1.2.3"; may be empty.
-    pub source: Markup,
+    title: String,
+    lead: Markup,
+    summary: Markup,
+    sections: Vec<Section>,
+    source: Markup,
 }
 
 /// A headed part of a page, which links can lead to.
@@ -196,6 +193,21 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
 }
 
 impl Page {
+    /// A page with its title, what was found (the items of a list), and its sections.
+    pub fn new(title: impl Into<String>, summary: Markup, sections: Vec<Section>) -> Self {
+        Self { title: title.into(), lead: Markup::default(), summary, sections, source: Markup::default() }
+    }
+
+    /// Adds what stands between the title and what was found.
+    pub fn with_lead(self, lead: Markup) -> Self {
+        Self { lead, ..self }
+    }
+
+    /// Adds what the page was made from, as it goes on after "Made by palpate 1.2.3".
+    pub fn with_source(self, source: Markup) -> Self {
+        Self { source, ..self }
+    }
+
     /// The page and its figures as files.
     pub fn files(self) -> Vec<ReportFile> {
         let (mut figures, mut tables) = (0, 0);

@@ -38,14 +38,10 @@ pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> 
         (positions.figure(report.rows_figure()), errors.figure(report.errors_figure()))
     };
     let meaning = Section::new("meaning", "How positions are found and judged").text(report.meaning());
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections: vec![positions.table(report.places()), errors, meaning],
-        source: html! { ", seed " (report.problem.design().seed) },
-    }
-    .files()
+    let sections = vec![positions.table(report.places()), errors, meaning];
+    Page::new(report.title, report.summary(), sections)
+        .with_source(html! { ", seed " (report.problem.design().seed) })
+        .files()
 }
 
 impl<'a> PositionDesignReport<'a> {

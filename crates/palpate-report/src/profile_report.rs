@@ -46,21 +46,15 @@ pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
         }
     });
     let (widths, kernels) = resolved.unzip();
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections: vec![
-            Section::new("profile", "The load").figure(load).table(report.patch_table()),
-            Section::new("resolution", "What this layout resolves").figure(widths).figure(kernels),
-            Section::new("readings", "Readings and what is left of them")
-                .figure(report.residual_figure())
-                .table(report.reading_table()),
-            Section::new("meaning", "What the profile means").text(meaning()),
-        ],
-        source: Markup::default(),
-    }
-    .files()
+    let sections = vec![
+        Section::new("profile", "The load").figure(load).table(report.patch_table()),
+        Section::new("resolution", "What this layout resolves").figure(widths).figure(kernels),
+        Section::new("readings", "Readings and what is left of them")
+            .figure(report.residual_figure())
+            .table(report.reading_table()),
+        Section::new("meaning", "What the profile means").text(meaning()),
+    ];
+    Page::new(report.title, report.summary(), sections).files()
 }
 
 impl ProfileReport<'_> {

@@ -48,14 +48,9 @@ pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
         Section::new("words", "What the words mean").text(glossary(report)),
         Section::new("run", "The run").table(run_table(report)),
     ]);
-    Page {
-        title: format!("Study {}", report.run.study),
-        lead: Markup::default(),
-        summary: summary(report),
-        sections,
-        source: source(report),
-    }
-    .files()
+    Page::new(format!("Study {}", report.run.study), summary(report), sections)
+        .with_source(source(report))
+        .files()
 }
 
 fn summary(report: &StudyReport) -> Markup {

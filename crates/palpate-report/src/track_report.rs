@@ -51,14 +51,9 @@ pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
         let section = Section::new("speed", "Errors against the speed").figure(report.sweep_figure());
         sections.push(section.table(report.sweep_table()));
     }
-    Page {
-        title: report.title.to_owned(),
-        lead: Markup::default(),
-        summary: report.summary(),
-        sections,
-        source: html! { " from " (report.source) },
-    }
-    .files()
+    Page::new(report.title, report.summary(), sections)
+        .with_source(html! { " from " (report.source) })
+        .files()
 }
 
 impl TrackReport<'_> {

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use palpate_design::sensors::DesignError;
-use palpate_estimators::evaluation::Portion;
+use palpate_estimators::evaluation::{Portion, Spread};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -96,6 +96,17 @@ fn threads_change_nothing_and_seeds_do() {
     let (one, three) = (run(&prepared, 3, 1), run(&prepared, 3, 3));
     assert_eq!(one, three);
     assert_ne!(one[0].fits[0].evaluation, one[0].fits[1].evaluation);
+}
+
+#[test]
+fn a_figure_spreads_over_the_seeds_position_by_position() {
+    let prepared = prepare(beam(THREE));
+    let outcome = &run(&prepared, 3, 2)[1];
+    let along = outcome.by_position(|located| located.error_m());
+    let positions = &prepared.judging().positions;
+    assert!(along.iter().map(|(x_m, _)| *x_m).eq(positions.iter().map(|position| position.x_m)));
+    let at_first = outcome.fits.iter().map(|fit| fit.evaluation.located[0].error_m()).collect();
+    assert_eq!(along[0].1, Spread::of(at_first).unwrap());
 }
 
 #[test]

@@ -53,3 +53,24 @@ fn positions_gather_their_repeats() {
     assert!(by_position.iter().all(|(_, summary)| summary.count == 2));
     assert!(by_position.windows(2).all(|pair| pair[0].0.x_m < pair[1].0.x_m));
 }
+
+#[test]
+fn errors_are_summed_up_by_cells_stretches_and_shares() {
+    let evaluation = evaluation();
+    let extent = Extent { length_m: 0.1, width_m: Some(0.05) };
+    let medians = evaluation.median_by_cell_m(&Cells { extent, columns: 5, rows: 2 });
+    assert_eq!(medians.len(), 10);
+    for (cell, median) in medians.iter().enumerate() {
+        // All contacts lie at y = 0, two in each column of cells.
+        if cell < 5 { close(*median, 0.75e-3 + 1e-3 * cell as f64) } else { assert!(median.is_nan()) }
+    }
+    let stretches = evaluation.median_by_stretch_m(2);
+    assert_eq!(stretches.len(), 2);
+    close(stretches[0].0, 0.025);
+    close(stretches[0].1, 1.5e-3);
+    close(stretches[1].1, 4e-3);
+    let percentiles = evaluation.percentiles_m();
+    assert_eq!((percentiles.len(), percentiles[49].0, percentiles[99].0), (100, 50, 100));
+    close(percentiles[49].1, 2.75e-3);
+    close(percentiles[99].1, 5e-3);
+}

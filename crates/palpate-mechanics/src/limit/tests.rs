@@ -151,6 +151,15 @@ fn a_plane_has_a_bound_in_both_directions() {
     let curve = LimitCurve::every(&limit, 2.0, Force::Known, 5e-3).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
     assert_eq!(curve.summary().unwrap().without, 11);
+    // A figure by x is its mean across; every column has a contact on the line, where there is no bound.
+    let by_x = curve.by_x(|bound| bound.sd_position_m);
+    assert_eq!(by_x.len(), 11);
+    assert!(by_x.is_sorted_by(|a, b| a.0 < b.0) && by_x.iter().all(|(_, mean)| mean.is_nan()));
+    let four = CramerRaoBound::new(&Pad, &four).unwrap();
+    let at = [0.018, 0.022].map(|y_m| Position { x_m: 0.03, y_m });
+    let curve = LimitCurve::at(&four, 2.0, Force::Known, &at).unwrap();
+    let bounds = curve.points.iter().map(|point| point.bound.unwrap().sd_x_m);
+    assert_eq!(curve.by_x(|bound| bound.sd_x_m), [(0.03, bounds.sum::<f64>() / 2.0)]);
 }
 
 /// The position whose readings are nearest to `reading` (whitened), among positions a hundredth of `step_m` apart around

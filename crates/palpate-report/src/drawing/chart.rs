@@ -1,5 +1,7 @@
 //! The chart as data: axes, series and marks, with no drawing in it.
 
+use super::ticks::plain;
+
 /// A chart of one plot area, its title, axes, series and legend.
 ///
 /// Any data can be drawn: values that are not finite (or beyond ±1e300) break a line and are otherwise left
@@ -50,12 +52,15 @@ impl Chart {
 pub struct Axis {
     /// What is measured, with its unit: "load position, mm".
     pub label: String,
-    /// First and last value shown.
-    pub range: AxisRange,
+    /// First and last value shown, in either order. `None`, a span of nothing, and ends that the scale cannot show (not finite, or not
+    /// positive on a logarithmic axis): from the data and marks, with padding; a linear axis then ends on round numbers and is not
+    /// padded across zero.
+    pub range: Option<(f64, f64)>,
     /// How values map to lengths.
     pub scale: Scale,
-    /// Where the labelled ticks are.
-    pub ticks: Ticks,
+    /// Values with a labelled tick, each with its label, where they lie in the range; one whose label would touch its neighbour's is
+    /// left out. `None`: round numbers, as many as are readable.
+    pub ticks: Option<Vec<(f64, String)>>,
 }
 
 impl Axis {
@@ -71,34 +76,18 @@ impl Axis {
 
     /// The same axis from `low` to `high`.
     pub fn from_to(self, low: f64, high: f64) -> Self {
-        Axis { range: AxisRange::Fixed { low, high }, ..self }
+        Axis { range: Some((low, high)), ..self }
     }
 
     /// The same axis with names instead of numbers.
     pub fn named(self, names: Vec<(f64, String)>) -> Self {
-        Axis { ticks: Ticks::Named(names), ..self }
+        Axis { ticks: Some(names), ..self }
     }
 
     /// The same axis with ticks at `values` only.
-    pub fn ticks_at(self, values: impl Into<Vec<f64>>) -> Self {
-        Axis { ticks: Ticks::At(values.into()), ..self }
+    pub fn ticks_at(self, values: impl IntoIterator<Item = f64>) -> Self {
+        self.named(values.into_iter().map(|value| (value, plain(value))).collect())
     }
-}
-
-/// First and last value that an axis shows.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum AxisRange {
-    /// From the data and marks, with padding; a linear axis ends on round numbers and is not padded across zero.
-    #[default]
-    Automatic,
-    /// From `low` to `high`; in either order. Treated as automatic where it spans nothing or the scale cannot
-    /// show it (not finite, or not positive on a logarithmic axis).
-    Fixed {
-        /// One end.
-        low: f64,
-        /// The other end.
-        high: f64,
-    },
 }
 
 /// How values map to lengths along an axis.
@@ -109,18 +98,6 @@ pub enum Scale {
     Linear,
     /// Equal ratios have equal lengths.
     Log10,
-}
-
-/// Where an axis carries labelled ticks.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum Ticks {
-    /// Round numbers, as many as are readable.
-    #[default]
-    Automatic,
-    /// These values, each with its name, where they lie in the range; one whose name would touch its neighbour's is left out.
-    Named(Vec<(f64, String)>),
-    /// These values where they lie in the range; one whose label would touch its neighbour's is left out.
-    At(Vec<f64>),
 }
 
 /// One thing that is drawn, with one entry in the legend.

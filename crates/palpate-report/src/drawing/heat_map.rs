@@ -1,6 +1,6 @@
 //! A quantity over a plane as colours: one map, or several of the same plane and scale beside each other.
 
-use super::chart::{Axis, Ticks};
+use super::chart::Axis;
 use super::extremes::Extremes;
 use super::geometry::{Point, Rect};
 use super::scale::AxisScale;
@@ -144,8 +144,8 @@ impl Layout {
         let height = (top + rows * row_height).max(bar.bottom + FOOT) + NAME_LINE + MARGIN;
         let axis = |size_mm: f64| AxisScale::new(&Axis::linear("").from_to(0.0, size_mm), &[]);
         let (x, y) = (axis(length_mm), axis(width_mm));
-        let x_ticks = ticks::choose(&x, &Ticks::Automatic, &|ticks| columns_fit(&x, ticks, map_width));
-        let y_ticks = ticks::choose(&y, &Ticks::Automatic, &|ticks| rows_fit(&y, ticks, map_height));
+        let x_ticks = ticks::choose(&x, None, &|ticks| columns_fit(&x, ticks, map_width));
+        let y_ticks = ticks::choose(&y, None, &|ticks| rows_fit(&y, ticks, map_height));
         Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
     }
 
@@ -191,7 +191,7 @@ impl Layout {
             svg.rectangle(area, colour_of((i as f64 + 0.5) / STEPS as f64));
         }
         let fits = |ticks: &[Tick]| rows_fit(&self.colours, ticks, bottom - top);
-        for Tick { value, label } in ticks::choose(&self.colours, &Ticks::Automatic, &fits) {
+        for Tick { value, label } in ticks::choose(&self.colours, None, &fits) {
             let y = bottom - self.colours.tick_share(value) * (bottom - top);
             svg.line(&[(right, y), (right + 4.0, y)], 1.0, QUIET_INK);
             let at = (right + 8.0, y);

@@ -62,10 +62,11 @@ impl<'a> Layout<'a> {
         let legend = Legend::new(chart, width - 2.0 * MARGIN, legend_rows);
 
         let least_height = free - legend.height;
-        let y_ticks = ticks::choose(&y, &chart.y.ticks, &|ticks| rows_fit(&y, ticks, least_height));
+        let y_ticks = ticks::choose(&y, chart.y.ticks.as_deref(), &|ticks| rows_fit(&y, ticks, least_height));
         let left = MARGIN + (widest(&y_ticks) + TICK_GAP).max(LEAST_GUTTER);
         let least_width = width - left - MARGIN - OVERHANG;
-        let x_ticks = ticks::choose(&x, &chart.x.ticks, &|ticks| columns_fit(&x, ticks, least_width));
+        let x_ticks =
+            ticks::choose(&x, chart.x.ticks.as_deref(), &|ticks| columns_fit(&x, ticks, least_width));
         let right = width - MARGIN - overhang(&x, &x_ticks, least_width);
 
         let (mark_rows, mark_labels) = mark_labels(chart, &x, (left, right), header_bottom);

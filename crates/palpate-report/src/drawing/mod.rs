@@ -15,8 +15,6 @@ pub(crate) mod svg;
 pub(crate) mod text;
 pub(crate) mod ticks;
 
-pub use chart::{
-    Axis, AxisRange, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke, Ticks,
-};
+pub use chart::{Axis, BandPoint, Chart, ErrorPoint, Mark, Marker, Scale, Series, SeriesKind, Stroke};
 pub use chart_svg::chart_to_svg;
 pub use heat_map::{HeatMap, HeatPanel, heat_map_to_svg};

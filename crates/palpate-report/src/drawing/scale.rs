@@ -1,6 +1,6 @@
 //! From values to shares of an axis.
 
-use super::chart::{Axis, AxisRange, Chart, Mark, Scale, SeriesKind};
+use super::chart::{Axis, Chart, Mark, Scale, SeriesKind};
 
 /// Largest magnitude that is drawn; beyond it a range could overflow.
 const LARGEST: f64 = 1e300;
@@ -56,7 +56,7 @@ fn drawable(scale: Scale, value: f64) -> bool {
 }
 
 fn fixed_ends(axis: &Axis) -> Option<(f64, f64)> {
-    let AxisRange::Fixed { low, high } = axis.range else { return None };
+    let (low, high) = axis.range?;
     let (low, high) = (low.min(high), low.max(high));
     let usable = drawable(axis.scale, low) && drawable(axis.scale, high) && !too_narrow(low, high);
     usable.then_some((low, high))

@@ -1,6 +1,6 @@
 //! Round numbers along an axis, how they are written, and where their labels stand.
 
-use super::chart::{Scale, Ticks};
+use super::chart::Scale;
 use super::geometry::Rect;
 use super::scale::{AxisScale, round_step_above};
 use super::svg::{Anchor, Label, QUIET_INK};
@@ -28,19 +28,16 @@ pub(crate) struct Tick {
     pub label: String,
 }
 
-/// The finest round ticks that `fits` accepts; `fits` must accept a single tick.
-pub(crate) fn choose(axis: &AxisScale, ticks: &Ticks, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
-    match (ticks, axis.scale) {
-        (Ticks::At(values), _) => {
-            let tick = |&value: &f64| Tick { value, label: plain(value) };
-            chosen(axis, values.iter().map(tick).collect(), fits)
-        }
-        (Ticks::Named(names), _) => {
-            let tick = |(value, name): &(f64, String)| Tick { value: *value, label: name.clone() };
-            chosen(axis, names.iter().map(tick).collect(), fits)
-        }
-        (Ticks::Automatic, Scale::Linear) => linear(axis, fits),
-        (Ticks::Automatic, Scale::Log10) => logarithmic(axis, fits),
+/// The ticks that are asked for where they fit; else the finest round ones that `fits` accepts. `fits` must accept a single tick.
+pub(crate) fn choose(
+    axis: &AxisScale,
+    asked: Option<&[(f64, String)]>,
+    fits: &dyn Fn(&[Tick]) -> bool,
+) -> Vec<Tick> {
+    match (asked, axis.scale) {
+        (Some(asked), _) => chosen(axis, asked, fits),
+        (None, Scale::Linear) => linear(axis, fits),
+        (None, Scale::Log10) => logarithmic(axis, fits),
     }
 }
 
@@ -56,8 +53,10 @@ pub(crate) fn minor(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
 }
 
 /// Those on the axis that leave each other room.
-fn chosen(axis: &AxisScale, mut asked: Vec<Tick>, fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
-    asked.retain(|tick| within(axis, tick.value));
+fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
+    let on_axis = asked.iter().filter(|(value, _)| within(axis, *value));
+    let mut asked: Vec<Tick> =
+        on_axis.map(|(value, label)| Tick { value: *value, label: label.clone() }).collect();
     asked.sort_by(|a, b| a.value.total_cmp(&b.value));
     asked.dedup_by(|a, b| a.value == b.value);
     let mut kept: Vec<Tick> = Vec::new();

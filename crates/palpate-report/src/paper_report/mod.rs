@@ -30,14 +30,10 @@ pub fn paper_report(report: &StudyReport) -> Vec<ReportFile> {
         published: published_figures(report.results),
         claims: claims(report.outcomes, report.study.judging()),
     };
-    Page {
-        title: "A distributive tactile sensor, replicated".to_owned(),
-        lead: lead(),
-        summary: paper.summary(),
-        sections: paper.sections(),
-        source: source(report),
-    }
-    .files()
+    Page::new("A distributive tactile sensor, replicated", paper.summary(), paper.sections())
+        .with_lead(lead())
+        .with_source(source(report))
+        .files()
 }
 
 /// The study with its verdicts.

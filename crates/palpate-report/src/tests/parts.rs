@@ -1,10 +1,10 @@
 //! Properties of the parts that a chart is laid out with.
 
+use crate::Axis;
 use crate::drawing::geometry::Rect;
 use crate::drawing::scale::AxisScale;
 use crate::drawing::ticks::{self, Tick};
 use crate::drawing::{svg, text};
-use crate::{Axis, Ticks};
 use proptest::prelude::*;
 
 fn labels(ticks: &[Tick]) -> Vec<&str> {
@@ -17,7 +17,10 @@ fn up_to(most: usize) -> impl Fn(&[Tick]) -> bool {
 
 fn tick_labels(axis: &Axis, most: usize) -> Vec<String> {
     let scale = AxisScale::new(axis, &[]);
-    labels(&ticks::choose(&scale, &axis.ticks, &up_to(most))).into_iter().map(str::to_owned).collect()
+    labels(&ticks::choose(&scale, axis.ticks.as_deref(), &up_to(most)))
+        .into_iter()
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]
@@ -55,7 +58,7 @@ fn ticks_stand_at_the_values_that_were_asked_for() {
 fn only_successive_decades_have_minor_lines() {
     let minor = |low, high, most| {
         let scale = AxisScale::new(&Axis::log10("").from_to(low, high), &[]);
-        ticks::minor(&scale, &ticks::choose(&scale, &Ticks::Automatic, &up_to(most)))
+        ticks::minor(&scale, &ticks::choose(&scale, None, &up_to(most)))
     };
     assert_eq!(minor(1.0, 1000.0, 8).len(), 24);
     assert_eq!(minor(1.0, 100.0, 8).len(), 0);

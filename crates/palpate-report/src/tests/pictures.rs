@@ -2,8 +2,9 @@
 
 use super::charts::awkward;
 use crate::drawing::svg::{Anchor, INK, Label, Svg};
+use crate::drawing::text;
 use crate::png::parse;
-use crate::{PngError, ReportFile, chart_to_svg, svg_to_png, text, with_png_copies};
+use crate::{PngError, ReportFile, chart_to_svg, svg_to_png, with_png_copies};
 use resvg::usvg;
 
 #[test]
