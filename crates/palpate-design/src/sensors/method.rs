@@ -15,16 +15,18 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// How a layout came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Evenly, whatever the constraints: what the others are compared with.
     Even,
     /// As the setup has it.
+    #[serde(skip_deserializing)]
     Existing,
     /// Greedy choice, then exchange until nothing improves.
     GreedyExchange,
     /// The best of all layouts.
+    #[serde(skip_deserializing)]
     Exhaustive,
     /// A genetic search.
     Genetic,
@@ -53,17 +55,6 @@ impl Method {
             Self::QrPivoting => "qr-pivoting",
         }
     }
-
-    /// What can be asked for by name, in the order that messages list them.
-    pub const NAMED: [Self; 7] = [
-        Self::Even,
-        Self::GreedyExchange,
-        Self::Genetic,
-        Self::Refined,
-        Self::DOptimal,
-        Self::PrincipalComponents,
-        Self::QrPivoting,
-    ];
 
     /// Whether it searches by the design's criterion, so that its best layout is the design.
     pub const fn is_search(self) -> bool {
