@@ -115,7 +115,7 @@ fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     match error {
         StudyRunError::Cancelled(_) => Failure::stopped(),
         StudyRunError::Design { place, error, .. } => {
-            complaint.help(help::for_sensors(error)).at_span(name, text, place.clone()).into()
+            complaint.help(super::design::help::for_sensors(error)).at_span(name, text, place.clone()).into()
         }
         _ => complaint.into(),
     }

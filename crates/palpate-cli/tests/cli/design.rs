@@ -105,7 +105,7 @@ fn a_rig_without_a_design_is_designed_too() {
     assert_eq!((&found["force"], &found["candidates"]), (&Value::from("known"), &Value::from(399)));
     let methods: Vec<&str> =
         found["designs"].as_array().unwrap().iter().filter_map(|d| d["method"].as_str()).collect();
-    assert_eq!(methods[..3], ["even", "rig", "greedy-exchange"]);
+    assert_eq!(methods[..3], ["even", "existing", "greedy-exchange"]);
     let unknown = designs(PAPER, &["--count", "3", "--unknown-force"]);
     assert_eq!(unknown["force"], "unknown");
 }

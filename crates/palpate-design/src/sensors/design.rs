@@ -111,9 +111,6 @@ pub enum DesignCriterion {
 }
 
 impl DesignCriterion {
-    /// Every criterion, in the order that messages list them.
-    pub const ALL: [Self; 4] = [Self::MeanLimit, Self::WorstLimit, Self::WithinTolerance, Self::DOptimality];
-
     /// Its name in files and tables.
     pub const fn name(self) -> &'static str {
         match self {

@@ -56,17 +56,6 @@ impl Method {
         }
     }
 
-    /// What can be asked for by name, in the order that messages list them.
-    pub const NAMED: [Self; 7] = [
-        Self::Even,
-        Self::GreedyExchange,
-        Self::Genetic,
-        Self::Refined,
-        Self::DOptimal,
-        Self::PrincipalComponents,
-        Self::QrPivoting,
-    ];
-
     /// Whether it searches by the design's criterion, so that its best layout is the design.
     pub const fn is_search(self) -> bool {
         matches!(self, Self::GreedyExchange | Self::Exhaustive | Self::Genetic | Self::Refined)

@@ -49,11 +49,11 @@ pub fn findings(outcome: &Outcome) -> Findings {
         repeats: asked.repeats,
         tolerance_mm: asked.tolerance_m * 1e3,
         contacts: problem.contacts().len(),
-        designs: outcome.placed.iter().map(design).collect(),
+        designs: outcome.placed.iter().map(found).collect(),
     }
 }
 
-fn design(placed: &Placed) -> Design {
+fn found(placed: &Placed) -> Design {
     let told = &placed.verification;
     Design {
         method: placed.placement,
