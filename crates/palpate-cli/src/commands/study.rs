@@ -1,6 +1,5 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
-use crate::commands::design::help;
 use crate::failure::{Complaint, Failure};
 use crate::progress::Observer;
 use crate::table::table;
