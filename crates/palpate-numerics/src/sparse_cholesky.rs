@@ -23,7 +23,7 @@ const PANEL: usize = 64;
 /// Supernodes of fewer columns take in their parent's next one though up to [`MOST_ZEROS`] of what is stored becomes zeros:
 /// larger fronts are worth that.
 const SMALL: usize = 48;
-const MOST_ZEROS: f64 = 1.0 / 3.0;
+const MOST_ZEROS: f64 = 0.2;
 
 /// As [`MOST_ZEROS`], in supernodes that are large enough.
 const FEW_ZEROS: f64 = 0.02;
@@ -269,8 +269,10 @@ impl Supernode {
         if taken {
             self.zeros = zeros;
             self.columns.end += 1;
-            self.pattern.extend_from_slice(rows);
-            self.pattern.sort_unstable();
+            if !rows.is_empty() {
+                self.pattern.extend_from_slice(rows);
+                self.pattern.sort_unstable();
+            }
         }
         taken
     }

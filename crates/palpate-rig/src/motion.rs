@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_second_contact_is_said_with_its_place() {
-        let third = "[[motion]]\nfrom = \"1 mm\"";
+        let third = "[[motion]]\nfrom = \"1 mm\"\nto = \"9 mm\"\nspeed = \"1 m/s\"";
         let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third].map(|keys| {
             let text = with_second(keys);
             let error = Rig::from_toml(&text).unwrap_err();
