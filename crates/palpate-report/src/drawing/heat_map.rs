@@ -13,7 +13,9 @@ const MARGIN: f64 = 12.0;
 const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
-const NAME_LINE: f64 = 22.0;
+const NAME_LINE: f64 = 28.0;
+/// From the top of a map or of the colour bar up to the middle of its name, clear of the uppermost label beside it.
+const NAME_RISE: f64 = 17.0;
 /// Room left of a map for the labels of its ticks, and beneath it.
 const GUTTER: f64 = 40.0;
 const FOOT: f64 = 26.0;
@@ -165,8 +167,9 @@ impl Layout {
             colour: QUIET_INK,
         };
         let mut labels = tick_labels(&plot, (&self.x.0, &self.x.1), (&self.y.0, &self.y.1));
-        let name = text::fit(&panel.name, NAME_SIZE, plot.width() + GUTTER);
-        let above = plot.top - 11.0;
+        // To the right of the name, the next map's axis has its own.
+        let name = text::fit(&panel.name, NAME_SIZE, plot.width() + 0.5 * GAP);
+        let above = plot.top - NAME_RISE;
         labels.push(Label {
             size: NAME_SIZE,
             colour: INK,
@@ -197,7 +200,7 @@ impl Layout {
             let at = (right + 8.0, y);
             svg.text(&Label { text: label, at, anchor: Anchor::Start, size: TICK_SIZE, colour: QUIET_INK });
         }
-        let at = (left, top - 11.0);
+        let at = (left, top - NAME_RISE);
         let text = text::fit(&map.label, NAME_SIZE, BAR_LABELS + BAR_WIDTH + MARGIN);
         svg.text(&Label { text, at, anchor: Anchor::Start, size: NAME_SIZE, colour: INK });
     }
