@@ -88,5 +88,5 @@ fn the_papers_network_learns_the_plate_a_little() {
 fn a_count_does_not_say_where_on_a_plane() {
     let folder = folder(Toml::of(PLATE).remove("sensors.grid").add("sensors.count", 9));
     let refused = complained(&run(folder.path(), &["inspect", "rig.toml"]), 2);
-    assert!(refused.contains("`count` alone does not say where on a plane they are"), "{refused}");
+    assert!(refused.contains("`count` does not go with a plane"), "{refused}");
 }
