@@ -187,7 +187,7 @@ impl Setup {
     /// # Errors
     /// [`SetupError`] for a sensor that does not go with the surface, or numbers of its channel out of their range.
     pub fn sensors(mut self, group: SensorGroup) -> Result<Self, SetupError> {
-        let SensorGroup { kind, ref channel, .. } = group;
+        let SensorGroup { kind, placement, channel } = group;
         let positive = "at least 0 and finite";
         for (what, value) in [
             ("the noise", channel.noise_sd),
@@ -203,12 +203,12 @@ impl Setup {
             |gain| (0.0..1.0).contains(&gain),
             "at least 0 and below 1",
         )?;
-        let positions = positions_of(&group.placement, self.surface.extent())?;
+        let positions = positions_of(placement, self.surface.extent())?;
         let before = self.layout.sensors.iter().filter(|sensor| sensor.kind == kind).count();
         for (i, position) in positions.into_iter().enumerate() {
             check_sensor(&self.surface, kind, i + 1, position)?;
             let name = format!("{kind}_{}", before + i + 1);
-            self.layout.sensors.push(Sensor { kind, position, name, channel: group.channel });
+            self.layout.sensors.push(Sensor { kind, position, name, channel });
         }
         Ok(self)
     }
@@ -280,15 +280,15 @@ fn check(
     if value.is_finite() && good(value) { Ok(()) } else { Err(SetupError::OutOfRange { what, value, bound }) }
 }
 
-fn positions_of(placement: &Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {
+fn positions_of(placement: Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {
     let positions = match placement {
         Placement::Evenly(count) if extent.is_plane() => {
-            return Err(SetupError::EvenlyOnPlane { count: *count });
+            return Err(SetupError::EvenlyOnPlane { count });
         }
-        Placement::Evenly(count) => even_positions(*count, extent.length_m).collect(),
+        Placement::Evenly(count) => even_positions(count, extent.length_m).collect(),
         Placement::Grid(..) if !extent.is_plane() => return Err(SetupError::GridOnLine),
-        Placement::Grid(columns, rows) => inner_grid(extent, *columns, *rows),
-        Placement::At(positions) => positions.clone(),
+        Placement::Grid(columns, rows) => inner_grid(extent, columns, rows),
+        Placement::At(positions) => positions,
     };
     if positions.is_empty() { Err(SetupError::NoSensors) } else { Ok(positions) }
 }

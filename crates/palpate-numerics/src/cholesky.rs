@@ -214,6 +214,7 @@ fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinit
         for (lane, row) in rows.outer_iter().enumerate() {
             x.iter_mut().zip(row).for_each(|(x, value)| x[lane] = *value);
         }
+        #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
         for j in 0..columns {
             let (done, rest) = x.split_at_mut(j);
             let mut sum = [0.0; LANES];
@@ -230,6 +231,7 @@ fn factor_narrow(panel: ArrayViewMut2<'_, f64>) -> Result<(), NotPositiveDefinit
 }
 
 /// Takes A·Aᵀ off the lower triangle of a matrix, A having as many rows; or off its first columns.
+#[expect(clippy::needless_pass_by_value, reason = "a view is handed on as the matrix is")]
 fn subtract_gram(mut matrix: ArrayViewMut2<'_, f64>, a: ArrayView2<'_, f64>) {
     let columns = matrix.ncols();
     if columns <= GRAM {

@@ -64,7 +64,7 @@ pub(super) enum PreparedArm {
     /// Networks on perfect sensors: one recording for all seeds, and one to judge by.
     InLanes(Box<InLanes>),
     /// Anything else.
-    SeedBySeed(SeedBySeed),
+    SeedBySeed(Box<SeedBySeed>),
 }
 
 /// An arm of networks on perfect sensors.
@@ -150,7 +150,7 @@ impl PreparedArm {
                 let estimator = Estimator::Network(network);
                 Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), trial })))
             }
-            _ => Ok(Self::SeedBySeed(SeedBySeed::of(&arm.rig, judging).map_err(simulated)?)),
+            _ => Ok(Self::SeedBySeed(Box::new(SeedBySeed::of(&arm.rig, judging).map_err(simulated)?))),
         }
     }
 }

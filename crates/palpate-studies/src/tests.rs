@@ -105,7 +105,12 @@ fn a_figure_spreads_over_the_seeds_position_by_position() {
     let along = outcome.by_position(|located| located.error_m());
     let positions = &prepared.judging().positions;
     assert!(along.iter().map(|(x_m, _)| *x_m).eq(positions.iter().map(|position| position.x_m)));
-    let at_first = outcome.fits.iter().map(|fit| fit.evaluation.located[0].error_m()).collect();
+    let mean_at_first = |fit: &TrainedSeed| {
+        let readings = prepared.judging().readings;
+        let first = &fit.evaluation.located[..readings];
+        first.iter().map(|located| located.error_m()).sum::<f64>() / readings as f64
+    };
+    let at_first = outcome.fits.iter().map(mean_at_first).collect();
     assert_eq!(along[0].1, Spread::of(at_first).unwrap());
 }
 

@@ -54,7 +54,7 @@ impl SensorProblem<'_> {
     /// Judges a layout, its own or any other of the same surface.
     ///
     /// # Errors
-    /// [`DesignError::CramerRaoBound`] where a sensor has no noise or all are dead.
+    /// [`DesignError::Limit`] where a sensor has no noise or all are dead.
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
         let limit = CramerRaoBound::new(*surface, layout)?;

@@ -96,11 +96,11 @@ impl SensorProblem<'_> {
         let mut designed: Vec<Designed> = even.into_iter().chain(existing).collect();
         let mut best = self.exchanged(&*self.objective, seed, watch)?;
         designed.push(self.designed(Method::GreedyExchange, &best.selection)?);
-        if exhaustive::layouts(&self.pool, self.free_slots()) <= exhaustive::MOST_LAYOUTS {
-            if let Some(found) = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)? {
-                designed.push(self.designed(Method::Exhaustive, &found.selection)?);
-                best = best.or_better(Some(found));
-            }
+        if exhaustive::layouts(&self.pool, self.free_slots()) <= exhaustive::MOST_LAYOUTS
+            && let Some(found) = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)?
+        {
+            designed.push(self.designed(Method::Exhaustive, &found.selection)?);
+            best = best.or_better(Some(found));
         }
         let found = self.genetic(seed, watch)?;
         designed.push(self.designed(Method::Genetic, &found.selection)?);

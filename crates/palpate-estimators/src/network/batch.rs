@@ -78,9 +78,9 @@ impl Kernel for Pass<'_> {
         let (outputs, last_outputs) = outputs.split_at_mut(groups * group * out);
         let whole = Pass { network, inputs, outputs };
         if const { S::REGISTERS >= 32 } {
-            whole.run_groups::<S::F32, 8>()
+            whole.run_groups::<S::F32, 8>();
         } else {
-            whole.run_groups::<S::F32, 4>()
+            whole.run_groups::<S::F32, 4>();
         }
         Pass { network, inputs: last_inputs, outputs: last_outputs }.run_groups::<S::F32, 1>();
     }

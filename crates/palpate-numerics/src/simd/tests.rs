@@ -79,6 +79,7 @@ fn the_best_set_is_the_first_available() {
     assert_eq!(InstructionSet::available()[0], InstructionSet::best());
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "arrays as the vectors give them")]
 fn assert_lanes<T: PartialEq + Debug, const N: usize>(lanes: [T; N], lane: impl Fn(usize) -> T) {
     assert_eq!(lanes, std::array::from_fn(lane));
 }

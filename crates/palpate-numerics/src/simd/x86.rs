@@ -3,6 +3,10 @@
 //! Safety of every block that calls instructions: [`super::InstructionSet`] hands these types to a kernel only after it has found that the
 //! machine has the instructions, and nothing else can name them.
 #![allow(unsafe_code, reason = "instructions that the machine was asked for")]
+#![allow(
+    clippy::missing_transmute_annotations,
+    reason = "the registers of a macro, whose types its uses name"
+)]
 
 use super::{Arithmetic, Eight, LOOK_UP, Number, Vector};
 use std::arch::x86_64::*;
