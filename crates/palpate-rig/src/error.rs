@@ -214,7 +214,7 @@ impl RigProblem {
     }
 }
 
-/// What types refuse; [`RigError::within`] says where.
+/// What types refuse; the error that carries them says where.
 impl serde::de::Error for RigError {
     fn custom<T: Display>(reason: T) -> Self {
         RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.nowhere()
