@@ -15,11 +15,12 @@
 //! use palpate_numerics::watch::Watch;
 //!
 //! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-//! let mut setup = Setup::new(beam).sensors(Deflection.evenly(4).noise(um(5.0)))?.known_force(newtons(3.0))?;
+//! let setup = Setup::new(beam).sensors(Deflection.evenly(4).noise(um(5.0)))?.known_force(newtons(3.0))?;
 //!
 //! // Where the four sensors tell most.
 //! let design = SensorDesign::of(&setup)?.sites(Sites::Every(mm(10.0)));
-//! setup.layout = SensorProblem::new(&setup, &design, Watch::NONE)?.greedy_exchange(0, Watch::NONE)?.layout;
+//! let best = SensorProblem::new(&setup, &design, Watch::NONE)?.greedy_exchange(0, Watch::NONE)?;
+//! let setup = Setup { layout: best.layout, ..setup.clone() };
 //!
 //! // Where to press next after six presses, and what that gains.
 //! let presses = setup.simulate(&Training::even(6).repeated(3), 0)?;

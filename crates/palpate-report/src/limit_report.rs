@@ -61,7 +61,7 @@ pub struct LimitReport<'a> {
 /// let limit = bench.cramer_rao_bound()?;
 /// let files = limit_report(&LimitReport {
 ///     title: "What physics allows on the paper's beam",
-///     bench: &bench,
+///     setup: &setup,
 ///     limit: &limit,
 ///     known: &LimitCurve::over(&limit, 3.0, Force::Known)?,
 ///     unknown: &LimitCurve::over(&limit, 3.0, Force::Unknown)?,
