@@ -57,8 +57,8 @@ pub struct LimitReport<'a> {
 /// use palpate_report::{LimitReport, limit_report};
 ///
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
-/// let bench = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
-/// let limit = bench.cramer_rao_bound()?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+/// let limit = setup.cramer_rao_bound()?;
 /// let files = limit_report(&LimitReport {
 ///     title: "What physics allows on the paper's beam",
 ///     setup: &setup,
