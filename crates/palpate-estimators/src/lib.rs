@@ -24,5 +24,6 @@ pub mod network;
 pub mod recording;
 pub mod setup;
 pub mod simulate;
+pub mod status;
 pub mod track_errors;
 pub mod tracking;
