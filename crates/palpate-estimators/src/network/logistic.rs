@@ -66,7 +66,7 @@ pub(crate) fn activate<V: Vector<N>, const N: usize>(activation: Activation, val
 
 /// [`activate`] for B sums, in step.
 #[inline(always)]
-pub(super) fn activate_block<V: Vector<N>, const N: usize, const B: usize>(
+fn activate_block<V: Vector<N>, const N: usize, const B: usize>(
     activation: Activation,
     values: &mut [V; B],
 ) {

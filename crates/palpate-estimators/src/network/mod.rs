@@ -1,6 +1,5 @@
 //! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
 
-mod batch;
 mod config;
 mod fitting;
 mod levenberg_marquardt;
@@ -12,7 +11,6 @@ mod prepared;
 mod topology;
 mod train;
 
-pub use batch::BatchNetwork;
 pub use config::{BackPropagation, InputScale, Network, OutputCoding, PresentationOrder};
 pub use fitting::{NetworkFitError, NetworkFitting};
 pub use levenberg_marquardt::{

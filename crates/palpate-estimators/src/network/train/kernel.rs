@@ -7,8 +7,6 @@
 //! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
 //! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
-//!
-//! Its forward pass is one by itself because weights lie side by side here, and in [`crate::network::BatchNetwork`] readings do.
 
 use super::order::{OrderDrawer, Streams, column_len};
 use super::{TrainingQueue, TrainingTask};
