@@ -1,10 +1,276 @@
 //! The centroid that array sensors use: the magnitude-weighted mean of the sensors' positions, calibrated by a linear map.
 
-mod fitting;
-mod locator;
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
 
-pub use fitting::{Centroid, CentroidFitError};
-pub use locator::{CentroidLocator, Weighing};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::held_out::HeldOutSpread;
+use crate::recording::{Recording, Row, TooFewPositions};
+use crate::setup::Setup;
+use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{Cholesky, NotPositiveDefinite};
+
+/// The calibrated centroid. Channel i weighs w_i = |r_i| / Σ|r_j|, its reading taken in units of the largest that its
+/// kind has in the training recording.
+///
+/// With sensors at known positions p_i the estimate is A·(Σ w_i·p_i) + b, with A and b from least squares over the
+/// training recording. Raw channels have no positions, so least squares gives each one a position of its own:
+/// the estimate is Σ w_i·p_i.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Centroid;
+
+/// Why a centroid cannot be calibrated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CentroidFitError {
+    /// One sensor has the same centroid wherever the contact is.
+    #[error("a centroid needs at least 2 sensors that are not dead; the layout has {found}")]
+    TooFewSensors {
+        /// Live sensors of the layout.
+        found: usize,
+    },
+    /// Fewer positions than unknowns of the map.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// Nothing is ever read by the sensors of one kind.
+    #[error("every {kind} reading of the recording is 0; a centroid weighs sensors by what they read")]
+    Silent {
+        /// The kind.
+        kind: SensorKind,
+    },
+    /// Every sensor sits at the same place, or all readings are alike.
+    #[error("the centroids of the recording do not tell its positions apart: {0}")]
+    Alike(#[from] NotPositiveDefinite),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Fit for Centroid {
+    type Method = CentroidLocator;
+    type Error = CentroidFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<CentroidLocator, CentroidFitError> {
+        let mut locator = uncalibrated(task.setup, task.recording)?;
+        let terms = locator.weighing.terms(locator.channel_scales.len(), locator.extent.width_m.is_some());
+        task.recording.check_distinct_positions(terms)?;
+        let rows: Vec<&Row> = task.recording.rows.iter().collect();
+        locator.map = calibrate(&locator, &rows)?;
+        let errors = held_out_errors(&locator, task.recording, terms, task.watch)?;
+        locator.spread = HeldOutSpread::of(&errors);
+        Ok(locator)
+    }
+}
+
+/// A locator that can weigh, but whose map is still empty.
+fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
+    let sensors = &setup.layout.sensors;
+    let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
+    if live < 2 {
+        return Err(CentroidFitError::TooFewSensors { found: live });
+    }
+    let mut channel_scales = Vec::with_capacity(sensors.len());
+    for sensor in sensors {
+        if sensor.channel.dead {
+            channel_scales.push(0.0);
+            continue;
+        }
+        let of_kind =
+            (0..sensors.len()).filter(|i| sensors[*i].kind == sensor.kind && !sensors[*i].channel.dead);
+        let readings = of_kind.flat_map(|i| recording.rows.iter().map(move |row| row.reading[i].abs()));
+        let largest = readings.fold(0.0, f64::max);
+        if !(largest > 0.0 && (1.0 / largest).is_finite()) {
+            return Err(CentroidFitError::Silent { kind: sensor.kind });
+        }
+        channel_scales.push(1.0 / largest);
+    }
+    let raw = sensors.iter().any(|sensor| sensor.kind == SensorKind::Raw);
+    let weighing = if raw {
+        Weighing::Channels
+    } else {
+        Weighing::Positions(sensors.iter().map(|sensor| sensor.position).collect())
+    };
+    Ok(CentroidLocator {
+        extent: setup.surface.extent(),
+        channel_scales,
+        weighing,
+        map: Vec::new(),
+        force_n: setup.force_n,
+        spread: None,
+    })
+}
+
+/// Least squares of the positions (x, and y where there is one) on the terms, row by row of the map.
+///
+/// A ridge of 10⁻¹² of the largest diagonal entry keeps terms that a recording does not excite, such as a dead channel's, at 0.
+fn calibrate(locator: &CentroidLocator, rows: &[&Row]) -> Result<Vec<Vec<f64>>, NotPositiveDefinite> {
+    let terms = locator.terms();
+    let mut normal = Array2::zeros((terms, terms));
+    let mut right = [Array1::zeros(terms), Array1::zeros(terms)];
+    for row in rows {
+        let Some(term) = locator.term_values(&row.reading) else { continue };
+        for i in 0..terms {
+            for j in 0..=i {
+                normal[[i, j]] += term[i] * term[j];
+            }
+            right[0][i] += term[i] * row.position.x_m;
+            right[1][i] += term[i] * row.position.y_m;
+        }
+    }
+    let ridge = 1e-12 * normal.diag().iter().fold(0.0, |m: f64, d: &f64| m.max(*d));
+    normal.diag_mut().iter_mut().for_each(|d| *d += ridge);
+    let cholesky = Cholesky::factor(normal)?;
+    let axes = if locator.extent.width_m.is_some() { 2 } else { 1 };
+    Ok(right[..axes].iter().map(|right| cholesky.solve(right).to_vec()).collect())
+}
+
+/// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; none where
+/// a fold leaves fewer positions than `terms`.
+fn held_out_errors(
+    locator: &CentroidLocator,
+    recording: &Recording,
+    terms: usize,
+    watch: Watch,
+) -> Result<Vec<[f64; 2]>, Cancelled> {
+    let positions = recording.distinct_positions().len();
+    let folds = recording.folds(positions.min(FOLDS)).unwrap_or_default();
+    let mut errors = Vec::with_capacity(recording.rows.len());
+    for fold in folds {
+        watch.round()?;
+        let held_out: Vec<&Row> = fold.held_out.iter().map(|i| &recording.rows[*i]).collect();
+        let training = recording.subset(&fold.training);
+        if training.check_distinct_positions(terms).is_err() {
+            return Ok(Vec::new());
+        }
+        let rows: Vec<&Row> = training.rows.iter().collect();
+        let Ok(map) = calibrate(locator, &rows) else { return Ok(Vec::new()) };
+        let judged = CentroidLocator { map, ..locator.clone() };
+        for row in held_out {
+            let Some(position) = judged.position(&row.reading) else { continue };
+            errors.push([position.x_m - row.position.x_m, position.y_m - row.position.y_m]);
+        }
+    }
+    Ok(errors)
+}
+
+/// Positions are held out one by one up to this many, and in groups beyond.
+const FOLDS: usize = 20;
+
+/// A centroid that locates; see [`Centroid`](super::Centroid).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CentroidLocator {
+    /// The surface.
+    pub extent: Extent,
+    /// One over the largest training reading of the channel's kind, in the inverse of its unit; 0 for a dead channel.
+    pub channel_scales: Vec<f64>,
+    /// What the magnitudes weigh.
+    pub weighing: Weighing,
+    /// A row for x, and one for y on a two-dimensional surface: with [`Weighing::Positions`] the factor of the
+    /// centroid's x (and y), then a constant in metres; with [`Weighing::Channels`] a position in metres a channel.
+    pub map: Vec<Vec<f64>>,
+    /// The contact's force in newtons, where the bench knows it.
+    pub force_n: Option<f64>,
+    /// How far maps were off at positions that they were not calibrated on.
+    pub spread: Option<HeldOutSpread>,
+}
+
+/// What the channels' magnitudes weigh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weighing {
+    /// The sensors' known positions, one a channel.
+    Positions(Vec<Position>),
+    /// Positions that calibration finds, for channels that have none.
+    Channels,
+}
+
+impl Weighing {
+    /// Unknowns of the map for a coordinate.
+    fn terms(&self, channels: usize, plane: bool) -> usize {
+        match self {
+            Self::Positions(_) => 2 + usize::from(plane),
+            Self::Channels => channels,
+        }
+    }
+}
+
+impl CentroidLocator {
+    fn terms(&self) -> usize {
+        self.weighing.terms(self.channel_scales.len(), self.extent.width_m.is_some())
+    }
+
+    /// What the map multiplies; `None` where every reading is 0 and nothing weighs.
+    fn term_values(&self, reading: &[f64]) -> Option<Vec<f64>> {
+        let mut weights: Vec<f64> =
+            reading.iter().zip(&self.channel_scales).map(|(r, s)| (r * s).abs()).collect();
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        weights.iter_mut().for_each(|weight| *weight /= total);
+        let Weighing::Positions(positions) = &self.weighing else { return Some(weights) };
+        let mean = |coordinate: fn(&Position) -> f64| {
+            weights.iter().zip(positions).map(|(w, p)| w * coordinate(p)).sum::<f64>()
+        };
+        let along = mean(|p| p.x_m);
+        Some(match self.extent.width_m {
+            None => vec![along, 1.0],
+            Some(_) => vec![along, mean(|p| p.y_m), 1.0],
+        })
+    }
+
+    /// The mapped centroid; `None` where every reading is 0.
+    fn position(&self, reading: &[f64]) -> Option<Position> {
+        let terms = self.term_values(reading)?;
+        let mapped = |row: &Vec<f64>| row.iter().zip(&terms).map(|(m, t)| m * t).sum::<f64>();
+        let mut coordinates = self.map.iter().map(mapped);
+        Some(Position { x_m: coordinates.next()?, y_m: coordinates.next().unwrap_or(0.0) })
+    }
+}
+
+impl Locate for CentroidLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let Some(position) = self.position(reading) else {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        };
+        let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };
+        let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
+        Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        let channels = setup.layout.len();
+        LocatorFault::check_count("channel scales", channels, self.channel_scales.len())?;
+        LocatorFault::check_numbers(
+            "channel scale",
+            self.channel_scales.iter().copied(),
+            |scale| scale >= 0.0,
+            "a number of at least 0",
+        )?;
+        if let Weighing::Positions(positions) = &self.weighing {
+            LocatorFault::check_count("sensor positions", channels, positions.len())?;
+            let coordinates = positions.iter().flat_map(|p| [p.x_m, p.y_m]);
+            LocatorFault::check_numbers("sensor position", coordinates, |_| true, "a finite number")?;
+        }
+        LocatorFault::check_count(
+            "rows of the map",
+            1 + usize::from(self.extent.width_m.is_some()),
+            self.map.len(),
+        )?;
+        for row in &self.map {
+            LocatorFault::check_count("numbers in a row of the map", self.terms(), row.len())?;
+            LocatorFault::check_numbers("map", row.iter().copied(), |_| true, "a finite number")?;
+        }
+        self.spread.map_or(Ok(()), |spread| spread.check())
+    }
+}
 
 #[cfg(test)]
 mod tests;

@@ -4,15 +4,518 @@
 //! Between two neighbouring sensors every influence function of a beam is a cubic polynomial of the contact position,
 //! so what explains a reading best is a root of a polynomial: all roots are found, and all are reported.
 
-mod balance;
-mod fitting;
-mod locator;
 mod polynomial;
-mod posterior;
-mod segment;
 
-pub use fitting::{ClosedForm, ClosedFormFitError};
-pub use locator::ClosedFormLocator;
+use serde::{Deserialize, Serialize};
+
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::setup::Setup;
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
+use palpate_numerics::small::Ldl;
+use palpate_numerics::watch::Cancelled;
+use palpate_numerics::{NORMAL_95, chi_squared_bound, held_interval, normal_interval_95};
+use polynomial::Polynomial;
+
+/// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
+///
+/// - Scales under both supports and nothing else: the moment balance a = l·R_right/(R_left + R_right), W = R_left + R_right.
+/// - Otherwise every deflection, slope, strain and reaction that the layout has: position, and force where it is unknown, by
+///   least squares weighted by the channels' noise; with two readings and an unknown force this is the root of their ratio.
+///
+/// Uncertainty is propagated from the channels' noise (and quantisation) to first order; where the layout gives a channel no noise
+/// there is none, and a reading that is off by more than a tenth of itself is outside the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClosedForm;
+
+/// Why the closed form does not suit a bench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ClosedFormFitError {
+    /// A surface without a model.
+    #[error("the closed form needs a beam's dimensions and stiffness; a measured surface has no model")]
+    NoModel,
+    /// Another kind of surface.
+    #[error("the closed form needs a beam on two simple supports; the surface is another one")]
+    NotABeam,
+    /// A channel in units of its own.
+    #[error(
+        "the closed form needs deflection, slope, strain or reaction sensors; the layout has a {kind} channel"
+    )]
+    NotModelled {
+        /// What the channel measures.
+        kind: SensorKind,
+    },
+    /// Too few sensors that see a contact.
+    #[error(
+        "the closed form needs at least {needed} sensors that see a contact ({}); the layout has {found}",
+        if *needed == 1 { "the force is known" } else { "the force is unknown" }
+    )]
+    TooFewSensors {
+        /// Unknowns: 1 for the position, and 1 for a force that is unknown.
+        needed: usize,
+        /// Sensors that are not dead and whose influence is not 0 everywhere.
+        found: usize,
+    },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Fit for ClosedForm {
+    type Method = ClosedFormLocator;
+    type Error = ClosedFormFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
+        locator(task.setup)
+    }
+}
+
+fn locator(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
+    if setup.surface.model().is_none() {
+        return Err(ClosedFormFitError::NoModel);
+    }
+    let SurfaceSpec::Beam(beam) = setup.surface else { return Err(ClosedFormFitError::NotABeam) };
+    let kinds = setup.layout.kinds();
+    if let Some(kind) = kinds.into_iter().find(|kind| *kind == SensorKind::Raw) {
+        return Err(ClosedFormFitError::NotModelled { kind });
+    }
+    let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
+    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.seeing().len());
+    if found < needed {
+        return Err(ClosedFormFitError::TooFewSensors { needed, found });
+    }
+    Ok(locator)
+}
+
+/// A closed form that locates; see [`ClosedForm`](super::ClosedForm).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClosedFormLocator {
+    /// The surface.
+    pub beam: Beam,
+    /// Its sensors.
+    pub layout: Layout,
+    /// The contact's force in newtons, where it is known.
+    pub force_n: Option<f64>,
+}
+
+impl ClosedFormLocator {
+    /// Channels that are not dead and that see a contact somewhere.
+    fn seeing(&self) -> Vec<usize> {
+        let sees = |sensor: &Sensor| {
+            let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m));
+            let influence = |contact: Position| self.beam.influence(sensor.kind, sensor.position, contact);
+            !sensor.channel.dead && quarters.into_iter().any(|contact| influence(contact) != 0.0)
+        };
+        (0..self.layout.len()).filter(|i| sees(&self.layout.sensors[*i])).collect()
+    }
+
+    /// What each channel's readings are multiplied by: 1/σ where every noise is known, else 1/full scale.
+    fn weights(&self, channels: &[usize]) -> Weights {
+        let sensors = || channels.iter().map(|i| &self.layout.sensors[*i]);
+        let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
+        if known.iter().all(|weight| weight.is_finite()) {
+            return Weights { weights: known, noise: Noise::Known };
+        }
+        let weights = sensors().map(|s| 1.0 / self.beam.full_scale(s.kind)).collect();
+        Weights { weights, noise: Noise::Unknown }
+    }
+
+    /// The stretches between neighbouring sensors, supports included.
+    fn segments(&self, channels: &[usize], weights: &[f64]) -> Vec<Segment> {
+        let length_m = self.beam.length_m;
+        let mut ends: Vec<f64> = channels.iter().map(|i| self.layout.sensors[*i].position.x_m).collect();
+        ends.extend([0.0, length_m]);
+        ends.sort_by(f64::total_cmp);
+        ends.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * length_m);
+        let influence = |channel: usize, contact_m: f64| {
+            let sensor = &self.layout.sensors[channels[channel]];
+            weights[channel] * self.beam.influence(sensor.kind, sensor.position, Position::along(contact_m))
+        };
+        ends.windows(2).map(|pair| Segment::new(pair[0], pair[1], channels.len(), influence)).collect()
+    }
+
+    /// The channels under the left and the right support, where the layout sees a contact by these two alone.
+    fn scales(&self, channels: &[usize]) -> Option<(usize, usize)> {
+        let &[first, second] = channels else { return None };
+        let sensor = |i: usize| &self.layout.sensors[i];
+        let reactions = [first, second].iter().all(|i| sensor(*i).kind == SensorKind::Reaction);
+        let (a, b) = (sensor(first).position.x_m, sensor(second).position.x_m);
+        let apart = (a - b).abs() > 0.5 * self.beam.length_m;
+        (reactions && apart).then_some(if a < b { (first, second) } else { (second, first) })
+    }
+
+    fn balance(&self, (left, right): (usize, usize), reading: &[f64], noise: Noise) -> Estimate {
+        let length_m = self.beam.length_m;
+        let variances = [left, right].map(|i| self.layout.sensors[i].channel.reading_sd().powi(2));
+        let balance = Balance { length_m, left_n: reading[left], right_n: reading[right], variances };
+        let balanced = match self.force_n {
+            Some(force_n) => balance.known_force(force_n),
+            None => balance.unknown_force(),
+        };
+        let misfit_n = balance.left_n + balance.right_n - balanced.force_n;
+        let tolerated = match noise {
+            Noise::Known => chi_squared_bound(RARE, 1) * variances.iter().sum::<f64>(),
+            Noise::Unknown => (0.1 * balanced.force_n).powi(2),
+        };
+        let [xx, xf, ff] = balanced.covariance;
+        let sd_m = xx.sqrt();
+        let on_surface = self.beam.contains(Position::along(balanced.position_m));
+        let near = |edge_m: f64| noise == Noise::Known && (balanced.position_m - edge_m).abs() <= 3.0 * sd_m;
+        let (status, position_m) = if balanced.force_n <= 0.0 || misfit_n.powi(2) > tolerated {
+            (Status::OutsideModel, balanced.position_m)
+        } else if on_surface || near(0.0) || near(length_m) {
+            // Noise may carry a contact at the very edge a little beyond it.
+            (Status::Located, balanced.position_m.clamp(0.0, length_m))
+        } else {
+            (Status::OutsideSurface, balanced.position_m)
+        };
+        let uncertainty = (noise == Noise::Known).then_some(Uncertainty {
+            covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
+            x_95_m: normal_interval_95(balanced.position_m, sd_m),
+            y_95_m: (0.0, 0.0),
+        });
+        let position = Position::along(position_m);
+        let contact = ContactEstimate { position, force_n: Some(balanced.force_n), uncertainty };
+        Estimate::of_contact(contact, status)
+    }
+}
+
+/// Whether the layout says how noisy its channels are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Noise {
+    Known,
+    Unknown,
+}
+
+struct Weights {
+    weights: Vec<f64>,
+    noise: Noise,
+}
+
+impl Locate for ClosedFormLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let channels = self.seeing();
+        let Weights { weights, noise } = self.weights(&channels);
+        let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
+        let size: f64 = whitened.iter().map(|r| r * r).sum();
+        let silent = if noise == Noise::Known { chi_squared_bound(RARE, whitened.len()) } else { 0.0 };
+        if size <= silent {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        }
+        if let Some(scales) = self.scales(&channels) {
+            return self.balance(scales, reading, noise);
+        }
+        let segments = self.segments(&channels, &weights);
+        Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise }.estimate()
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("sensors", setup.layout.len(), self.layout.len())?;
+        let beam =
+            [self.beam.length_m, self.beam.width_m, self.beam.thickness_m, self.beam.youngs_modulus_pa];
+        LocatorFault::check_numbers("beam", beam, |x| x > 0.0, "a number greater than 0")?;
+        let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
+        let on_beam = |x: f64| self.beam.contains(Position::along(x));
+        LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
+        LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
+        let (needed, found) = (1 + usize::from(self.force_n.is_none()), self.seeing().len());
+        if found < needed {
+            return Err(LocatorFault::Count { what: "sensors that see a contact", needed, found });
+        }
+        Ok(())
+    }
+}
+
+/// Modes whose probabilities sum to less than this are not spoken of.
+const NEGLIGIBLE: f64 = 0.05;
+
+/// A reading that noise gives as rarely as this has another cause.
+const RARE: f64 = 1e-3;
+
+/// Squared residuals that differ by less than this share of the reading are the same in double precision.
+const ROUNDING: f64 = 1e-13;
+
+/// What is asked: a whitened reading, and the force in newtons where it is known.
+struct Posterior<'a> {
+    segments: &'a [Segment],
+    reading: &'a [f64],
+    force_n: Option<f64>,
+    noise: Noise,
+}
+
+/// A position that explains the reading better than its neighbours do, or a stretch of positions that explain it alike.
+#[derive(Clone, Copy, Debug)]
+struct Explanation {
+    from_m: f64,
+    to_m: f64,
+    position_m: f64,
+    force_n: f64,
+    chi_squared: f64,
+    /// Covariance of position and force: xx, xf, ff.
+    covariance: [f64; 3],
+}
+
+impl Posterior<'_> {
+    fn estimate(&self) -> Estimate {
+        let mut found = self.explanations();
+        found.sort_by(|a, b| self.log_weight(b).total_cmp(&self.log_weight(a)));
+        let Some(best) = found.first() else {
+            return Estimate::of_position(Position::default(), Status::OutsideModel);
+        };
+        let mut estimate = Estimate::of_contact(self.contact(best), Status::Located);
+        if best.force_n <= 0.0 || best.chi_squared > self.tolerated() {
+            estimate.status = Status::OutsideModel;
+            return estimate;
+        }
+        let shares: Vec<f64> =
+            found.iter().map(|e| (self.log_weight(e) - self.log_weight(best)).exp()).collect();
+        let total: f64 = shares.iter().sum();
+        if 1.0 - 1.0 / total > NEGLIGIBLE || best.to_m - best.from_m > 0.01 * self.length_m() {
+            estimate.status = Status::Ambiguous;
+            for (other, share) in found.iter().zip(&shares).skip(1) {
+                let mode = Mode { contact: self.contact(other), probability: share / total };
+                if mode.probability < 0.1 * NEGLIGIBLE || !estimate.modes.push(mode) {
+                    break;
+                }
+            }
+        }
+        estimate
+    }
+
+    fn length_m(&self) -> f64 {
+        self.segments.last().map_or(0.0, |segment| segment.to_m)
+    }
+
+    fn size(&self) -> f64 {
+        self.reading.iter().map(|r| r * r).sum()
+    }
+
+    /// Local minima of the squared residual over the beam. Between neighbouring candidates it is monotone, as all its turns
+    /// and all the ends of segments are candidates.
+    fn explanations(&self) -> Vec<Explanation> {
+        let mut candidates: Vec<Explanation> = Vec::new();
+        for segment in self.segments {
+            let places = segment.candidates(self.reading, self.force_n);
+            candidates.extend(places.into_iter().map(|position_m| self.explanation(segment, position_m)));
+        }
+        candidates.sort_by(|a, b| a.position_m.total_cmp(&b.position_m));
+        let same = ROUNDING * self.size();
+        let mut stretches: Vec<Explanation> = Vec::new();
+        for next in candidates {
+            match stretches.last_mut() {
+                Some(last) if (last.chi_squared - next.chi_squared).abs() <= same => {
+                    last.to_m = next.to_m;
+                    // The middle of a stretch that one position explains as well as the next.
+                    last.position_m = 0.5 * (last.from_m + last.to_m);
+                }
+                _ => stretches.push(next),
+            }
+        }
+        let chi =
+            |i: Option<usize>| i.and_then(|i| stretches.get(i)).map_or(f64::INFINITY, |e| e.chi_squared);
+        let lowest = |i: &usize| chi(Some(*i)) < chi(i.checked_sub(1)) && chi(Some(*i)) < chi(Some(i + 1));
+        (0..stretches.len()).filter(lowest).map(|i| stretches[i]).collect()
+    }
+
+    fn explanation(&self, segment: &Segment, position_m: f64) -> Explanation {
+        let influence = segment.influence_at(position_m);
+        let (mut n, mut d) = (0.0, 0.0);
+        for ((h, _), r) in influence.iter().zip(self.reading) {
+            n += r * h;
+            d += h * h;
+        }
+        let best = if d > 0.0 { (n / d).max(0.0) } else { 0.0 };
+        let force_n = self.force_n.unwrap_or(best);
+        let residual = influence.iter().zip(self.reading).map(|((h, _), r)| (r - force_n * h).powi(2));
+        Explanation {
+            from_m: position_m,
+            to_m: position_m,
+            position_m,
+            force_n,
+            chi_squared: residual.sum(),
+            covariance: self.covariance(&influence, force_n),
+        }
+    }
+
+    /// Inverse of the Fisher information of (a, W), whose square root is the Jacobian (W·h̃′, h̃); a position that the reading
+    /// does not determine is given the variance of one anywhere on the beam, l²/12.
+    fn covariance(&self, influence: &[(f64, f64)], force_n: f64) -> [f64; 3] {
+        let (mut xx, mut xf, mut ff) = (0.0, 0.0, 0.0);
+        for (h, slope) in influence {
+            xx += (force_n * slope).powi(2);
+            xf += force_n * slope * h;
+            ff += h * h;
+        }
+        let most = self.length_m().powi(2) / 12.0;
+        if self.force_n.is_some() {
+            return [most.min(1.0 / xx), 0.0, 0.0];
+        }
+        match Ldl::new(&[[ff, xf], [xf, xx]]) {
+            Some(factors) => {
+                let [_, [_, of_position]] = factors.inverse();
+                let (variance, slope) = (most.min(of_position), -xf / ff);
+                // cov(a, W) = slope·var a and var W = 1/ff + slope²·var a, whatever var a is.
+                [variance, slope * variance, 1.0 / ff + slope * slope * variance]
+            }
+            None => [most, 0.0, if ff > 0.0 { 1.0 / ff } else { 0.0 }],
+        }
+    }
+
+    /// Logarithm of the probability around an explanation, up to a constant, by Laplace's method. Where the noise is unknown
+    /// only explanations as good as exact share in it.
+    fn log_weight(&self, explanation: &Explanation) -> f64 {
+        match self.noise {
+            Noise::Known => {
+                let width = (explanation.to_m - explanation.from_m).powi(2) / 12.0;
+                let [xx, xf, ff] = explanation.covariance;
+                let volume = if self.force_n.is_some() { xx } else { (xx * ff - xf * xf).max(0.0) };
+                -0.5 * explanation.chi_squared + 0.5 * volume.max(width * ff).max(f64::MIN_POSITIVE).ln()
+            }
+            Noise::Unknown => -0.5 * explanation.chi_squared / (1e-10 * self.size()),
+        }
+    }
+
+    fn tolerated(&self) -> f64 {
+        let unknowns = 1 + usize::from(self.force_n.is_none());
+        match self.noise {
+            Noise::Known => chi_squared_bound(RARE, self.reading.len().saturating_sub(unknowns).max(1)),
+            Noise::Unknown => 0.01 * self.size(),
+        }
+    }
+
+    fn contact(&self, explanation: &Explanation) -> ContactEstimate {
+        let Explanation { from_m, to_m, position_m, covariance: [xx, xf, ff], .. } = *explanation;
+        let half_m = NORMAL_95 * xx.sqrt();
+        let uncertainty = Uncertainty {
+            covariance: [xx.max((to_m - from_m).powi(2) / 12.0), 0.0, xf, 0.0, 0.0, ff],
+            x_95_m: held_interval((from_m - half_m, to_m + half_m), self.length_m()),
+            y_95_m: (0.0, 0.0),
+        };
+        ContactEstimate {
+            position: Position::along(position_m),
+            force_n: Some(explanation.force_n),
+            uncertainty: (self.noise == Noise::Known).then_some(uncertainty),
+        }
+    }
+}
+
+/// The readings of the scales under both supports, in newtons, and their noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Balance {
+    length_m: f64,
+    left_n: f64,
+    right_n: f64,
+    /// Variances of left and right in N².
+    variances: [f64; 2],
+}
+
+/// A contact that balances the reactions; its position may lie beyond the supports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Balanced {
+    position_m: f64,
+    force_n: f64,
+    /// Covariance of position and force: xx, xf, ff.
+    covariance: [f64; 3],
+}
+
+impl Balance {
+    /// Position and force, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W, ∂W/∂R = 1.
+    fn unknown_force(&self) -> Balanced {
+        let force_n = self.left_n + self.right_n;
+        let position_m = self.length_m * self.right_n / force_n;
+        let slopes = [-position_m / force_n, (self.length_m - position_m) / force_n];
+        let [left, right] = self.variances;
+        let covariance = [
+            slopes[0] * slopes[0] * left + slopes[1] * slopes[1] * right,
+            slopes[0] * left + slopes[1] * right,
+            left + right,
+        ];
+        Balanced { position_m, force_n, covariance }
+    }
+
+    /// The position by weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l, for a known force W.
+    fn known_force(&self, force_n: f64) -> Balanced {
+        let [left, right] = self.variances.map(|variance| if variance > 0.0 { 1.0 / variance } else { 1.0 });
+        let share = (right * self.right_n + left * (force_n - self.left_n)) / ((left + right) * force_n);
+        let [var_left, var_right] = self.variances;
+        let noise = (right * right * var_right + left * left * var_left) / ((left + right) * force_n).powi(2);
+        let position_m = self.length_m * share;
+        Balanced { position_m, force_n, covariance: [self.length_m.powi(2) * noise, 0.0, 0.0] }
+    }
+}
+
+/// A stretch of the beam between neighbouring sensors or supports.
+#[derive(Clone, Debug, PartialEq)]
+struct Segment {
+    from_m: f64,
+    to_m: f64,
+    /// h̃ of each channel, a polynomial of t = (a − from)/(to − from).
+    influence: Vec<Polynomial>,
+    /// The same for the unknown force, divided by t or 1 − t where every influence is 0 at that end: there N²/D would
+    /// be 0/0, and the division leaves it as it is.
+    reduced: Vec<Polynomial>,
+    /// Whether `reduced` is in 1 − t.
+    mirrored: bool,
+    /// Where `reduced` begins: at 0, or just beside an end where no sensor reads anything and only an infinite force would.
+    start: f64,
+}
+
+/// Share of a segment that is just beside its end.
+const BESIDE: f64 = 1e-6;
+
+impl Segment {
+    /// The segment from `from_m` to `to_m`, where `influence(channel, a)` is cubic in a.
+    fn new(from_m: f64, to_m: f64, channels: usize, influence: impl Fn(usize, f64) -> f64) -> Self {
+        let at = |t: f64| from_m + t * (to_m - from_m);
+        let cubic = |channel: usize| {
+            Polynomial::cubic_through([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|t| influence(channel, at(t))))
+        };
+        let polynomials: Vec<Polynomial> = (0..channels).map(cubic).collect();
+        let vanish = |t: f64| polynomials.iter().all(|p| p.at(t).abs() <= 1e-12 * p.size());
+        let mirrored = vanish(1.0) && !vanish(0.0);
+        let mut reduced = polynomials.clone();
+        if mirrored {
+            reduced = reduced.iter().map(Polynomial::mirrored).collect();
+        }
+        if mirrored || vanish(0.0) {
+            reduced = reduced.iter().map(Polynomial::over_t).collect();
+        }
+        let start = if mirrored || vanish(0.0) { BESIDE } else { 0.0 };
+        Self { from_m, to_m, influence: polynomials, reduced, mirrored, start }
+    }
+
+    /// Positions at which the squared residual is stationary, its ends always among them.
+    fn candidates(&self, reading: &[f64], force_n: Option<f64>) -> Vec<f64> {
+        let functions = if force_n.is_some() { &self.influence } else { &self.reduced };
+        let (mut n, mut d) = (Polynomial::zero(), Polynomial::zero());
+        for (h, r) in functions.iter().zip(reading) {
+            n = n.plus(*r, h);
+            d = d.plus(1.0, &h.times(h));
+        }
+        let stationary = match force_n {
+            Some(force_n) => n.derivative().plus(-0.5 * force_n, &d.derivative()),
+            None => n.derivative().times(&d).plus(-0.5, &n.times(&d.derivative())),
+        };
+        let mirrored = self.mirrored && force_n.is_none();
+        let place = |t: f64| self.from_m + (self.to_m - self.from_m) * if mirrored { 1.0 - t } else { t };
+        let start = if force_n.is_some() { 0.0 } else { self.start };
+        let turns = stationary.sign_changes().into_iter().filter(|t| *t > start);
+        [start, 1.0].into_iter().chain(turns).map(place).collect()
+    }
+
+    /// h̃ of every channel at `position_m`, and its derivative by the position in 1/m.
+    fn influence_at(&self, position_m: f64) -> Vec<(f64, f64)> {
+        let length_m = self.to_m - self.from_m;
+        let t = (position_m - self.from_m) / length_m;
+        self.influence.iter().map(|h| (h.at(t), h.derivative().at(t) / length_m)).collect()
+    }
+}
 
 #[cfg(test)]
 mod tests;

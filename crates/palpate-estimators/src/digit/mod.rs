@@ -8,19 +8,744 @@
 //! the force: one Gaussian a stretch, cut off at its gauges; and where one gauge alone sees a contact of unknown
 //! force, which tells force times lever and no more, a curve of contacts that explain it alike.
 
-mod fitting;
-mod gauges;
-mod likelihood;
 mod linear_theory;
-mod locator;
-mod posterior;
-mod refine;
 mod shape;
 
-pub use fitting::{DigitEstimator, DigitFitError, DigitTheory};
 pub use linear_theory::LinearTheory;
-pub use locator::DigitLocator;
 pub use shape::{DigitShape, ShapePoint};
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::setup::Setup;
+use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Digit, Surface, SurfaceSpec};
+use palpate_numerics::small::{Ldl, Matrix, add_outer};
+use palpate_numerics::watch::Cancelled;
+use palpate_numerics::{bisect, chi_squared_bound, held_interval, normal_distribution, normal_interval_95};
+
+/// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
+/// noise, and learns nothing from a recording.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DigitEstimator {
+    /// What the gauges read.
+    pub theory: DigitTheory,
+}
+
+/// How a finger bends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DigitTheory {
+    /// As far as the force bends it: the elastica.
+    #[default]
+    Exact,
+    /// Hardly at all: strain is force times lever. For comparison, and for small forces.
+    Linear,
+}
+
+/// Why the digit's estimator does not suit a bench.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DigitFitError {
+    /// Another kind of surface.
+    #[error("the digit estimator needs `kind = \"digit\"` in [surface]; the surface is another one")]
+    NotADigit,
+    /// A sensor that is no strain gauge.
+    #[error("the digit estimator needs strain gauges; the layout has a {kind} sensor")]
+    NotAGauge {
+        /// What the sensor measures.
+        kind: SensorKind,
+    },
+    /// A gauge whose noise is not given.
+    #[error(
+        "gauge {gauge} has neither noise nor resolution; the digit estimator weighs gauges by their noise: give `noise` in [sensors]"
+    )]
+    NoNoise {
+        /// Which, from 1.
+        gauge: usize,
+    },
+    /// Too few gauges for what is to be found.
+    #[error(
+        "the digit estimator needs at least {needed} living gauges ({}); the layout has {found}",
+        if *needed == 1 { "the force is known" } else { "the force is unknown" }
+    )]
+    TooFewGauges {
+        /// Unknowns: 1 for the position, and 1 for a force that is unknown.
+        needed: usize,
+        /// Gauges that are not dead.
+        found: usize,
+    },
+    /// A known force that bends the digit further than its model goes.
+    #[error(
+        "the force is {force_n} N; a contact at the tip bears at most {most_n} N, a load F·l²/(E·I) of {}",
+        Digit::MOST_LOAD
+    )]
+    TooMuchForce {
+        /// The force, in newtons.
+        force_n: f64,
+        /// The largest, in newtons.
+        most_n: f64,
+    },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Fit for DigitEstimator {
+    type Method = DigitLocator;
+    type Error = DigitFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<DigitLocator, DigitFitError> {
+        locator(task.setup, self.theory)
+    }
+}
+
+fn locator(setup: &Setup, theory: DigitTheory) -> Result<DigitLocator, DigitFitError> {
+    let SurfaceSpec::Digit(digit) = setup.surface else { return Err(DigitFitError::NotADigit) };
+    if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
+        return Err(DigitFitError::NotAGauge { kind });
+    }
+    let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n: setup.force_n, theory };
+    if let Some(i) = locator.gauge_without_noise() {
+        return Err(DigitFitError::NoNoise { gauge: i + 1 });
+    }
+    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.living());
+    if found < needed {
+        return Err(DigitFitError::TooFewGauges { needed, found });
+    }
+    let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
+    match setup.force_n {
+        Some(force_n) if force_n > most_n => Err(DigitFitError::TooMuchForce { force_n, most_n }),
+        _ => Ok(locator),
+    }
+}
+
+/// A reading that noise gives as rarely as this has another cause.
+const RARE: f64 = 1e-3;
+/// Explanations whose probabilities sum to less than this are not spoken of.
+const NEGLIGIBLE: f64 = 0.05;
+/// Where one gauge sees a contact alone, an interval wider than this share of the length is no place.
+const WIDE: f64 = 0.01;
+
+/// A digit's estimator that locates; see [`DigitEstimator`](super::DigitEstimator).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DigitLocator {
+    /// The finger.
+    pub digit: Digit,
+    /// Its gauges.
+    pub layout: Layout,
+    /// The contact's force in newtons, where it is known.
+    pub force_n: Option<f64>,
+    /// What the gauges read.
+    pub theory: DigitTheory,
+}
+
+impl DigitLocator {
+    /// The shape of the finger at an estimated contact, at `steps` + 1 points from clamp to tip.
+    pub fn shape(&self, contact: &ContactEstimate, steps: usize) -> DigitShape {
+        DigitShape::new(&self.digit, contact, steps)
+    }
+
+    /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
+    pub fn leave_out(&mut self, gauge: usize) -> bool {
+        let needed = 1 + usize::from(self.force_n.is_none());
+        let Some(sensor) = self.layout.sensors.get_mut(gauge) else { return false };
+        let was_dead = std::mem::replace(&mut sensor.channel.dead, true);
+        if self.living() < needed {
+            self.layout.sensors[gauge].channel.dead = was_dead;
+            return false;
+        }
+        true
+    }
+
+    /// Gauges that are not dead.
+    fn living(&self) -> usize {
+        self.layout.sensors.iter().filter(|sensor| !sensor.channel.dead).count()
+    }
+
+    /// The first living gauge without noise and resolution.
+    fn gauge_without_noise(&self) -> Option<usize> {
+        let clean = |sd: f64| !(sd > 0.0 && sd.is_finite());
+        self.layout
+            .sensors
+            .iter()
+            .position(|sensor| !sensor.channel.dead && clean(sensor.channel.reading_sd()))
+    }
+
+    fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
+        let explained = posterior.keep_explanations(chi_squared_bound(RARE, freedom.max(1)));
+        let Some(best) = posterior.pieces.first() else {
+            return Estimate::of_position(Position::default(), Status::OutsideModel);
+        };
+        let length_m = self.digit.length_m;
+        let quantile_m = |share: f64| posterior.quantile_m(share, length_m);
+        let ends = (quantile_m(0.025), quantile_m(0.975));
+        let mut estimate = Estimate::of_contact(contact(best, ends), Status::Located);
+        if !explained {
+            estimate.status = Status::OutsideModel;
+            return estimate;
+        }
+        let others: Vec<&Piece> =
+            posterior.pieces[1..].iter().filter(|piece| are_apart(best, piece)).collect();
+        let elsewhere: f64 = others.iter().map(|piece| piece.probability).sum();
+        if elsewhere > NEGLIGIBLE || (best.is_curve() && ends.1 - ends.0 > WIDE * length_m) {
+            estimate.status = Status::Ambiguous;
+            for other in others.into_iter().filter(|other| other.probability > 0.1 * NEGLIGIBLE) {
+                let sd_m = other.covariance[0].sqrt();
+                let ends = held_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
+                if !estimate
+                    .modes
+                    .push(Mode { contact: contact(other, ends), probability: other.probability })
+                {
+                    break;
+                }
+            }
+        }
+        estimate
+    }
+}
+
+/// Whether two pieces are two places, not the two sides of a gauge.
+fn are_apart(a: &Piece, b: &Piece) -> bool {
+    let reach_m = 3.0 * (a.covariance[0].sqrt() + b.covariance[0].sqrt());
+    (a.best.position_m - b.best.position_m).abs() > reach_m
+}
+
+fn contact(piece: &Piece, x_95_m: (f64, f64)) -> ContactEstimate {
+    let [xx, xf, ff] = piece.covariance;
+    let uncertainty = Uncertainty { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
+    ContactEstimate {
+        position: Position::along(piece.best.position_m),
+        force_n: Some(piece.best.force_n),
+        uncertainty: Some(uncertainty),
+    }
+}
+
+impl Locate for DigitLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let gauges = gauges(&self.layout, reading);
+        let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
+        let none_saturated = gauges.len() == self.living();
+        if none_saturated && size <= chi_squared_bound(RARE, gauges.len().max(1)) {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        }
+        let likelihood =
+            Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
+        let unknowns = 1 + usize::from(self.force_n.is_none());
+        self.estimate(Posterior::new(&likelihood), gauges.len().saturating_sub(unknowns))
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("gauges", setup.layout.len(), self.layout.len())?;
+        let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
+        LocatorFault::check_count("sensors that are no gauges", 0, others)?;
+        let Digit { length_m, width_m, thickness_m, youngs_modulus_pa, .. } = self.digit;
+        let sizes = [length_m, width_m, thickness_m, youngs_modulus_pa, self.digit.characteristic_force_n()];
+        LocatorFault::check_numbers("digit", sizes, |x| x > 0.0, "a number greater than 0")?;
+        let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
+        let on_digit = |x: f64| self.digit.contains(Position::along(x));
+        LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
+        let noise = self
+            .layout
+            .sensors
+            .iter()
+            .filter(|sensor| !sensor.channel.dead)
+            .map(|sensor| sensor.channel.reading_sd());
+        LocatorFault::check_numbers("gauge noise", noise, |sd| sd > 0.0, "a number greater than 0")?;
+        LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
+        let (needed, found) = (1 + usize::from(self.force_n.is_none()), self.living());
+        if found < needed {
+            return Err(LocatorFault::Count { what: "living gauges", needed, found });
+        }
+        Ok(())
+    }
+}
+
+/// Pieces whose |r|² is larger than the least by this have no weight: e⁻³⁰.
+const HOPELESS: f64 = 60.0;
+/// Points of a curve of contacts that explain a reading alike.
+const CURVE_POINTS: usize = 96;
+
+/// The posterior of position and force. Before the reading it is flat over the position and over the logarithm of the force:
+/// a contact anywhere, and of any order of magnitude.
+struct Posterior {
+    /// Most probable first.
+    pieces: Vec<Piece>,
+}
+
+/// The posterior on one stretch.
+#[derive(Clone, Debug)]
+struct Piece {
+    /// The most likely contact; of a curve, its median.
+    best: Guess,
+    /// |r|² there.
+    chi_squared: f64,
+    /// Covariance of position and force: xx, xf, ff.
+    covariance: [f64; 3],
+    /// Its share of the posterior probability.
+    probability: f64,
+    log_weight: f64,
+    spread: Spread,
+}
+
+/// How the position is distributed over a stretch.
+#[derive(Clone, Debug)]
+enum Spread {
+    /// Normally, but cut off at the ends of the stretch.
+    Normal { centre_m: f64, sd_m: f64, from_m: f64, to_m: f64 },
+    /// At the best position, as the piece is cut off far out in its tail.
+    Point,
+    /// Along a curve: equal steps from one position to another, and the share of the probability up to the end of each.
+    Curve { from_m: f64, to_m: f64, shares: Vec<f64> },
+}
+
+impl Posterior {
+    /// The posterior of a reading; without pieces where no contact explains any of it.
+    fn new(likelihood: &Likelihood) -> Self {
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut least = f64::INFINITY;
+        // From the tip on, as gauges that must read nothing rule out stretches nearer to the clamp.
+        for stretch in stretches(likelihood.gauges, likelihood.digit.length_m).into_iter().rev() {
+            if likelihood.least_chi_squared(stretch) > least + HOPELESS {
+                continue;
+            }
+            let alone = stretch.seeing == 1 && likelihood.force_n.is_none();
+            let piece = if alone { curve(likelihood, stretch) } else { normal(likelihood, stretch) };
+            if let Some(piece) = piece {
+                least = least.min(piece.chi_squared);
+                pieces.push(piece);
+            }
+        }
+        pieces.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        let mut posterior = Self { pieces };
+        posterior.normalise();
+        posterior
+    }
+
+    /// Drops pieces whose best contact leaves an |r|² of more than `most`, unless all do; says whether any is left that does not.
+    fn keep_explanations(&mut self, most: f64) -> bool {
+        let explains = |piece: &Piece| piece.chi_squared <= most;
+        let any = self.pieces.iter().any(explains);
+        if any {
+            self.pieces.retain(explains);
+            self.normalise();
+        }
+        any
+    }
+
+    fn normalise(&mut self) {
+        let most = self.pieces.iter().map(|piece| piece.log_weight).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = self.pieces.iter().map(|piece| (piece.log_weight - most).exp()).sum();
+        for piece in &mut self.pieces {
+            piece.probability = (piece.log_weight - most).exp() / total;
+        }
+    }
+
+    /// The position below which the contact lies with probability `share`, by bisection.
+    fn quantile_m(&self, share: f64, length_m: f64) -> f64 {
+        let below =
+            |at_m: f64| self.pieces.iter().map(|piece| piece.probability * piece.below(at_m)).sum::<f64>();
+        bisect((0.0, length_m), 30, |at_m| below(at_m) < share)
+    }
+}
+
+impl Piece {
+    /// Whether one gauge alone saw the contact, so that a curve of contacts explains the reading alike.
+    fn is_curve(&self) -> bool {
+        matches!(self.spread, Spread::Curve { .. })
+    }
+
+    /// The probability that the contact lies below `at_m`, given this stretch.
+    fn below(&self, at_m: f64) -> f64 {
+        match &self.spread {
+            Spread::Normal { centre_m, sd_m, from_m, to_m } => {
+                let mass = |to_m: f64| normal_mass((from_m - centre_m) / sd_m, (to_m - centre_m) / sd_m);
+                if at_m <= *from_m { 0.0 } else { mass(at_m.min(*to_m)) / mass(*to_m) }
+            }
+            Spread::Point => f64::from(at_m >= self.best.position_m),
+            Spread::Curve { from_m, to_m, shares } => {
+                let steps = shares.len() as f64 * (at_m - from_m) / (to_m - from_m);
+                if steps <= 0.0 {
+                    return 0.0;
+                }
+                let step = (steps as usize).min(shares.len() - 1);
+                let before = if step == 0 { 0.0 } else { shares[step - 1] };
+                before + (steps - step as f64).min(1.0) * (shares[step] - before)
+            }
+        }
+    }
+}
+
+/// Φ(high) − Φ(low), with its digits also far out in the upper tail.
+fn normal_mass(low: f64, high: f64) -> f64 {
+    if low > 0.0 {
+        normal_distribution(-low) - normal_distribution(-high)
+    } else {
+        normal_distribution(high) - normal_distribution(low)
+    }
+}
+
+/// The piece around the most likely contact on a stretch: |r|² is a parabola about the end of the next Gauss–Newton step, which
+/// may lie beyond the stretch. By Laplace's method its weight is the volume beneath, as far as it is on the stretch.
+fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
+    let known = likelihood.force_n.is_some();
+    let (best, sums) = search(likelihood, stretch);
+    let factors = sums.factors(known)?;
+    let [along_m, _] = factors.solve(sums.score);
+    let [[xx, xf], [_, ff]] = factors.inverse();
+    let (centre_m, sd_m) = (best.position_m + along_m, xx.sqrt());
+    let mass = normal_mass((stretch.from_m - centre_m) / sd_m, (stretch.to_m - centre_m) / sd_m);
+    let volume = match likelihood.force_n {
+        Some(_) => (TAU * xx).sqrt(),
+        None => TAU / factors.determinant().sqrt() / best.force_n,
+    };
+    let gained = factors.quadratic(sums.score);
+    let (log_weight, spread) = if mass > 0.0 {
+        let spread = Spread::Normal { centre_m, sd_m, from_m: stretch.from_m, to_m: stretch.to_m };
+        (-0.5 * (sums.chi_squared - gained) + (volume * mass).ln(), spread)
+    } else {
+        (-0.5 * sums.chi_squared + volume.ln(), Spread::Point)
+    };
+    log_weight.is_finite().then_some(Piece {
+        best,
+        chi_squared: sums.chi_squared,
+        covariance: [xx, xf, ff],
+        probability: 0.0,
+        log_weight,
+        spread,
+    })
+}
+
+/// The piece of a stretch that one gauge alone sees, for an unknown force: at every position some force explains the moment.
+/// A position weighs as much as the logarithm of its force is uncertain.
+fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
+    let points = curve_points(likelihood, stretch);
+    let most = points.iter().map(|point| point.log_weight).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = points.iter().map(|point| (point.log_weight - most).exp()).sum();
+    if !total.is_finite() {
+        return None;
+    }
+    let weight = |point: &CurvePoint| (point.log_weight - most).exp() / total;
+    let shares: Vec<f64> = points
+        .iter()
+        .scan(0.0, |up_to, point| {
+            *up_to += weight(point);
+            Some(*up_to)
+        })
+        .collect();
+    let median = &points[shares.iter().position(|share| *share >= 0.5)?];
+    let mean =
+        |of: &dyn Fn(&CurvePoint) -> f64| points.iter().map(|point| weight(point) * of(point)).sum::<f64>();
+    let (mean_m, mean_n) = (mean(&|point| point.guess.position_m), mean(&|point| point.guess.force_n));
+    let off_m = |point: &CurvePoint| point.guess.position_m - mean_m;
+    let off_n = |point: &CurvePoint| point.guess.force_n - mean_n;
+    let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
+    Some(Piece {
+        best: median.guess,
+        chi_squared: median.chi_squared,
+        covariance: [
+            mean(&|point| off_m(point).powi(2)) + step_m * step_m / 12.0,
+            mean(&|point| off_m(point) * off_n(point)),
+            mean(&|point| off_n(point).powi(2) + point.force_variance),
+        ],
+        probability: 0.0,
+        log_weight: most + total.ln(),
+        spread: Spread::Curve { from_m: stretch.from_m, to_m: stretch.to_m, shares },
+    })
+}
+
+/// A contact of a curve, which stands for its step of the way along the stretch.
+struct CurvePoint {
+    guess: Guess,
+    chi_squared: f64,
+    /// Of the force, at this position.
+    force_variance: f64,
+    log_weight: f64,
+}
+
+/// The best force at each position, from clamp to tip. The search begins at the far end, where the force is small, and each force
+/// begins the search for the next.
+fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
+    let step_m = (stretch.to_m - stretch.from_m) / CURVE_POINTS as f64;
+    let mut force_n = likelihood.linear_force_n(stretch.to_m, stretch);
+    let mut point = |i: usize| {
+        let position_m = stretch.from_m + (i as f64 + 0.5) * step_m;
+        let start_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
+        let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: start_n });
+        force_n = guess.force_n;
+        let force_variance = 1.0 / sums.information[1][1];
+        let volume = (TAU * force_variance).sqrt() / guess.force_n * step_m;
+        let log_weight = -0.5 * sums.chi_squared + volume.ln();
+        CurvePoint { guess, chi_squared: sums.chi_squared, force_variance, log_weight }
+    };
+    let mut points: Vec<CurvePoint> = (0..CURVE_POINTS).rev().map(&mut point).collect();
+    points.reverse();
+    points
+}
+
+/// A gauge that reads within its range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Gauge {
+    at_m: f64,
+    /// Standard deviation of its noise and quantisation: √(σ² + step²/12).
+    sd: f64,
+    /// Its reading, a strain.
+    strain: f64,
+}
+
+/// Contacts that the same gauges see: the first `seeing` of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stretch {
+    seeing: usize,
+    from_m: f64,
+    to_m: f64,
+}
+
+/// The gauges of a reading from clamp to tip, without dead and saturated ones.
+fn gauges(layout: &Layout, reading: &[f64]) -> Vec<Gauge> {
+    let inside = |(sensor, strain): &(&Sensor, f64)| {
+        !sensor.channel.dead && sensor.channel.range.is_none_or(|(low, high)| low < *strain && *strain < high)
+    };
+    let gauge = |(sensor, strain): (&Sensor, f64)| Gauge {
+        at_m: sensor.position.x_m,
+        sd: sensor.channel.reading_sd(),
+        strain,
+    };
+    let mut gauges: Vec<Gauge> =
+        layout.sensors.iter().zip(reading.iter().copied()).filter(inside).map(gauge).collect();
+    gauges.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
+    gauges
+}
+
+/// The stretches on which at least one gauge sees a contact, from clamp to tip.
+fn stretches(gauges: &[Gauge], length_m: f64) -> Vec<Stretch> {
+    let end = |i: usize| gauges.get(i).map_or(length_m, |gauge| gauge.at_m);
+    let stretch = |i: usize| Stretch { seeing: i + 1, from_m: gauges[i].at_m, to_m: end(i + 1) };
+    // Gauges at one place have no stretch between them.
+    (0..gauges.len()).map(stretch).filter(|it| it.to_m - it.from_m > 1e-9 * length_m).collect()
+}
+
+/// A reading of a digit, to be explained.
+#[derive(Clone, Copy)]
+struct Likelihood<'a> {
+    digit: &'a Digit,
+    theory: DigitTheory,
+    gauges: &'a [Gauge],
+    /// The force in newtons, where it is known.
+    force_n: Option<f64>,
+}
+
+/// A contact that is tried: position along the digit in metres, and force in newtons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Guess {
+    position_m: f64,
+    force_n: f64,
+}
+
+/// The sums over the gauges, whitened: residual r, Jacobian J of the model by position and force.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    /// |r|².
+    chi_squared: f64,
+    /// Jᵀ·r.
+    score: [f64; 2],
+    /// JᵀJ, the Fisher information.
+    information: Matrix<2>,
+}
+
+impl Likelihood<'_> {
+    /// The largest force that is looked for at a position.
+    fn most_force_n(&self, position_m: f64) -> f64 {
+        Digit::MOST_LOAD * self.digit.bending_stiffness() / (position_m * position_m)
+    }
+
+    /// |r|² of the gauges that see nothing of a contact on a stretch: no contact there does better.
+    fn least_chi_squared(&self, stretch: Stretch) -> f64 {
+        self.gauges[stretch.seeing..].iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum()
+    }
+
+    /// The sums at a guess on a stretch.
+    fn at(&self, guess: Guess, stretch: Stretch) -> Sums {
+        let Guess { position_m, force_n } = guess;
+        let bent = match self.theory {
+            DigitTheory::Exact => {
+                Some(self.digit.shape(Contact { position: Position::along(position_m), force_n }))
+            }
+            DigitTheory::Linear => None,
+        };
+        let stiffness = self.digit.bending_stiffness();
+        let mut sums = Sums { chi_squared: self.least_chi_squared(stretch), ..Sums::default() };
+        for gauge in &self.gauges[..stretch.seeing] {
+            let (curvature, [by_position, by_force]) = match &bent {
+                Some(shape) => (shape.curvature(gauge.at_m), shape.curvature_gradient(gauge.at_m)),
+                None => {
+                    let lever_m = position_m - gauge.at_m;
+                    (force_n * lever_m / stiffness, [force_n / stiffness, lever_m / stiffness])
+                }
+            };
+            let scale = self.digit.strain_per_curvature_m() / gauge.sd;
+            sums.add(gauge.strain / gauge.sd - scale * curvature, scale * by_position, scale * by_force);
+        }
+        if self.force_n.is_some() {
+            sums.score[1] = 0.0;
+            sums.information = [[sums.information[0][0], 0.0], [0.0, 0.0]];
+        }
+        sums
+    }
+
+    /// The force by which the linear theory explains the reading best at a position: where a search begins.
+    fn linear_force_n(&self, position_m: f64, stretch: Stretch) -> f64 {
+        let scale = self.digit.strain_per_curvature_m() / self.digit.bending_stiffness();
+        let (mut n, mut d) = (0.0, 0.0);
+        for gauge in &self.gauges[..stretch.seeing] {
+            let by_force = scale * (position_m - gauge.at_m) / gauge.sd;
+            n += by_force * gauge.strain / gauge.sd;
+            d += by_force * by_force;
+        }
+        if d > 0.0 { n / d } else { 0.0 }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, residual: f64, by_position: f64, by_force: f64) {
+        self.chi_squared += residual * residual;
+        self.score[0] += by_position * residual;
+        self.score[1] += by_force * residual;
+        add_outer(&mut self.information, 1.0, &[by_position, by_force]);
+    }
+
+    /// The factors of JᵀJ, whose inverse is the covariance of position and force; without the force where it is known.
+    /// `None` where the reading does not tell them.
+    fn factors(&self, force_known: bool) -> Option<Ldl<2>> {
+        Ldl::of_free(&self.information, [true, !force_known])
+    }
+
+    /// The Gauss–Newton step (JᵀJ)⁻¹·Jᵀr of position and force.
+    fn step(&self, force_known: bool) -> Option<[f64; 2]> {
+        Some(self.factors(force_known)?.solve(self.score))
+    }
+
+    /// The step of the force alone.
+    fn force_step(&self) -> f64 {
+        let [_, [_, ff]] = self.information;
+        if ff > 0.0 { self.score[1] / ff } else { 0.0 }
+    }
+}
+
+/// Where on a stretch the search starts, as shares of it.
+const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
+/// What the linear theory's force is multiplied by at a start: a finger that bends far has shorter levers.
+const START_FORCES: [f64; 6] = [1.0, 1.4, 2.0, 3.0, 5.0, 8.0];
+/// Steps that are tried; from a start five to ten reach the last digits.
+const MOST_STEPS: usize = 60;
+/// A step of this share of its parameter is the last one.
+const LAST_STEP: f64 = 1e-10;
+/// A step that is halved more often than this gains nothing.
+const MOST_HALVINGS: usize = 30;
+
+/// The best contact on a stretch: the lowest of the minima that are reached from the best force at each start.
+fn search(likelihood: &Likelihood, stretch: Stretch) -> (Guess, Sums) {
+    let reached = START_SHARES.map(|share| {
+        let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
+        refine(likelihood, stretch, start(likelihood, stretch, position_m))
+    });
+    let [first, rest @ ..] = reached;
+    rest.into_iter()
+        .fold(first, |best, next| if next.1.chi_squared < best.1.chi_squared { next } else { best })
+}
+
+/// The best of a few forces at a position.
+fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
+    let linear_n = likelihood.linear_force_n(position_m, stretch);
+    let guess = |factor: f64| within(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
+    let chi_squared = |guess: Guess| likelihood.at(guess, stretch).chi_squared;
+    let better = |best: Guess, next: Guess| if chi_squared(next) < chi_squared(best) { next } else { best };
+    START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
+}
+
+/// Goes from a guess to the nearest minimum of |r|² on the stretch.
+fn refine(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
+    let mut best = (start, likelihood.at(start, stretch));
+    for _ in 0..MOST_STEPS {
+        let step = step(likelihood, stretch, best);
+        let Some(next) = descend(likelihood, stretch, best, step) else { break };
+        let moved = (next.0.position_m - best.0.position_m).abs() / stretch.to_m
+            + (next.0.force_n - best.0.force_n).abs() / next.0.force_n.max(f64::MIN_POSITIVE);
+        best = next;
+        if moved < LAST_STEP {
+            break;
+        }
+    }
+    best
+}
+
+/// The best force at a position that is held.
+fn refine_force(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
+    let mut best = (start, likelihood.at(start, stretch));
+    for _ in 0..MOST_STEPS {
+        let step = [0.0, best.1.force_step()];
+        let Some(next) = descend(likelihood, stretch, best, step) else { break };
+        let moved = (next.0.force_n - best.0.force_n).abs();
+        best = next;
+        if moved < LAST_STEP * best.0.force_n {
+            break;
+        }
+    }
+    best
+}
+
+/// The Gauss–Newton step, up to the end of the stretch; at an end that it would leave, the step of the force alone.
+fn step(likelihood: &Likelihood, stretch: Stretch, (guess, sums): (Guess, Sums)) -> [f64; 2] {
+    let Some([along_m, harder_n]) = sums.step(likelihood.force_n.is_some()) else {
+        return [0.0, sums.force_step()];
+    };
+    let room_m =
+        if along_m > 0.0 { stretch.to_m - guess.position_m } else { stretch.from_m - guess.position_m };
+    if room_m.abs() <= 1e-12 * stretch.to_m {
+        return [0.0, sums.force_step()];
+    }
+    let share = (room_m / along_m).min(1.0);
+    if along_m == 0.0 { [0.0, harder_n] } else { [share * along_m, share * harder_n] }
+}
+
+/// The longest of the step, its half, its quarter and so on that makes |r|² smaller.
+fn descend(
+    likelihood: &Likelihood,
+    stretch: Stretch,
+    (guess, sums): (Guess, Sums),
+    [along_m, harder_n]: [f64; 2],
+) -> Option<(Guess, Sums)> {
+    let mut share = 1.0;
+    for _ in 0..MOST_HALVINGS {
+        let moved = Guess {
+            position_m: guess.position_m + share * along_m,
+            force_n: guess.force_n + share * harder_n,
+        };
+        let next = within(likelihood, moved, stretch);
+        let there = likelihood.at(next, stretch);
+        if there.chi_squared < sums.chi_squared {
+            return Some((next, there));
+        }
+        share *= 0.5;
+    }
+    None
+}
+
+/// The guess, held on the stretch and to forces that push and that the model covers.
+fn within(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
+    let position_m = guess.position_m.max(stretch.from_m).min(stretch.to_m);
+    let force_n = likelihood.force_n.unwrap_or_else(|| {
+        let most_n = likelihood.most_force_n(position_m);
+        guess.force_n.max(1e-9 * most_n).min(most_n)
+    });
+    Guess { position_m, force_n }
+}
 
 #[cfg(test)]
 mod tests;

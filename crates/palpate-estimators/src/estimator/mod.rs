@@ -1,28 +1,567 @@
 //! Where methods meet: whoever evaluates, studies, reports or listens treats every estimator alike.
 
-mod choice;
-mod config;
-mod error;
-mod fitting;
-mod load_sensors;
-mod locator;
 mod locator_file;
 mod settings;
-mod tracking;
 
-pub use crate::fit::LocatorProvenance;
-pub use crate::fit::ReadingError;
+pub use crate::fit::{LocatorProvenance, ReadingError};
 pub use crate::load_profile::{
     Cells, CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler,
     Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
-pub use choice::{CHOICE_FOLDS, Choice, Comparison, choose, contenders};
-pub use config::Estimator;
-pub use error::FitError;
-pub use load_sensors::setup_load_sensors;
-pub use locator::{LeaveOutError, Locator, Method};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 pub use settings::Setting;
-pub use tracking::{NotTrackable, Tracking};
+
+use std::sync::Arc;
+
+use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
+use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
+use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
+use crate::evaluation::{EvaluationError, Trial, Tried, try_estimator};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, SeedQueue};
+use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
+use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
+use crate::likelihood::Likelihood;
+use crate::load_profile::LoadChannel;
+use crate::neighbours::{Neighbours, NeighboursFitError, NeighboursLocator};
+use crate::network::{
+    LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
+    NetworkLocator, TrainingOutcome,
+};
+use crate::setup::Setup;
+
+use palpate_mechanics::surface::SurfaceSpec;
+use palpate_numerics::watch::Cancelled;
+
+/// A configured method; fitting it to a recording gives a locator.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Estimator {
+    /// The founding paper's network (`kind = "network"`).
+    Network(Network),
+    /// Networks trained by Levenberg–Marquardt with Bayesian regularisation (`kind = "network-lm"`).
+    NetworkLm(LevenbergMarquardt),
+    /// Influence functions, inverted (`kind = "influence"`).
+    Influence(Influence),
+    /// Gaussian-process regression of the position (`kind = "gaussian-process"`).
+    GaussianProcess(GaussianProcessEstimator),
+    /// The beam's own equations (`kind = "closed-form"`).
+    ClosedForm(ClosedForm),
+    /// The bending finger's own equations (`kind = "digit"`).
+    Digit(DigitEstimator),
+    /// Nearest neighbours (`kind = "neighbours"`).
+    Neighbours(Neighbours),
+    /// The calibrated centroid of array sensors (`kind = "centroid"`).
+    Centroid(Centroid),
+    /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
+    Auto,
+}
+
+impl Estimator {
+    /// Every `kind` that a rig can name.
+    pub const KINDS: &'static [&'static str] = &[
+        "network",
+        "network-lm",
+        "influence",
+        "gaussian-process",
+        "closed-form",
+        "digit",
+        "neighbours",
+        "centroid",
+        "auto",
+    ];
+
+    /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
+    pub fn contenders(setup: &Setup) -> Vec<Self> {
+        let mut contenders = vec![
+            Self::Influence(Influence::default()),
+            Self::GaussianProcess(GaussianProcessEstimator::default()),
+        ];
+        if matches!(setup.surface, SurfaceSpec::Beam(_)) {
+            contenders.push(Self::ClosedForm(ClosedForm));
+        }
+        if matches!(setup.surface, SurfaceSpec::Digit(_)) {
+            contenders.insert(0, Self::Digit(DigitEstimator::default()));
+        }
+        contenders.extend([
+            Self::Neighbours(Neighbours::default()),
+            Self::Centroid(Centroid),
+            Self::NetworkLm(LevenbergMarquardt::default()),
+            Self::Network(Network::default()),
+        ]);
+        contenders
+    }
+
+    /// A digit's estimator by the linear theory of bending, to be compared with.
+    pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator { theory: DigitTheory::Linear });
+
+    /// Distinct contact positions that a recording must have for fitting.
+    pub fn positions_needed(&self) -> usize {
+        match self {
+            Self::ClosedForm(_) | Self::Digit(_) => 1,
+            _ => 2,
+        }
+    }
+
+    /// The most often that one fit asks whether to go on.
+    pub fn most_rounds(&self) -> u64 {
+        match self {
+            Self::Network(config) => u64::from(config.training.max_epochs),
+            _ => 1,
+        }
+    }
+
+    /// The `kind` under which a rig names this estimator.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Network(_) => "network",
+            Self::NetworkLm(_) => "network-lm",
+            Self::Influence(_) => "influence",
+            Self::GaussianProcess(_) => "gaussian-process",
+            Self::ClosedForm(_) => "closed-form",
+            Self::Digit(_) => "digit",
+            Self::Neighbours(_) => "neighbours",
+            Self::Centroid(_) => "centroid",
+            Self::Auto => "auto",
+        }
+    }
+}
+
+impl Default for Estimator {
+    fn default() -> Self {
+        Self::Network(Network::default())
+    }
+}
+
+/// Why an estimator cannot be fitted to a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+    /// The network's reason.
+    #[error(transparent)]
+    Network(#[from] NetworkFitError),
+    /// The Levenberg–Marquardt networks' reason.
+    #[error(transparent)]
+    NetworkLm(#[from] LevenbergMarquardtFitError),
+    /// The influence estimator's reason.
+    #[error(transparent)]
+    Influence(#[from] InfluenceFitError),
+    /// The Gaussian process's reason.
+    #[error(transparent)]
+    GaussianProcess(#[from] GaussianProcessError),
+    /// The closed form's reason.
+    #[error(transparent)]
+    ClosedForm(#[from] ClosedFormFitError),
+    /// The digit estimator's reason.
+    #[error(transparent)]
+    Digit(#[from] DigitFitError),
+    /// The nearest neighbours' reason.
+    #[error(transparent)]
+    Neighbours(#[from] NeighboursFitError),
+    /// The centroid's reason.
+    #[error(transparent)]
+    Centroid(#[from] CentroidFitError),
+    /// No estimator suits the recording; the last one's complaint.
+    #[error("no estimator suits the recording: {0}")]
+    Choice(Box<EvaluationError<FitError>>),
+}
+
+impl Fit for Estimator {
+    type Method = Method;
+    type Error = FitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
+        Ok(match self {
+            Self::Network(network) => network.fit_method(task)?.into(),
+            Self::NetworkLm(networks) => networks.fit_method(task)?.into(),
+            Self::Influence(influence) => influence.fit_method(task)?.into(),
+            Self::GaussianProcess(process) => process.fit_method(task)?.into(),
+            Self::ClosedForm(form) => form.fit_method(task)?.into(),
+            Self::Digit(digit) => digit.fit_method(task)?.into(),
+            Self::Neighbours(neighbours) => neighbours.fit_method(task)?.into(),
+            Self::Centroid(centroid) => centroid.fit_method(task)?.into(),
+            Self::Auto => choose(task)?.best.fit_method(task)?,
+        })
+    }
+
+    fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Method>) -> Result<(), FitError> {
+        match self {
+            Self::Network(network) => many(network, task, queue),
+            Self::NetworkLm(networks) => many(networks, task, queue),
+            Self::Influence(influence) => many(influence, task, queue),
+            Self::GaussianProcess(process) => many(process, task, queue),
+            Self::ClosedForm(form) => many(form, task, queue),
+            Self::Digit(digit) => many(digit, task, queue),
+            Self::Neighbours(neighbours) => many(neighbours, task, queue),
+            Self::Centroid(centroid) => many(centroid, task, queue),
+            Self::Auto => choose(task)?.best.fit_many(task, queue),
+        }
+    }
+}
+
+fn many<E: Fit>(estimator: &E, task: FitTask, queue: &mut dyn SeedQueue<Method>) -> Result<(), FitError>
+where
+    Method: From<E::Method>,
+    FitError: From<E::Error>,
+{
+    Ok(estimator.fit_many(task, &mut AnyMethod(queue))?)
+}
+
+/// A queue of any method as a queue of one.
+struct AnyMethod<'a>(&'a mut dyn SeedQueue<Method>);
+
+impl<M> SeedQueue<M> for AnyMethod<'_>
+where
+    Method: From<M>,
+{
+    fn next_seed(&mut self) -> Option<u64> {
+        self.0.next_seed()
+    }
+
+    fn fitted(&mut self, seed: u64, locator: Fitted<M>) {
+        self.0.fitted(seed, locator.map(Method::from));
+    }
+}
+
+/// A locator of any estimator: what files hold.
+pub type Locator = Fitted<Method>;
+
+/// The methods that can locate.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "a program holds one locator, or a few")]
+pub enum Method {
+    /// The founding paper's network.
+    Network(NetworkLocator),
+    /// Networks trained by Levenberg–Marquardt.
+    NetworkLm(LevenbergMarquardtLocator),
+    /// Influence functions, inverted.
+    Influence(InfluenceLocator),
+    /// Gaussian-process regression.
+    GaussianProcess(GaussianProcessLocator),
+    /// The beam's own equations.
+    ClosedForm(ClosedFormLocator),
+    /// The bending finger's own equations.
+    Digit(DigitLocator),
+    /// Nearest neighbours.
+    Neighbours(NeighboursLocator),
+    /// The calibrated centroid.
+    Centroid(CentroidLocator),
+}
+
+macro_rules! methods {
+    ($($variant:ident($method:ty)),* $(,)?) => {
+        $(impl From<$method> for Method {
+            fn from(method: $method) -> Self {
+                Self::$variant(method)
+            }
+        })*
+    };
+}
+
+methods! {
+    Network(NetworkLocator),
+    NetworkLm(LevenbergMarquardtLocator),
+    Influence(InfluenceLocator),
+    GaussianProcess(GaussianProcessLocator),
+    ClosedForm(ClosedFormLocator),
+    Digit(DigitLocator),
+    Neighbours(NeighboursLocator),
+    Centroid(CentroidLocator),
+}
+
+impl Locate for Method {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        self.as_locate().locate(reading)
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.as_locate().check(setup)
+    }
+}
+
+impl Method {
+    fn as_locate(&self) -> &dyn Locate {
+        match self {
+            Self::Network(network) => network,
+            Self::NetworkLm(networks) => networks,
+            Self::Influence(influence) => influence,
+            Self::GaussianProcess(process) => process,
+            Self::ClosedForm(form) => form,
+            Self::Digit(digit) => digit,
+            Self::Neighbours(neighbours) => neighbours,
+            Self::Centroid(centroid) => centroid,
+        }
+    }
+}
+
+impl<M> Fitted<M>
+where
+    Method: From<M>,
+{
+    /// The same locator as one of any estimator.
+    pub fn into_locator(self) -> Locator {
+        self.map(Method::from)
+    }
+}
+
+/// A channel that cannot be left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LeaveOutError {
+    /// There is no such channel.
+    #[error("there is no channel {channel}; the locator has channels 1 to {channels}")]
+    NoChannel {
+        /// Which was named, from 1.
+        channel: usize,
+        /// Channels of the locator.
+        channels: usize,
+    },
+    /// The method cannot do without it.
+    #[error("a locator of kind `{kind}` needs every channel: fit it again without the dead one")]
+    Needed {
+        /// The locator's kind.
+        kind: &'static str,
+    },
+    /// It is the last one.
+    #[error("it is the last living channel; at least 1 must be left")]
+    NoneLeft,
+}
+
+impl Locator {
+    /// The shape that the surface has by an estimate, at `steps` + 1 points; `None` for a method that does not tell it.
+    pub fn shape(&self, estimate: &Estimate, steps: usize) -> Option<DigitShape> {
+        match &self.method {
+            Method::Digit(digit) => Some(digit.shape(&estimate.contact, steps)),
+            _ => None,
+        }
+    }
+
+    /// Leaves a dead channel out of all sums from now on, without fitting again.
+    ///
+    /// # Errors
+    /// [`LeaveOutError`] when there is no such channel, or the method needs it.
+    pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
+        let channels = self.setup.layout.len();
+        if channel >= channels {
+            return Err(LeaveOutError::NoChannel { channel: channel + 1, channels });
+        }
+        let kind = self.kind();
+        match &mut self.method {
+            Method::Influence(influence) => {
+                if matches!(influence, InfluenceLocator::Measured(_)) {
+                    return Err(LeaveOutError::Needed { kind });
+                }
+                if !influence.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
+            Method::Digit(digit) => {
+                if !digit.leave_out(channel) {
+                    return Err(LeaveOutError::NoneLeft);
+                }
+            }
+            _ => return Err(LeaveOutError::Needed { kind }),
+        }
+        self.setup.layout.sensors[channel].channel.dead = true;
+        Ok(())
+    }
+
+    /// The `kind` under which a rig names its estimator.
+    pub fn kind(&self) -> &'static str {
+        match self.method {
+            Method::Network(_) => "network",
+            Method::NetworkLm(_) => "network-lm",
+            Method::Influence(_) => "influence",
+            Method::GaussianProcess(_) => "gaussian-process",
+            Method::ClosedForm(_) => "closed-form",
+            Method::Digit(_) => "digit",
+            Method::Neighbours(_) => "neighbours",
+            Method::Centroid(_) => "centroid",
+        }
+    }
+
+    /// The weights of a network; nothing for another method.
+    pub fn weights(&self) -> &[f64] {
+        match &self.method {
+            Method::Network(network) => &network.parts().weights,
+            _ => &[],
+        }
+    }
+
+    /// How its training ended, where it was trained by epochs.
+    pub fn training_outcome(&self) -> Option<TrainingOutcome> {
+        match &self.method {
+            Method::Network(network) => Some(network.parts().outcome),
+            _ => None,
+        }
+    }
+}
+
+/// How one estimator did over some trials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Its answers to all trials together, and their times.
+    pub tried: Tried,
+}
+
+/// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
+/// where that is of its kind. Networks trained by back-propagation stop after as many presentations as
+/// take some seconds.
+pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator> {
+    const MOST_PRESENTATIONS: usize = 20_000_000;
+    let mut contenders = Estimator::contenders(setup);
+    for contender in &mut contenders {
+        if contender.kind() == own.kind() {
+            *contender = own.clone();
+        }
+        if let Estimator::Network(config) = contender {
+            let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
+            config.training.max_epochs = config.training.max_epochs.min(most);
+        }
+    }
+    contenders
+}
+
+/// What `auto` chose, and the mean error in metres of each estimator in cross-validation, best first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// The estimator with the least mean error.
+    pub best: Estimator,
+    /// Kinds with their mean errors in metres, best first; those that do not suit the recording are left out.
+    pub mean_errors_m: Vec<(&'static str, f64)>,
+}
+
+/// Folds of the cross-validation that chooses.
+pub const CHOICE_FOLDS: usize = 5;
+
+/// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds.
+///
+/// # Errors
+/// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason; and
+/// [`FitError::Cancelled`] when the watch stopped it.
+pub fn choose(task: FitTask) -> Result<Choice, FitError> {
+    let FitTask { setup, recording, seed, watch } = task;
+    let positions = recording.distinct_positions().len();
+    let unsuited = |error| FitError::Choice(Box::new(error));
+    let trials =
+        Trial::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
+    let mut tried = Vec::new();
+    let mut last = None;
+    for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
+        match try_estimator(setup, &estimator, &trials, seed, &|| 0.0, watch) {
+            Ok(one) => {
+                if let Some(summary) = one.evaluation.summary(None) {
+                    tried.push((estimator, summary.average_m));
+                }
+            }
+            Err(error) if Cancelled::caused(&error) => return Err(Cancelled.into()),
+            Err(error) => last = Some(error),
+        }
+    }
+    tried.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mean_errors_m = tried.iter().map(|(estimator, error_m)| (estimator.kind(), *error_m)).collect();
+    match (tried.into_iter().next(), last) {
+        (Some((best, _)), _) => Ok(Choice { best, mean_errors_m }),
+        (None, Some(error)) => Err(unsuited(error)),
+        (None, None) => Err(Cancelled.into()),
+    }
+}
+
+/// The sensors of a bench, by mechanics.
+///
+/// # Errors
+/// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
+pub fn setup_load_sensors(setup: &Setup) -> Result<LoadSensors<'_>, LoadSensorsError> {
+    LoadSensors::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
+}
+
+impl<'a> Profiler<'a> {
+    /// For readings of a setup, by mechanics.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] as for [`setup_load_sensors`].
+    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+        Ok(Self::new(setup_load_sensors(setup)?))
+    }
+}
+
+impl Locator {
+    /// What a spread load reads: by the fitted influence functions of an influence locator, with its offsets and noise, and
+    /// by the mechanics of the bench for any other.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] for a measured surface, a live sensor without noise, or when none is alive.
+    pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
+        match &self.method {
+            Method::Influence(InfluenceLocator::Beam(beam)) => {
+                let channels = beam.channels().map(|channel| {
+                    let (influence, offset, noise_sd) = channel?;
+                    Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
+                });
+                Ok(LoadSensors { extent: self.setup.surface.extent(), channels: channels.collect() })
+            }
+            _ => setup_load_sensors(&self.setup),
+        }
+    }
+}
+
+/// What a tracker needs of a locator.
+pub struct Tracking {
+    likelihood: Box<dyn Likelihood>,
+}
+
+/// A locator by which moving contacts cannot be followed, or not in that way.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotTrackable {
+    /// It cannot say how probable a reading is at a contact.
+    #[error("a moving contact is followed by an influence locator of a surface with a model; this one is of kind `{kind}`{}", if *measured { ", on a measured surface" } else { "" })]
+    Kind {
+        /// The locator's kind.
+        kind: &'static str,
+        /// Whether its surface has no model.
+        measured: bool,
+    },
+    /// The shape in which its surface swings is not known.
+    #[error(
+        "inertia is reckoned with on a beam on two simple supports, whose first mode is half a sine; this surface is held otherwise: follow it in balance, without a natural frequency"
+    )]
+    Mode,
+}
+
+impl Tracking {
+    /// The likelihood to follow contacts by.
+    pub fn likelihood(&self) -> &dyn Likelihood {
+        &*self.likelihood
+    }
+}
+
+impl Locator {
+    /// What a tracker of this configuration needs.
+    ///
+    /// # Errors
+    /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.
+    pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
+        if config.swing.is_some() && !matches!(self.setup.surface, SurfaceSpec::Beam(_)) {
+            return Err(NotTrackable::Mode);
+        }
+        match &self.method {
+            Method::Influence(InfluenceLocator::Beam(beam)) => {
+                Ok(Tracking { likelihood: Box::new(BeamLikelihood::new(beam)) })
+            }
+            Method::Influence(InfluenceLocator::Plane(plane)) => {
+                Ok(Tracking { likelihood: Box::new(PlateLikelihood::new(plane)) })
+            }
+            method => Err(NotTrackable::Kind {
+                kind: self.kind(),
+                measured: matches!(method, Method::Influence(_)),
+            }),
+        }
+    }
+}

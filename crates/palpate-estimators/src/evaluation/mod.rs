@@ -1,23 +1,21 @@
 //! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
 
 mod calibration;
-mod limit_ratio;
-mod statistics;
-mod trial;
 
 pub use calibration::{Calibrated, Calibration};
-pub use limit_ratio::limit_ratio;
 pub use palpate_numerics::{median, percentile};
-pub use statistics::Spread;
-pub use trial::{EvaluationError, Trial, Tried, cross_validate, try_estimator};
 
-use crate::fit::{Fitted, Locate, ReadingError};
+use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
 use crate::load_profile::Cells;
-use crate::recording::Recording;
+use crate::recording::{Fold, Recording, TooFewPositions};
+use crate::setup::Setup;
+use crate::simulate::SimulateError;
 use palpate_core::ContactEstimate;
-use palpate_mechanics::contact::Position;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::Force;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
 
 /// One reading whose contact was known, and where the locator saw it.
@@ -197,6 +195,173 @@ impl Evaluation {
         });
         summaries.collect()
     }
+}
+
+/// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.
+const ENDS: f64 = 1.0 / 80.0;
+/// Where the limit is larger than this share of the length, an estimator cannot reach it: it is a bound for small errors.
+const LARGE_LIMIT: f64 = 1.0 / 200.0;
+/// The same on a plane, whose two directions share the readings.
+const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
+
+/// Mean error over the limit's mean error, for the bench's noise; `None` where there is no limit. Counted are contacts
+/// at least 1/80 of the length from both ends, on a plane also of the width from both sides, where the limit is at most
+/// 1/200 of the length, on a plane 1/20.
+pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
+    let limit = setup.cramer_rao_bound().ok()?;
+    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let extent = setup.surface.extent();
+    let within =
+        |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
+    let is_inner = |at: Position| {
+        within(at.x_m, extent.length_m) && extent.width_m.is_none_or(|width_m| within(at.y_m, width_m))
+    };
+    let large = if extent.is_plane() { LARGE_LIMIT_ON_A_PLANE } else { LARGE_LIMIT };
+    let (mut error_m, mut bound_m) = (0.0, 0.0);
+    for located in &evaluation.located {
+        let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
+        let bound = limit.at(Contact { position: located.truth, force_n }, force);
+        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m) else {
+            continue;
+        };
+        if is_inner(located.truth) {
+            error_m += located.error_m();
+            bound_m += bound.mean_error_m();
+        }
+    }
+    (bound_m > 0.0).then(|| error_m / bound_m)
+}
+
+/// Where a figure lies over many seeds.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// Half of the seeds lie below.
+    pub median: f64,
+    /// One in twenty lies below.
+    pub p05: f64,
+    /// One in twenty lies above.
+    pub p95: f64,
+}
+
+impl Spread {
+    /// The same spread in another unit, of which one of this makes `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
+    }
+
+    /// The spread of some values, in any order; `None` of nothing.
+    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        Some(Self {
+            median: percentile(&values, 50.0)?,
+            p05: percentile(&values, 5.0)?,
+            p95: percentile(&values, 95.0)?,
+        })
+    }
+}
+
+/// A recording to fit, and one to judge by, whose contacts the fit has not seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// What is fitted.
+    pub training: Recording,
+    /// What is judged by.
+    pub judged: Recording,
+}
+
+/// An estimator's answers to some trials together, and the time they took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tried {
+    /// The answers.
+    pub evaluation: Evaluation,
+    /// Mean time of a fit, by the caller's clock.
+    pub fit_seconds: f64,
+    /// Mean time of an estimate in nanoseconds, by the caller's clock.
+    pub locate_ns: f64,
+}
+
+impl Trial {
+    /// A trial a fold of a recording, by position.
+    ///
+    /// # Errors
+    /// [`TooFewPositions`] as for [`Recording::folds`].
+    pub fn by_folds(recording: &Recording, folds: usize) -> Result<Vec<Self>, TooFewPositions> {
+        let folds = recording.folds(folds)?;
+        let trial = |fold: &Fold| Self {
+            training: recording.subset(&fold.training),
+            judged: recording.subset(&fold.held_out),
+        };
+        Ok(folds.iter().map(trial).collect())
+    }
+}
+
+/// Fits an estimator to each trial and locates what the trial judges by. `clock` tells seconds since any fixed moment.
+///
+/// # Errors
+/// [`EvaluationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
+pub fn try_estimator<E: Fit>(
+    setup: &Setup,
+    estimator: &E,
+    trials: &[Trial],
+    seed: u64,
+    clock: &dyn Fn() -> f64,
+    watch: Watch,
+) -> Result<Tried, EvaluationError<E::Error>> {
+    let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m, located: Vec::new() };
+    let (mut fitting_s, mut locating_s) = (0.0, 0.0);
+    for trial in trials {
+        let start = clock();
+        let task = FitTask { setup, recording: &trial.training, seed, watch };
+        let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
+        let fitted = clock();
+        let part = Evaluation::of(&locator, &trial.judged)?;
+        (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
+        evaluation.located.extend(part.located);
+    }
+    let readings = evaluation.located.len().max(1) as f64;
+    Ok(Tried {
+        evaluation,
+        fit_seconds: fitting_s / trials.len().max(1) as f64,
+        locate_ns: locating_s / readings * 1e9,
+    })
+}
+
+/// Why an estimator cannot be evaluated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EvaluationError<E: std::error::Error + 'static> {
+    /// The setup cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Too few positions for the folds.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// The estimator does not fit.
+    #[error(transparent)]
+    Fit(E),
+    /// A reading does not suit the locator.
+    #[error(transparent)]
+    Reading(#[from] ReadingError),
+}
+
+impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for EvaluationError<E> {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Fit(cancelled.into())
+    }
+}
+
+/// Fits an estimator to each fold's training rows and locates the held-out ones; the answers of all folds together. Folds
+/// are by position, see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others
+/// chooses without the held-out rows.
+///
+/// # Errors
+/// [`EvaluationError`] when a fold cannot be fitted, or the watch stopped it.
+pub fn cross_validate<E: Fit>(
+    estimator: &E,
+    task: FitTask,
+    folds: usize,
+) -> Result<Evaluation, EvaluationError<E::Error>> {
+    let trials = Trial::by_folds(task.recording, folds)?;
+    Ok(try_estimator(task.setup, estimator, &trials, task.seed, &|| 0.0, task.watch)?.evaluation)
 }
 
 #[cfg(test)]

@@ -74,3 +74,10 @@ fn errors_are_summed_up_by_cells_stretches_and_shares() {
     close(percentiles[49].1, 2.75e-3);
     close(percentiles[99].1, 5e-3);
 }
+
+#[test]
+fn a_spread_does_not_mind_the_order() {
+    let spread = Spread::of((0..=100).rev().map(f64::from).collect()).unwrap();
+    assert_eq!(spread, Spread { median: 50.0, p05: 5.0, p95: 95.0 });
+    assert_eq!(Spread::of(vec![]), None);
+}

@@ -1,10 +1,9 @@
 //! What an inverse method sees of a reading: its channels, or what of them does not depend on the load.
 
-mod fitted;
-
-pub use fitted::{ChannelScale, Feature, FeatureSource, Features};
-
+use crate::fit::LocatorFault;
+use crate::recording::Recording;
 use crate::setup::Setup;
+use palpate_numerics::mean_and_variance;
 
 /// Which numbers a reading becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -32,6 +31,177 @@ pub struct NoFeatures {
     pub channels: usize,
     /// Its rows.
     pub rows: usize,
+}
+
+/// From a reading to standardized features: (source − centre)/spread, so that each has mean 0 and variance 1 over the
+/// recording. Channels and features that never change over it are left out.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Features {
+    /// Which numbers a reading becomes.
+    pub kind: FeatureKind,
+    /// The channels that are looked at.
+    pub channels: Vec<ChannelScale>,
+    /// ‖r‖ of a reading that is all zeros; greater than 0.
+    pub least_norm: f64,
+    /// The features, in order.
+    pub features: Vec<Feature>,
+}
+
+/// What a channel is divided by before norms are taken, so that channels of different kinds have comparable numbers.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelScale {
+    /// Which channel of a reading, from 0.
+    pub channel: usize,
+    /// Root mean square of all channels of its kind, in their unit; greater than 0.
+    pub divisor: f64,
+}
+
+/// One feature.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Feature {
+    /// What it is made of.
+    pub source: FeatureSource,
+    /// Its mean over the recording.
+    pub centre: f64,
+    /// Its standard deviation over the recording; greater than 0.
+    pub spread: f64,
+}
+
+/// What a feature is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FeatureSource {
+    /// One of [`Features::channels`], from 0: r, or r/‖r‖ where features are load-invariant.
+    Channel(usize),
+    /// ln ‖r‖.
+    LogNorm,
+}
+
+/// A norm below this share of the least in the recording counts as this.
+const LEAST_NORM: f64 = 1e-3;
+/// A spread below this share of the largest magnitude is rounding.
+const ROUNDING: f64 = 1e-12;
+
+impl Features {
+    /// Fixes the features of a recording of finite readings.
+    ///
+    /// # Errors
+    /// [`NoFeatures`] when no channel varies.
+    pub fn fit(kind: FeatureKind, recording: &Recording) -> Result<Self, NoFeatures> {
+        let rows = recording.rows.len();
+        let none = NoFeatures { channels: recording.channels.len(), rows };
+        let channels = channel_scales(recording);
+        let mut features = Self { kind, channels, least_norm: 1.0, features: Vec::new() };
+        let norms = recording.rows.iter().map(|row| features.norm(&row.reading)).filter(|norm| *norm > 0.0);
+        let least = norms.fold(f64::INFINITY, f64::min);
+        if !least.is_finite() {
+            return Err(none);
+        }
+        features.least_norm = LEAST_NORM * least;
+        let channels = (0..features.channels.len()).map(FeatureSource::Channel);
+        let log_norm = (kind == FeatureKind::LoadInvariant).then_some(FeatureSource::LogNorm);
+        let found = channels.chain(log_norm).filter_map(|source| features.standardized(source, recording));
+        features.features = found.collect();
+        if features.features.is_empty() { Err(none) } else { Ok(features) }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.features.len()
+    }
+
+    /// Whether there are none, which fitting never gives.
+    pub fn is_empty(&self) -> bool {
+        self.features.is_empty()
+    }
+
+    /// Writes the features of a reading; `out` is as long as there are features.
+    pub fn apply_into(&self, reading: &[f64], out: &mut [f64]) {
+        let norm = self.norm(reading).max(self.least_norm);
+        for (out, feature) in out.iter_mut().zip(&self.features) {
+            *out = (self.raw(feature.source, reading, norm) - feature.centre) / feature.spread;
+        }
+    }
+
+    /// The features of a reading.
+    pub fn apply(&self, reading: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.len()];
+        self.apply_into(reading, &mut out);
+        out
+    }
+
+    /// Checks what a file may have got wrong, for readings of `channels` channels.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    pub fn check(&self, channels: usize) -> Result<(), LocatorFault> {
+        let positive = |what, numbers: &mut dyn Iterator<Item = f64>| {
+            LocatorFault::check_numbers(what, numbers, |value| value > 0.0, "finite and greater than 0")
+        };
+        positive("least norm", &mut [self.least_norm].into_iter())?;
+        positive("channel divisor", &mut self.channels.iter().map(|scale| scale.divisor))?;
+        positive("feature spread", &mut self.features.iter().map(|feature| feature.spread))?;
+        let centres = self.features.iter().map(|feature| feature.centre);
+        LocatorFault::check_numbers("feature centre", centres, |_| true, "finite")?;
+        let known = self.channels.iter().filter(|scale| scale.channel < channels).count();
+        LocatorFault::check_count("channel scales of known channels", self.channels.len(), known)?;
+        let made = |feature: &&Feature| match feature.source {
+            FeatureSource::Channel(i) => i < self.channels.len(),
+            FeatureSource::LogNorm => self.kind == FeatureKind::LoadInvariant,
+        };
+        let made = self.features.iter().filter(made).count();
+        LocatorFault::check_count("features of known sources", self.features.len().max(1), made)
+    }
+
+    fn norm(&self, reading: &[f64]) -> f64 {
+        let square = |scale: &ChannelScale| (value(reading, scale.channel) / scale.divisor).powi(2);
+        self.channels.iter().map(square).sum::<f64>().sqrt()
+    }
+
+    fn raw(&self, source: FeatureSource, reading: &[f64], norm: f64) -> f64 {
+        let FeatureSource::Channel(i) = source else { return norm.ln() };
+        let ChannelScale { channel, divisor } = self.channels[i];
+        let scaled = value(reading, channel) / divisor;
+        if self.kind == FeatureKind::LoadInvariant { scaled / norm } else { scaled }
+    }
+
+    /// The feature made of `source`, unless it never changes.
+    fn standardized(&self, source: FeatureSource, recording: &Recording) -> Option<Feature> {
+        let raw = |reading: &[f64]| self.raw(source, reading, self.norm(reading).max(self.least_norm));
+        let values: Vec<f64> = recording.rows.iter().map(|row| raw(&row.reading)).collect();
+        let (centre, variance) = mean_and_variance(values.iter().copied());
+        let spread = variance.sqrt();
+        let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+        (spread > ROUNDING * largest && spread.is_finite()).then_some(Feature { source, centre, spread })
+    }
+}
+
+/// The channels that vary, over the root mean square of those of their kind.
+fn channel_scales(recording: &Recording) -> Vec<ChannelScale> {
+    let column = |channel: usize| recording.rows.iter().map(move |row| value(&row.reading, channel));
+    let varies = |channel: &usize| {
+        let (least, most) =
+            column(*channel).fold((f64::MAX, f64::MIN), |(a, b), value| (a.min(value), b.max(value)));
+        most - least > ROUNDING * least.abs().max(most.abs())
+    };
+    let live: Vec<usize> = (0..recording.channels.len()).filter(varies).collect();
+    let kind = |channel: usize| recording.kinds.get(channel);
+    let of_one = |&channel: &usize| {
+        let alike = live.iter().filter(|other| kind(**other) == kind(channel));
+        let (sum, count) = alike
+            .flat_map(|other| column(*other))
+            .fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
+        ChannelScale { channel, divisor: (sum / count).sqrt() }
+    };
+    live.iter().map(of_one).filter(|scale| scale.divisor.is_finite() && scale.divisor > 0.0).collect()
+}
+
+/// A channel's value; 0 for one that is not there.
+fn value(reading: &[f64], channel: usize) -> f64 {
+    reading.get(channel).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

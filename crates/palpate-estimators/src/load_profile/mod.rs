@@ -16,20 +16,565 @@
 //! Computation 4 (1992), for the evidence; Jaynes, *Prior Probabilities*, IEEE Trans. SSC 4 (1968), for the exponential prior.
 
 mod cells;
-mod load_sensors;
-mod non_negative;
-mod patch_limit;
-mod patches;
-mod profile;
-mod resolution;
 mod smoothness;
 
 pub use cells::Cells;
-pub use load_sensors::{LoadChannel, LoadSensors, LoadSensorsError};
-pub use patch_limit::{PatchLimit, patch_limits};
-pub use patches::{PATCH_SHARE, Patch};
-pub use profile::{CentreOfPressure, LoadProfile, Profiler};
-pub use resolution::Resolution;
+
+use ndarray::{Array1, Array2};
+use serde::Serialize;
+use std::sync::Arc;
+
+use crate::fit::ReadingError;
+use palpate_core::Status;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
+use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad};
+use palpate_numerics::{Cholesky, chi_squared_bound, median, normal_interval_95, normal_quantile};
+use smoothness::{Mixture, Problem};
+
+/// One channel of a reading.
+#[derive(Clone)]
+pub struct LoadChannel<'a> {
+    /// What it reads per newton.
+    pub influence: Arc<dyn InfluenceFunction + 'a>,
+    /// What it reads without load, in its SI unit.
+    pub offset: f64,
+    /// Standard deviation of its noise, in its SI unit; greater than 0.
+    pub noise_sd: f64,
+}
+
+/// What a reading is made by: a channel each, or `None` for those that are dead.
+#[derive(Clone)]
+pub struct LoadSensors<'a> {
+    /// The surface.
+    pub extent: Extent,
+    /// Its channels, in the order of a reading.
+    pub channels: Vec<Option<LoadChannel<'a>>>,
+}
+
+/// Why readings cannot become a profile.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LoadSensorsError {
+    /// The surface has no model, and nothing was fitted.
+    #[error(
+        "a measured surface has no influence functions of a spread load; give a surface with a model, such as a beam"
+    )]
+    NoModel,
+    /// A live sensor has no noise, or none is alive.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
+}
+
+impl<'a> LoadSensors<'a> {
+    /// The sensors of `layout` under a surface with a model; the noise of each is √(σ² + q²/12), q being its resolution.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] for a live sensor without noise, or when none is alive.
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LoadSensorsError> {
+        let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
+            let noise_sd = sd?;
+            let influence = surface.influence_function(sensor.kind, sensor.position);
+            Some(LoadChannel { influence, offset: 0.0, noise_sd })
+        };
+        let channels = layout.sensors.iter().zip(layout.reading_sds()?).map(channel).collect();
+        Ok(Self { extent: surface.extent(), channels })
+    }
+
+    /// The channels that live.
+    pub fn alive(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
+        self.channels.iter().flatten()
+    }
+}
+
+/// Readings that noise alone makes this rarely are a contact; those that a load and noise make this rarely are not of the
+/// model.
+const RARE: f64 = 1e-4;
+
+/// Turns readings of one bench into load profiles.
+pub struct Profiler<'a> {
+    sensors: LoadSensors<'a>,
+    cells: Cells,
+    problem: Problem,
+    /// What the misfit of a reading seldom exceeds by noise.
+    worst_misfit: f64,
+}
+
+/// A load, as one reading tells it.
+#[derive(Clone, Debug)]
+pub struct LoadProfile {
+    /// How far it is to be believed: located, no contact, or outside the model, when no load explains the reading within
+    /// its noise.
+    pub status: Status,
+    /// The cells of the surface.
+    pub cells: Cells,
+    /// Force of each cell, in newtons.
+    pub forces_n: Vec<f64>,
+    /// Covariance of the cells' forces, in N².
+    pub covariance_n2: Array2<f64>,
+    /// Their sum, in newtons.
+    pub total_n: f64,
+    /// Standard deviation of the sum.
+    pub total_sd_n: f64,
+    /// Where the whole force acts; `None` without load.
+    pub centre: Option<CentreOfPressure>,
+    /// The patches that carry load, along x.
+    pub patches: Vec<Patch>,
+    /// What each channel would read of this load, in its SI unit; `None` for dead channels.
+    pub fitted: Vec<Option<f64>>,
+    /// Reading less fitted, over the standard deviation of the noise; `None` for dead channels.
+    pub residuals: Vec<Option<f64>>,
+    /// The least sum of squared residuals that any smoothness leaves.
+    pub misfit: f64,
+    /// What it seldom exceeds by noise: once in 10,000 readings, whatever the load.
+    pub worst_misfit: f64,
+    /// λ of the most probable smoothness, in 1/N²; `None` without load.
+    pub smoothness: Option<f64>,
+}
+
+/// Where a spread force acts as a whole: the mean position of the load.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CentreOfPressure {
+    /// The place.
+    pub position: Position,
+    /// Standard deviation along x, in metres.
+    pub sd_x_m: f64,
+    /// Standard deviation along y, in metres; 0 on a line.
+    pub sd_y_m: f64,
+}
+
+impl<'a> Profiler<'a> {
+    /// For readings of these sensors.
+    pub fn new(sensors: LoadSensors<'a>) -> Self {
+        let cells = Cells::over(sensors.extent);
+        let rows: Vec<Vec<f64>> = sensors
+            .alive()
+            .map(|channel| {
+                let mean = |cell| {
+                    let points = cells.points(cell);
+                    points.iter().map(|point| channel.influence.at(*point)).sum::<f64>() / points.len() as f64
+                };
+                (0..cells.len()).map(|cell| mean(cell) / channel.noise_sd).collect()
+            })
+            .collect();
+        let influence = Array2::from_shape_fn((rows.len(), cells.len()), |(i, cell)| rows[i][cell]);
+        let worst_misfit = chi_squared_bound(RARE, rows.len().max(1));
+        Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), worst_misfit }
+    }
+
+    /// The cells of its profiles.
+    pub fn cells(&self) -> Cells {
+        self.cells
+    }
+
+    /// The sensors that it reads.
+    pub fn sensors(&self) -> &LoadSensors<'a> {
+        &self.sensors
+    }
+
+    /// The load that a reading tells: one finite value a channel, in SI units.
+    ///
+    /// # Errors
+    /// [`ReadingError`] for another number of channels or a value that is not finite.
+    pub fn profile(&self, reading: &[f64]) -> Result<LoadProfile, ReadingError> {
+        ReadingError::check(reading, self.sensors.channels.len())?;
+        let channels = self.sensors.channels.iter().zip(reading);
+        let whitened = channels.filter_map(|(channel, value)| {
+            let channel = channel.as_ref()?;
+            Some((value - channel.offset) / channel.noise_sd)
+        });
+        let y: Array1<f64> = whitened.collect();
+        let silent = y.dot(&y) <= self.worst_misfit;
+        let mixture = if silent { None } else { self.problem.solve(&y) };
+        Ok(match mixture {
+            Some(mixture) => self.loaded(&y, &mixture),
+            None => self.unloaded(&y, if silent { Status::NoContact } else { Status::OutsideModel }),
+        })
+    }
+
+    /// What this layout resolves at the smoothness of a profile; `None` for a profile without load.
+    pub fn resolution(&self, profile: &LoadProfile) -> Option<Resolution> {
+        Resolution::of(&self.problem, self.cells, profile.smoothness?)
+    }
+
+    fn loaded(&self, y: &Array1<f64>, mixture: &Mixture) -> LoadProfile {
+        let Mixture { forces, covariance, smoothness, least_misfit } = mixture;
+        let total_n = forces.sum();
+        let outside = *least_misfit > self.worst_misfit;
+        let status = if outside { Status::OutsideModel } else { Status::Located };
+        let forces_n = forces.to_vec();
+        let patches = find_patches(&self.cells, &forces_n, covariance);
+        let everything: Vec<usize> = (0..self.cells.len()).collect();
+        let centre = centre_of(&self.cells, &everything, &forces_n, covariance);
+        let (fitted, residuals) = self.fitted(y, forces);
+        LoadProfile {
+            status,
+            cells: self.cells,
+            forces_n,
+            total_n,
+            total_sd_n: covariance.sum().sqrt(),
+            covariance_n2: covariance.clone(),
+            centre,
+            patches,
+            fitted,
+            residuals,
+            misfit: *least_misfit,
+            worst_misfit: self.worst_misfit,
+            smoothness: Some(*smoothness),
+        }
+    }
+
+    fn unloaded(&self, y: &Array1<f64>, status: Status) -> LoadProfile {
+        let cells = self.cells.len();
+        let (fitted, residuals) = self.fitted(y, &Array1::zeros(cells));
+        LoadProfile {
+            status,
+            cells: self.cells,
+            forces_n: vec![0.0; cells],
+            covariance_n2: Array2::zeros((cells, cells)),
+            total_n: 0.0,
+            total_sd_n: 0.0,
+            centre: None,
+            patches: Vec::new(),
+            fitted,
+            residuals,
+            misfit: y.dot(y),
+            worst_misfit: self.worst_misfit,
+            smoothness: None,
+        }
+    }
+
+    /// What the channels would read of the load, and what is left of the reading, channel by channel.
+    fn fitted(&self, y: &Array1<f64>, forces: &Array1<f64>) -> (Vec<Option<f64>>, Vec<Option<f64>>) {
+        let explained = self.problem.influence.dot(forces);
+        let mut each = explained.iter().zip(y);
+        let channel = |channel: &Option<LoadChannel>| {
+            let channel = channel.as_ref()?;
+            let (explained, read) = each.next()?;
+            Some((channel.offset + explained * channel.noise_sd, read - explained))
+        };
+        self.sensors.channels.iter().map(channel).map(|pair| (pair.map(|p| p.0), pair.map(|p| p.1))).unzip()
+    }
+}
+
+impl LoadProfile {
+    /// Density of the load in a cell and the ends of its 95 % interval, held at 0: N/m on a line, N/m² on a plane.
+    pub fn density(&self, cell: usize) -> (f64, (f64, f64)) {
+        let measure = self.cells.measure();
+        let (force, sd) = (self.forces_n[cell], self.covariance_n2[[cell, cell]].sqrt());
+        let (low, high) = normal_interval_95(force, sd);
+        (force / measure, (low.max(0.0) / measure, high / measure))
+    }
+
+    /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
+    pub fn density_sd(&self, cell: usize) -> f64 {
+        self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
+    }
+
+    /// The ends of the total force's 95 % interval, in newtons.
+    pub fn total_95_n(&self) -> (f64, f64) {
+        let (low, high) = normal_interval_95(self.total_n, self.total_sd_n);
+        (low.max(0.0), high)
+    }
+}
+
+impl CentreOfPressure {
+    /// The ends of the 95 % interval along x, in metres.
+    pub fn x_95_m(&self) -> (f64, f64) {
+        normal_interval_95(self.position.x_m, self.sd_x_m)
+    }
+
+    /// The ends of the 95 % interval along y, in metres.
+    pub fn y_95_m(&self) -> (f64, f64) {
+        normal_interval_95(self.position.y_m, self.sd_y_m)
+    }
+}
+
+/// The mean position of the force of some cells, with its standard deviation to first order; `None` where they have none.
+fn centre_of(
+    cells: &Cells,
+    listed: &[usize],
+    forces_n: &[f64],
+    covariance: &Array2<f64>,
+) -> Option<CentreOfPressure> {
+    let force: f64 = listed.iter().map(|cell| forces_n[*cell]).sum();
+    if force <= 0.0 {
+        return None;
+    }
+    let along = |coordinate: fn(Position) -> f64| {
+        let at = |cell: &usize| coordinate(cells.centre(*cell));
+        let mean = listed.iter().map(|cell| at(cell) * forces_n[*cell]).sum::<f64>() / force;
+        let slopes: Vec<f64> = listed.iter().map(|cell| (at(cell) - mean) / force).collect();
+        (mean, sd_of_sum(listed, &slopes, covariance))
+    };
+    let ((x_m, sd_x_m), (y_m, sd_y_m)) = (along(|p| p.x_m), along(|p| p.y_m));
+    Some(CentreOfPressure { position: Position { x_m, y_m }, sd_x_m, sd_y_m })
+}
+
+/// Standard deviation of Σ slope·force over some cells.
+fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 {
+    let row = |(i, a): (&usize, &f64)| {
+        listed.iter().zip(slopes).map(|(j, b)| a * b * covariance[[*i, *j]]).sum::<f64>()
+    };
+    listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
+}
+
+/// A patch is where the load is above this share of its highest density.
+pub const PATCH_SHARE: f64 = 0.1;
+/// A patch that noise alone makes with more than this probability is none of its own.
+const CHANCE: f64 = 1e-3;
+/// Cells between a patch and another that it may be part of.
+const REACH_CELLS: usize = 2;
+
+/// A connected part of the surface that carries load.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Patch {
+    /// Its left end, or lower left corner: where the load rises above the share of its highest density.
+    pub from: Position,
+    /// Its right end, or upper right corner.
+    pub to: Position,
+    /// Where its force acts as a whole.
+    pub centre: CentreOfPressure,
+    /// Its force in newtons, its flanks below the share included.
+    pub force_n: f64,
+    /// Standard deviation of the force.
+    pub force_sd_n: f64,
+}
+
+impl Patch {
+    /// The ends of the force's 95 % interval, in newtons.
+    pub fn force_95_n(&self) -> (f64, f64) {
+        let (low, high) = normal_interval_95(self.force_n, self.force_sd_n);
+        (low.max(0.0), high)
+    }
+
+    /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
+    pub fn as_load(&self, extent: Extent) -> UniformLoad {
+        let Position { x_m, y_m } = self.centre.position;
+        let side = |centre: f64, (from, to): (f64, f64), size: f64| {
+            let half = (0.5 * (to - from)).min(centre).min(size - centre).max(0.0);
+            (centre - half, centre + half)
+        };
+        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m);
+        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m.unwrap_or(0.0));
+        let corner = |x_m, y_m| Position { x_m, y_m };
+        UniformLoad { from: corner(left, low), to: corner(right, high), force_n: self.force_n }
+    }
+}
+
+/// A patch in the making: cells above the share, and all cells with its flanks.
+struct Part {
+    core: Vec<usize>,
+    all: Vec<usize>,
+}
+
+/// The patches of a profile, along x.
+///
+/// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
+/// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
+/// where there is none, is none.
+fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
+    let mut parts = grow(cells, forces_n, cores(cells, forces_n));
+    let least_ratio = normal_quantile(1.0 - CHANCE);
+    let stands_out = |part: &Part| {
+        let (force, sd) = force_of(&part.all, forces_n, covariance);
+        force > least_ratio * sd
+    };
+    while let Some(weak) = weakest(&parts, |part| !stands_out(part), forces_n) {
+        let part = parts.swap_remove(weak);
+        if let Some(beside) = parts.iter_mut().find(|other| touches(cells, &part.all, &other.all)) {
+            beside.all.extend(part.all);
+        }
+    }
+    let mut patches: Vec<Patch> =
+        parts.iter().filter_map(|part| patch(cells, part, forces_n, covariance)).collect();
+    patches.sort_by(|a, b| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
+    patches
+}
+
+/// Connected cells above the share of the highest.
+fn cores(cells: &Cells, forces_n: &[f64]) -> Vec<Vec<usize>> {
+    let highest = forces_n.iter().fold(0.0, |most: f64, force| most.max(*force));
+    let mut open: Vec<bool> = forces_n.iter().map(|force| *force > PATCH_SHARE * highest).collect();
+    let mut cores = Vec::new();
+    for start in 0..cells.len() {
+        let mut core = Vec::new();
+        let mut edge = vec![start];
+        while let Some(cell) = edge.pop() {
+            if std::mem::replace(&mut open[cell], false) {
+                core.push(cell);
+                edge.extend(cells.neighbours(cell));
+            }
+        }
+        if !core.is_empty() {
+            cores.push(core);
+        }
+    }
+    cores
+}
+
+/// Gives each part the cells that lie downhill from it, the highest first.
+fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
+    let mut owner = vec![None; cells.len()];
+    for (number, core) in cores.iter().enumerate() {
+        core.iter().for_each(|cell| owner[*cell] = Some(number));
+    }
+    let mut parts: Vec<Part> = cores.into_iter().map(|core| Part { all: core.clone(), core }).collect();
+    let mut flanks: Vec<usize> =
+        (0..cells.len()).filter(|cell| owner[*cell].is_none() && forces_n[*cell] > 0.0).collect();
+    flanks.sort_by(|a, b| forces_n[*b].total_cmp(&forces_n[*a]));
+    for cell in flanks {
+        let uphill = cells.neighbours(cell).filter(|beside| owner[*beside].is_some());
+        let uphill = uphill.max_by(|a, b| forces_n[*a].total_cmp(&forces_n[*b]));
+        if let Some(number) = uphill.and_then(|beside| owner[beside]) {
+            owner[cell] = Some(number);
+            parts[number].all.push(cell);
+        }
+    }
+    parts
+}
+
+/// The part with the least force among those that are meant.
+fn weakest(parts: &[Part], meant: impl Fn(&Part) -> bool, forces_n: &[f64]) -> Option<usize> {
+    let force = |part: &Part| part.all.iter().map(|cell| forces_n[*cell]).sum::<f64>();
+    let those = parts.iter().enumerate().filter(|(_, part)| meant(part));
+    those.min_by(|(_, a), (_, b)| force(a).total_cmp(&force(b))).map(|(number, _)| number)
+}
+
+/// Whether no more than a few cells lie between two sets of cells.
+fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
+    let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
+    one.iter().any(|a| {
+        other.iter().any(|b| {
+            let ((ax, ay), (bx, by)) = (place(*a), place(*b));
+            ax.abs_diff(bx).max(ay.abs_diff(by)) <= REACH_CELLS + 1
+        })
+    })
+}
+
+fn force_of(listed: &[usize], forces_n: &[f64], covariance: &Array2<f64>) -> (f64, f64) {
+    let force = listed.iter().map(|cell| forces_n[*cell]).sum();
+    (force, sd_of_sum(listed, &vec![1.0; listed.len()], covariance))
+}
+
+fn patch(cells: &Cells, part: &Part, forces_n: &[f64], covariance: &Array2<f64>) -> Option<Patch> {
+    let centre = centre_of(cells, &part.all, forces_n, covariance)?;
+    let (force_n, force_sd_n) = force_of(&part.all, forces_n, covariance);
+    let corners = || part.core.iter().map(|cell| cells.corners(*cell));
+    let least = |coordinate: fn(Position) -> f64| {
+        corners().map(|(from, _)| coordinate(from)).fold(f64::INFINITY, f64::min)
+    };
+    let most = |coordinate: fn(Position) -> f64| {
+        corners().map(|(_, to)| coordinate(to)).fold(f64::NEG_INFINITY, f64::max)
+    };
+    Some(Patch {
+        from: Position { x_m: least(|p| p.x_m), y_m: least(|p| p.y_m) },
+        to: Position { x_m: most(|p| p.x_m), y_m: most(|p| p.y_m) },
+        centre,
+        force_n,
+        force_sd_n,
+    })
+}
+
+/// Least standard deviations for one of several patches.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PatchLimit {
+    /// Of its centre along x, in metres.
+    pub sd_x_m: f64,
+    /// Of its centre along y, in metres; 0 on a line.
+    pub sd_y_m: f64,
+    /// Of its force, in newtons.
+    pub sd_force_n: f64,
+}
+
+/// The limits of patches that are each loaded evenly, of known number and sizes: the diagonal of the inverse of the Fisher
+/// information Σ_i ∇m_i·∇m_iᵀ/σ_i², where m_i is what sensor i reads of all patches and ∇ goes over all centres and forces
+/// (Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory*, 1993, section 3.9). `None` where the readings do
+/// not tell them all.
+pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<PatchLimit>> {
+    let plane = sensors.extent.width_m.is_some();
+    let each = if plane { 3 } else { 2 };
+    let alive: Vec<_> = sensors.alive().collect();
+    let mut slopes = Array2::zeros((alive.len(), each * loads.len()));
+    for (channel, mut row) in alive.iter().zip(slopes.outer_iter_mut()) {
+        for (number, load) in loads.iter().enumerate() {
+            let [along, across] = load.mean_gradient(&*channel.influence);
+            let first = each * number;
+            row[first] = load.mean(&*channel.influence) / channel.noise_sd;
+            row[first + 1] = load.force_n * along / channel.noise_sd;
+            if plane {
+                row[first + 2] = load.force_n * across / channel.noise_sd;
+            }
+        }
+    }
+    // Columns of length 1, so that newtons and metres weigh alike.
+    let lengths: Vec<f64> = slopes.columns().into_iter().map(|column| column.dot(&column).sqrt()).collect();
+    for (mut column, length) in slopes.columns_mut().into_iter().zip(&lengths) {
+        column /= *length;
+    }
+    let inverse = Cholesky::factor(slopes.t().dot(&slopes)).ok()?.inverse();
+    let sd = |parameter: usize| inverse[[parameter, parameter]].sqrt() / lengths[parameter];
+    let limit = |number: usize| {
+        let first = each * number;
+        let sd_y_m = if plane { sd(first + 2) } else { 0.0 };
+        PatchLimit { sd_x_m: sd(first + 1), sd_y_m, sd_force_n: sd(first) }
+    };
+    Some((0..loads.len()).map(limit).collect())
+}
+
+/// Averaging kernels of the linearised inverse: without the bound at 0, the force told of cell i is Σ_k R_ik times the force
+/// of cell k, with R = (AᵀA + λ·P)⁻¹·AᵀA (Backus and Gilbert, *The Resolving Power of Gross Earth Data*, Geophys. J. R. astr.
+/// Soc. 16, 1968). That no load is negative resolves more than this where there is none beside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resolution {
+    /// The cells.
+    pub cells: Cells,
+    /// R, a kernel a row.
+    pub kernels: Array2<f64>,
+    /// Width of each cell's kernel at half of its height, in metres; on a plane the side of a square as large as the area
+    /// where it is above half of its height.
+    pub widths_m: Vec<f64>,
+}
+
+impl Resolution {
+    fn of(problem: &Problem, cells: Cells, smoothness: f64) -> Option<Self> {
+        let hessian = &problem.gram + &(smoothness * &problem.roughness);
+        let factor = Cholesky::factor(hessian).ok()?;
+        let half = factor.solve_lower_matrix(problem.gram.clone());
+        // H⁻¹ = L⁻ᵀ·L⁻¹, and gram is symmetric: R = L⁻ᵀ·(L⁻¹·AᵀA).
+        let kernels = factor.inverse_lower().t().dot(&half);
+        let widths_m = (0..cells.len()).map(|cell| width_m(&cells, &kernels.row(cell).to_vec())).collect();
+        Some(Self { cells, kernels, widths_m })
+    }
+}
+
+impl Resolution {
+    /// The median of the kernels' widths, in metres.
+    pub fn median_width_m(&self) -> f64 {
+        median(self.widths_m.clone()).unwrap_or(0.0)
+    }
+}
+
+/// Width of a kernel at half of its height.
+fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
+    let Some(top) = (0..kernel.len()).max_by(|a, b| kernel[*a].total_cmp(&kernel[*b])) else { return 0.0 };
+    let half = 0.5 * kernel[top];
+    if cells.extent.width_m.is_some() {
+        let above = kernel.iter().filter(|value| **value > half).count();
+        return (above as f64 * cells.measure()).sqrt();
+    }
+    // Cells from the top to where the kernel falls to half, between two cells in proportion; the edge is an end too.
+    let reach = |steps: &mut dyn Iterator<Item = usize>| {
+        let (mut before, mut reached) = (kernel[top], 0.0);
+        for cell in steps {
+            if kernel[cell] <= half {
+                return reached + (before - half) / (before - kernel[cell]);
+            }
+            (before, reached) = (kernel[cell], reached + 1.0);
+        }
+        reached + 0.5
+    };
+    cells.sides_m()[0] * (reach(&mut (0..top).rev()) + reach(&mut (top + 1..kernel.len())))
+}
 
 #[cfg(test)]
 mod tests;

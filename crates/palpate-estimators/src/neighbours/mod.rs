@@ -1,11 +1,188 @@
 //! The k nearest neighbours: a contact is where the training presses were whose readings are most alike.
 
-mod fitting;
-mod locator;
-mod search;
+use serde::{Deserialize, Serialize};
 
-pub use fitting::{Neighbours, NeighboursFitError};
-pub use locator::{Neighbour, NeighboursLocator};
+use crate::features::{FeatureKind, Features, NoFeatures};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::held_out::HeldOutSpread;
+use crate::recording::{Row, TooFewPositions};
+use crate::setup::Setup;
+use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+/// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
+/// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Neighbours {
+    /// Most neighbours to try, at least 1. Of k = 1, 2, … that which is nearest to the training rows in the root mean square
+    /// is taken, each row located by the rows at other positions.
+    pub most: usize,
+}
+
+impl Default for Neighbours {
+    fn default() -> Self {
+        Self { most: 64 }
+    }
+}
+
+/// Why neighbours cannot be asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NeighboursFitError {
+    /// No position has another one to be judged by.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// Nothing to compare readings by.
+    #[error(transparent)]
+    Features(#[from] NoFeatures),
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Fit for Neighbours {
+    type Method = NeighboursLocator;
+    type Error = NeighboursFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<NeighboursLocator, NeighboursFitError> {
+        let recording = task.recording;
+        recording.check_distinct_positions(2)?;
+        let features = Features::fit(FeatureKind::for_setup(task.setup), recording)?;
+        let neighbour =
+            |row: &Row| Neighbour { features: features.apply(&row.reading), position: row.position };
+        let rows: Vec<Neighbour> = recording.rows.iter().map(neighbour).collect();
+        let errors = held_out_errors(&rows, self.most.max(1), task.watch)?;
+        let square = |errors: &Vec<[f64; 2]>| errors.iter().flatten().map(|e| e * e).sum::<f64>();
+        let best = (0..errors.len()).min_by(|a, b| square(&errors[*a]).total_cmp(&square(&errors[*b])));
+        let best = best.unwrap_or(0);
+        Ok(NeighboursLocator {
+            extent: task.setup.surface.extent(),
+            features,
+            count: best + 1,
+            rows,
+            force_n: task.setup.force_n,
+            spread: errors.get(best).and_then(|errors| HeldOutSpread::of(errors)),
+        })
+    }
+}
+
+/// Errors (x, y) in metres of every row by 1, 2, … neighbours at other positions, up to `most` or as many as every row has.
+fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
+    let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
+    for (i, row) in rows.iter().enumerate() {
+        watch.round()?;
+        let others = rows.iter().filter(|other| other.position != row.position);
+        let means = means(&nearest(others, &row.features, most));
+        if i == 0 {
+            errors = vec![Vec::with_capacity(rows.len()); means.len()];
+        }
+        errors.truncate(means.len());
+        let off = |mean: &Position| [mean.x_m - row.position.x_m, mean.y_m - row.position.y_m];
+        errors.iter_mut().zip(&means).for_each(|(errors, mean)| errors.push(off(mean)));
+    }
+    Ok(errors)
+}
+
+/// Neighbours that locate; see [`Neighbours`](super::Neighbours).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NeighboursLocator {
+    /// The surface.
+    pub extent: Extent,
+    /// By what readings are compared.
+    pub features: Features,
+    /// k, how many neighbours are asked.
+    pub count: usize,
+    /// The training rows.
+    pub rows: Vec<Neighbour>,
+    /// The contact's force in newtons, where the bench knows it.
+    pub force_n: Option<f64>,
+    /// How far the neighbours at other positions were off.
+    pub spread: Option<HeldOutSpread>,
+}
+
+/// A training row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Neighbour {
+    /// Its reading's features.
+    pub features: Vec<f64>,
+    /// Its contact.
+    pub position: Position,
+}
+
+impl Locate for NeighboursLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let found = nearest(self.rows.iter(), &self.features.apply(reading), self.count);
+        let Some(position) = means(&found).pop() else {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        };
+        let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };
+        let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
+        Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.features.check(setup.layout.len())?;
+        LocatorFault::check_numbers("count of neighbours", [self.count as f64], |k| k >= 1.0, "at least 1")?;
+        LocatorFault::check_numbers("count of rows", [self.rows.len() as f64], |n| n >= 1.0, "at least 1")?;
+        for row in &self.rows {
+            let (needed, found) = (self.features.len(), row.features.len());
+            LocatorFault::check_count("features of a row", needed, found)?;
+            LocatorFault::check_numbers(
+                "feature of a row",
+                row.features.iter().copied(),
+                |_| true,
+                "a finite number",
+            )?;
+            let place = [row.position.x_m, row.position.y_m];
+            LocatorFault::check_numbers("position", place, |_| true, "a finite number")?;
+        }
+        self.spread.map_or(Ok(()), |spread| spread.check())
+    }
+}
+
+/// The `most` nearest of `rows` to `place`, nearest first, with their squared distances. Ties go to the earlier row.
+fn nearest<'a>(
+    rows: impl Iterator<Item = &'a Neighbour>,
+    place: &[f64],
+    most: usize,
+) -> Vec<(f64, &'a Neighbour)> {
+    let squared =
+        |row: &Neighbour| row.features.iter().zip(place).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+    let mut found: Vec<(f64, &Neighbour)> = Vec::with_capacity(most + 1);
+    for row in rows {
+        let distance = squared(row);
+        if found.len() == most && found.last().is_some_and(|(last, _)| distance >= *last) {
+            continue;
+        }
+        let after = found.partition_point(|(other, _)| *other <= distance);
+        found.insert(after, (distance, row));
+        found.truncate(most);
+    }
+    found
+}
+
+/// Σ p_i/d_i / Σ 1/d_i over the nearest 1, 2, … of `found`: one position a count. Rows at distance 0 outweigh all others.
+fn means(found: &[(f64, &Neighbour)]) -> Vec<Position> {
+    let exact = found.iter().take_while(|(squared, _)| *squared == 0.0).count();
+    let (mut x, mut y, mut total) = (0.0, 0.0, 0.0);
+    let mut means = Vec::with_capacity(found.len());
+    for (i, (squared, row)) in found.iter().enumerate() {
+        if exact == 0 || i < exact {
+            let weight = if exact == 0 { 1.0 / squared.sqrt() } else { 1.0 };
+            x += weight * row.position.x_m;
+            y += weight * row.position.y_m;
+            total += weight;
+        }
+        means.push(Position { x_m: x / total, y_m: y / total });
+    }
+    means
+}
 
 #[cfg(test)]
 mod tests;

@@ -1,26 +1,635 @@
 //! Feed-forward networks: the founding paper's, trained by back-propagation, and ensembles trained by Levenberg–Marquardt.
+//!
+//! There are four forward passes, each where another would be slower or could not run:
+//!
+//! - [`palpate_core::Network`], row by row, needs no memory but its scratch: it runs on a chip, and the others are tested against it.
+//! - [`PreparedNetwork`] locates. It takes a third of the time, as its weights lie in columns, which a chip has no room to lay out. (The
+//!   same rows with AVX2 and FMA take two and a half times as long.)
+//! - [`train_many`] and [`train_one`] train: weights of several networks lie side by side, and the pass over the first layer is one with its update.
+//! - [`LevenbergMarquardt`] keeps the outputs of every layer, which derivatives by the weights need and the faster passes do not keep.
 
-mod config;
-mod fitting;
 mod levenberg_marquardt;
-mod locator;
 mod logistic;
-mod outcome;
-mod patterns;
 mod prepared;
-mod topology;
 mod train;
 
-pub use config::{BackPropagation, InputScale, Network, OutputCoding, PresentationOrder};
-pub use fitting::{NetworkFitError, NetworkFitting};
 pub use levenberg_marquardt::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
 };
-pub use locator::{ChannelScaling, NetworkLocator, NetworkParts};
-pub use outcome::{TrainedNetwork, TrainingOutcome, TrainingStatus};
 pub use palpate_core::Activation;
-pub use patterns::Patterns;
 pub use prepared::PreparedNetwork;
-pub use topology::Topology;
 pub use train::{Precision, TrainingQueue, TrainingTask, train_many, train_one};
+
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, SeedQueue};
+use crate::recording::Recording;
+use crate::setup::Setup;
+use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::{Extent, Surface};
+use palpate_numerics::mean_and_variance;
+use palpate_numerics::simd::InstructionSet;
+use palpate_numerics::watch::Cancelled;
+
+/// A feed-forward network and how it is trained. The default is the founding paper's: one hidden layer of ten
+/// logistic nodes, a logistic output, and back-propagation with learning rate 0.7 and momentum 0.9.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    /// Nodes of each hidden layer, input side first.
+    pub hidden: Vec<usize>,
+    /// Activation of every hidden layer.
+    pub hidden_activation: Activation,
+    /// Activation of the output layer.
+    pub output_activation: Activation,
+    /// Whether every node has a bias.
+    pub biases: bool,
+    /// What the output stands for.
+    pub output: OutputCoding,
+    /// How readings become inputs.
+    pub input_scale: InputScale,
+    /// How the weights are found.
+    pub training: BackPropagation,
+    /// The arithmetic of training; estimates are made in 64 bits whatever it is.
+    pub precision: Precision,
+}
+
+impl Default for Network {
+    fn default() -> Self {
+        Self {
+            hidden: vec![10],
+            hidden_activation: Activation::Logistic,
+            output_activation: Activation::Logistic,
+            biases: true,
+            output: OutputCoding::Normalized,
+            input_scale: InputScale::FullScale,
+            training: BackPropagation::default(),
+            precision: Precision::F64,
+        }
+    }
+}
+
+/// What the network's output stands for (paper, section 2.3.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutputCoding {
+    /// The contact position in metres; a logistic output can overshoot a surface shorter than 1 m.
+    Position,
+    /// The contact position divided by the surface's length.
+    Normalized,
+}
+
+/// How readings become network inputs. The paper does not say; the choice decides how fast and how well it trains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InputScale {
+    /// Each sensor kind divided by the largest reading that the contact force can cause anywhere on the surface; for
+    /// a surface without a model, by the largest magnitude in the training recording.
+    FullScale,
+    /// Each channel shifted to mean 0 and divided by its standard deviation over the training recording.
+    Standardized,
+    /// Every channel divided by this reading, in the SI unit of the sensors (m, rad, 1, N) or raw.
+    DivideBy(f64),
+}
+
+/// Back-propagation with momentum, one weight update a pattern (Rumelhart, Hinton and Williams 1986).
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct BackPropagation {
+    /// η, the step along the gradient; greater than 0.
+    pub learning_rate: f64,
+    /// α, the share of the previous step that is repeated; 0 ≤ α < 1.
+    pub momentum: f64,
+    /// Training converges when the sum of squared output errors over one epoch is at most this.
+    pub aggregate_error: f64,
+    /// Training is capped after this many epochs.
+    pub max_epochs: u32,
+    /// In which order the patterns are presented.
+    pub order: PresentationOrder,
+    /// Weights start uniform within ± this.
+    pub initial_weights: f64,
+}
+
+impl Default for BackPropagation {
+    fn default() -> Self {
+        Self {
+            learning_rate: 0.7,
+            momentum: 0.9,
+            aggregate_error: 1e-5,
+            max_epochs: 1_000_000,
+            order: PresentationOrder::Shuffled,
+            initial_weights: 0.5,
+        }
+    }
+}
+
+/// The order in which an epoch presents the patterns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PresentationOrder {
+    /// A fresh random permutation every epoch.
+    Shuffled,
+    /// As recorded, every epoch alike.
+    Fixed,
+}
+
+/// Layer sizes, activations and biases of a fully connected feed-forward network.
+///
+/// Weights are one flat list: layer by layer, node by node; a node's row holds one weight an input and, with biases,
+/// the bias last, as the weight of an input that is always 1.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Topology {
+    /// Nodes of every layer, inputs first and outputs last: `[8, 10, 1]` is the founding paper's.
+    pub sizes: Vec<usize>,
+    /// Whether every node has a bias.
+    pub biases: bool,
+    /// Activation of the hidden layers.
+    pub hidden_activation: Activation,
+    /// Activation of the output layer.
+    pub output_activation: Activation,
+}
+
+impl Topology {
+    /// The topology that `config` asks for between `inputs` readings and `outputs` coordinates.
+    pub fn new(config: &Network, inputs: usize, outputs: usize) -> Self {
+        let sizes = std::iter::once(inputs).chain(config.hidden.iter().copied()).chain([outputs]).collect();
+        Self {
+            sizes,
+            biases: config.biases,
+            hidden_activation: config.hidden_activation,
+            output_activation: config.output_activation,
+        }
+    }
+
+    /// Number of inputs.
+    pub fn inputs(&self) -> usize {
+        self.sizes.first().copied().unwrap_or(0)
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.sizes.last().copied().unwrap_or(0)
+    }
+
+    /// Number of layers with weights.
+    pub fn layers(&self) -> usize {
+        self.sizes.len().saturating_sub(1)
+    }
+
+    /// Weights of one node of weighted layer `layer` (0 is the first hidden one), its bias included.
+    pub fn row_len(&self, layer: usize) -> usize {
+        self.sizes[layer] + usize::from(self.biases)
+    }
+
+    /// Nodes of weighted layer `layer`.
+    pub fn rows(&self, layer: usize) -> usize {
+        self.sizes[layer + 1]
+    }
+
+    /// Activation of weighted layer `layer`.
+    pub fn activation(&self, layer: usize) -> Activation {
+        if layer + 1 == self.layers() { self.output_activation } else { self.hidden_activation }
+    }
+
+    /// Number of weights, biases included.
+    pub fn weight_count(&self) -> usize {
+        (0..self.layers()).map(|layer| self.rows(layer) * self.row_len(layer)).sum()
+    }
+
+    /// The same of a shape that may be nonsense: `None` when there is no such number.
+    pub(crate) fn checked_weight_count(&self) -> Option<usize> {
+        self.sizes.windows(2).try_fold(0usize, |sum, pair| {
+            pair[1].checked_mul(pair[0].checked_add(usize::from(self.biases))?)?.checked_add(sum)
+        })
+    }
+}
+
+/// Training patterns, already scaled and coded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patterns {
+    /// Inputs of a pattern.
+    pub inputs: usize,
+    /// Outputs of a pattern.
+    pub outputs: usize,
+    /// Inputs, pattern by pattern.
+    pub input_values: Vec<f64>,
+    /// Targets, pattern by pattern.
+    pub target_values: Vec<f64>,
+}
+
+impl Patterns {
+    /// The largest number of patterns that the presentation order can number.
+    pub const MOST: usize = 1 << 16;
+
+    /// Number of patterns.
+    pub fn count(&self) -> usize {
+        self.target_values.len() / self.outputs.max(1)
+    }
+
+    /// The inputs of pattern `p`.
+    pub fn input(&self, p: usize) -> &[f64] {
+        &self.input_values[p * self.inputs..][..self.inputs]
+    }
+
+    /// The targets of pattern `p`.
+    pub fn target(&self, p: usize) -> &[f64] {
+        &self.target_values[p * self.outputs..][..self.outputs]
+    }
+}
+
+/// Why a network cannot be fitted to a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NetworkFitError {
+    /// Too many rows for the presentation order.
+    #[error("the recording has {found} rows; a network is trained on at most {most}")]
+    TooManyRows {
+        /// Rows.
+        found: usize,
+        /// Bound.
+        most: usize,
+    },
+    /// Nothing to learn from.
+    #[error("the recording has no rows; a network needs at least 1")]
+    NoRows,
+    /// A channel's readings do not scale.
+    #[error(
+        "channel `{channel}` cannot be scaled: its {what} is {value}; it must be a number greater than 0"
+    )]
+    Unscalable {
+        /// The channel's name.
+        channel: String,
+        /// What was to divide it.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+/// A network that is ready to be trained: its patterns and how readings and positions were coded into them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NetworkFitting {
+    /// Shape of the network.
+    pub topology: Topology,
+    /// What it is shown.
+    pub patterns: Patterns,
+    /// How its weights are found.
+    pub rule: BackPropagation,
+    scaling: Vec<ChannelScaling>,
+    output_scale_m: Vec<f64>,
+    extent: Extent,
+}
+
+impl Fit for Network {
+    type Method = NetworkLocator;
+    type Error = NetworkFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<NetworkLocator, NetworkFitError> {
+        let fitting = NetworkFitting::of(self, task)?;
+        let network = train_one(self.precision, &fitting.task(), task.seed, task.watch)?;
+        Ok(fitting.locator(network))
+    }
+
+    /// Trains as many networks side by side as there are lanes.
+    fn fit_many(
+        &self,
+        task: FitTask,
+        queue: &mut dyn SeedQueue<NetworkLocator>,
+    ) -> Result<(), NetworkFitError> {
+        task.check_channels()?;
+        let fitting = NetworkFitting::of(self, task)?;
+        let mut queue = Coded { fitting: &fitting, task, queue };
+        let set = InstructionSet::best();
+        Ok(train_many(set, self.precision, &fitting.task(), &mut queue, task.watch)?)
+    }
+}
+
+impl Network {
+    /// The locator that an earlier fit gave, from its weights and outcome; `None` when their number is not the network's.
+    ///
+    /// # Errors
+    /// [`NetworkFitError`] when the recording cannot be coded.
+    pub fn restore(
+        &self,
+        task: FitTask,
+        weights: Vec<f64>,
+        outcome: TrainingOutcome,
+    ) -> Result<Option<Fitted<NetworkLocator>>, NetworkFitError> {
+        task.check_channels()?;
+        let fitting = NetworkFitting::of(self, task)?;
+        let topology = fitting.topology.clone();
+        Ok((weights.len() == topology.weight_count()).then(|| {
+            let network = TrainedNetwork { topology, weights, outcome };
+            Fitted::new(task, fitting.locator(network))
+        }))
+    }
+}
+
+/// A queue of trained networks in front of a queue of locators.
+struct Coded<'a> {
+    fitting: &'a NetworkFitting,
+    task: FitTask<'a>,
+    queue: &'a mut dyn SeedQueue<NetworkLocator>,
+}
+
+impl TrainingQueue for Coded<'_> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.queue.next_seed()
+    }
+
+    fn finished(&mut self, seed: u64, network: TrainedNetwork) {
+        self.queue.fitted(seed, Fitted::new(self.task.seed(seed), self.fitting.locator(network)));
+    }
+}
+
+impl NetworkFitting {
+    /// Codes the recording of a fit.
+    ///
+    /// # Errors
+    /// [`NetworkFitError`] as for [`NetworkFitting::prepare`].
+    pub fn of(config: &Network, task: FitTask) -> Result<Self, NetworkFitError> {
+        let surface = &task.setup.surface;
+        Self::prepare(config, surface.extent(), surface.model(), task.setup.force_n, task.recording)
+    }
+
+    /// Codes a recording of a surface (with its model, where it has one, and its known force in newtons).
+    ///
+    /// # Errors
+    /// [`NetworkFitError`] when there are no rows, too many, or a channel whose scale is 0.
+    pub fn prepare(
+        config: &Network,
+        extent: Extent,
+        model: Option<&dyn Surface>,
+        force_n: Option<f64>,
+        recording: &Recording,
+    ) -> Result<Self, NetworkFitError> {
+        let rows = recording.rows.len();
+        if rows == 0 {
+            return Err(NetworkFitError::NoRows);
+        }
+        if rows > Patterns::MOST {
+            return Err(NetworkFitError::TooManyRows { found: rows, most: Patterns::MOST });
+        }
+        let scaling = channel_scaling(config.input_scale, model, force_n, recording)?;
+        let output_scale_m = output_scale_m(config.output, extent);
+        let mut patterns = Patterns {
+            inputs: recording.channels.len(),
+            outputs: output_scale_m.len(),
+            input_values: Vec::with_capacity(rows * recording.channels.len()),
+            target_values: Vec::with_capacity(rows * output_scale_m.len()),
+        };
+        for row in &recording.rows {
+            let scaled = row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value));
+            patterns.input_values.extend(scaled);
+            let coordinates = [row.position.x_m, row.position.y_m];
+            patterns
+                .target_values
+                .extend(coordinates.iter().zip(&output_scale_m).map(|(x, scale)| x / scale));
+        }
+        let topology = Topology::new(config, patterns.inputs, patterns.outputs);
+        Ok(Self { topology, patterns, rule: config.training, scaling, output_scale_m, extent })
+    }
+
+    /// What a trainer asks for.
+    pub fn task(&self) -> TrainingTask<'_> {
+        TrainingTask { topology: &self.topology, patterns: &self.patterns, rule: &self.rule }
+    }
+
+    /// The locator that a trained network makes.
+    pub fn locator(&self, network: TrainedNetwork) -> NetworkLocator {
+        NetworkLocator::from(NetworkParts {
+            topology: network.topology,
+            weights: network.weights,
+            scaling: self.scaling.clone(),
+            output_scale_m: self.output_scale_m.clone(),
+            extent: self.extent,
+            outcome: network.outcome,
+        })
+    }
+}
+
+/// The length that an output of 1 stands for, by coordinate.
+fn output_scale_m(coding: OutputCoding, extent: Extent) -> Vec<f64> {
+    let sizes = std::iter::once(extent.length_m).chain(extent.width_m);
+    sizes.map(|size_m| if coding == OutputCoding::Position { 1.0 } else { size_m }).collect()
+}
+
+fn channel_scaling(
+    scale: InputScale,
+    model: Option<&dyn Surface>,
+    force_n: Option<f64>,
+    recording: &Recording,
+) -> Result<Vec<ChannelScaling>, NetworkFitError> {
+    let column = |c: usize| recording.rows.iter().map(move |row| row.reading[c]);
+    let largest = || recording.rows.iter().flat_map(|row| &row.reading).fold(0.0, |m: f64, r| m.max(r.abs()));
+    let one = |c: usize| -> Result<ChannelScaling, NetworkFitError> {
+        let (offset, divisor, what) = match (scale, model.zip(force_n)) {
+            (InputScale::DivideBy(divisor), _) => (0.0, divisor, "divisor"),
+            (InputScale::FullScale, Some((surface, force_n))) => {
+                (0.0, surface.full_scale(recording.kinds[c]) * force_n, "full scale")
+            }
+            (InputScale::FullScale, None) => (0.0, largest(), "largest reading"),
+            (InputScale::Standardized, _) => {
+                let (mean, variance) = mean_and_variance(column(c));
+                (mean, variance.sqrt(), "standard deviation")
+            }
+        };
+        if !(divisor.is_finite() && divisor > 0.0) {
+            let channel = recording.channels[c].clone();
+            return Err(NetworkFitError::Unscalable { channel, what, value: divisor });
+        }
+        Ok(ChannelScaling { offset, divisor })
+    };
+    (0..recording.channels.len()).map(one).collect()
+}
+
+/// How a training ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrainingStatus {
+    /// The aggregate error fell to the tolerance.
+    Converged,
+    /// The epoch cap came first.
+    Capped,
+    /// The weights left the numbers.
+    Diverged,
+}
+
+impl std::fmt::Display for TrainingStatus {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Self::Converged => "converged",
+            Self::Capped => "capped",
+            Self::Diverged => "diverged",
+        })
+    }
+}
+
+/// How a training ended and what it took. Not converging is a status, never an error.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct TrainingOutcome {
+    /// How it ended.
+    pub status: TrainingStatus,
+    /// Passes over all patterns.
+    pub epochs: u32,
+    /// Sum of squared output errors over the last epoch.
+    pub aggregate_error: f64,
+}
+
+impl Default for TrainingOutcome {
+    /// That of a method which is not trained by epochs: converged before the first.
+    fn default() -> Self {
+        Self { status: TrainingStatus::Converged, epochs: 0, aggregate_error: 0.0 }
+    }
+}
+
+impl TrainingOutcome {
+    /// The verdict after an epoch: `None` while training goes on.
+    fn after_epoch(epochs: u32, error: f64, rule: &BackPropagation) -> Option<Self> {
+        let status = if !error.is_finite() {
+            TrainingStatus::Diverged
+        } else if error <= rule.aggregate_error {
+            TrainingStatus::Converged
+        } else if epochs >= rule.max_epochs {
+            TrainingStatus::Capped
+        } else {
+            return None;
+        };
+        Some(Self { status, epochs, aggregate_error: error })
+    }
+}
+
+/// A network's weights, and how they were found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainedNetwork {
+    /// Its shape.
+    pub topology: Topology,
+    /// Its weights, in the order that [`Topology`] states.
+    pub weights: Vec<f64>,
+    /// How its training ended.
+    pub outcome: TrainingOutcome,
+}
+
+/// How a channel's reading r becomes an input: (r − offset) / divisor.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelScaling {
+    /// In the channel's SI unit, or raw.
+    pub offset: f64,
+    /// In the channel's SI unit, or raw; greater than 0.
+    pub divisor: f64,
+}
+
+impl ChannelScaling {
+    /// The input for a reading.
+    pub fn apply(self, reading: f64) -> f64 {
+        (reading - self.offset) / self.divisor
+    }
+}
+
+/// What training a network gives, and what a locator file holds of it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkParts {
+    /// Its shape.
+    pub topology: Topology,
+    /// Its weights, in the order that [`Topology`] states.
+    pub weights: Vec<f64>,
+    /// Scaling of each channel.
+    pub scaling: Vec<ChannelScaling>,
+    /// The length in metres that an output of 1 stands for, by coordinate.
+    pub output_scale_m: Vec<f64>,
+    /// The surface.
+    pub extent: Extent,
+    /// How its training ended.
+    pub outcome: TrainingOutcome,
+}
+
+/// A network that locates.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(from = "NetworkParts", into = "NetworkParts")]
+pub struct NetworkLocator {
+    parts: NetworkParts,
+    /// `None` where a file's numbers do not fit together, which [`Locate::check`] reports.
+    network: Option<PreparedNetwork>,
+}
+
+impl From<NetworkParts> for NetworkLocator {
+    fn from(parts: NetworkParts) -> Self {
+        Self { network: PreparedNetwork::new(&parts.topology, &parts.weights), parts }
+    }
+}
+
+impl From<NetworkLocator> for NetworkParts {
+    fn from(locator: NetworkLocator) -> Self {
+        locator.parts
+    }
+}
+
+impl NetworkParts {
+    fn check_numbers(&self, channels: usize) -> Result<(), LocatorFault> {
+        let sizes = &self.topology.sizes;
+        let count = LocatorFault::check_count;
+        if sizes.len() < 2 {
+            return Err(LocatorFault::Count { what: "layers", needed: 2, found: sizes.len() });
+        }
+        let nodes = sizes.iter().map(|nodes| *nodes as f64);
+        LocatorFault::check_numbers("layer", nodes, |nodes| nodes > 0.0, "of at least 1 node")?;
+        count("inputs", channels, self.topology.inputs())?;
+        count("channel scalings", channels, self.scaling.len())?;
+        count("output scales", self.topology.outputs(), self.output_scale_m.len())?;
+        count("outputs", 1 + usize::from(self.extent.width_m.is_some()), self.topology.outputs())?;
+        let weights = self.topology.checked_weight_count();
+        count("weights", weights.unwrap_or(usize::MAX), self.weights.len())?;
+        let finite = "a finite number";
+        LocatorFault::check_numbers("weight", self.weights.iter().copied(), |_| true, finite)?;
+        let offsets = self.scaling.iter().map(|scaling| scaling.offset);
+        LocatorFault::check_numbers("scaling's offset", offsets, |_| true, finite)?;
+        let scales =
+            self.scaling.iter().map(|scaling| scaling.divisor).chain(self.output_scale_m.iter().copied());
+        LocatorFault::check_numbers("scale", scales, |scale| scale > 0.0, "greater than 0")
+    }
+}
+
+/// Channels for which the inputs lie on the stack.
+const FEW_CHANNELS: usize = 16;
+
+impl NetworkLocator {
+    /// What it was made from.
+    pub fn parts(&self) -> &NetworkParts {
+        &self.parts
+    }
+
+    /// The position for a reading of as many channels as the network has inputs; elsewhere `None`.
+    pub fn position(&self, reading: &[f64]) -> Option<Position> {
+        let (mut few, mut many) = ([0.0; FEW_CHANNELS], Vec::new());
+        let inputs = if let Some(inputs) = few.get_mut(..reading.len()) {
+            inputs
+        } else {
+            many.resize(reading.len(), 0.0);
+            &mut many[..]
+        };
+        for ((input, r), scaling) in inputs.iter_mut().zip(reading).zip(&self.parts.scaling) {
+            *input = scaling.apply(*r);
+        }
+        let mut outputs = [0.0; 2];
+        let outputs = outputs.get_mut(..self.parts.topology.outputs())?;
+        self.network.as_ref()?.forward_into(inputs, outputs).ok()?;
+        let mut coordinates = outputs.iter().zip(&self.parts.output_scale_m).map(|(a, scale)| a * scale);
+        Some(Position { x_m: coordinates.next()?, y_m: coordinates.next().unwrap_or(0.0) })
+    }
+}
+
+impl Locate for NetworkLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let position = self.position(reading).unwrap_or(Position::along(f64::NAN));
+        let on_surface = self.parts.extent.contains(position);
+        Estimate::of_position(position, if on_surface { Status::Located } else { Status::OutsideSurface })
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.parts.check_numbers(setup.layout.len())
+    }
+}

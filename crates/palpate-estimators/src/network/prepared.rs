@@ -1,8 +1,5 @@
 //! The forward pass of one network over one reading, four nodes a register.
 //!
-//! It is a pass by itself, beside that of [`palpate_core::Network`], because it takes a third of the time: its weights lie in columns, which
-//! a chip has no room to lay out. (The same rows with AVX2 and FMA take two and a half times as long.)
-//!
 //! What bounds it: latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its division,
 //! some seventy cycles, and the machine's window holds little of the next reading meanwhile. Hence multiply-adds that round once, a
 //! quotient for 2^r rather than a long polynomial, and registers of four: eight lanes would save work, which is not what is waited for.

@@ -1,10 +1,23 @@
-//! Training by back-propagation: one network, or many side by side.
+//! Training by back-propagation with momentum: one network, or N side by side, one a lane.
+//!
+//! Symbols: w weights, Δ the last step of the weights, x inputs of a layer, z weighted sums, a outputs, t targets,
+//! δ = −∂E/∂z, η learning rate, α momentum.
+//!
+//! What bounds it: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
+//! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
+//! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
+//! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
 
-mod kernel;
 mod order;
 
-use super::{BackPropagation, Patterns, Topology, TrainedNetwork};
-use palpate_numerics::simd::{InstructionSet, Kernel, Simd, run_loops};
+use std::mem::swap;
+
+use super::{
+    Activation, BackPropagation, Patterns, PresentationOrder, Topology, TrainedNetwork, TrainingOutcome,
+    logistic,
+};
+use order::{OrderDrawer, Streams, column_len};
+use palpate_numerics::simd::{InstructionSet, Kernel, LOOK_UP, Real, Simd, Vector, run_loops};
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Width of a floating-point number in training.
@@ -95,8 +108,8 @@ impl Kernel for InLanes<'_> {
     fn run<S: Simd>(self) -> Result<(), Cancelled> {
         let Training { precision, task, queue, watch } = self.0;
         match precision {
-            Precision::F64 => kernel::train::<S, S::F64, 8>(task, queue, watch),
-            Precision::F32 => kernel::train::<S, S::F32, 16>(task, queue, watch),
+            Precision::F64 => train::<S, S::F64, 8>(task, queue, watch),
+            Precision::F32 => train::<S, S::F32, 16>(task, queue, watch),
         }
     }
 }
@@ -112,8 +125,8 @@ impl Kernel for Alone<'_> {
     fn run<S: Simd>(self) -> Result<(), Cancelled> {
         let Training { precision, task, queue, watch } = self.0;
         match precision {
-            Precision::F64 => kernel::train::<S, S::Array<f64, 1>, 1>(task, queue, watch),
-            Precision::F32 => kernel::train::<S, S::Array<f32, 1>, 1>(task, queue, watch),
+            Precision::F64 => train::<S, S::Array<f64, 1>, 1>(task, queue, watch),
+            Precision::F32 => train::<S, S::Array<f32, 1>, 1>(task, queue, watch),
         }
     }
 }
@@ -129,6 +142,384 @@ impl TrainingQueue for OneSeed {
     }
     fn finished(&mut self, _: u64, network: TrainedNetwork) {
         self.network = Some(network);
+    }
+}
+
+/// Trains every network of the queue with the vectors `V` of `S`. A lane whose network has finished takes the next seed.
+#[inline(always)]
+fn train<S: Simd, V: Vector<N>, const N: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
+    let topology = task.topology;
+    let row_lens: Vec<usize> = (0..topology.layers()).map(|k| topology.row_len(k)).collect();
+    // Where registers hold the inputs of two patterns, to know the paper's shape saves a tenth of the time; elsewhere a fiftieth, which
+    // does not pay for the code.
+    if const { S::REGISTERS >= 2 * 9 } && row_lens == [9, 11] {
+        train_shape::<V, N, 9, 11>(task, queue, watch)
+    } else {
+        train_shape::<V, N, ANY, ANY>(task, queue, watch)
+    }
+}
+
+/// Stands for a row length that is known only when the program runs.
+const ANY: usize = 0;
+
+/// The row length `len`, as a constant where the shape is known: then loops over a row unroll, and the inputs of the
+/// paper's eight sensors stay in registers.
+#[inline(always)]
+fn row_len<const KNOWN: usize>(len: usize) -> usize {
+    if KNOWN == ANY { len } else { KNOWN }
+}
+
+/// [`train`] for rows of `FIRST` weights in the first layer and `UPPER` in every other.
+#[inline(always)]
+fn train_shape<V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
+    task: &TrainingTask,
+    queue: &mut dyn TrainingQueue,
+    watch: Watch,
+) -> Result<(), Cancelled> {
+    let mut group = Group::<V, N, FIRST, UPPER>::new(task);
+    for lane in 0..N {
+        group.start_next(lane, queue);
+    }
+    group.sum_first_pattern();
+    while group.is_busy() {
+        watch.round()?;
+        let errors = group.run_epoch();
+        if group.retire(errors.to_array(), queue) {
+            group.sum_first_pattern();
+        }
+    }
+    Ok(())
+}
+
+/// The network in one lane.
+#[derive(Clone, Copy)]
+struct Occupant {
+    seed: u64,
+    epochs: u32,
+}
+
+/// One layer of N networks.
+struct Layer<V> {
+    activation: Activation,
+    row_len: usize,
+    /// w, row by row.
+    weights: Vec<V>,
+    /// w of one update before.
+    before: Vec<V>,
+    /// z, then a; followed by the constant 1 that biases weigh.
+    outputs: Vec<V>,
+    /// δ, gathered over the layer above.
+    deltas: Vec<V>,
+}
+
+struct Group<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> {
+    task: &'t TrainingTask<'t>,
+    /// The patterns, a column an input and a column an output.
+    input_table: Table<V::Real>,
+    target_table: Table<V::Real>,
+    occupants: [Option<Occupant>; N],
+    streams: Streams<N>,
+    drawer: OrderDrawer,
+    /// This epoch's patterns, a row a presentation; and the next epoch's, whose first pattern ends this one.
+    order: Vec<[u32; N]>,
+    next_order: Vec<[u32; N]>,
+    /// x of this pattern and of the next, each followed by the constant 1 that biases weigh.
+    inputs: Vec<V>,
+    next_inputs: Vec<V>,
+    targets: Vec<V>,
+    layers: Vec<Layer<V>>,
+}
+
+impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> Group<'t, V, N, FIRST, UPPER> {
+    fn new(task: &'t TrainingTask<'t>) -> Self {
+        let (topology, patterns) = (task.topology, task.patterns);
+        let one = V::splat(V::Real::from_f64(1.0));
+        let zero = V::splat(V::Real::from_f64(0.0));
+        let layer = |k: usize| Layer {
+            activation: topology.activation(k),
+            row_len: topology.row_len(k),
+            weights: vec![zero; topology.rows(k) * topology.row_len(k)],
+            before: vec![zero; topology.rows(k) * topology.row_len(k)],
+            outputs: vec![one; topology.rows(k) + usize::from(topology.biases)],
+            deltas: vec![zero; topology.rows(k) + usize::from(topology.biases)],
+        };
+        let identity: Vec<[u32; N]> = (0..patterns.count()).map(|pattern| [pattern as u32; N]).collect();
+        Self {
+            task,
+            input_table: Table::from_rows(&patterns.input_values, patterns.inputs),
+            target_table: Table::from_rows(&patterns.target_values, patterns.outputs),
+            occupants: [None; N],
+            streams: Streams::unseeded(),
+            drawer: OrderDrawer::new(patterns.count()),
+            next_order: identity.clone(),
+            order: identity,
+            inputs: vec![one; topology.row_len(0)],
+            next_inputs: vec![one; topology.row_len(0)],
+            targets: vec![zero; topology.outputs()],
+            layers: (0..topology.layers()).map(layer).collect(),
+        }
+    }
+
+    fn is_busy(&self) -> bool {
+        self.occupants.iter().any(Option::is_some)
+    }
+
+    /// Puts the queue's next network into a lane, or leaves the lane idle.
+    fn start_next(&mut self, lane: usize, queue: &mut dyn TrainingQueue) {
+        let Some(seed) = queue.next_seed() else {
+            self.occupants[lane] = None;
+            return;
+        };
+        self.occupants[lane] = Some(Occupant { seed, epochs: 0 });
+        let mut stream = Streams::seeded(seed);
+        for layer in &mut self.layers {
+            for (weight, before) in layer.weights.iter_mut().zip(&mut layer.before) {
+                let value = V::Real::from_f64(stream.uniform(self.task.rule.initial_weights));
+                set_lane(weight, lane, value);
+                set_lane(before, lane, value);
+            }
+        }
+        if self.task.rule.order == PresentationOrder::Shuffled {
+            let mut picks = vec![0; self.drawer.patterns()];
+            self.drawer.draw_one(&mut stream, &mut picks);
+            for (row, pick) in self.order.iter_mut().zip(picks) {
+                row[lane] = pick;
+            }
+        }
+        self.streams.set(lane, &stream);
+    }
+
+    /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
+    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn TrainingQueue) -> bool {
+        let mut replaced = false;
+        for (lane, error) in errors.into_iter().enumerate() {
+            let Some(occupant) = &mut self.occupants[lane] else { continue };
+            occupant.epochs += 1;
+            let Occupant { seed, epochs } = *occupant;
+            let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), self.task.rule) else {
+                continue;
+            };
+            let weights = self.layers.iter().flat_map(|layer| &layer.weights);
+            let weights = weights.map(|weight| weight.to_array()[lane].to_f64()).collect();
+            queue.finished(seed, TrainedNetwork { topology: self.task.topology.clone(), weights, outcome });
+            self.start_next(lane, queue);
+            replaced = true;
+        }
+        replaced
+    }
+
+    /// z of the first layer for the first pattern; afterwards the pass over the layer keeps one pattern ahead.
+    #[inline(always)]
+    fn sum_first_pattern(&mut self) {
+        self.input_table.look_up(&self.order[0], &mut self.inputs);
+        let layer = &mut self.layers[0];
+        for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
+            *output = weighted_sum::<V, N, FIRST>(row, &self.inputs);
+        }
+    }
+
+    /// Presents every pattern once; the sums of squared errors.
+    #[inline(always)]
+    fn run_epoch(&mut self) -> V {
+        if self.task.rule.order == PresentationOrder::Shuffled {
+            self.drawer.draw(&mut self.streams, &mut self.next_order);
+        }
+        let mut error = V::splat(V::Real::from_f64(0.0));
+        for presentation in 0..self.order.len() {
+            let following = self.order.get(presentation + 1).unwrap_or(&self.next_order[0]);
+            self.input_table.look_up(following, &mut self.next_inputs);
+            self.forward();
+            self.target_table.look_up(&self.order[presentation], &mut self.targets);
+            error = self.compare_with_targets(error);
+            self.backward();
+            self.update_first_layer();
+            swap(&mut self.inputs, &mut self.next_inputs);
+        }
+        swap(&mut self.order, &mut self.next_order);
+        error
+    }
+
+    /// From the first layer's sums to the outputs.
+    #[inline(always)]
+    fn forward(&mut self) {
+        for k in 0..self.layers.len() {
+            let (below, layer) = self.layers.split_at_mut(k);
+            let layer = &mut layer[0];
+            if let Some(below) = below.last() {
+                for (row, output) in layer.weights.chunks_exact(layer.row_len).zip(&mut layer.outputs) {
+                    *output = weighted_sum::<V, N, UPPER>(row, &below.outputs);
+                }
+            }
+            let rows = layer.weights.len() / layer.row_len;
+            logistic::activate(layer.activation, &mut layer.outputs[..rows]);
+        }
+    }
+
+    /// δ of the output layer; adds the squared errors to `error`.
+    #[inline(always)]
+    fn compare_with_targets(&mut self, mut error: V) -> V {
+        if let Some(layer) = self.layers.last_mut() {
+            for ((target, output), delta) in self.targets.iter().zip(&layer.outputs).zip(&mut layer.deltas) {
+                let difference = *target - *output;
+                error = difference.mul_add(difference, error);
+                *delta = difference * logistic::derivative(layer.activation, *output);
+            }
+        }
+        error
+    }
+
+    /// From the output layer down to the second: sends δ to the layer below, then updates the weights.
+    #[inline(always)]
+    fn backward(&mut self) {
+        let (eta, alpha) = rates::<V, N>(self.task.rule);
+        let zero = V::splat(V::Real::from_f64(0.0));
+        for k in (1..self.layers.len()).rev() {
+            let (below, layer) = self.layers.split_at_mut(k);
+            let (below, layer) = (&mut below[k - 1], &mut layer[0]);
+            below.deltas.fill(zero);
+            let rows = layer.weights.chunks_exact(layer.row_len);
+            let rows = rows.zip(layer.before.chunks_exact_mut(layer.row_len));
+            for ((row, before), delta) in rows.zip(&layer.deltas) {
+                let step = Step { delta: *delta, eta_delta: eta * *delta, alpha };
+                update_and_send_back::<V, N, UPPER>(row, before, &below.outputs, &mut below.deltas, step);
+            }
+            swap(&mut layer.weights, &mut layer.before);
+            for (delta, output) in below.deltas.iter_mut().zip(&below.outputs) {
+                *delta = *delta * logistic::derivative(below.activation, *output);
+            }
+        }
+    }
+
+    /// Updates the first layer with this pattern and sums it for the next, in one pass.
+    #[inline(always)]
+    fn update_first_layer(&mut self) {
+        let (eta, alpha) = rates::<V, N>(self.task.rule);
+        let layer = &mut self.layers[0];
+        let rows = layer.weights.chunks_exact(layer.row_len);
+        let rows = rows.zip(layer.before.chunks_exact_mut(layer.row_len));
+        for (((row, before), output), delta) in rows.zip(&mut layer.outputs).zip(&layer.deltas) {
+            let step = Step { delta: *delta, eta_delta: eta * *delta, alpha };
+            *output = update_and_sum::<V, N, FIRST>(row, before, &self.inputs, &self.next_inputs, step);
+        }
+        swap(&mut layer.weights, &mut layer.before);
+    }
+}
+
+#[inline(always)]
+fn rates<V: Vector<N>, const N: usize>(rule: &BackPropagation) -> (V, V) {
+    (V::splat(V::Real::from_f64(rule.learning_rate)), V::splat(V::Real::from_f64(rule.momentum)))
+}
+
+#[inline(always)]
+fn weighted_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(row: &[V], inputs: &[V]) -> V {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, inputs) = (&row[..len], &inputs[..len]);
+    let mut sum = V::splat(V::Real::from_f64(0.0));
+    for i in 0..len {
+        sum = row[i].mul_add(inputs[i], sum);
+    }
+    sum
+}
+
+/// What one node's weights move by: η δ x + α Δ.
+#[derive(Clone, Copy)]
+struct Step<V> {
+    delta: V,
+    eta_delta: V,
+    alpha: V,
+}
+
+impl<V> Step<V> {
+    #[inline(always)]
+    fn apply<const N: usize>(&self, w: V, before: V, x: V) -> V
+    where
+        V: Vector<N>,
+    {
+        self.eta_delta.mul_add(x, self.alpha.mul_add(w - before, w))
+    }
+}
+
+/// Updates a node's weights, and sums them over the next pattern's inputs.
+#[inline(always)]
+fn update_and_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(
+    row: &[V],
+    before: &mut [V],
+    x: &[V],
+    next_x: &[V],
+    step: Step<V>,
+) -> V {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, before, x, next_x) = (&row[..len], &mut before[..len], &x[..len], &next_x[..len]);
+    let mut sum = V::splat(V::Real::from_f64(0.0));
+    for i in 0..len {
+        let new = step.apply(row[i], before[i], x[i]);
+        before[i] = new;
+        sum = new.mul_add(next_x[i], sum);
+    }
+    sum
+}
+
+/// Adds a node's share to the δ of the layer below, and updates its weights.
+#[inline(always)]
+fn update_and_send_back<V: Vector<N>, const N: usize, const KNOWN: usize>(
+    row: &[V],
+    before: &mut [V],
+    x: &[V],
+    back: &mut [V],
+    step: Step<V>,
+) {
+    let len = row_len::<KNOWN>(row.len());
+    let (row, before, x, back) = (&row[..len], &mut before[..len], &x[..len], &mut back[..len]);
+    for i in 0..len {
+        back[i] = row[i].mul_add(step.delta, back[i]);
+        before[i] = step.apply(row[i], before[i], x[i]);
+    }
+}
+
+fn set_lane<V: Vector<N>, const N: usize>(vector: &mut V, lane: usize, value: V::Real) {
+    let mut values = vector.to_array();
+    values[lane] = value;
+    *vector = V::load(&values);
+}
+
+/// Columns of numbers, one number a pattern.
+struct Table<R> {
+    /// Length of a column: a power of two, so that no pick, masked to it, lies outside.
+    column_len: usize,
+    values: Vec<R>,
+}
+
+impl<R: Real> Table<R> {
+    /// Turns rows of `width` values into columns.
+    fn from_rows(rows: &[f64], width: usize) -> Self {
+        let column_len = column_len(rows.len() / width.max(1));
+        let mut values = vec![R::from_f64(0.0); column_len * width];
+        for (k, &value) in rows.iter().enumerate() {
+            values[k % width * column_len + k / width] = R::from_f64(value);
+        }
+        Self { column_len, values }
+    }
+
+    /// For every column, the value of each lane's pick, of which only the low bits count.
+    #[inline(always)]
+    fn look_up<V: Vector<N, Real = R>, const N: usize>(&self, picks: &[u32; N], values: &mut [V]) {
+        if self.column_len == LOOK_UP {
+            for (column, value) in self.values.as_chunks().0.iter().zip(values) {
+                *value = V::look_up(column, picks);
+            }
+            return;
+        }
+        for (column, value) in self.values.chunks_exact(self.column_len).zip(values) {
+            let mut lanes = [column[0]; N];
+            for l in 0..N {
+                lanes[l] = column[picks[l] as usize & (column.len() - 1)];
+            }
+            *value = V::load(&lanes);
+        }
     }
 }
 

@@ -3,13 +3,11 @@
 use std::io::Read;
 
 use super::cells::Cells;
-use super::columns::{Columns, Frame, Header, Need, PositionColumns};
+use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem, Place};
-use super::lines::{is_passed_over, without_mark};
-use super::reading_parser::ChannelFields;
 use super::{Provenance, Recording, Row, sha256_hex};
-use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
@@ -151,7 +149,7 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
 }
 
 /// What a row says of its contact.
-pub(super) struct Touch {
+struct Touch {
     pub position: Position,
     pub force_n: Option<f64>,
     nuisance: Option<f64>,
@@ -159,7 +157,7 @@ pub(super) struct Touch {
 
 /// Which fields of a row say where and how hard the contact was.
 #[derive(Clone, Debug)]
-pub(super) struct ContactFields {
+struct ContactFields {
     x: usize,
     y: Option<usize>,
     position_unit: Unit,
@@ -198,5 +196,241 @@ impl ContactFields {
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         Ok(Touch { position, force_n: force_n.or(schema.known_force_n), nuisance })
+    }
+}
+
+/// Lines of CSV as they come, and the fields that the first of them told.
+#[derive(Clone, Debug)]
+struct Lines<F> {
+    source: String,
+    /// How many have been read.
+    count: usize,
+    /// The fields, and how many a line has.
+    fields: Option<(F, usize)>,
+}
+
+impl<F> Lines<F> {
+    fn new(source: &str) -> Self {
+        Self { source: source.to_owned(), count: 0, fields: None }
+    }
+
+    /// The cells of the next line and its fields, which `find` finds in the first one; `None` for the header, a blank line or a
+    /// comment (`#`).
+    fn next<'a>(
+        &'a mut self,
+        line: &'a [u8],
+        header: Header,
+        find: impl FnOnce(&Cells) -> Result<F, CsvError>,
+    ) -> Result<Option<(Cells<'a>, &'a F)>, CsvError> {
+        self.count += 1;
+        let text = utf8(&self.source, self.count, line)?;
+        let text = if self.count == 1 { without_mark(text) } else { text };
+        if is_passed_over(text) {
+            return Ok(None);
+        }
+        let cells = Cells::parse(&self.source, self.count, text)?;
+        let (fields, width) = match &mut self.fields {
+            Some(found) => found,
+            none => {
+                let found = none.insert((find(&cells)?, cells.width()));
+                if header == Header::Present {
+                    return Ok(None);
+                }
+                found
+            }
+        };
+        cells.check_width(*width)?;
+        Ok(Some((cells, fields)))
+    }
+}
+
+/// Turns lines of CSV into readings; only the channel columns need to be there.
+#[derive(Clone, Debug)]
+pub struct ReadingParser {
+    lines: Lines<ChannelFields>,
+    columns: Columns,
+}
+
+impl ReadingParser {
+    /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
+    pub fn new(source: &str, columns: &Columns) -> Self {
+        Self { lines: Lines::new(source), columns: columns.clone() }
+    }
+
+    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
+    pub fn awaits_columns(&self) -> bool {
+        self.lines.fields.is_none()
+    }
+
+    /// Reads the next line: one value per channel, in SI units; `None` for the header, a blank line or a comment (`#`).
+    ///
+    /// After an error the parser goes on with the next line.
+    ///
+    /// # Errors
+    /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
+    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8.
+    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
+        let Self { lines, columns } = self;
+        let next = lines.next(line, columns.header, |head| ChannelFields::find(head, columns))?;
+        next.map(|(cells, channels)| channels.reading(&cells)).transpose()
+    }
+}
+
+/// Which fields of a row are the channels, in the layout's order.
+#[derive(Clone, Debug)]
+struct ChannelFields(Vec<(usize, Unit)>);
+
+impl ChannelFields {
+    pub fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+        let find =
+            |channel: &super::ValueColumn| Ok((head.find(&channel.column, columns.header)?, channel.unit));
+        columns.channels.iter().map(find).collect::<Result<_, _>>().map(Self)
+    }
+
+    pub fn reading(&self, cells: &Cells) -> Result<Vec<f64>, CsvError> {
+        self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
+    }
+}
+
+/// The column of time, in seconds.
+pub(super) const TIME: &str = "time_s";
+
+/// The columns of a second contact.
+pub(super) const SECOND: [&str; 2] = ["position_2_mm", "force_2_n"];
+
+/// A recording of contacts that move, with the time of every row and, where there is one, the second contact.
+///
+/// Its file has a `time_s` column beside the others; whoever reads it as an ordinary recording passes that over, as any column without
+/// a role.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedRecording {
+    /// The rows; a force of 0 says that nothing touched.
+    pub recording: Recording,
+    /// When each was taken, in seconds.
+    pub times_s: Vec<f64>,
+    /// The second contact of each row; nothing where there is but one contact.
+    pub second: Vec<Contact>,
+}
+
+impl TimedRecording {
+    /// The true contacts of every row whose force is known.
+    pub fn truths(&self) -> Vec<Vec<Contact>> {
+        let rows = self.recording.rows.iter().enumerate();
+        let all = rows.filter_map(|(i, row)| {
+            row.contact().map(|first| std::iter::once(first).chain(self.second.get(i).copied()).collect())
+        });
+        all.collect()
+    }
+}
+
+/// One line of readings in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedReading {
+    /// When it was taken, where the file says, in seconds.
+    pub time_s: Option<f64>,
+    /// The true contacts, where the file says; the force is 0 of one that did not touch.
+    pub truth: Option<Vec<Contact>>,
+    /// One value a channel, in SI units.
+    pub reading: Vec<f64>,
+}
+
+/// Turns lines of CSV into readings in time; only the channel columns need to be there.
+pub struct TimedParser<'a> {
+    lines: Lines<TimedFields>,
+    schema: Schema<'a>,
+}
+
+/// Which fields of a row say when it was taken, what touched, and what was read.
+#[derive(Clone, Debug)]
+struct TimedFields {
+    time: Option<usize>,
+    contact: Option<ContactFields>,
+    second: Option<[usize; 2]>,
+    channels: ChannelFields,
+}
+
+impl<'a> TimedParser<'a> {
+    /// A parser for the lines of `source`, from the first one.
+    pub fn new(source: &str, schema: Schema<'a>) -> Self {
+        Self { lines: Lines::new(source), schema }
+    }
+
+    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
+    pub fn awaits_columns(&self) -> bool {
+        self.lines.fields.is_none()
+    }
+
+    /// Whether a column tells the time.
+    pub fn has_time(&self) -> bool {
+        self.lines.fields.as_ref().is_some_and(|(fields, _)| fields.time.is_some())
+    }
+
+    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on
+    /// with the next line.
+    ///
+    /// # Errors
+    /// [`CsvError`] with line and column, as [`ReadingParser::parse_line`] has them, and for a time or a contact that is no number, or
+    /// a contact off the surface.
+    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
+        let Self { lines, schema } = self;
+        let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
+        let Some((cells, fields)) = next else { return Ok(None) };
+        let time_s = fields.time.map(|field| cells.number(field, Unit::NONE)).transpose()?;
+        let touch = fields.contact.as_ref().map(|contact| contact.touch(&cells, schema)).transpose()?;
+        // A force that nobody knows is not 0: something touched.
+        let truth = touch.map(|touch| Contact {
+            position: touch.position,
+            force_n: touch.force_n.unwrap_or(f64::INFINITY),
+        });
+        let second = fields.second.map(|fields| second_contact(&cells, fields)).transpose()?;
+        let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
+        Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&cells)? }))
+    }
+}
+
+/// The second contact of a line, from the fields of its place and its force.
+fn second_contact(cells: &Cells, [x, force]: [usize; 2]) -> Result<Contact, CsvError> {
+    let position = Position::along(cells.number(x, SensorKind::Deflection.unit())?);
+    Ok(Contact { position, force_n: cells.number(force, SensorKind::Reaction.unit())? })
+}
+
+impl TimedFields {
+    fn find(head: &Cells, schema: &Schema) -> Result<Self, CsvError> {
+        let columns = schema.columns;
+        let named = columns.header == Header::Present;
+        let time = Column::Name(TIME.to_owned());
+        let time = if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
+        let contact = if named { ContactFields::find(head, columns).ok() } else { None };
+        let second = SECOND.map(|name| Column::Name(name.to_owned()));
+        let second = if named && second.iter().all(|column| head.has(column)) {
+            let [x, force] = &second;
+            Some([head.find(x, columns.header)?, head.find(force, columns.header)?])
+        } else {
+            None
+        };
+        let channels = ChannelFields::find(head, columns)?;
+        Ok(Self { time, contact, second, channels })
+    }
+}
+
+/// Whether a line holds nothing, not even a comma, or is a comment.
+fn is_passed_over(line: &str) -> bool {
+    line.trim().is_empty() || line.starts_with('#')
+}
+
+/// `text` without the byte-order mark that some spreadsheets put first.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// `bytes` as text, without the line's end.
+fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvError> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Ok(text.trim_end_matches(['\r', '\n'])),
+        Err(_) => {
+            let text = String::from_utf8_lossy(bytes).trim_end_matches(['\r', '\n']).to_owned();
+            let span = 0..text.len();
+            Err(CsvProblem::NotUtf8.at(source, Place { line, column: None, text, span }))
+        }
     }
 }

@@ -3,23 +3,53 @@
 use std::io::{self, Write};
 
 use super::columns::{Column, Columns, PositionColumns};
-use super::{Recording, Row};
+use super::csv_in::{SECOND, TIME};
+use super::{Recording, Row, TimedRecording};
 use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::Unit;
 
 /// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the force
-/// column is written where every row has a force, a nuisance coordinate never. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes from, in a
-/// first line that begins with `#`.
+/// column is written where every row has a force, a nuisance coordinate never. `extent` says whether positions have one coordinate or
+/// two. `comment` says where the recording comes from, in a first line that begins with `#`.
 ///
 /// # Errors
 /// Whatever `out` reports.
-pub fn write(recording: &Recording, extent: Extent, comment: &str, mut out: impl Write) -> io::Result<()> {
+pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
     let columns = Columns::own(&recording.channels, &recording.kinds, extent);
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
+    let rows = recording.rows.iter().map(|row| record(row, &columns));
+    write_lines(comment, std::iter::once(header(&columns)).chain(rows), out)
+}
+
+/// Writes a recording as [`write`] does, with the time first.
+///
+/// # Errors
+/// Whatever `out` reports.
+pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
+    let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
+    let timed_record = |time: String, second: [String; 2], rest: Vec<String>| {
+        let second = second.into_iter().filter(|_| !timed.second.is_empty());
+        std::iter::once(time).chain(second).chain(rest).collect::<Vec<_>>()
+    };
+    let heading = timed_record(TIME.to_owned(), SECOND.map(str::to_owned), header(&columns));
+    let rows = timed.recording.rows.iter().zip(&timed.times_s).enumerate().map(|(i, (row, time_s))| {
+        let second = timed.second.get(i).map_or_else(Default::default, |contact| {
+            [columns.position_unit.format_si(contact.position.x_m), Unit::NONE.format_si(contact.force_n)]
+        });
+        timed_record(Unit::NONE.format_si(*time_s), second, record(row, &columns))
+    });
+    write_lines(comment, std::iter::once(heading).chain(rows), out)
+}
+
+fn write_lines(
+    comment: &str,
+    lines: impl Iterator<Item = Vec<String>>,
+    mut out: impl Write,
+) -> io::Result<()> {
     writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
-    out.write_all(csv_row(header(&columns)).as_bytes())?;
-    for row in &recording.rows {
-        out.write_all(csv_row(record(row, &columns)).as_bytes())?;
+    for line in lines {
+        out.write_all(csv_row(line).as_bytes())?;
     }
     out.flush()
 }
@@ -45,7 +75,7 @@ pub fn csv_row(fields: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     line
 }
 
-pub(super) fn header(columns: &Columns) -> Vec<String> {
+fn header(columns: &Columns) -> Vec<String> {
     let position = match &columns.position {
         PositionColumns::Along(x) => vec![x],
         PositionColumns::Plane { x, y } => vec![x, y],
@@ -60,7 +90,7 @@ pub(super) fn header(columns: &Columns) -> Vec<String> {
     all.map(name).collect()
 }
 
-pub(super) fn record(row: &Row, columns: &Columns) -> Vec<String> {
+fn record(row: &Row, columns: &Columns) -> Vec<String> {
     let mut record = vec![columns.position_unit.format_si(row.position.x_m)];
     if let PositionColumns::Plane { .. } = columns.position {
         record.push(columns.position_unit.format_si(row.position.y_m));
@@ -77,7 +107,7 @@ pub(super) fn record(row: &Row, columns: &Columns) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::csv_row;
-    use crate::recording::fields::split;
+    use crate::recording::cells::split;
 
     #[test]
     fn a_field_is_quoted_where_it_must_be() {

@@ -1,8 +1,16 @@
-//! A surface and its contacts under several motions, which mix.
+//! The state of a surface and its contacts, what a step of time does to it, and its Gaussian under several motions, which mix.
+//!
+//! The state of a line with C contacts is (u, u̇) and then (x, v, v̇, W) of each contact: N = 2 + 4·C numbers. u = m·ω²·q
+//! is the force of the surface's first mode, whose share of the contacts' force is p = Σ W·φ(x) with φ its shape:
+//! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not look at it.
 
+use super::TrackerConfig;
 use super::gaussian::{Change, Gaussian};
-use super::step::{MOTIONS, OF_CONTACT, contact};
-use crate::likelihood::ContactFit;
+use crate::likelihood::{ContactFit, LineLikelihood};
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::surface::modal::Oscillator;
+use palpate_numerics::small::Matrix;
+use std::f64::consts::PI;
 
 /// What a step of time does to the M members of a bank, states of N numbers.
 pub(super) trait Dynamics<const N: usize, const M: usize> {
@@ -199,5 +207,297 @@ impl<const K: usize> SeenNumbers<K> {
     fn held(&self, k: usize, value: f64) -> f64 {
         let (least, most) = self.bounds[k];
         value.max(least).min(most)
+    }
+}
+
+/// Force of the first mode, and how fast it changes.
+pub(super) const U: usize = 0;
+pub(super) const U_RATE: usize = 1;
+/// Position, speed, acceleration and force, from where a contact's numbers begin.
+pub(super) const X: usize = 0;
+pub(super) const V: usize = 1;
+pub(super) const A: usize = 2;
+pub(super) const W: usize = 3;
+/// Position, speed and acceleration.
+const OF_MOTION: usize = 3;
+/// Numbers of a contact.
+pub(super) const OF_CONTACT: usize = 4;
+
+/// Motions of a contact.
+pub(super) const MOTIONS: usize = 3;
+
+/// Where the numbers of contact `k` begin.
+pub(super) const fn contact(k: usize) -> usize {
+    2 + OF_CONTACT * k
+}
+
+/// How many contacts a state of N numbers has.
+pub(super) const fn contacts(numbers: usize) -> usize {
+    (numbers - 2) / OF_CONTACT
+}
+
+/// What a reading sees of a state on a line: u, then place and force of each contact, K = 1 + 2·C numbers.
+pub(super) fn seen_on_line<const K: usize>(length_m: f64) -> SeenNumbers<K> {
+    SeenNumbers {
+        entries: std::array::from_fn(|k| match k {
+            0 => U,
+            k if k % 2 == 1 => contact(k / 2) + X,
+            k => contact(k / 2 - 1) + W,
+        }),
+        bounds: std::array::from_fn(|k| match k {
+            0 => (f64::NEG_INFINITY, f64::INFINITY),
+            k if k % 2 == 1 => (0.0, length_m),
+            _ => (0.0, f64::INFINITY),
+        }),
+        is_place: std::array::from_fn(|k| k % 2 == 1),
+    }
+}
+
+/// The motion of contact `k` in member `member` of a bank, whose number has a digit to the base 3 for each contact.
+pub(super) const fn motion_of(member: usize, k: usize) -> usize {
+    member / MOTIONS.pow(k as u32) % MOTIONS
+}
+
+/// A step of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Step {
+    duration_s: f64,
+    motions: [Motion; MOTIONS],
+    /// The probability that a motion lasts through the step; the others share the rest.
+    lasts: f64,
+    /// Variance that an unknown force gains, over its square.
+    drift: f64,
+    swing: Option<FreeSwing>,
+}
+
+/// What free swinging makes of (u, u̇) in the step, and the variance that u̇ gains over the square of all forces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct FreeSwing {
+    free: [[f64; 2]; 2],
+    noise: f64,
+}
+
+impl Step {
+    /// A step; forces drift where they are not known.
+    pub fn new(config: &TrackerConfig, duration_s: f64, forces_known: bool) -> Self {
+        let motion = |sd: f64| Motion::new(duration_s, config.acceleration_s, sd);
+        Self {
+            duration_s,
+            motions: config.accelerations_m_per_s2.map(motion),
+            lasts: (-duration_s / config.motion_s).exp(),
+            drift: if forces_known { 0.0 } else { config.force_drift.powi(2) * duration_s },
+            swing: config.swing.map(|swing| {
+                let omega = 2.0 * PI * swing.frequency_hz;
+                FreeSwing {
+                    free: Oscillator::new(omega, swing.damping_ratio, duration_s).free(),
+                    // White noise that keeps a damped oscillator at the standard deviation TREMOR.
+                    noise: 4.0 * swing.damping_ratio * omega.powi(3) * TREMOR * TREMOR * duration_s,
+                }
+            }),
+        }
+    }
+
+    /// The probability that member `from` of a bank for `contacts` contacts becomes member `to`.
+    pub fn passes(&self, contacts: usize, from: usize, to: usize) -> f64 {
+        let passes = |k: usize| {
+            let stays = motion_of(from, k) == motion_of(to, k);
+            if stays { self.lasts } else { (1.0 - self.lasts) / (MOTIONS - 1) as f64 }
+        };
+        (0..contacts).map(passes).product()
+    }
+
+    /// The motion that a member's digit says.
+    pub fn motion(&self, number: usize) -> &Motion {
+        &self.motions[number]
+    }
+
+    /// Variance that a force of `force_n` gains.
+    pub fn drift_n2(&self, force_n: f64) -> f64 {
+        self.drift * force_n.powi(2)
+    }
+}
+
+/// A step of contacts on a line.
+#[derive(Clone, Copy)]
+pub(super) struct OnLine<'a> {
+    pub step: &'a Step,
+    pub likelihood: &'a dyn LineLikelihood,
+}
+
+impl<const N: usize, const M: usize> Dynamics<N, M> for OnLine<'_> {
+    fn passes(&self, from: usize, to: usize) -> f64 {
+        self.step.passes(contacts(N), from, to)
+    }
+
+    fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N> {
+        let mut change = Change::nothing(belief);
+        for k in 0..contacts(N) {
+            let at = contact(k);
+            self.step.motion(motion_of(member, k)).move_along(at, belief, &mut change);
+            change.noise[at + W][at + W] = self.step.drift_n2(belief.mean[at + W]);
+        }
+        if let Some(swing) = &self.step.swing {
+            self.swing(swing, belief, &mut change);
+        }
+        change
+    }
+}
+
+impl OnLine<'_> {
+    /// The first mode swings under the force that it has halfway: (u − p, u̇) swings freely.
+    fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, change: &mut Change<N>) {
+        let half_s = 0.5 * self.step.duration_s;
+        let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
+        let follows = [(U, 1.0 - uu), (U_RATE, -su)];
+        let (mut balance_n, mut force_n) = (0.0, 0.0);
+        for k in 0..contacts(N) {
+            let at = contact(k);
+            let halfway_m = mean[at + X] + half_s * (mean[at + V] + 0.5 * half_s * mean[at + A]);
+            let ([shape, slope], own_n) = (self.likelihood.first_mode(halfway_m), mean[at + W]);
+            balance_n += own_n * shape;
+            force_n += own_n;
+            for (row, share) in follows {
+                let along = share * own_n * slope;
+                change.forward[row][at + X] = along;
+                change.forward[row][at + V] = along * half_s;
+                change.forward[row][at + A] = 0.5 * along * half_s * half_s;
+                change.forward[row][at + W] = share * shape;
+            }
+        }
+        let (away_n, rate) = (mean[U] - balance_n, mean[U_RATE]);
+        change.mean[U] = balance_n + uu * away_n + us * rate;
+        change.mean[U_RATE] = su * away_n + ss * rate;
+        change.forward[U][U] = uu;
+        change.forward[U][U_RATE] = us;
+        change.forward[U_RATE][U] = su;
+        change.forward[U_RATE][U_RATE] = ss;
+        change.noise[U_RATE][U_RATE] = swing.noise * force_n * force_n;
+    }
+}
+
+/// Nothing presses as evenly as its model: a first mode that is always kept trembling, by this share of the force.
+const TREMOR: f64 = 1e-4;
+
+/// What time does to position, speed and acceleration: F and Q.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Motion {
+    forward: Matrix<3>,
+    noise: Matrix<3>,
+}
+
+impl Motion {
+    /// Writes into `change` what it does to the position, speed and acceleration that begin at entry `at` of a state.
+    pub fn move_along<const N: usize>(&self, at: usize, belief: &Gaussian<N>, change: &mut Change<N>) {
+        for i in 0..OF_MOTION {
+            for j in 0..OF_MOTION {
+                change.forward[at + i][at + j] = self.forward[i][j];
+                change.noise[at + i][at + j] = self.noise[i][j];
+            }
+            change.mean[at + i] = (0..OF_MOTION).map(|j| self.forward[i][j] * belief.mean[at + j]).sum();
+        }
+    }
+
+    /// A contact whose acceleration has standard deviation `sd` and a correlation that falls by e in `lasts_s` (R. Singer,
+    /// IEEE Trans. Aerosp. Electron. Syst. 6, 1970).
+    fn new(duration_s: f64, lasts_s: f64, sd: f64) -> Self {
+        let (t, u) = (duration_s, duration_s / lasts_s);
+        let e = (-u).exp();
+        let forward =
+            [[1.0, t, lasts_s * lasts_s * (u - 1.0 + e)], [0.0, 1.0, lasts_s * (1.0 - e)], [0.0, 0.0, e]];
+        let mut noise = [[0.0; 3]; 3];
+        let mut set = |i: usize, j: usize, value: f64| {
+            noise[i][j] = value * sd * sd * lasts_s.powi(4 - i as i32 - j as i32);
+            noise[j][i] = noise[i][j];
+        };
+        if u < 0.05 {
+            // What the closed form comes to while it would lose its digits.
+            set(X, X, u.powi(5) / 10.0);
+            set(X, V, u.powi(4) / 4.0);
+            set(X, A, u.powi(3) / 3.0);
+            set(V, V, 2.0 * u.powi(3) / 3.0);
+            set(V, A, u * u);
+            set(A, A, 2.0 * u);
+        } else {
+            let ee = e * e;
+            set(X, X, 1.0 - ee + 2.0 * u + 2.0 * u.powi(3) / 3.0 - 2.0 * u * u - 4.0 * u * e);
+            set(X, V, ee + 1.0 - 2.0 * e + 2.0 * u * e - 2.0 * u + u * u);
+            set(X, A, 1.0 - ee - 2.0 * u * e);
+            set(V, V, 4.0 * e - 3.0 - ee + 2.0 * u);
+            set(V, A, ee + 1.0 - 2.0 * e);
+            set(A, A, 1.0 - ee);
+        }
+        Self { forward, noise }
+    }
+}
+
+/// Numbers of the state of a contact on a plane: (x, v_x, v̇_x, y, v_y, v̇_y, W). Motions along and across have the same law and do not
+/// know of each other; the plane is in balance at every reading.
+pub(super) const PLANE_NUMBERS: usize = 7;
+/// Where position, speed and acceleration along begin, those across, and the force.
+pub(super) const ALONG: usize = 0;
+pub(super) const ACROSS: usize = 3;
+pub(super) const FORCE: usize = 6;
+
+/// What a reading sees of a contact on a plane: x, y and W.
+pub(super) fn seen_on_plane(extent: Extent) -> SeenNumbers<3> {
+    let [length_m, width_m] = sides_m(extent);
+    SeenNumbers {
+        entries: [ALONG, ACROSS, FORCE],
+        bounds: [(0.0, length_m), (0.0, width_m), (0.0, f64::INFINITY)],
+        is_place: [true, true, false],
+    }
+}
+
+/// A step of a contact on a plane.
+#[derive(Clone, Copy)]
+pub(super) struct OnPlane<'a>(pub &'a Step);
+
+impl Dynamics<PLANE_NUMBERS, MOTIONS> for OnPlane<'_> {
+    fn passes(&self, from: usize, to: usize) -> f64 {
+        self.0.passes(1, from, to)
+    }
+
+    fn change(&self, belief: &Gaussian<PLANE_NUMBERS>, member: usize) -> Change<PLANE_NUMBERS> {
+        let mut change = Change::nothing(belief);
+        let motion = self.0.motion(motion_of(member, 0));
+        motion.move_along(ALONG, belief, &mut change);
+        motion.move_along(ACROSS, belief, &mut change);
+        change.noise[FORCE][FORCE] = self.0.drift_n2(belief.mean[FORCE]);
+        change
+    }
+}
+
+/// Length and width, in metres; a line has no width.
+pub(super) fn sides_m(extent: Extent) -> [f64; 2] {
+    [extent.length_m, extent.width_m.unwrap_or(0.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_of_two_halves_is_the_whole_motion() {
+        let belief = Gaussian {
+            mean: [0.2, 0.5, 1.0],
+            covariance: [[4e-6, 1e-6, 1e-5], [1e-6, 1e-2, 1e-3], [1e-5, 1e-3, 4.0]],
+        };
+        // On both sides of where the closed form is replaced by its first terms.
+        for duration_s in [0.2, 9e-3] {
+            let moved = |belief: &Gaussian<3>, share: f64| {
+                let Motion { forward, noise } = Motion::new(share * duration_s, 0.1, 2.0);
+                let mean = std::array::from_fn(|i| (0..3).map(|j| forward[i][j] * belief.mean[j]).sum());
+                belief.predicted(&Change { mean, forward, noise })
+            };
+            let halves = moved(&moved(&belief, 0.5), 0.5);
+            let whole = moved(&belief, 1.0);
+            let noise = Motion::new(duration_s, 0.1, 2.0).noise;
+            for (i, noise) in noise.iter().enumerate() {
+                let rounded = 1e-9 + if duration_s < 0.1 { 0.05 } else { 0.0 };
+                assert!((halves.mean[i] - whole.mean[i]).abs() < 1e-12);
+                let off = (halves.covariance[i][i] - whole.covariance[i][i]).abs();
+                assert!(off <= rounded * noise[i] + 1e-12 * whole.covariance[i][i], "{i}: {off}");
+            }
+        }
     }
 }

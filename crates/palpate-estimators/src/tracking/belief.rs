@@ -1,10 +1,11 @@
 //! What is believed of a surface with no, one or two contacts; on a plane there is at most one.
 
-use super::bank::Bank;
+use super::bank::{
+    ACROSS, ALONG, Bank, FORCE, OnLine, OnPlane, PLANE_NUMBERS, Step, V, W, X, contact, contacts,
+    seen_on_line, seen_on_plane,
+};
 use super::gaussian::Gaussian;
-use super::on_plane::{self, OnPlane};
-use super::step::{OnLine, Step, V, W, X, contact, contacts, seen_on_line};
-use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
+use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
 use palpate_mechanics::contact::{Contact, Position};
 
 /// A bank of a surface with as many contacts.
@@ -17,20 +18,7 @@ pub(super) enum Belief {
     Nothing(Bank<2, 1>),
     One(Bank<6, 3>),
     Two(Box<Bank<10, 9>>),
-    OnPlane(Box<Bank<{ on_plane::NUMBERS }, 3>>),
-}
-
-/// A belief as one Gaussian.
-#[derive(Clone, Debug, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one contact is the rule, and a box would cost it an allocation a reading"
-)]
-pub(super) enum Mixed {
-    Nothing(Gaussian<2>),
-    One(Gaussian<6>),
-    Two(Gaussian<10>),
-    OnPlane(Gaussian<{ on_plane::NUMBERS }>),
+    OnPlane(Box<Bank<PLANE_NUMBERS, 3>>),
 }
 
 /// A reading, and what the surface says about it.
@@ -114,8 +102,8 @@ impl Belief {
                 (Self::Two(Box::new(bank)), evidence)
             }
             (Self::OnPlane(bank), Geometry::Plane(plane)) => {
-                let expand = |about: &[f64; 3]| on_plane::fit(plane, seen.whitened, about);
-                let (bank, evidence) = bank.updated(&on_plane::seen(extent), expand, None)?;
+                let expand = |about: &[f64; 3]| seen.fit_on_plane(plane, about);
+                let (bank, evidence) = bank.updated(&seen_on_plane(extent), expand, None)?;
                 (Self::OnPlane(Box::new(bank)), evidence)
             }
             // Contacts of a line are not believed in on a plane, nor the other way round.
@@ -135,12 +123,13 @@ impl Belief {
         }
     }
 
-    pub fn mixed(&self) -> Mixed {
+    /// The moments of each contact, over all motions.
+    pub fn moments(&self) -> Vec<Moments> {
         match self {
-            Self::Nothing(bank) => Mixed::Nothing(bank.mixed()),
-            Self::One(bank) => Mixed::One(bank.mixed()),
-            Self::Two(bank) => Mixed::Two(bank.mixed()),
-            Self::OnPlane(bank) => Mixed::OnPlane(bank.mixed()),
+            Self::Nothing(_) => Vec::new(),
+            Self::One(bank) => line_moments(&bank.mixed()),
+            Self::Two(bank) => line_moments(&bank.mixed()),
+            Self::OnPlane(bank) => vec![plane_moments(&bank.mixed())],
         }
     }
 
@@ -160,18 +149,6 @@ impl Belief {
                 Some(Self::OnPlane(Box::new(bank.smoothed(&OnPlane(step), later))))
             }
             _ => None,
-        }
-    }
-}
-
-impl Mixed {
-    /// The moments of each contact.
-    pub fn contacts(&self) -> Vec<Moments> {
-        match self {
-            Self::Nothing(belief) => moments(belief),
-            Self::One(belief) => moments(belief),
-            Self::Two(belief) => moments(belief),
-            Self::OnPlane(belief) => vec![on_plane::moments(belief)],
         }
     }
 }
@@ -208,13 +185,18 @@ impl Seen<'_> {
         let contacts = [at(x_m, force_n), at(other_m, other_n)];
         line.fit_two(self.whitened, contacts, self.swings.then_some(mode_n))
     }
+
+    pub fn fit_on_plane(&self, plane: &dyn PlaneLikelihood, about: &[f64; 3]) -> ContactFit<3> {
+        let [x_m, y_m, force_n] = *about;
+        plane.fit_on_plane(self.whitened, Contact { position: Position { x_m, y_m }, force_n })
+    }
 }
 
 fn at(x_m: f64, force_n: f64) -> Contact {
     Contact { position: Position::along(x_m), force_n }
 }
 
-fn moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
+fn line_moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
     let of = |k: usize| {
         let [x, v, w] = [X, V, W].map(|i| contact(k) + i);
         let variance = |i: usize| belief.covariance[i][i].max(0.0);
@@ -225,4 +207,14 @@ fn moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
         }
     };
     (0..contacts(N)).map(of).collect()
+}
+
+/// The contact of a state.
+fn plane_moments(belief: &Gaussian<PLANE_NUMBERS>) -> Moments {
+    let entries = [ALONG, ALONG + 1, FORCE, ACROSS, ACROSS + 1];
+    Moments {
+        mean: entries.map(|i| belief.mean[i]),
+        variance: entries.map(|i| belief.covariance[i][i].max(0.0)),
+        covariance_m2: belief.covariance[ALONG][ACROSS],
+    }
 }

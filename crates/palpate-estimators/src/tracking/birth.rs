@@ -4,23 +4,27 @@
 //! many times the one that fits, at any usual speed, on a surface that it has not made swing much. The reading then says
 //! how probable that was, and what is left of it.
 
-use super::bank::Bank;
+use super::TrackerConfig;
+use super::bank::{
+    A, ACROSS, ALONG, Bank, FORCE, OF_CONTACT, PLANE_NUMBERS, U, U_RATE, V, W, X, contact, seen_on_line,
+    seen_on_plane, sides_m,
+};
 use super::belief::{Belief, Seen};
-use super::config::TrackerConfig;
 use super::gaussian::Gaussian;
-use super::step::{A, OF_CONTACT, U, U_RATE, V, W, X, contact, seen_on_line};
-use crate::likelihood::{ContactFit, LineLikelihood};
+use crate::likelihood::{ContactFit, LineLikelihood, PlaneLikelihood};
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::NORMAL_95;
+use palpate_numerics::small::{principal_direction, principal_variances};
 use std::f64::consts::PI;
 
 /// A valley of a reading's misfit that is wider than this share of the length is born in parts no wider, since its force
 /// changes along it.
-pub(super) const WIDEST: f64 = 1.0 / 40.0;
+const WIDEST: f64 = 1.0 / 40.0;
 /// The most parts of a valley.
-pub(super) const MOST_PARTS: f64 = 16.0;
+const MOST_PARTS: f64 = 16.0;
 /// A force that is not known lies anywhere between 0 and this many times the one that explains a reading.
-pub(super) const FORCES: f64 = 10.0;
+const FORCES: f64 = 10.0;
 /// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
 const UNREST: f64 = 0.02;
 
@@ -52,7 +56,7 @@ impl<L: ?Sized> Births<'_, L> {
 }
 
 /// The force that fits a place, from a fit of one near it; its number is the third.
-pub(super) fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
+fn better_force_n(fit: &ContactFit<3>, near_n: f64) -> f64 {
     let information = fit.information[2][2];
     if information > 0.0 { (near_n + fit.score[2] / information).max(0.0) } else { near_n }
 }
@@ -213,5 +217,103 @@ impl Births<'_, dyn LineLikelihood + '_> {
             variance_n2,
             room,
         })
+    }
+}
+
+/// A contact on a plane that has just come, before its reading.
+#[derive(Clone, Copy)]
+struct PlaneNewcomer {
+    contact: Contact,
+    /// Covariance of the place in m²: xx, xy, yy.
+    covariance_m2: [f64; 3],
+    /// The share of all places that it stands for.
+    room: f64,
+}
+
+/// A contact in each valley of the reading's misfit, held possible as on a line. A long valley is born in
+/// parts along its longer axis; across it the reading tells where.
+impl Births<'_, dyn PlaneLikelihood + '_> {
+    /// The contacts that touch a surface on which there was nothing; each with the logarithm of how probable the reading is.
+    pub fn where_nothing_touched(&self) -> Vec<(f64, Belief)> {
+        self.valleys()
+            .flat_map(|contact| self.parts(contact))
+            .filter_map(|newcomer| self.one(&newcomer))
+            .collect()
+    }
+
+    /// A contact with the reading; what it does next is not known from that, so its motions are as one.
+    fn one(&self, newcomer: &PlaneNewcomer) -> Option<(f64, Belief)> {
+        let Contact { position: Position { x_m, y_m }, force_n } = newcomer.contact;
+        if force_n <= 0.0 {
+            return None;
+        }
+        let mut belief = Gaussian::<PLANE_NUMBERS>::default();
+        let [xx, xy, yy] = newcomer.covariance_m2;
+        for (at, place_m, variance_m2) in [(ALONG, x_m, xx), (ACROSS, y_m, yy)] {
+            belief.mean[at] = place_m;
+            belief.covariance[at][at] = variance_m2;
+            belief.covariance[at + 1][at + 1] = self.config.speed_sd_m_per_s.powi(2);
+            belief.covariance[at + 2][at + 2] = self.config.accelerations_m_per_s2[1].powi(2);
+        }
+        (belief.covariance[ALONG][ACROSS], belief.covariance[ACROSS][ALONG]) = (xy, xy);
+        belief.mean[FORCE] = force_n;
+        if self.seen.likelihood.known_force_n().is_none() {
+            belief.covariance[FORCE][FORCE] = (FORCES * force_n).powi(2) / 12.0;
+        }
+        let born: Bank<PLANE_NUMBERS, 1> = Bank::of(belief);
+        let expand = |about: &[f64; 3]| self.seen.fit_on_plane(self.likelihood, about);
+        let numbers = seen_on_plane(self.seen.likelihood.extent());
+        let (bank, evidence) = born.updated(&numbers, expand, Some([x_m, y_m, force_n]))?;
+        Some((evidence + newcomer.room.ln(), Belief::OnPlane(Box::new(Bank::of(bank.members[0])))))
+    }
+
+    /// The parts of one valley.
+    fn parts(&self, contact: &ContactEstimate) -> Vec<PlaneNewcomer> {
+        let (Some(force_n), Some(uncertainty)) = (contact.force_n, contact.uncertainty) else {
+            return Vec::new();
+        };
+        let [xx, xy, _, yy, ..] = uncertainty.covariance;
+        let sides_m = sides_m(self.seen.likelihood.extent());
+        let longest_m = sides_m[0].max(sides_m[1]);
+        let [longest, _] = principal_variances([xx, xy, yy]);
+        let reach_m = NORMAL_95 * longest.sqrt();
+        let [cos, sin] = principal_direction([xx, xy, yy]);
+        let count = (2.0 * reach_m / (WIDEST * longest_m)).ceil().clamp(1.0, MOST_PARTS);
+        let anywhere = sides_m.map(|side_m| side_m.powi(2) / 12.0);
+        if count == 1.0 {
+            let (position, known_n) = (contact.position, self.seen.likelihood.known_force_n());
+            let contact = Contact { position, force_n: known_n.unwrap_or(force_n) };
+            return vec![PlaneNewcomer {
+                contact,
+                covariance_m2: [anywhere[0], 0.0, anywhere[1]],
+                room: 1.0,
+            }];
+        }
+        let width_m = 2.0 * reach_m / count;
+        let [along, across] = [width_m.powi(2) / 12.0, longest_m.powi(2) / 12.0];
+        let covariance_m2 = [
+            along * cos * cos + across * sin * sin,
+            (along - across) * sin * cos,
+            along * sin * sin + across * cos * cos,
+        ];
+        let part = |i: usize| {
+            let off_m = (i as f64 + 0.5) * width_m - reach_m;
+            let position = Position {
+                x_m: (contact.position.x_m + off_m * cos).clamp(0.0, sides_m[0]),
+                y_m: (contact.position.y_m + off_m * sin).clamp(0.0, sides_m[1]),
+            };
+            let contact = Contact { position, force_n: self.best_force_n(position, force_n) };
+            PlaneNewcomer { contact, covariance_m2, room: width_m / longest_m }
+        };
+        (0..count as usize).map(part).collect()
+    }
+
+    /// The force that fits a place, from one that fits near it; the known one where it is known.
+    fn best_force_n(&self, position: Position, near_n: f64) -> f64 {
+        if let Some(known_n) = self.seen.likelihood.known_force_n() {
+            return known_n;
+        }
+        let near = Contact { position, force_n: near_n };
+        better_force_n(&self.likelihood.fit_on_plane(self.seen.whitened, near), near_n)
     }
 }

@@ -25,18 +25,215 @@
 mod bank;
 mod belief;
 mod birth;
-mod config;
 mod gaussian;
-mod on_plane;
-mod smoother;
-mod step;
-mod track;
 mod tracker;
 
-pub use config::{Swing, TrackerConfig};
-pub use smoother::SmoothTracker;
-pub use track::{Across, Track, TrackError, Tracked};
-pub use tracker::Tracker;
+pub use tracker::{SmoothTracker, Tracker};
+
+use crate::likelihood::Likelihood;
+use belief::Moments;
+use palpate_core::{ContactEstimate, Estimate, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
+
+/// How contacts come, move and go, and how the surface swings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerConfig {
+    /// Motions from steady to brisk: standard deviation of the acceleration, in m/s².
+    pub accelerations_m_per_s2: [f64; 3],
+    /// How long an acceleration lasts, in seconds: its correlation falls by e in that time.
+    pub acceleration_s: f64,
+    /// How long a contact keeps to one of the motions on average, in seconds.
+    pub motion_s: f64,
+    /// Standard deviation of the speed of a contact that has just come, in m/s.
+    pub speed_sd_m_per_s: f64,
+    /// How far an unknown force drifts in a second, as a share of it.
+    pub force_drift: f64,
+    /// How often a second a contact comes while nothing touches, and goes while something does.
+    pub changes_per_s: f64,
+    /// How often a second a contact goes and is at once somewhere else.
+    pub jumps_per_s: f64,
+    /// How the surface swings, where that is known; else it is taken to be in balance.
+    pub swing: Option<Swing>,
+}
+
+/// The first mode of a surface that swings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swing {
+    /// Its natural frequency, in hertz; greater than 0.
+    pub frequency_hz: f64,
+    /// The share of its critical damping, at least 0 and below 1.
+    pub damping_ratio: f64,
+}
+
+impl Default for TrackerConfig {
+    /// For hands, robots and wheels up to some metres a second.
+    fn default() -> Self {
+        Self {
+            accelerations_m_per_s2: [0.03, 0.6, 6.0],
+            acceleration_s: 0.3,
+            motion_s: 1.0,
+            speed_sd_m_per_s: 0.5,
+            force_drift: 0.1,
+            changes_per_s: 1.0,
+            jumps_per_s: 1e-3,
+            swing: None,
+        }
+    }
+}
+
+/// Below this share of the probability, one hypothesis does not speak for all.
+const SURE: f64 = 0.98;
+
+/// What is known at one reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// When the reading was taken, in seconds.
+    pub time_s: f64,
+    /// The probabilities that nothing touches, that one contact does, and that two do.
+    pub numbers: [f64; 3],
+    /// The contacts, as many as is most probable. Each keeps its place in the list while it is followed.
+    pub contacts: Vec<Tracked>,
+    /// What the reading says by itself.
+    pub alone: Estimate,
+}
+
+/// A contact that is followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracked {
+    /// Where it is along the surface, in metres.
+    pub x_m: f64,
+    /// How fast it moves along the surface, in m/s.
+    pub speed_m_per_s: f64,
+    /// How hard it presses, in newtons.
+    pub force_n: f64,
+    /// Standard deviations of the three, the position's with what calibration leaves.
+    pub sd: [f64; 3],
+    /// The 95 % interval of the position, in metres.
+    pub x_95_m: (f64, f64),
+    /// The same across a plane; nothing on a line.
+    pub across: Option<Across>,
+}
+
+/// Where a contact that is followed is across a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Across {
+    /// Where it is, in metres.
+    pub y_m: f64,
+    /// How fast it moves across, in m/s.
+    pub speed_m_per_s: f64,
+    /// Standard deviations of the two, the position's with what calibration leaves.
+    pub sd: [f64; 2],
+    /// The 95 % interval of y, in metres.
+    pub y_95_m: (f64, f64),
+    /// Covariance of x and y, in m².
+    pub covariance_m2: f64,
+}
+
+/// A reading that cannot be followed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TrackError {
+    /// Time does not go on.
+    #[error("the reading is of {time_s} s; it must be later than the one before, of {before_s} s")]
+    Time {
+        /// Its time, in seconds.
+        time_s: f64,
+        /// The time of the one before.
+        before_s: f64,
+    },
+}
+
+impl Track {
+    /// The probability that something touches.
+    pub fn touching(&self) -> f64 {
+        (self.numbers[1] + self.numbers[2]).clamp(0.0, 1.0)
+    }
+}
+
+impl Tracked {
+    /// As the estimate of a reading has it; how the force varies with the place is not told.
+    pub fn estimate(&self) -> ContactEstimate {
+        let [sd_m, _, sd_n] = self.sd;
+        let (y_m, y_95_m, xy, yy) = self.across.map_or((0.0, (0.0, 0.0), 0.0, 0.0), |across| {
+            (across.y_m, across.y_95_m, across.covariance_m2, across.sd[0].powi(2))
+        });
+        let covariance = [sd_m * sd_m, xy, 0.0, yy, 0.0, sd_n * sd_n];
+        ContactEstimate {
+            position: Position { x_m: self.x_m, y_m },
+            force_n: Some(self.force_n),
+            uncertainty: Some(Uncertainty { covariance, x_95_m: self.x_95_m, y_95_m }),
+        }
+    }
+
+    /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
+    fn all(beliefs: &[(f64, Vec<Moments>)], likelihood: &dyn Likelihood) -> Vec<Self> {
+        let Some((weight, best)) = beliefs.first() else { return Vec::new() };
+        let sum: f64 = beliefs.iter().map(|(weight, _)| weight).sum();
+        let (true, [first]) = (*weight < SURE * sum, best.as_slice()) else {
+            return Self::of(best, likelihood);
+        };
+        if likelihood.extent().is_plane() {
+            return Self::of(&[spread(first, beliefs, sum)], likelihood);
+        }
+        let mut all = Self::of(best, likelihood);
+        if let [one] = all.as_mut_slice() {
+            let floor_m2 = one.sd[0].powi(2) - first.variance[0];
+            let parts = beliefs.iter().map(|(weight, contacts)| {
+                (weight / sum, contacts[0].mean[0], (contacts[0].variance[0] + floor_m2).sqrt())
+            });
+            one.x_95_m = interval(&parts.collect::<Vec<_>>(), likelihood.extent().length_m);
+        }
+        all
+    }
+
+    /// The contacts of one belief.
+    fn of(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
+        let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
+        let floors_m2 = likelihood.calibration_m2(&contacts);
+        let Extent { length_m, width_m } = likelihood.extent();
+        let tracked = |(moments, [xx, xy, yy]): (&Moments, [f64; 3])| {
+            let [x_m, speed_m_per_s, force_n, y_m, speed_across] = moments.mean;
+            let [along, speed, force, across, across_speed] = moments.variance;
+            let sd = [(along + xx).sqrt(), speed.sqrt(), force.sqrt()];
+            let across = |width_m: f64| {
+                let sd = [(across + yy).sqrt(), across_speed.sqrt()];
+                Across {
+                    y_m,
+                    speed_m_per_s: speed_across,
+                    sd,
+                    y_95_m: held_interval(normal_interval_95(y_m, sd[0]), width_m),
+                    covariance_m2: moments.covariance_m2 + xy,
+                }
+            };
+            let x_95_m = held_interval(normal_interval_95(x_m, sd[0]), length_m);
+            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: width_m.map(across) }
+        };
+        belief.iter().zip(floors_m2).map(tracked).collect()
+    }
+}
+
+/// The most probable contact of a plane, with the covariance about it of all that are held possible.
+fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments {
+    let mut spread = Moments { variance: [0.0; 5], covariance_m2: 0.0, ..*best };
+    for (weight, one) in beliefs.iter().filter_map(|(weight, contacts)| Some((weight, contacts.first()?))) {
+        let (share, off) = (weight / sum, |i: usize| one.mean[i] - best.mean[i]);
+        for (i, variance) in spread.variance.iter_mut().enumerate() {
+            *variance += share * (one.variance[i] + off(i).powi(2));
+        }
+        spread.covariance_m2 += share * (one.covariance_m2 + off(0) * off(3));
+    }
+    spread
+}
+
+/// The 95 % interval of a mixture of normal distributions: share, mean and standard deviation of each.
+fn interval(parts: &[(f64, f64, f64)], length_m: f64) -> (f64, f64) {
+    let below = |x_m: f64| -> f64 {
+        parts.iter().map(|(share, mean, sd)| share * normal_distribution((x_m - mean) / sd)).sum()
+    };
+    let quantile = |share: f64| bisect((0.0, length_m), 24, |x_m| below(x_m) < share);
+    (quantile(0.025), quantile(0.975))
+}
 
 #[cfg(test)]
 mod tests;

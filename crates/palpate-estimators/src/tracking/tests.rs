@@ -3,6 +3,8 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+mod on_plane;
+
 use super::*;
 use crate::fit::FitTask;
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};

@@ -1,17 +1,16 @@
 //! The filter: each reading as it comes.
 
-use super::belief::{Belief, Mixed, Moments, Seen};
+use super::bank::Step;
+use super::belief::{Belief, Moments, Seen};
 use super::birth::Births;
-use super::config::TrackerConfig;
-use super::step::Step;
-use super::track::{Track, TrackError, Tracked};
+use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 
 /// The most hypotheses that are held possible at once.
 const MOST_HYPOTHESES: usize = 12;
-/// A hypothesis this many times less probable than the best is dropped, as its logarithm.
-const NEGLIGIBLE: f64 = 16.0;
+/// Logarithm of how many times less probable than the best a hypothesis is that is dropped.
+const MOST_LOG_RATIO: f64 = 16.0;
 /// The most contacts that are followed at once.
 const MOST_CONTACTS: usize = 2;
 
@@ -71,12 +70,12 @@ impl<'a> Tracker<'a> {
         let seen =
             Seen { likelihood: self.likelihood, whitened: &whitened, swings: self.config.swing.is_some() };
         let born = self.births(newborn, seen, &alone);
-        self.weigh(seen);
+        self.update(seen);
         self.hypotheses.extend(born);
-        let mixed = self.tidy();
+        let moments = self.prune();
         self.whitened = whitened;
         self.time_s = Some(time_s);
-        Ok(self.track(time_s, alone, &mixed))
+        Ok(self.track(time_s, alone, moments))
     }
 
     /// The hypotheses, the most probable first.
@@ -157,8 +156,8 @@ impl<'a> Tracker<'a> {
         self.next_id += 1;
     }
 
-    /// Weighs what there is by the reading, and moves it.
-    fn weigh(&mut self, seen: Seen) {
+    /// Updates every hypothesis and its weight by the reading.
+    fn update(&mut self, seen: Seen) {
         for hypothesis in &mut self.hypotheses {
             match hypothesis.belief.updated(seen) {
                 Some((belief, evidence)) => {
@@ -209,28 +208,26 @@ impl<'a> Tracker<'a> {
     }
 
     /// Makes the weights probabilities again, drops what is improbable, and lets the more probable of two that are one
-    /// stand for both; what is left, as single Gaussians.
-    fn tidy(&mut self) -> Vec<Mixed> {
+    /// stand for both; the moments of what is left.
+    fn prune(&mut self) -> Vec<Vec<Moments>> {
         self.hypotheses.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let best = self.hypotheses.first().map_or(f64::NEG_INFINITY, |first| first.weight);
         if best == f64::NEG_INFINITY {
             // A reading that nothing explains at all tells nothing: begin again.
             self.hypotheses.clear();
             self.add(0.0, Belief::nothing());
-            return vec![Belief::nothing().mixed()];
+            return vec![Vec::new()];
         }
         let mut kept: Vec<Hypothesis> = Vec::with_capacity(MOST_HYPOTHESES);
         let mut moments: Vec<Vec<Moments>> = Vec::with_capacity(MOST_HYPOTHESES);
-        let mut mixed: Vec<Mixed> = Vec::with_capacity(MOST_HYPOTHESES);
         for mut hypothesis in self.hypotheses.drain(..) {
             // That nothing touches stays possible, as a start for what comes.
             let nothing = hypothesis.belief.contacts() == 0;
-            let probable = hypothesis.weight > best - NEGLIGIBLE;
+            let probable = hypothesis.weight > best - MOST_LOG_RATIO;
             if !nothing && (!probable || kept.len() >= MOST_HYPOTHESES) {
                 continue;
             }
-            let belief = hypothesis.belief.mixed();
-            let contacts = belief.contacts();
+            let contacts = hypothesis.belief.moments();
             match moments.iter().position(|other| are_one(other, &contacts)) {
                 Some(same) => {
                     let other: &mut Hypothesis = &mut kept[same];
@@ -242,7 +239,6 @@ impl<'a> Tracker<'a> {
                     }
                     kept.push(hypothesis);
                     moments.push(contacts);
-                    mixed.push(belief);
                 }
             }
         }
@@ -252,18 +248,19 @@ impl<'a> Tracker<'a> {
         self.hypotheses
             .iter_mut()
             .for_each(|hypothesis| hypothesis.weight = (hypothesis.weight - all).max(f64::MIN));
-        mixed
+        moments
     }
 
-    fn track(&self, time_s: f64, alone: Estimate, mixed: &[Mixed]) -> Track {
+    fn track(&self, time_s: f64, alone: Estimate, moments: Vec<Vec<Moments>>) -> Track {
         let mut numbers = [0.0; 1 + MOST_CONTACTS];
         for hypothesis in &self.hypotheses {
             numbers[hypothesis.belief.contacts()] += hypothesis.weight.exp();
         }
         let number = (1..numbers.len()).fold(0, |best, i| if numbers[i] > numbers[best] { i } else { best });
-        let of_number = self.hypotheses.iter().zip(mixed).filter(|(one, _)| one.belief.contacts() == number);
+        let of_number =
+            self.hypotheses.iter().zip(moments).filter(|(one, _)| one.belief.contacts() == number);
         let beliefs: Vec<(f64, Vec<Moments>)> =
-            of_number.map(|(hypothesis, mixed)| (hypothesis.weight.exp(), mixed.contacts())).collect();
+            of_number.map(|(hypothesis, contacts)| (hypothesis.weight.exp(), contacts)).collect();
         let contacts = Tracked::all(&beliefs, self.likelihood);
         Track { time_s, numbers, contacts, alone }
     }
@@ -273,4 +270,91 @@ impl<'a> Tracker<'a> {
 fn are_one(a: &[Moments], b: &[Moments]) -> bool {
     let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_one_with(b));
     a.len() == b.len() && (same(&mut b.iter()) || same(&mut b.iter().rev()))
+}
+
+/// A [`Tracker`] that remembers, so that it can go back.
+pub struct SmoothTracker<'a> {
+    tracker: Tracker<'a>,
+    likelihood: &'a dyn Likelihood,
+    tracks: Vec<Track>,
+    /// What was held possible at each reading, of contacts.
+    past: Vec<Vec<Remembered>>,
+}
+
+/// A hypothesis as it was.
+#[derive(Clone, Debug)]
+struct Remembered {
+    id: u64,
+    belief: Belief,
+}
+
+impl<'a> SmoothTracker<'a> {
+    /// A tracker that has seen nothing.
+    pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
+        let tracker = Tracker::new(likelihood, config);
+        Self { tracker, likelihood, tracks: Vec::new(), past: Vec::new() }
+    }
+
+    /// Takes the next reading; see [`Tracker::follow`].
+    ///
+    /// # Errors
+    /// [`TrackError`] when the time is not later than before.
+    pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
+        let track = self.tracker.follow(time_s, reading)?;
+        let lasts = |id: u64| self.tracker.hypotheses().iter().any(|hypothesis| hypothesis.id == id);
+        if let Some(before) = self.past.last_mut() {
+            // Nobody goes back to what neither lasted nor was shown.
+            let mut number = 0;
+            before.retain(|remembered| {
+                number += 1;
+                number == 1 || lasts(remembered.id)
+            });
+        }
+        // The one that is shown comes first.
+        let shown = track.contacts.len();
+        let (shown, others): (Vec<_>, Vec<_>) = self
+            .tracker
+            .hypotheses()
+            .iter()
+            .filter(|hypothesis| hypothesis.belief.contacts() > 0)
+            .partition(|hypothesis| hypothesis.belief.contacts() == shown);
+        let remembered = shown
+            .into_iter()
+            .chain(others)
+            .map(|hypothesis| Remembered { id: hypothesis.id, belief: hypothesis.belief.clone() });
+        self.past.push(remembered.collect());
+        self.tracks.push(track);
+        Ok(())
+    }
+
+    /// What the filter knew at each reading.
+    pub fn filtered(&self) -> &[Track] {
+        &self.tracks
+    }
+
+    /// What is known at each reading when all have been seen. How many contacts there are stays what the filter found; of
+    /// the hypotheses it held, the one that lasted is gone back over.
+    pub fn smoothed(&self) -> Vec<Track> {
+        let mut smoothed = self.tracks.clone();
+        // The contacts at the reading after, as all readings show them.
+        let mut later: Option<(u64, Belief)> = None;
+        for k in (0..smoothed.len()).rev() {
+            let number = self.tracks[k].contacts.len();
+            let lasting = later.and_then(|(id, belief)| self.gone_back(k, id, &belief));
+            let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
+            let last = || self.past[k].first().map(|one| (one.id, one.belief.clone()));
+            later = if number > 0 { lasting.or_else(last) } else { None };
+            let moments = later.as_ref().map(|(_, belief)| belief.moments());
+            smoothed[k].contacts =
+                moments.map_or_else(Vec::new, |moments| Tracked::of(&moments, self.likelihood));
+        }
+        smoothed
+    }
+
+    /// What hypothesis `id` was at reading `k`, given what it was at the next.
+    fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
+        let remembered = self.past[k].iter().find(|remembered| remembered.id == id)?;
+        let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
+        remembered.belief.smoothed(&step, self.likelihood.geometry(), later).map(|belief| (id, belief))
+    }
 }

@@ -1,16 +1,496 @@
 //! Networks by Levenberg–Marquardt with Bayesian regularisation: the evidence sets the weight decay, and an ensemble with the curvature
 //! around each member says how sure the answer is.
 
-mod evidence;
-mod fitting;
-mod inputs;
-mod locator;
-mod perceptron;
 mod training;
 
-pub use fitting::{LevenbergMarquardt, LevenbergMarquardtFitError};
-pub use inputs::NetworkInputs;
-pub use locator::{LevenbergMarquardtLocator, Member, OutputScale};
+use ndarray::{Array1, Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::network::{Activation, Topology};
+use crate::recording::{Recording, TooFewPositions};
+use crate::setup::Setup;
+use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{mean, mean_and_variance, normal_interval_95, symmetric_eigen};
+
+use training::{Trained, Training, jacobians};
+
+/// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
+///
+/// Outputs are the position and, where the bench does not know the force but every row of the recording does, the force.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LevenbergMarquardt {
+    /// Nodes of each hidden layer, input side first; at least 1 each.
+    pub hidden: Vec<usize>,
+    /// Networks in the ensemble, at least 1: those with the greatest evidence of twice as many that are trained.
+    pub ensemble: usize,
+    /// Each training is capped after this many iterations.
+    pub max_iterations: u32,
+}
+
+impl Default for LevenbergMarquardt {
+    fn default() -> Self {
+        Self { hidden: vec![10], ensemble: 5, max_iterations: 200 }
+    }
+}
+
+/// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
+/// *Analyzing bagging*, Annals of Statistics 30, 2002): a step costs presses × weights², and what more presses tell goes into the
+/// ensemble.
+const MOST_PRESSES: usize = 1000;
+
+/// Why networks cannot be fitted to a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LevenbergMarquardtFitError {
+    /// One position has nothing to teach.
+    #[error(transparent)]
+    Positions(#[from] TooFewPositions),
+    /// A layer or an ensemble of nothing.
+    #[error("a network with {what} 0 cannot be trained; it must be at least 1")]
+    Zero {
+        /// What is 0.
+        what: &'static str,
+    },
+    /// Readings that never change.
+    #[error(transparent)]
+    Features(#[from] NoFeatures),
+    /// Readings that differ by no more than noise.
+    #[error(
+        "the recording's readings do not differ by more than noise; a network has nothing to tell positions by"
+    )]
+    Alike,
+    /// No training kept to the numbers.
+    #[error("none of {trainings} trainings gave a network with finite weights")]
+    Diverged {
+        /// How many were tried.
+        trainings: usize,
+    },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Fit for LevenbergMarquardt {
+    type Method = LevenbergMarquardtLocator;
+    type Error = LevenbergMarquardtFitError;
+
+    fn fit_method(&self, task: FitTask) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
+        self.check()?;
+        task.recording.check_distinct_positions(2)?;
+        let inputs = NetworkInputs::of(&task.setup.layout, task.recording)?;
+        let input_rows = input_rows(&inputs, task.recording)?;
+        let scales = output_scales(task.setup, task.recording);
+        let targets = target_rows(task.setup, task.recording, &scales);
+        let topology = self.topology(inputs.axes.len(), scales.len());
+        let training = Training {
+            topology: &topology,
+            inputs: input_rows,
+            targets,
+            max_iterations: self.max_iterations,
+        };
+        let members = self.ensemble(&training, task.seed, task.watch)?;
+        Ok(LevenbergMarquardtLocator {
+            extent: task.setup.surface.extent(),
+            force_n: task.setup.force_n,
+            inputs,
+            topology,
+            scales,
+            members,
+        })
+    }
+}
+
+impl LevenbergMarquardt {
+    fn check(&self) -> Result<(), LevenbergMarquardtFitError> {
+        let zero = |what| Err(LevenbergMarquardtFitError::Zero { what });
+        match self {
+            Self { hidden, .. } if hidden.contains(&0) => zero("hidden nodes"),
+            Self { ensemble: 0, .. } => zero("networks in its ensemble"),
+            _ => Ok(()),
+        }
+    }
+
+    fn topology(&self, inputs: usize, outputs: usize) -> Topology {
+        let sizes = std::iter::once(inputs).chain(self.hidden.iter().copied()).chain([outputs]);
+        Topology {
+            sizes: sizes.collect(),
+            biases: true,
+            hidden_activation: Activation::Tanh,
+            output_activation: Activation::Linear,
+        }
+    }
+
+    /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little.
+    fn ensemble(
+        &self,
+        training: &Training,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<Vec<Member>, LevenbergMarquardtFitError> {
+        let trainings = 2 * self.ensemble;
+        let mut trained: Vec<Trained> = Vec::new();
+        for i in 0..trainings as u64 {
+            let seed = seed.wrapping_mul(trainings as u64).wrapping_add(i);
+            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, watch)?);
+        }
+        if trained.is_empty() {
+            return Err(LevenbergMarquardtFitError::Diverged { trainings });
+        }
+        trained.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        trained.truncate(self.ensemble);
+        Ok(trained.into_iter().map(Member::of).collect())
+    }
+}
+
+fn input_rows(
+    inputs: &NetworkInputs,
+    recording: &Recording,
+) -> Result<Array2<f64>, LevenbergMarquardtFitError> {
+    let width = inputs.axes.len();
+    if width == 0 {
+        return Err(LevenbergMarquardtFitError::Alike);
+    }
+    let mut rows = Array2::zeros((recording.rows.len(), width));
+    for (i, row) in recording.rows.iter().enumerate() {
+        rows.row_mut(i).iter_mut().zip(inputs.values(&row.reading)).for_each(|(input, value)| *input = value);
+    }
+    Ok(rows)
+}
+
+/// x, y where the surface has one, and the force where it is an output.
+fn truths<'a>(setup: &Setup, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
+    let rows = &recording.rows;
+    let mut truths: Vec<Box<dyn Fn(usize) -> f64>> = vec![Box::new(|i| rows[i].position.x_m)];
+    if setup.surface.extent().width_m.is_some() {
+        truths.push(Box::new(|i| rows[i].position.y_m));
+    }
+    if setup.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
+        truths.push(Box::new(|i| rows[i].force_n.unwrap_or_default()));
+    }
+    truths
+}
+
+/// Mean and standard deviation of every output over the recording.
+fn output_scales(setup: &Setup, recording: &Recording) -> Vec<OutputScale> {
+    let count = recording.rows.len();
+    let scale = |truth: &dyn Fn(usize) -> f64| {
+        let (mean, variance) = mean_and_variance((0..count).map(truth));
+        OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
+    };
+    truths(setup, recording).iter().map(|truth| scale(truth.as_ref())).collect()
+}
+
+fn target_rows(setup: &Setup, recording: &Recording, scales: &[OutputScale]) -> Array2<f64> {
+    let truths = truths(setup, recording);
+    Array2::from_shape_fn((recording.rows.len(), scales.len()), |(i, k)| {
+        (truths[k](i) - scales[k].mean) / scales[k].sd
+    })
+}
+
+/// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
+/// training recording.
+///
+/// They are load-invariant even where the force is known: near a support the readings themselves shrink to nothing, while their
+/// direction still tells one end from the other.
+///
+/// Axes along which the recording has no more than noise are left out: where the layout says how noisy its channels are,
+/// those with a variance below four times that of the noise; else those below 10⁻⁸ of the largest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkInputs {
+    /// From a reading to features with mean 0 and variance 1.
+    pub features: Features,
+    /// A row an input: what each feature is multiplied by.
+    pub axes: Vec<Vec<f64>>,
+}
+
+impl NetworkInputs {
+    /// The inputs for a recording; none where its readings differ by no more than noise.
+    fn of(layout: &Layout, recording: &Recording) -> Result<Self, NoFeatures> {
+        let features = Features::fit(FeatureKind::LoadInvariant, recording)?;
+        let mut inputs = Self { features, axes: Vec::new() };
+        let noise = inputs.feature_noise(layout, recording);
+        // In units of the noise, where that is known, all that is not signal has variance 1 along every axis.
+        let unit = noise.clone().unwrap_or_else(|| Array1::ones(inputs.features.len()));
+        let mut covariance = Array2::zeros((unit.len(), unit.len()));
+        for row in &recording.rows {
+            let values = Array1::from(inputs.features.apply(&row.reading)) / &unit;
+            let column = values.view().insert_axis(ndarray::Axis(1));
+            covariance += &column.dot(&column.t());
+        }
+        covariance /= recording.rows.len() as f64;
+        let (variances, axes) = symmetric_eigen(&covariance);
+        let least = if noise.is_some() { 4.0 } else { 1e-8 * variances[0] };
+        let seen = variances.iter().zip(axes.columns()).filter(|(variance, _)| **variance > least);
+        inputs.axes = seen.map(|(variance, axis)| (&axis / &unit / variance.sqrt()).to_vec()).collect();
+        Ok(inputs)
+    }
+
+    /// Standard deviation of every feature's noise, where the layout says how noisy its channels are; to first order at
+    /// the mean norm where features are load-invariant: that of r/|r| is σ/|r|, that of ln |r| at most as large.
+    fn feature_noise(&self, layout: &Layout, recording: &Recording) -> Option<Array1<f64>> {
+        let Features { kind, channels, features, .. } = &self.features;
+        let scaled: Vec<f64> = channels
+            .iter()
+            .map(|scale| {
+                let channel = &layout.sensors[scale.channel].channel;
+                channel.reading_sd() / scale.divisor
+            })
+            .collect();
+        if scaled.contains(&0.0) {
+            return None;
+        }
+        let largest = scaled.iter().fold(0.0, |m: f64, s| m.max(*s));
+        let norm = match kind {
+            FeatureKind::Readings => 1.0,
+            FeatureKind::LoadInvariant => {
+                let square = |reading: &[f64]| {
+                    channels.iter().map(|s| (reading[s.channel] / s.divisor).powi(2)).sum::<f64>()
+                };
+                mean(recording.rows.iter().map(|row| square(&row.reading).sqrt()))
+            }
+        };
+        let of_feature = |source| match source {
+            FeatureSource::Channel(i) => scaled[i],
+            FeatureSource::LogNorm => largest,
+        };
+        Some(features.iter().map(|feature| of_feature(feature.source) / norm / feature.spread).collect())
+    }
+
+    /// The inputs for a reading.
+    pub fn values(&self, reading: &[f64]) -> Vec<f64> {
+        let features = self.features.apply(reading);
+        self.axes.iter().map(|axis| axis.iter().zip(&features).map(|(w, f)| w * f).sum()).collect()
+    }
+
+    fn check(&self, channels: usize) -> Result<(), LocatorFault> {
+        self.features.check(channels)?;
+        for axis in &self.axes {
+            LocatorFault::check_count("numbers of an axis", self.features.len(), axis.len())?;
+            LocatorFault::check_numbers("axis", axis.iter().copied(), |_| true, "a finite number")?;
+        }
+        Ok(())
+    }
+}
+
+/// Networks that locate; see [`LevenbergMarquardt`](super::LevenbergMarquardt).
+///
+/// The estimate is the mean of the members. Its covariance is that of the mixture: the spread of the members, and the mean over
+/// them of g·A⁻¹·gᵀ, by which the weights are unsure (g an output's derivatives by the weights, A the curvature), and of
+/// the noise 1/β that training left. The 95 % interval is the mean ± 1.96 standard deviations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevenbergMarquardtLocator {
+    /// The surface.
+    pub extent: Extent,
+    /// The contact's force in newtons, where the bench knows it.
+    pub force_n: Option<f64>,
+    /// From a reading to inputs.
+    pub inputs: NetworkInputs,
+    /// Shape of every member.
+    pub topology: Topology,
+    /// What the outputs stand for: x, then y on a two-dimensional surface, then the force where it is an output.
+    pub scales: Vec<OutputScale>,
+    /// The networks, the one with the greatest evidence first.
+    pub members: Vec<Member>,
+}
+
+/// An output a stands for mean + sd·a, in metres or newtons.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputScale {
+    /// Mean over the training recording.
+    pub mean: f64,
+    /// Standard deviation over the training recording; greater than 0.
+    pub sd: f64,
+}
+
+/// One network, and how sure it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Member {
+    /// Its weights, in the order that [`Topology`] states.
+    pub weights: Vec<f64>,
+    /// L of the curvature A = L·Lᵀ of the training objective around the weights: rows of the lower triangle, one after the other.
+    pub curvature_factor: Vec<f64>,
+    /// Variance 1/β of each output's noise, in units of the output's own variance.
+    pub noise: Vec<f64>,
+    /// γ, how many of the weights the recording determines.
+    pub effective_parameters: f64,
+    /// Logarithm of the evidence, up to a constant that is the same for all members.
+    pub log_evidence: f64,
+    /// Iterations that training took.
+    pub iterations: u32,
+}
+
+impl Member {
+    fn of(trained: Trained) -> Self {
+        let lower = trained.curvature.lower();
+        let rows = lower.outer_iter().enumerate();
+        Self {
+            weights: trained.weights,
+            curvature_factor: rows
+                .flat_map(|(i, row)| row.iter().copied().take(i + 1).collect::<Vec<_>>())
+                .collect(),
+            noise: trained.hyperparameters.betas.iter().map(|beta| 1.0 / beta).collect(),
+            effective_parameters: trained.effective_parameters,
+            log_evidence: trained.log_evidence,
+            iterations: trained.iterations,
+        }
+    }
+
+    /// L⁻¹·g.
+    fn solve_lower(&self, mut gradient: Vec<f64>) -> Vec<f64> {
+        let mut rows = self.curvature_factor.as_slice();
+        for i in 0..gradient.len() {
+            let (row, rest) = rows.split_at(i + 1);
+            rows = rest;
+            let (done, rest) = gradient.split_at_mut(i);
+            let sum: f64 = row.iter().zip(&*done).map(|(l, x)| l * x).sum();
+            rest[0] = (rest[0] - sum) / row[i];
+        }
+        gradient
+    }
+}
+
+/// Mean and covariance of the outputs.
+struct Prediction {
+    mean: Vec<f64>,
+    /// A row an output.
+    covariance: Vec<Vec<f64>>,
+}
+
+impl LevenbergMarquardtLocator {
+    /// Mean and covariance of the mixture, in units of the outputs' scales.
+    fn predict(&self, inputs: &[f64]) -> Option<Prediction> {
+        let count = self.topology.outputs();
+        let inputs = ArrayView2::from_shape((1, inputs.len()), inputs).ok()?;
+        let share = 1.0 / self.members.len() as f64;
+        let mut outputs: Vec<Array1<f64>> = Vec::with_capacity(self.members.len());
+        let mut covariance = vec![vec![0.0; count]; count];
+        for member in &self.members {
+            let (output, gradients) = jacobians(&self.topology, &member.weights, &inputs);
+            let sent: Vec<Vec<f64>> = gradients
+                .into_iter()
+                .map(|gradient| member.solve_lower(gradient.into_raw_vec_and_offset().0))
+                .collect();
+            for i in 0..count {
+                for j in 0..count {
+                    let weights: f64 = sent[i].iter().zip(&sent[j]).map(|(a, b)| a * b).sum();
+                    covariance[i][j] += share * (weights + if i == j { member.noise[i] } else { 0.0 });
+                }
+            }
+            outputs.push(output.row(0).to_owned());
+        }
+        let mean: Vec<f64> = (0..count).map(|k| share * outputs.iter().map(|o| o[k]).sum::<f64>()).collect();
+        for output in &outputs {
+            for i in 0..count {
+                for j in 0..count {
+                    covariance[i][j] += share * (output[i] - mean[i]) * (output[j] - mean[j]);
+                }
+            }
+        }
+        Some(Prediction { mean, covariance })
+    }
+
+    fn contact(&self, prediction: &Prediction) -> ContactEstimate {
+        let value = |k: usize| self.scales[k].mean + self.scales[k].sd * prediction.mean[k];
+        let covariance =
+            |i: usize, j: usize| self.scales[i].sd * self.scales[j].sd * prediction.covariance[i][j];
+        let y = self.extent.width_m.map(|_| 1);
+        let force = (self.scales.len() > 1 + usize::from(y.is_some())).then(|| self.scales.len() - 1);
+        let both = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j));
+        let interval = |k: usize| normal_interval_95(value(k), covariance(k, k).sqrt());
+        let x = Some(0);
+        ContactEstimate {
+            position: Position { x_m: value(0), y_m: y.map_or(0.0, value) },
+            force_n: self.force_n.or(force.map(value)),
+            uncertainty: Some(Uncertainty {
+                covariance: [
+                    both(x, x),
+                    both(x, y),
+                    both(x, force),
+                    both(y, y),
+                    both(y, force),
+                    both(force, force),
+                ],
+                x_95_m: interval(0),
+                y_95_m: y.map_or((0.0, 0.0), interval),
+            }),
+        }
+    }
+}
+
+impl Locate for LevenbergMarquardtLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        let prediction = self.predict(&self.inputs.values(reading));
+        let Some(prediction) = prediction else {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        };
+        let contact = self.contact(&prediction);
+        let on_surface = self.extent.contains(contact.position);
+        Estimate::of_contact(contact, if on_surface { Status::Located } else { Status::OutsideSurface })
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        self.inputs.check(setup.layout.len())?;
+        let sizes = &self.topology.sizes;
+        LocatorFault::check_numbers(
+            "layer",
+            sizes.iter().map(|n| *n as f64),
+            |n| n >= 1.0,
+            "at least 1 node",
+        )?;
+        LocatorFault::check_numbers("count of layers", [sizes.len() as f64], |n| n >= 2.0, "at least 2")?;
+        LocatorFault::check_count("inputs", self.inputs.axes.len(), self.topology.inputs())?;
+        LocatorFault::check_count("outputs", self.scales.len(), self.topology.outputs())?;
+        let axes = 1 + usize::from(self.extent.width_m.is_some());
+        let most = axes + usize::from(self.force_n.is_none());
+        LocatorFault::check_count("outputs", self.scales.len().clamp(axes, most), self.scales.len())?;
+        let scales = self.scales.iter().map(|s| s.mean);
+        LocatorFault::check_numbers("output mean", scales, |_| true, "a finite number")?;
+        let scales = self.scales.iter().map(|s| s.sd);
+        LocatorFault::check_numbers("output scale", scales, |sd| sd > 0.0, "greater than 0")?;
+        LocatorFault::check_numbers(
+            "count of members",
+            [self.members.len() as f64],
+            |n| n >= 1.0,
+            "at least 1",
+        )?;
+        self.members.iter().try_for_each(|member| self.check_member(member))
+    }
+}
+
+impl LevenbergMarquardtLocator {
+    fn check_member(&self, member: &Member) -> Result<(), LocatorFault> {
+        let weights = self.topology.weight_count();
+        LocatorFault::check_count("weights", weights, member.weights.len())?;
+        LocatorFault::check_count(
+            "curvature numbers",
+            weights * (weights + 1) / 2,
+            member.curvature_factor.len(),
+        )?;
+        LocatorFault::check_count("noise variances", self.scales.len(), member.noise.len())?;
+        let finite = member.weights.iter().chain(&member.curvature_factor).copied();
+        LocatorFault::check_numbers("weight or curvature", finite, |_| true, "a finite number")?;
+        let pivots = (0..weights).map(|i| member.curvature_factor[i * (i + 3) / 2]);
+        LocatorFault::check_numbers("curvature pivot", pivots, |d| d > 0.0, "greater than 0")?;
+        LocatorFault::check_numbers(
+            "noise variance",
+            member.noise.iter().copied(),
+            |v| v >= 0.0,
+            "at least 0",
+        )
+    }
+}
 
 #[cfg(test)]
 mod tests;

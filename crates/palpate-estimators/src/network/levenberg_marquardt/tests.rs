@@ -3,8 +3,7 @@
 use ndarray::Array2;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use super::evidence::Hyperparameters;
-use super::perceptron::{jacobians, outputs};
+use super::training::{Hyperparameters, jacobians, outputs};
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::network::{Activation, Topology};

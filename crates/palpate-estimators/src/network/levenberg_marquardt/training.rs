@@ -1,15 +1,27 @@
-//! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994).
+//! Levenberg–Marquardt: Gauss–Newton steps, damped as far as they must be (Levenberg 1944; Marquardt 1963; Hagan and Menhaj 1994), with
+//! weight decay and noise by the evidence framework (D. J. C. MacKay, Neural Computation 4 (1992), 448; with the Gauss–Newton curvature
+//! of F. D. Foresee and M. T. Hagan, ICNN 1997).
+//!
+//! Symbols: w the P weights, e_k the errors of output k over N rows and J_k their Jacobian; α weight decay, β_k one over
+//! the variance of output k's noise; A = Σ β_k·J_kᵀJ_k + α·1 the curvature; γ_k effective parameters.
+//!
+//! ```text
+//! S   = ½ Σ β_k·|e_k|² + ½ α·|w|²
+//! γ_k = β_k·tr(A⁻¹·J_kᵀJ_k),  γ = Σ γ_k = P − α·tr A⁻¹
+//! α   = γ/|w|²,  β_k = (N − γ_k)/|e_k|²
+//! ln evidence = −S − ½ ln det A + ½ P ln α + ½ N Σ ln β_k    (up to a constant)
+//! ```
+//!
+//! Derivatives by the weights: x inputs of a layer, a = f(W·x + b) its outputs, δ = ∂output/∂z for one of the network's outputs, sent
+//! back by δ_below = f′ ∘ Wᵀ·δ; ∂output/∂w_ij = δ_i·x_j.
 
-use ndarray::{Array1, Array2, Axis};
+use crate::network::{Activation, Topology};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::{Cholesky, random_order};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-use super::evidence::Hyperparameters;
-use super::perceptron::{jacobians, outputs};
-use crate::network::Topology;
-use palpate_numerics::{Cholesky, random_order};
 
 /// What one network is trained on.
 pub(super) struct Training<'a> {
@@ -159,4 +171,169 @@ impl Training<'_> {
 /// |e_k|² of every output.
 fn squares(errors: &Array2<f64>) -> Vec<f64> {
     errors.columns().into_iter().map(|column| column.dot(&column)).collect()
+}
+
+/// α and β.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Hyperparameters {
+    pub(super) alpha: f64,
+    pub(super) betas: Vec<f64>,
+}
+
+/// Targets have variance 1; noise below this standard deviation is none.
+const LEAST_NOISE: f64 = 1e-7;
+
+impl Hyperparameters {
+    /// S for the squared errors of every output and |w|².
+    pub(super) fn objective(&self, squared_errors: &[f64], squared_weights: f64) -> f64 {
+        let misfit: f64 = self.betas.iter().zip(squared_errors).map(|(beta, e)| beta * e).sum();
+        0.5 * (misfit + self.alpha * squared_weights)
+    }
+
+    /// Σ β_k·J_kᵀJ_k + (α + μ)·1.
+    pub(super) fn curvature(&self, products: &[Array2<f64>], mu: f64) -> Array2<f64> {
+        let size = products.first().map_or(0, Array2::nrows);
+        let mut curvature = Array2::eye(size) * (self.alpha + mu);
+        for (product, beta) in products.iter().zip(&self.betas) {
+            curvature.scaled_add(*beta, product);
+        }
+        curvature
+    }
+
+    /// γ_k from the factored A.
+    pub(super) fn effective_parameters(&self, a: &Cholesky, products: &[Array2<f64>]) -> Vec<f64> {
+        let inverse = a.inverse();
+        let trace = |product: &Array2<f64>| (&inverse * product).sum();
+        products.iter().zip(&self.betas).map(|(product, beta)| beta * trace(product)).collect()
+    }
+
+    /// One step of the fixed point.
+    pub(super) fn update(
+        &mut self,
+        gammas: &[f64],
+        rows: usize,
+        squared_errors: &[f64],
+        squared_weights: f64,
+    ) {
+        let rows = rows as f64;
+        self.alpha = (gammas.iter().sum::<f64>() / squared_weights).clamp(1e-8, 1e8);
+        for ((beta, gamma), error) in self.betas.iter_mut().zip(gammas).zip(squared_errors) {
+            // A network that could take every row by heart leaves no rows to see noise in: it is granted one in a hundred.
+            let free = (rows - gamma).max(0.01 * rows);
+            *beta = (free / error).min(LEAST_NOISE.powi(-2));
+        }
+    }
+
+    /// ln evidence, for S and the factored A.
+    pub(super) fn log_evidence(&self, objective: f64, a: &Cholesky, rows: usize) -> f64 {
+        let noise: f64 = self.betas.iter().map(|beta| beta.ln()).sum();
+        -objective - 0.5 * a.log_determinant()
+            + 0.5 * a.size() as f64 * self.alpha.ln()
+            + 0.5 * rows as f64 * noise
+    }
+}
+
+/// Outputs of every row of inputs, a row each.
+pub(super) fn outputs(topology: &Topology, weights: &[f64], inputs: &ArrayView2<f64>) -> Array2<f64> {
+    let mut outputs = Array2::zeros((inputs.nrows(), topology.outputs()));
+    let mut layers = Activations::new(topology);
+    for (input, mut output) in inputs.outer_iter().zip(outputs.outer_iter_mut()) {
+        layers.forward(topology, weights, input.iter().copied());
+        output.iter_mut().zip(layers.last()).for_each(|(out, a)| *out = *a);
+    }
+    outputs
+}
+
+/// Outputs, and for every output the matrix of its derivatives: a row for each of the inputs' rows, a column a weight.
+pub(super) fn jacobians(
+    topology: &Topology,
+    weights: &[f64],
+    inputs: &ArrayView2<f64>,
+) -> (Array2<f64>, Vec<Array2<f64>>) {
+    let (rows, count) = (inputs.nrows(), topology.weight_count());
+    let mut outputs = Array2::zeros((rows, topology.outputs()));
+    let mut jacobians = vec![Array2::zeros((rows, count)); topology.outputs()];
+    let mut layers = Activations::new(topology);
+    for (row, input) in inputs.outer_iter().enumerate() {
+        layers.forward(topology, weights, input.iter().copied());
+        for (k, jacobian) in jacobians.iter_mut().enumerate() {
+            outputs[[row, k]] = layers.last()[k];
+            if let Some(gradient) = jacobian.row_mut(row).as_slice_mut() {
+                layers.gradient(topology, weights, k, gradient);
+            }
+        }
+    }
+    (outputs, jacobians)
+}
+
+/// What flows through a network: the inputs first, then each layer's outputs.
+struct Activations {
+    layers: Vec<Vec<f64>>,
+    delta: Vec<f64>,
+    below: Vec<f64>,
+}
+
+impl Activations {
+    fn new(topology: &Topology) -> Self {
+        let layers = topology.sizes.iter().map(|size| vec![0.0; *size]).collect();
+        Self { layers, delta: Vec::new(), below: Vec::new() }
+    }
+
+    fn last(&self) -> &[f64] {
+        self.layers.last().map_or(&[], Vec::as_slice)
+    }
+
+    fn forward(&mut self, topology: &Topology, mut weights: &[f64], inputs: impl Iterator<Item = f64>) {
+        self.layers[0].iter_mut().zip(inputs).for_each(|(x, input)| *x = input);
+        for layer in 0..topology.layers() {
+            let (below, above) = self.layers.split_at_mut(layer + 1);
+            let (x, activation) = (&below[layer], topology.activation(layer));
+            for a in above[0].iter_mut() {
+                let (row, rest) = weights.split_at(topology.row_len(layer));
+                weights = rest;
+                let bias = if topology.biases { row[x.len()] } else { 0.0 };
+                *a = activation.apply(row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>() + bias);
+            }
+        }
+    }
+
+    /// ∂ output `k` / ∂ weights at the last forward pass.
+    fn gradient(&mut self, topology: &Topology, weights: &[f64], k: usize, gradient: &mut [f64]) {
+        self.delta.clear();
+        self.delta.resize(topology.outputs(), 0.0);
+        self.delta[k] = slope(topology.output_activation, self.last()[k]);
+        let mut end = weights.len();
+        for layer in (0..topology.layers()).rev() {
+            let (row_len, rows) = (topology.row_len(layer), topology.rows(layer));
+            let start = end - row_len * rows;
+            let x = &self.layers[layer];
+            self.below.clear();
+            self.below.resize(x.len(), 0.0);
+            for (i, delta) in self.delta.iter().enumerate() {
+                let place = start + i * row_len;
+                for (j, x) in x.iter().enumerate() {
+                    gradient[place + j] = delta * x;
+                    self.below[j] += delta * weights[place + j];
+                }
+                if topology.biases {
+                    gradient[place + x.len()] = *delta;
+                }
+            }
+            if layer > 0 {
+                let activation = topology.activation(layer - 1);
+                self.below.iter_mut().zip(x).for_each(|(delta, a)| *delta *= slope(activation, *a));
+            }
+            std::mem::swap(&mut self.delta, &mut self.below);
+            end = start;
+        }
+    }
+}
+
+/// f′ from the output a.
+fn slope(activation: Activation, a: f64) -> f64 {
+    match activation {
+        Activation::Logistic => a * (1.0 - a),
+        Activation::Tanh => 1.0 - a * a,
+        Activation::Linear => 1.0,
+    }
 }
