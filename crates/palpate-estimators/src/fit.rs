@@ -58,12 +58,28 @@ pub struct ChannelMismatch {
     pub found: usize,
 }
 
-/// Where [`Fit::fit_many`] takes its seeds from and leaves what it fitted.
-pub trait SeedQueue<M> {
+/// Seeds of fits that are still to be made, and where their results go.
+pub trait SeedQueue<T> {
     /// The seed of the next fit; `None` when all are taken.
     fn next_seed(&mut self) -> Option<u64>;
-    /// Takes a locator.
-    fn fitted(&mut self, seed: u64, locator: Fitted<M>);
+    /// Takes what a fit gave.
+    fn fitted(&mut self, seed: u64, result: T);
+}
+
+/// A queue of `U` as one of what `map` makes into `U`.
+pub(crate) struct Mapped<'a, U, F> {
+    pub queue: &'a mut dyn SeedQueue<U>,
+    pub map: F,
+}
+
+impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for Mapped<'_, U, F> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.queue.next_seed()
+    }
+
+    fn fitted(&mut self, seed: u64, result: T) {
+        self.queue.fitted(seed, (self.map)(seed, result));
+    }
 }
 
 /// An estimator: a configured method that can be fitted.
@@ -120,7 +136,11 @@ pub trait Fit {
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it; what was fitted before is in the
     /// queue.
-    fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Self::Method>) -> Result<(), Self::Error> {
+    fn fit_many(
+        &self,
+        task: FitTask,
+        queue: &mut dyn SeedQueue<Fitted<Self::Method>>,
+    ) -> Result<(), Self::Error> {
         while let Some(seed) = queue.next_seed() {
             queue.fitted(seed, self.fit_task(task.seed(seed))?);
         }

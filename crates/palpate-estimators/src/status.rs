@@ -2,7 +2,8 @@
 //! its channels.
 //!
 //! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
-//!   exceeds more often than [`FALSE_ALARM_RATE`], and a contact explains the reading no better than its unknowns cost.
+//!   exceeds more often than [`FALSE_ALARM_RATE`], and a contact explains the reading no better than its unknowns cost
+//!   ([`contact_cost`]).
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
 //!   [`FALSE_ALARM_RATE`].
 //! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
@@ -24,6 +25,15 @@ pub const OTHER_PLACE: f64 = 0.05;
 /// is then explained.
 pub fn misfit_bound(freedom: usize) -> f64 {
     if freedom == 0 { f64::INFINITY } else { chi_squared_bound(FALSE_ALARM_RATE, freedom) }
+}
+
+/// Places along a line that readings tell apart.
+const PLACES: f64 = 33.0;
+
+/// What a contact with so many unknowns costs in χ², read by so many channels, by the extended Bayesian information criterion (Chen and
+/// Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln P, with P the places it could have been at.
+pub fn contact_cost(unknowns: usize, channels: usize) -> f64 {
+    unknowns as f64 * (channels as f64).ln() + 2.0 * PLACES.ln()
 }
 
 #[cfg(test)]

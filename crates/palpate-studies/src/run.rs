@@ -194,7 +194,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl SeedQueue<Method> for Queue<'_> {
+impl SeedQueue<Locator> for Queue<'_> {
     fn next_seed(&mut self) -> Option<u64> {
         let work = &self.work[self.arm];
         let next = work.taken.fetch_add(1, Ordering::Relaxed);

@@ -2,9 +2,10 @@
 //! after the other; one core, in CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
 
 use cpu_time::ThreadTime;
+use palpate_estimators::fit::SeedQueue;
 use palpate_estimators::network::{
-    BackPropagation, Network, Patterns, Precision, PresentationOrder, Topology, TrainedNetwork,
-    TrainingQueue, TrainingTask, train_many, train_one,
+    BackPropagation, Network, Precision, PresentationOrder, Topology, TrainedNetwork, TrainingSet,
+    TrainingTask, train_many, train_one,
 };
 use palpate_numerics::median;
 use palpate_numerics::simd::InstructionSet;
@@ -82,18 +83,18 @@ struct Seeds {
     left: u64,
 }
 
-impl TrainingQueue for Seeds {
+impl SeedQueue<TrainedNetwork> for Seeds {
     fn next_seed(&mut self) -> Option<u64> {
         self.left = self.left.checked_sub(1)?;
         Some(self.left)
     }
-    fn finished(&mut self, _: u64, network: TrainedNetwork) {
+    fn fitted(&mut self, _: u64, network: TrainedNetwork) {
         std::hint::black_box(network);
     }
 }
 
-fn beam_patterns(count: usize) -> Patterns {
-    let mut patterns = Patterns { inputs: 8, outputs: 1, input_values: vec![], target_values: vec![] };
+fn beam_patterns(count: usize) -> TrainingSet {
+    let mut patterns = TrainingSet { inputs: 8, outputs: 1, input_values: vec![], target_values: vec![] };
     for p in 0..count {
         let a = (p as f64 + 0.5) / count as f64;
         for i in 1..=8 {

@@ -9,7 +9,7 @@ use crate::lines::Lines;
 use crate::{input, output};
 use findings::Findings;
 use palpate_estimators::estimator::{
-    LoadProfile, LoadSensorsError, Locator, PatchLimit, Profiler, patch_limits, setup_load_sensors,
+    LoadProfile, LoadSensors, LoadSensorsError, Locator, PatchLimit, Profiler, patch_limits,
 };
 use palpate_estimators::recording::ReadingParser;
 use palpate_estimators::setup::Setup;
@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Subject::Locator(Box::new(input::read_locator(path)?))
     };
     let sensors = match &subject {
-        Subject::Rig(rig) => setup_load_sensors(&rig.setup),
+        Subject::Rig(rig) => LoadSensors::of(&rig.setup),
         Subject::Locator(locator) => locator.load_sensors(),
     };
     let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);

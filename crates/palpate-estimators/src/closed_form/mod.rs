@@ -10,13 +10,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
+use crate::status::{OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{NORMAL_95, chi_squared_bound, held_interval, normal_interval_95};
+use palpate_numerics::{NORMAL_95, held_interval, normal_interval_95};
 use polynomial::Polynomial;
 
 /// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
@@ -70,26 +71,18 @@ impl Fit for ClosedForm {
     type Method = ClosedFormLocator;
     type Error = ClosedFormFitError;
 
-    fn fit_method(&self, task: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
-        locator(task.setup)
+    fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
+        if setup.surface.model().is_none() {
+            return Err(ClosedFormFitError::NoModel);
+        }
+        let SurfaceSpec::Beam(beam) = setup.surface else { return Err(ClosedFormFitError::NotABeam) };
+        if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
+            return Err(ClosedFormFitError::NotModelled { kind });
+        }
+        let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
+        let (needed, found) = (locator.unknowns(), locator.seeing().len());
+        if found < needed { Err(ClosedFormFitError::TooFewSensors { needed, found }) } else { Ok(locator) }
     }
-}
-
-fn locator(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
-    if setup.surface.model().is_none() {
-        return Err(ClosedFormFitError::NoModel);
-    }
-    let SurfaceSpec::Beam(beam) = setup.surface else { return Err(ClosedFormFitError::NotABeam) };
-    let kinds = setup.layout.kinds();
-    if let Some(kind) = kinds.into_iter().find(|kind| *kind == SensorKind::Raw) {
-        return Err(ClosedFormFitError::NotModelled { kind });
-    }
-    let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
-    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.seeing().len());
-    if found < needed {
-        return Err(ClosedFormFitError::TooFewSensors { needed, found });
-    }
-    Ok(locator)
 }
 
 /// A closed form that locates; see [`ClosedForm`](super::ClosedForm).
@@ -105,6 +98,11 @@ pub struct ClosedFormLocator {
 }
 
 impl ClosedFormLocator {
+    /// 1 for the position, and 1 for a force that is unknown.
+    fn unknowns(&self) -> usize {
+        1 + usize::from(self.force_n.is_none())
+    }
+
     /// Channels that are not dead and that see a contact somewhere.
     fn seeing(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
@@ -116,14 +114,13 @@ impl ClosedFormLocator {
     }
 
     /// What each channel's readings are multiplied by: 1/σ where every noise is known, else 1/full scale.
-    fn weights(&self, channels: &[usize]) -> Weights {
+    fn weights(&self, channels: &[usize]) -> (Vec<f64>, Noise) {
         let sensors = || channels.iter().map(|i| &self.layout.sensors[*i]);
         let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
         if known.iter().all(|weight| weight.is_finite()) {
-            return Weights { weights: known, noise: Noise::Known };
+            return (known, Noise::Known);
         }
-        let weights = sensors().map(|s| 1.0 / self.beam.full_scale(s.kind)).collect();
-        Weights { weights, noise: Noise::Unknown }
+        (sensors().map(|s| 1.0 / self.beam.full_scale(s.kind)).collect(), Noise::Unknown)
     }
 
     /// The stretches between neighbouring sensors, supports included.
@@ -150,39 +147,56 @@ impl ClosedFormLocator {
         (reactions && apart).then_some(if a < b { (first, second) } else { (second, first) })
     }
 
+    /// The moment balance of two supports that weigh; the position may come to lie beyond them.
+    ///
+    /// For an unknown force W a = l·R_right/W and W = R_left + R_right, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W,
+    /// ∂W/∂R = 1; for a known one a is from weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l.
     fn balance(&self, (left, right): (usize, usize), reading: &[f64], noise: Noise) -> Estimate {
         let length_m = self.beam.length_m;
-        let variances = [left, right].map(|i| self.layout.sensors[i].channel.reading_sd().powi(2));
-        let balance = Balance { length_m, left_n: reading[left], right_n: reading[right], variances };
-        let balanced = match self.force_n {
-            Some(force_n) => balance.known_force(force_n),
-            None => balance.unknown_force(),
+        let (left_n, right_n) = (reading[left], reading[right]);
+        let [var_left, var_right] =
+            [left, right].map(|i| self.layout.sensors[i].channel.reading_sd().powi(2));
+        let (position_m, force_n, [xx, xf, ff]) = match self.force_n {
+            None => {
+                let force_n = left_n + right_n;
+                let position_m = length_m * right_n / force_n;
+                let slopes = [-position_m / force_n, (length_m - position_m) / force_n];
+                let xx = slopes[0] * slopes[0] * var_left + slopes[1] * slopes[1] * var_right;
+                let xf = slopes[0] * var_left + slopes[1] * var_right;
+                (position_m, force_n, [xx, xf, var_left + var_right])
+            }
+            Some(force_n) => {
+                let weight = |variance: f64| if variance > 0.0 { 1.0 / variance } else { 1.0 };
+                let (left, right) = (weight(var_left), weight(var_right));
+                let share = (right * right_n + left * (force_n - left_n)) / ((left + right) * force_n);
+                let noise =
+                    (right * right * var_right + left * left * var_left) / ((left + right) * force_n).powi(2);
+                (length_m * share, force_n, [length_m.powi(2) * noise, 0.0, 0.0])
+            }
         };
-        let misfit_n = balance.left_n + balance.right_n - balanced.force_n;
+        let misfit_n = left_n + right_n - force_n;
         let tolerated = match noise {
-            Noise::Known => chi_squared_bound(RARE, 1) * variances.iter().sum::<f64>(),
-            Noise::Unknown => (0.1 * balanced.force_n).powi(2),
+            Noise::Known => misfit_bound(1) * (var_left + var_right),
+            Noise::Unknown => (0.1 * force_n).powi(2),
         };
-        let [xx, xf, ff] = balanced.covariance;
         let sd_m = xx.sqrt();
-        let on_surface = self.beam.contains(Position::along(balanced.position_m));
-        let near = |edge_m: f64| noise == Noise::Known && (balanced.position_m - edge_m).abs() <= 3.0 * sd_m;
-        let (status, position_m) = if balanced.force_n <= 0.0 || misfit_n.powi(2) > tolerated {
-            (Status::OutsideModel, balanced.position_m)
+        let on_surface = self.beam.contains(Position::along(position_m));
+        let near = |edge_m: f64| noise == Noise::Known && (position_m - edge_m).abs() <= 3.0 * sd_m;
+        let (status, held_m) = if force_n <= 0.0 || misfit_n.powi(2) > tolerated {
+            (Status::OutsideModel, position_m)
         } else if on_surface || near(0.0) || near(length_m) {
             // Noise may carry a contact at the very edge a little beyond it.
-            (Status::Located, balanced.position_m.clamp(0.0, length_m))
+            (Status::Located, position_m.clamp(0.0, length_m))
         } else {
-            (Status::OutsideSurface, balanced.position_m)
+            (Status::OutsideSurface, position_m)
         };
         let uncertainty = (noise == Noise::Known).then_some(Uncertainty {
             covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: normal_interval_95(balanced.position_m, sd_m),
+            x_95_m: normal_interval_95(position_m, sd_m),
             y_95_m: (0.0, 0.0),
         });
-        let position = Position::along(position_m);
-        let contact = ContactEstimate { position, force_n: Some(balanced.force_n), uncertainty };
-        Estimate::of_contact(contact, status)
+        let position = Position::along(held_m);
+        Estimate::of_contact(ContactEstimate { position, force_n: Some(force_n), uncertainty }, status)
     }
 }
 
@@ -193,26 +207,28 @@ enum Noise {
     Unknown,
 }
 
-struct Weights {
-    weights: Vec<f64>,
-    noise: Noise,
-}
-
 impl Locate for ClosedFormLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let channels = self.seeing();
-        let Weights { weights, noise } = self.weights(&channels);
+        let (weights, noise) = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
         let size: f64 = whitened.iter().map(|r| r * r).sum();
-        let silent = if noise == Noise::Known { chi_squared_bound(RARE, whitened.len()) } else { 0.0 };
-        if size <= silent {
-            return Estimate::of_position(Position::default(), Status::NoContact);
-        }
-        if let Some(scales) = self.scales(&channels) {
+        let quiet = size <= if noise == Noise::Known { misfit_bound(channels.len()) } else { 0.0 };
+        let scales = self.scales(&channels);
+        if let (false, Some(scales)) = (quiet, scales) {
             return self.balance(scales, reading, noise);
         }
         let segments = self.segments(&channels, &weights);
-        Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise }.estimate()
+        let posterior = Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise };
+        let found = posterior.explanations();
+        let least = found.iter().fold(f64::INFINITY, |least, explanation| least.min(explanation.chi_squared));
+        if quiet && size <= least + contact_cost(self.unknowns(), channels.len()) {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        }
+        match scales {
+            Some(scales) => self.balance(scales, reading, noise),
+            None => posterior.estimate(found),
+        }
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
@@ -224,19 +240,13 @@ impl Locate for ClosedFormLocator {
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
-        let (needed, found) = (1 + usize::from(self.force_n.is_none()), self.seeing().len());
+        let (needed, found) = (self.unknowns(), self.seeing().len());
         if found < needed {
             return Err(LocatorFault::Count { what: "sensors that see a contact", needed, found });
         }
         Ok(())
     }
 }
-
-/// Modes whose probabilities sum to less than this are not spoken of.
-const NEGLIGIBLE: f64 = 0.05;
-
-/// A reading that noise gives as rarely as this has another cause.
-const RARE: f64 = 1e-3;
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.
 const ROUNDING: f64 = 1e-13;
@@ -262,8 +272,7 @@ struct Explanation {
 }
 
 impl Posterior<'_> {
-    fn estimate(&self) -> Estimate {
-        let mut found = self.explanations();
+    fn estimate(&self, mut found: Vec<Explanation>) -> Estimate {
         found.sort_by(|a, b| self.log_weight(b).total_cmp(&self.log_weight(a)));
         let Some(best) = found.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
@@ -273,17 +282,16 @@ impl Posterior<'_> {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
-        let shares: Vec<f64> =
-            found.iter().map(|e| (self.log_weight(e) - self.log_weight(best)).exp()).collect();
-        let total: f64 = shares.iter().sum();
-        if 1.0 - 1.0 / total > NEGLIGIBLE || best.to_m - best.from_m > 0.01 * self.length_m() {
-            estimate.status = Status::Ambiguous;
-            for (other, share) in found.iter().zip(&shares).skip(1) {
-                let mode = Mode { contact: self.contact(other), probability: share / total };
-                if mode.probability < 0.1 * NEGLIGIBLE || !estimate.modes.push(mode) {
-                    break;
-                }
+        let share = |e: &Explanation| (self.log_weight(e) - self.log_weight(best)).exp();
+        let total: f64 = found.iter().map(share).sum();
+        for other in &found[1..] {
+            let mode = Mode { contact: self.contact(other), probability: share(other) / total };
+            if mode.probability >= OTHER_PLACE {
+                estimate.modes.push(mode);
             }
+        }
+        if !estimate.modes.as_slice().is_empty() || best.to_m - best.from_m > 0.01 * self.length_m() {
+            estimate.status = Status::Ambiguous;
         }
         estimate
     }
@@ -384,7 +392,8 @@ impl Posterior<'_> {
     fn tolerated(&self) -> f64 {
         let unknowns = 1 + usize::from(self.force_n.is_none());
         match self.noise {
-            Noise::Known => chi_squared_bound(RARE, self.reading.len().saturating_sub(unknowns).max(1)),
+            // Contacts press and lie on the beam, so that as many readings as unknowns need not have one that explains them.
+            Noise::Known => misfit_bound(self.reading.len().saturating_sub(unknowns).max(1)),
             Noise::Unknown => 0.01 * self.size(),
         }
     }
@@ -405,52 +414,15 @@ impl Posterior<'_> {
     }
 }
 
-/// The readings of the scales under both supports, in newtons, and their noise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Balance {
-    length_m: f64,
-    left_n: f64,
-    right_n: f64,
-    /// Variances of left and right in N².
-    variances: [f64; 2],
-}
-
-/// A contact that balances the reactions; its position may lie beyond the supports.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Balanced {
-    position_m: f64,
-    force_n: f64,
-    /// Covariance of position and force: xx, xf, ff.
-    covariance: [f64; 3],
-}
-
-impl Balance {
-    /// Position and force, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W, ∂W/∂R = 1.
-    fn unknown_force(&self) -> Balanced {
-        let force_n = self.left_n + self.right_n;
-        let position_m = self.length_m * self.right_n / force_n;
-        let slopes = [-position_m / force_n, (self.length_m - position_m) / force_n];
-        let [left, right] = self.variances;
-        let covariance = [
-            slopes[0] * slopes[0] * left + slopes[1] * slopes[1] * right,
-            slopes[0] * left + slopes[1] * right,
-            left + right,
-        ];
-        Balanced { position_m, force_n, covariance }
-    }
-
-    /// The position by weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l, for a known force W.
-    fn known_force(&self, force_n: f64) -> Balanced {
-        let [left, right] = self.variances.map(|variance| if variance > 0.0 { 1.0 / variance } else { 1.0 });
-        let share = (right * self.right_n + left * (force_n - self.left_n)) / ((left + right) * force_n);
-        let [var_left, var_right] = self.variances;
-        let noise = (right * right * var_right + left * left * var_left) / ((left + right) * force_n).powi(2);
-        let position_m = self.length_m * share;
-        Balanced { position_m, force_n, covariance: [self.length_m.powi(2) * noise, 0.0, 0.0] }
-    }
-}
-
-/// A stretch of the beam between neighbouring sensors or supports.
+/// A stretch of the beam between neighbouring sensors or supports, where the influence functions are polynomials.
+///
+/// Symbols: r̃ reading and h̃(a) influence at position a, both whitened; W force; N = r̃ᵀh̃, D = h̃ᵀh̃. Within a segment the
+/// squared residual is
+///
+/// ```text
+/// |r̃|² − N²/D            best force,  stationary where 2·N′·D − N·D′ = 0   (degree 8)
+/// |r̃|² − 2·W·N + W²·D    known force, stationary where W·D′ − 2·N′ = 0     (degree 5)
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 struct Segment {
     from_m: f64,

@@ -18,14 +18,16 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::likelihood::ContactFit;
 use crate::setup::Setup;
+use crate::status::{OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Digit, Surface, SurfaceSpec};
-use palpate_numerics::small::{Ldl, Matrix, add_outer};
+use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{bisect, chi_squared_bound, held_interval, normal_distribution, normal_interval_95};
+use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.
@@ -100,35 +102,32 @@ impl Fit for DigitEstimator {
     type Method = DigitLocator;
     type Error = DigitFitError;
 
-    fn fit_method(&self, task: FitTask) -> Result<DigitLocator, DigitFitError> {
-        locator(task.setup, self.theory)
+    fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<DigitLocator, DigitFitError> {
+        let SurfaceSpec::Digit(digit) = setup.surface else { return Err(DigitFitError::NotADigit) };
+        if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
+            return Err(DigitFitError::NotAGauge { kind });
+        }
+        let force_n = setup.force_n;
+        let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n, theory: self.theory };
+        let noiseless = |sensor: &Sensor| {
+            let sd = sensor.channel.reading_sd();
+            !sensor.channel.dead && !(sd > 0.0 && sd.is_finite())
+        };
+        if let Some(i) = locator.layout.sensors.iter().position(noiseless) {
+            return Err(DigitFitError::NoNoise { gauge: i + 1 });
+        }
+        let (needed, found) = (locator.unknowns(), locator.living().count());
+        if found < needed {
+            return Err(DigitFitError::TooFewGauges { needed, found });
+        }
+        let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
+        match force_n {
+            Some(force_n) if force_n > most_n => Err(DigitFitError::TooMuchForce { force_n, most_n }),
+            _ => Ok(locator),
+        }
     }
 }
 
-fn locator(setup: &Setup, theory: DigitTheory) -> Result<DigitLocator, DigitFitError> {
-    let SurfaceSpec::Digit(digit) = setup.surface else { return Err(DigitFitError::NotADigit) };
-    if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
-        return Err(DigitFitError::NotAGauge { kind });
-    }
-    let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n: setup.force_n, theory };
-    if let Some(i) = locator.gauge_without_noise() {
-        return Err(DigitFitError::NoNoise { gauge: i + 1 });
-    }
-    let (needed, found) = (1 + usize::from(setup.force_n.is_none()), locator.living());
-    if found < needed {
-        return Err(DigitFitError::TooFewGauges { needed, found });
-    }
-    let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();
-    match setup.force_n {
-        Some(force_n) if force_n > most_n => Err(DigitFitError::TooMuchForce { force_n, most_n }),
-        _ => Ok(locator),
-    }
-}
-
-/// A reading that noise gives as rarely as this has another cause.
-const RARE: f64 = 1e-3;
-/// Explanations whose probabilities sum to less than this are not spoken of.
-const NEGLIGIBLE: f64 = 0.05;
 /// Where one gauge sees a contact alone, an interval wider than this share of the length is no place.
 const WIDE: f64 = 0.01;
 
@@ -154,32 +153,29 @@ impl DigitLocator {
 
     /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
     pub fn leave_out(&mut self, gauge: usize) -> bool {
-        let needed = 1 + usize::from(self.force_n.is_none());
+        let needed = self.unknowns();
         let Some(sensor) = self.layout.sensors.get_mut(gauge) else { return false };
         let was_dead = std::mem::replace(&mut sensor.channel.dead, true);
-        if self.living() < needed {
+        let enough = self.living().count() >= needed;
+        if !enough {
             self.layout.sensors[gauge].channel.dead = was_dead;
-            return false;
         }
-        true
+        enough
+    }
+
+    /// 1 for the position, and 1 for a force that is unknown.
+    fn unknowns(&self) -> usize {
+        1 + usize::from(self.force_n.is_none())
     }
 
     /// Gauges that are not dead.
-    fn living(&self) -> usize {
-        self.layout.sensors.iter().filter(|sensor| !sensor.channel.dead).count()
-    }
-
-    /// The first living gauge without noise and resolution.
-    fn gauge_without_noise(&self) -> Option<usize> {
-        let clean = |sd: f64| !(sd > 0.0 && sd.is_finite());
-        self.layout
-            .sensors
-            .iter()
-            .position(|sensor| !sensor.channel.dead && clean(sensor.channel.reading_sd()))
+    fn living(&self) -> impl Iterator<Item = &Sensor> {
+        self.layout.sensors.iter().filter(|sensor| !sensor.channel.dead)
     }
 
     fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
-        let explained = posterior.keep_explanations(chi_squared_bound(RARE, freedom.max(1)));
+        // Contacts press and lie on the digit, so that as many readings as unknowns need not have one that explains them.
+        let explained = posterior.keep_explanations(misfit_bound(freedom.max(1)));
         let Some(best) = posterior.pieces.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
@@ -191,21 +187,14 @@ impl DigitLocator {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
-        let others: Vec<&Piece> =
-            posterior.pieces[1..].iter().filter(|piece| are_apart(best, piece)).collect();
-        let elsewhere: f64 = others.iter().map(|piece| piece.probability).sum();
-        if elsewhere > NEGLIGIBLE || (best.is_curve() && ends.1 - ends.0 > WIDE * length_m) {
+        let others = posterior.pieces[1..].iter().filter(|piece| are_apart(best, piece));
+        for other in others.filter(|other| other.probability >= OTHER_PLACE) {
+            let sd_m = other.covariance[0].sqrt();
+            let ends = held_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
+            estimate.modes.push(Mode { contact: contact(other, ends), probability: other.probability });
+        }
+        if !estimate.modes.as_slice().is_empty() || (best.is_curve() && ends.1 - ends.0 > WIDE * length_m) {
             estimate.status = Status::Ambiguous;
-            for other in others.into_iter().filter(|other| other.probability > 0.1 * NEGLIGIBLE) {
-                let sd_m = other.covariance[0].sqrt();
-                let ends = held_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
-                if !estimate
-                    .modes
-                    .push(Mode { contact: contact(other, ends), probability: other.probability })
-                {
-                    break;
-                }
-            }
         }
         estimate
     }
@@ -231,14 +220,16 @@ impl Locate for DigitLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let gauges = gauges(&self.layout, reading);
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
-        let none_saturated = gauges.len() == self.living();
-        if none_saturated && size <= chi_squared_bound(RARE, gauges.len().max(1)) {
-            return Estimate::of_position(Position::default(), Status::NoContact);
-        }
+        let none_saturated = gauges.len() == self.living().count();
+        let quiet = none_saturated && size <= misfit_bound(gauges.len());
         let likelihood =
             Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
-        let unknowns = 1 + usize::from(self.force_n.is_none());
-        self.estimate(Posterior::new(&likelihood), gauges.len().saturating_sub(unknowns))
+        let posterior = Posterior::new(&likelihood);
+        let least = posterior.pieces.iter().fold(f64::INFINITY, |least, piece| least.min(piece.chi_squared));
+        if quiet && size <= least + contact_cost(self.unknowns(), gauges.len()) {
+            return Estimate::of_position(Position::default(), Status::NoContact);
+        }
+        self.estimate(posterior, gauges.len().saturating_sub(self.unknowns()))
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
@@ -251,15 +242,10 @@ impl Locate for DigitLocator {
         let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
-        let noise = self
-            .layout
-            .sensors
-            .iter()
-            .filter(|sensor| !sensor.channel.dead)
-            .map(|sensor| sensor.channel.reading_sd());
+        let noise = self.living().map(|sensor| sensor.channel.reading_sd());
         LocatorFault::check_numbers("gauge noise", noise, |sd| sd > 0.0, "a number greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
-        let (needed, found) = (1 + usize::from(self.force_n.is_none()), self.living());
+        let (needed, found) = (self.unknowns(), self.living().count());
         if found < needed {
             return Err(LocatorFault::Count { what: "living gauges", needed, found });
         }
@@ -268,7 +254,7 @@ impl Locate for DigitLocator {
 }
 
 /// Pieces whose |r|² is larger than the least by this have no weight: e⁻³⁰.
-const HOPELESS: f64 = 60.0;
+const MOST_EXCESS: f64 = 60.0;
 /// Points of a curve of contacts that explain a reading alike.
 const CURVE_POINTS: usize = 96;
 
@@ -291,12 +277,12 @@ struct Piece {
     /// Its share of the posterior probability.
     probability: f64,
     log_weight: f64,
-    spread: Spread,
+    marginal: Marginal,
 }
 
 /// How the position is distributed over a stretch.
 #[derive(Clone, Debug)]
-enum Spread {
+enum Marginal {
     /// Normally, but cut off at the ends of the stretch.
     Normal { centre_m: f64, sd_m: f64, from_m: f64, to_m: f64 },
     /// At the best position, as the piece is cut off far out in its tail.
@@ -312,7 +298,7 @@ impl Posterior {
         let mut least = f64::INFINITY;
         // From the tip on, as gauges that must read nothing rule out stretches nearer to the clamp.
         for stretch in stretches(likelihood.gauges, likelihood.digit.length_m).into_iter().rev() {
-            if likelihood.least_chi_squared(stretch) > least + HOPELESS {
+            if likelihood.least_chi_squared(stretch) > least + MOST_EXCESS {
                 continue;
             }
             let alone = stretch.seeing == 1 && likelihood.force_n.is_none();
@@ -358,18 +344,18 @@ impl Posterior {
 impl Piece {
     /// Whether one gauge alone saw the contact, so that a curve of contacts explains the reading alike.
     fn is_curve(&self) -> bool {
-        matches!(self.spread, Spread::Curve { .. })
+        matches!(self.marginal, Marginal::Curve { .. })
     }
 
     /// The probability that the contact lies below `at_m`, given this stretch.
     fn below(&self, at_m: f64) -> f64 {
-        match &self.spread {
-            Spread::Normal { centre_m, sd_m, from_m, to_m } => {
+        match &self.marginal {
+            Marginal::Normal { centre_m, sd_m, from_m, to_m } => {
                 let mass = |to_m: f64| normal_mass((from_m - centre_m) / sd_m, (to_m - centre_m) / sd_m);
                 if at_m <= *from_m { 0.0 } else { mass(at_m.min(*to_m)) / mass(*to_m) }
             }
-            Spread::Point => f64::from(at_m >= self.best.position_m),
-            Spread::Curve { from_m, to_m, shares } => {
+            Marginal::Point => f64::from(at_m >= self.best.position_m),
+            Marginal::Curve { from_m, to_m, shares } => {
                 let steps = shares.len() as f64 * (at_m - from_m) / (to_m - from_m);
                 if steps <= 0.0 {
                     return 0.0;
@@ -394,10 +380,9 @@ fn normal_mass(low: f64, high: f64) -> f64 {
 /// The piece around the most likely contact on a stretch: |r|² is a parabola about the end of the next Gauss–Newton step, which
 /// may lie beyond the stretch. By Laplace's method its weight is the volume beneath, as far as it is on the stretch.
 fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
-    let known = likelihood.force_n.is_some();
-    let (best, sums) = search(likelihood, stretch);
-    let factors = sums.factors(known)?;
-    let [along_m, _] = factors.solve(sums.score);
+    let (best, fit) = search(likelihood, stretch);
+    let factors = likelihood.factors(&fit)?;
+    let [along_m, _] = factors.solve(fit.score);
     let [[xx, xf], [_, ff]] = factors.inverse();
     let (centre_m, sd_m) = (best.position_m + along_m, xx.sqrt());
     let mass = normal_mass((stretch.from_m - centre_m) / sd_m, (stretch.to_m - centre_m) / sd_m);
@@ -405,20 +390,20 @@ fn normal(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
         Some(_) => (TAU * xx).sqrt(),
         None => TAU / factors.determinant().sqrt() / best.force_n,
     };
-    let gained = factors.quadratic(sums.score);
-    let (log_weight, spread) = if mass > 0.0 {
-        let spread = Spread::Normal { centre_m, sd_m, from_m: stretch.from_m, to_m: stretch.to_m };
-        (-0.5 * (sums.chi_squared - gained) + (volume * mass).ln(), spread)
+    let gained = factors.quadratic(fit.score);
+    let (log_weight, marginal) = if mass > 0.0 {
+        let marginal = Marginal::Normal { centre_m, sd_m, from_m: stretch.from_m, to_m: stretch.to_m };
+        (-0.5 * (fit.misfit - gained) + (volume * mass).ln(), marginal)
     } else {
-        (-0.5 * sums.chi_squared + volume.ln(), Spread::Point)
+        (-0.5 * fit.misfit + volume.ln(), Marginal::Point)
     };
     log_weight.is_finite().then_some(Piece {
         best,
-        chi_squared: sums.chi_squared,
+        chi_squared: fit.misfit,
         covariance: [xx, xf, ff],
         probability: 0.0,
         log_weight,
-        spread,
+        marginal,
     })
 }
 
@@ -456,7 +441,7 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
         ],
         probability: 0.0,
         log_weight: most + total.ln(),
-        spread: Spread::Curve { from_m: stretch.from_m, to_m: stretch.to_m, shares },
+        marginal: Marginal::Curve { from_m: stretch.from_m, to_m: stretch.to_m, shares },
     })
 }
 
@@ -477,12 +462,13 @@ fn curve_points(likelihood: &Likelihood, stretch: Stretch) -> Vec<CurvePoint> {
     let mut point = |i: usize| {
         let position_m = stretch.from_m + (i as f64 + 0.5) * step_m;
         let start_n = force_n.max(0.0).min(likelihood.most_force_n(position_m));
-        let (guess, sums) = refine_force(likelihood, stretch, Guess { position_m, force_n: start_n });
+        let start = Guess { position_m, force_n: start_n };
+        let (guess, fit) = refine(likelihood, stretch, start, |(_, fit)| force_step(fit));
         force_n = guess.force_n;
-        let force_variance = 1.0 / sums.information[1][1];
+        let force_variance = 1.0 / fit.information[1][1];
         let volume = (TAU * force_variance).sqrt() / guess.force_n * step_m;
-        let log_weight = -0.5 * sums.chi_squared + volume.ln();
-        CurvePoint { guess, chi_squared: sums.chi_squared, force_variance, log_weight }
+        let log_weight = -0.5 * fit.misfit + volume.ln();
+        CurvePoint { guess, chi_squared: fit.misfit, force_variance, log_weight }
     };
     let mut points: Vec<CurvePoint> = (0..CURVE_POINTS).rev().map(&mut point).collect();
     points.reverse();
@@ -548,17 +534,6 @@ struct Guess {
     force_n: f64,
 }
 
-/// The sums over the gauges, whitened: residual r, Jacobian J of the model by position and force.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Sums {
-    /// |r|².
-    chi_squared: f64,
-    /// Jᵀ·r.
-    score: [f64; 2],
-    /// JᵀJ, the Fisher information.
-    information: Matrix<2>,
-}
-
 impl Likelihood<'_> {
     /// The largest force that is looked for at a position.
     fn most_force_n(&self, position_m: f64) -> f64 {
@@ -570,8 +545,9 @@ impl Likelihood<'_> {
         self.gauges[stretch.seeing..].iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum()
     }
 
-    /// The sums at a guess on a stretch.
-    fn at(&self, guess: Guess, stretch: Stretch) -> Sums {
+    /// The fit of position and force at a guess on a stretch; the misfit is |r|², and the score and information Jᵀ·r and JᵀJ of the
+    /// whitened residual r and the model's Jacobian J.
+    fn at(&self, guess: Guess, stretch: Stretch) -> ContactFit<2> {
         let Guess { position_m, force_n } = guess;
         let bent = match self.theory {
             DigitTheory::Exact => {
@@ -580,7 +556,7 @@ impl Likelihood<'_> {
             DigitTheory::Linear => None,
         };
         let stiffness = self.digit.bending_stiffness();
-        let mut sums = Sums { chi_squared: self.least_chi_squared(stretch), ..Sums::default() };
+        let mut fit = ContactFit { misfit: self.least_chi_squared(stretch), ..ContactFit::NOTHING };
         for gauge in &self.gauges[..stretch.seeing] {
             let (curvature, [by_position, by_force]) = match &bent {
                 Some(shape) => (shape.curvature(gauge.at_m), shape.curvature_gradient(gauge.at_m)),
@@ -590,13 +566,20 @@ impl Likelihood<'_> {
                 }
             };
             let scale = self.digit.strain_per_curvature_m() / gauge.sd;
-            sums.add(gauge.strain / gauge.sd - scale * curvature, scale * by_position, scale * by_force);
+            let residual = gauge.strain / gauge.sd - scale * curvature;
+            fit.add(residual, &[scale * by_position, scale * by_force], 1.0);
         }
         if self.force_n.is_some() {
-            sums.score[1] = 0.0;
-            sums.information = [[sums.information[0][0], 0.0], [0.0, 0.0]];
+            fit.score[1] = 0.0;
+            fit.information = [[fit.information[0][0], 0.0], [0.0, 0.0]];
         }
-        sums
+        fit.mirrored()
+    }
+
+    /// The factors of JᵀJ, whose inverse is the covariance of position and force; without the force where it is known.
+    /// `None` where the reading does not tell them.
+    fn factors(&self, fit: &ContactFit<2>) -> Option<Ldl<2>> {
+        Ldl::of_free(&fit.information, [true, self.force_n.is_none()])
     }
 
     /// The force by which the linear theory explains the reading best at a position: where a search begins.
@@ -612,31 +595,14 @@ impl Likelihood<'_> {
     }
 }
 
-impl Sums {
-    fn add(&mut self, residual: f64, by_position: f64, by_force: f64) {
-        self.chi_squared += residual * residual;
-        self.score[0] += by_position * residual;
-        self.score[1] += by_force * residual;
-        add_outer(&mut self.information, 1.0, &[by_position, by_force]);
-    }
-
-    /// The factors of JᵀJ, whose inverse is the covariance of position and force; without the force where it is known.
-    /// `None` where the reading does not tell them.
-    fn factors(&self, force_known: bool) -> Option<Ldl<2>> {
-        Ldl::of_free(&self.information, [true, !force_known])
-    }
-
-    /// The Gauss–Newton step (JᵀJ)⁻¹·Jᵀr of position and force.
-    fn step(&self, force_known: bool) -> Option<[f64; 2]> {
-        Some(self.factors(force_known)?.solve(self.score))
-    }
-
-    /// The step of the force alone.
-    fn force_step(&self) -> f64 {
-        let [_, [_, ff]] = self.information;
-        if ff > 0.0 { self.score[1] / ff } else { 0.0 }
-    }
+/// The step of the force alone.
+fn force_step(fit: &ContactFit<2>) -> [f64; 2] {
+    let [_, [_, ff]] = fit.information;
+    [0.0, if ff > 0.0 { fit.score[1] / ff } else { 0.0 }]
 }
+
+/// A guess and its fit.
+type Tried = (Guess, ContactFit<2>);
 
 /// Where on a stretch the search starts, as shares of it.
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
@@ -650,31 +616,35 @@ const LAST_STEP: f64 = 1e-10;
 const MOST_HALVINGS: usize = 30;
 
 /// The best contact on a stretch: the lowest of the minima that are reached from the best force at each start.
-fn search(likelihood: &Likelihood, stretch: Stretch) -> (Guess, Sums) {
+fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
     let reached = START_SHARES.map(|share| {
         let position_m = stretch.from_m + share * (stretch.to_m - stretch.from_m);
-        refine(likelihood, stretch, start(likelihood, stretch, position_m))
+        let start = start(likelihood, stretch, position_m);
+        refine(likelihood, stretch, start, |best| gauss_newton_step(likelihood, stretch, best))
     });
     let [first, rest @ ..] = reached;
-    rest.into_iter()
-        .fold(first, |best, next| if next.1.chi_squared < best.1.chi_squared { next } else { best })
+    rest.into_iter().fold(first, |best, next| if next.1.misfit < best.1.misfit { next } else { best })
 }
 
 /// The best of a few forces at a position.
 fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
     let linear_n = likelihood.linear_force_n(position_m, stretch);
     let guess = |factor: f64| within(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
-    let chi_squared = |guess: Guess| likelihood.at(guess, stretch).chi_squared;
+    let chi_squared = |guess: Guess| likelihood.at(guess, stretch).misfit;
     let better = |best: Guess, next: Guess| if chi_squared(next) < chi_squared(best) { next } else { best };
     START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
 }
 
-/// Goes from a guess to the nearest minimum of |r|² on the stretch.
-fn refine(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
+/// Goes from a guess by some kind of steps to the nearest minimum of |r|² on the stretch.
+fn refine(
+    likelihood: &Likelihood,
+    stretch: Stretch,
+    start: Guess,
+    step: impl Fn(&Tried) -> [f64; 2],
+) -> Tried {
     let mut best = (start, likelihood.at(start, stretch));
     for _ in 0..MOST_STEPS {
-        let step = step(likelihood, stretch, best);
-        let Some(next) = descend(likelihood, stretch, best, step) else { break };
+        let Some(next) = descend(likelihood, stretch, &best, step(&best)) else { break };
         let moved = (next.0.position_m - best.0.position_m).abs() / stretch.to_m
             + (next.0.force_n - best.0.force_n).abs() / next.0.force_n.max(f64::MIN_POSITIVE);
         best = next;
@@ -685,30 +655,14 @@ fn refine(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Su
     best
 }
 
-/// The best force at a position that is held.
-fn refine_force(likelihood: &Likelihood, stretch: Stretch, start: Guess) -> (Guess, Sums) {
-    let mut best = (start, likelihood.at(start, stretch));
-    for _ in 0..MOST_STEPS {
-        let step = [0.0, best.1.force_step()];
-        let Some(next) = descend(likelihood, stretch, best, step) else { break };
-        let moved = (next.0.force_n - best.0.force_n).abs();
-        best = next;
-        if moved < LAST_STEP * best.0.force_n {
-            break;
-        }
-    }
-    best
-}
-
-/// The Gauss–Newton step, up to the end of the stretch; at an end that it would leave, the step of the force alone.
-fn step(likelihood: &Likelihood, stretch: Stretch, (guess, sums): (Guess, Sums)) -> [f64; 2] {
-    let Some([along_m, harder_n]) = sums.step(likelihood.force_n.is_some()) else {
-        return [0.0, sums.force_step()];
-    };
+/// The Gauss–Newton step (JᵀJ)⁻¹·Jᵀr, up to the end of the stretch; at an end that it would leave, the step of the force alone.
+fn gauss_newton_step(likelihood: &Likelihood, stretch: Stretch, (guess, fit): &Tried) -> [f64; 2] {
+    let Some(factors) = likelihood.factors(fit) else { return force_step(fit) };
+    let [along_m, harder_n] = factors.solve(fit.score);
     let room_m =
         if along_m > 0.0 { stretch.to_m - guess.position_m } else { stretch.from_m - guess.position_m };
     if room_m.abs() <= 1e-12 * stretch.to_m {
-        return [0.0, sums.force_step()];
+        return force_step(fit);
     }
     let share = (room_m / along_m).min(1.0);
     if along_m == 0.0 { [0.0, harder_n] } else { [share * along_m, share * harder_n] }
@@ -718,18 +672,15 @@ fn step(likelihood: &Likelihood, stretch: Stretch, (guess, sums): (Guess, Sums))
 fn descend(
     likelihood: &Likelihood,
     stretch: Stretch,
-    (guess, sums): (Guess, Sums),
+    (guess, fit): &Tried,
     [along_m, harder_n]: [f64; 2],
-) -> Option<(Guess, Sums)> {
+) -> Option<Tried> {
     let mut share = 1.0;
     for _ in 0..MOST_HALVINGS {
-        let moved = Guess {
-            position_m: guess.position_m + share * along_m,
-            force_n: guess.force_n + share * harder_n,
-        };
-        let next = within(likelihood, moved, stretch);
+        let (position_m, force_n) = (guess.position_m + share * along_m, guess.force_n + share * harder_n);
+        let next = within(likelihood, Guess { position_m, force_n }, stretch);
         let there = likelihood.at(next, stretch);
-        if there.chi_squared < sums.chi_squared {
+        if there.misfit < fit.misfit {
             return Some((next, there));
         }
         share *= 0.5;

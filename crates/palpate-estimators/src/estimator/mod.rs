@@ -19,7 +19,7 @@ use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::{EvaluationError, Trial, Tried, try_estimator};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, SeedQueue};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
 use crate::likelihood::Likelihood;
@@ -34,43 +34,120 @@ use crate::setup::Setup;
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::Cancelled;
 
-/// A configured method; fitting it to a recording gives a locator.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Estimator {
-    /// The founding paper's network (`kind = "network"`).
-    Network(Network),
-    /// Networks trained by Levenberg–Marquardt with Bayesian regularisation (`kind = "network-lm"`).
-    NetworkLm(LevenbergMarquardt),
-    /// Influence functions, inverted (`kind = "influence"`).
-    Influence(Influence),
-    /// Gaussian-process regression of the position (`kind = "gaussian-process"`).
-    GaussianProcess(GaussianProcessEstimator),
-    /// The beam's own equations (`kind = "closed-form"`).
-    ClosedForm(ClosedForm),
-    /// The bending finger's own equations (`kind = "digit"`).
-    Digit(DigitEstimator),
-    /// Nearest neighbours (`kind = "neighbours"`).
-    Neighbours(Neighbours),
-    /// The calibrated centroid of array sensors (`kind = "centroid"`).
-    Centroid(Centroid),
-    /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
-    Auto,
+/// Makes of the one list of estimators the types that are any of them.
+macro_rules! estimators {
+    ($($(#[doc = $doc:literal])* $kind:literal $variant:ident($config:ty) $method:ty, $error:ty;)*) => {
+        /// A configured method; fitting it to a recording gives a locator.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Estimator {
+            $($(#[doc = $doc])* #[doc = concat!("(`kind = \"", $kind, "\"`).")] $variant($config),)*
+            /// Whichever of the others locates best in cross-validation (`kind = "auto"`).
+            Auto,
+        }
+
+        /// The methods that can locate.
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        #[expect(clippy::large_enum_variant, reason = "a program holds one locator, or a few")]
+        pub enum Method {
+            $($(#[doc = $doc])* #[doc = concat!("(`", $kind, "`).")] $variant($method),)*
+        }
+
+        /// Why an estimator cannot be fitted to a recording.
+        #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+        pub enum FitError {
+            /// The recording's channels are not the setup's.
+            #[error(transparent)]
+            Channels(#[from] ChannelMismatch),
+            /// The fit was stopped.
+            #[error("{0}")]
+            Cancelled(#[from] Cancelled),
+            /// No estimator suits the recording; the last one's complaint.
+            #[error("no estimator suits the recording: {0}")]
+            Choice(Box<EvaluationError<FitError>>),
+            $(#[doc = concat!("Why `", $kind, "` does not suit it.")]
+            #[error(transparent)]
+            $variant(#[from] $error),)*
+        }
+
+        impl Estimator {
+            /// Every `kind` that a rig can name.
+            pub const KINDS: &'static [&'static str] = &[$($kind,)* "auto"];
+
+            /// The `kind` under which a rig names this estimator.
+            pub fn kind(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(_) => $kind,)*
+                    Self::Auto => "auto",
+                }
+            }
+        }
+
+        impl Fit for Estimator {
+            type Method = Method;
+            type Error = FitError;
+
+            fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
+                match self {
+                    $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
+                    Self::Auto => choose(task)?.best.fit_method(task),
+                }
+            }
+
+            fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
+                match self {
+                    $(Self::$variant(estimator) => {
+                        let map = |_, locator: Fitted<$method>| locator.into_locator();
+                        Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
+                    })*
+                    Self::Auto => choose(task)?.best.fit_many(task, queue),
+                }
+            }
+        }
+
+        impl Method {
+            /// The `kind` under which a rig names its estimator.
+            pub fn kind(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(_) => $kind,)*
+                }
+            }
+
+            fn as_locate(&self) -> &dyn Locate {
+                match self {
+                    $(Self::$variant(method) => method,)*
+                }
+            }
+        }
+
+        $(impl From<$method> for Method {
+            fn from(method: $method) -> Self {
+                Self::$variant(method)
+            }
+        })*
+    };
+}
+
+estimators! {
+    /// The founding paper's network
+    "network" Network(Network) NetworkLocator, NetworkFitError;
+    /// Networks trained by Levenberg–Marquardt with Bayesian regularisation
+    "network-lm" NetworkLm(LevenbergMarquardt) LevenbergMarquardtLocator, LevenbergMarquardtFitError;
+    /// Influence functions, inverted
+    "influence" Influence(Influence) InfluenceLocator, InfluenceFitError;
+    /// Gaussian-process regression of the position
+    "gaussian-process" GaussianProcess(GaussianProcessEstimator) GaussianProcessLocator, GaussianProcessError;
+    /// The beam's own equations
+    "closed-form" ClosedForm(ClosedForm) ClosedFormLocator, ClosedFormFitError;
+    /// The bending finger's own equations
+    "digit" Digit(DigitEstimator) DigitLocator, DigitFitError;
+    /// Nearest neighbours
+    "neighbours" Neighbours(Neighbours) NeighboursLocator, NeighboursFitError;
+    /// The calibrated centroid of array sensors
+    "centroid" Centroid(Centroid) CentroidLocator, CentroidFitError;
 }
 
 impl Estimator {
-    /// Every `kind` that a rig can name.
-    pub const KINDS: &'static [&'static str] = &[
-        "network",
-        "network-lm",
-        "influence",
-        "gaussian-process",
-        "closed-form",
-        "digit",
-        "neighbours",
-        "centroid",
-        "auto",
-    ];
-
     /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
     pub fn contenders(setup: &Setup) -> Vec<Self> {
         let mut contenders = vec![
@@ -110,21 +187,6 @@ impl Estimator {
             _ => 1,
         }
     }
-
-    /// The `kind` under which a rig names this estimator.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Network(_) => "network",
-            Self::NetworkLm(_) => "network-lm",
-            Self::Influence(_) => "influence",
-            Self::GaussianProcess(_) => "gaussian-process",
-            Self::ClosedForm(_) => "closed-form",
-            Self::Digit(_) => "digit",
-            Self::Neighbours(_) => "neighbours",
-            Self::Centroid(_) => "centroid",
-            Self::Auto => "auto",
-        }
-    }
 }
 
 impl Default for Estimator {
@@ -133,147 +195,8 @@ impl Default for Estimator {
     }
 }
 
-/// Why an estimator cannot be fitted to a recording.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// The recording's channels are not the setup's.
-    #[error(transparent)]
-    Channels(#[from] ChannelMismatch),
-    /// The fit was stopped.
-    #[error("{0}")]
-    Cancelled(#[from] Cancelled),
-    /// The network's reason.
-    #[error(transparent)]
-    Network(#[from] NetworkFitError),
-    /// The Levenberg–Marquardt networks' reason.
-    #[error(transparent)]
-    NetworkLm(#[from] LevenbergMarquardtFitError),
-    /// The influence estimator's reason.
-    #[error(transparent)]
-    Influence(#[from] InfluenceFitError),
-    /// The Gaussian process's reason.
-    #[error(transparent)]
-    GaussianProcess(#[from] GaussianProcessError),
-    /// The closed form's reason.
-    #[error(transparent)]
-    ClosedForm(#[from] ClosedFormFitError),
-    /// The digit estimator's reason.
-    #[error(transparent)]
-    Digit(#[from] DigitFitError),
-    /// The nearest neighbours' reason.
-    #[error(transparent)]
-    Neighbours(#[from] NeighboursFitError),
-    /// The centroid's reason.
-    #[error(transparent)]
-    Centroid(#[from] CentroidFitError),
-    /// No estimator suits the recording; the last one's complaint.
-    #[error("no estimator suits the recording: {0}")]
-    Choice(Box<EvaluationError<FitError>>),
-}
-
-impl Fit for Estimator {
-    type Method = Method;
-    type Error = FitError;
-
-    fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
-        Ok(match self {
-            Self::Network(network) => network.fit_method(task)?.into(),
-            Self::NetworkLm(networks) => networks.fit_method(task)?.into(),
-            Self::Influence(influence) => influence.fit_method(task)?.into(),
-            Self::GaussianProcess(process) => process.fit_method(task)?.into(),
-            Self::ClosedForm(form) => form.fit_method(task)?.into(),
-            Self::Digit(digit) => digit.fit_method(task)?.into(),
-            Self::Neighbours(neighbours) => neighbours.fit_method(task)?.into(),
-            Self::Centroid(centroid) => centroid.fit_method(task)?.into(),
-            Self::Auto => choose(task)?.best.fit_method(task)?,
-        })
-    }
-
-    fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Method>) -> Result<(), FitError> {
-        match self {
-            Self::Network(network) => many(network, task, queue),
-            Self::NetworkLm(networks) => many(networks, task, queue),
-            Self::Influence(influence) => many(influence, task, queue),
-            Self::GaussianProcess(process) => many(process, task, queue),
-            Self::ClosedForm(form) => many(form, task, queue),
-            Self::Digit(digit) => many(digit, task, queue),
-            Self::Neighbours(neighbours) => many(neighbours, task, queue),
-            Self::Centroid(centroid) => many(centroid, task, queue),
-            Self::Auto => choose(task)?.best.fit_many(task, queue),
-        }
-    }
-}
-
-fn many<E: Fit>(estimator: &E, task: FitTask, queue: &mut dyn SeedQueue<Method>) -> Result<(), FitError>
-where
-    Method: From<E::Method>,
-    FitError: From<E::Error>,
-{
-    Ok(estimator.fit_many(task, &mut AnyMethod(queue))?)
-}
-
-/// A queue of any method as a queue of one.
-struct AnyMethod<'a>(&'a mut dyn SeedQueue<Method>);
-
-impl<M> SeedQueue<M> for AnyMethod<'_>
-where
-    Method: From<M>,
-{
-    fn next_seed(&mut self) -> Option<u64> {
-        self.0.next_seed()
-    }
-
-    fn fitted(&mut self, seed: u64, locator: Fitted<M>) {
-        self.0.fitted(seed, locator.map(Method::from));
-    }
-}
-
 /// A locator of any estimator: what files hold.
 pub type Locator = Fitted<Method>;
-
-/// The methods that can locate.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "a program holds one locator, or a few")]
-pub enum Method {
-    /// The founding paper's network.
-    Network(NetworkLocator),
-    /// Networks trained by Levenberg–Marquardt.
-    NetworkLm(LevenbergMarquardtLocator),
-    /// Influence functions, inverted.
-    Influence(InfluenceLocator),
-    /// Gaussian-process regression.
-    GaussianProcess(GaussianProcessLocator),
-    /// The beam's own equations.
-    ClosedForm(ClosedFormLocator),
-    /// The bending finger's own equations.
-    Digit(DigitLocator),
-    /// Nearest neighbours.
-    Neighbours(NeighboursLocator),
-    /// The calibrated centroid.
-    Centroid(CentroidLocator),
-}
-
-macro_rules! methods {
-    ($($variant:ident($method:ty)),* $(,)?) => {
-        $(impl From<$method> for Method {
-            fn from(method: $method) -> Self {
-                Self::$variant(method)
-            }
-        })*
-    };
-}
-
-methods! {
-    Network(NetworkLocator),
-    NetworkLm(LevenbergMarquardtLocator),
-    Influence(InfluenceLocator),
-    GaussianProcess(GaussianProcessLocator),
-    ClosedForm(ClosedFormLocator),
-    Digit(DigitLocator),
-    Neighbours(NeighboursLocator),
-    Centroid(CentroidLocator),
-}
 
 impl Locate for Method {
     fn locate(&self, reading: &[f64]) -> Estimate {
@@ -282,21 +205,6 @@ impl Locate for Method {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         self.as_locate().check(setup)
-    }
-}
-
-impl Method {
-    fn as_locate(&self) -> &dyn Locate {
-        match self {
-            Self::Network(network) => network,
-            Self::NetworkLm(networks) => networks,
-            Self::Influence(influence) => influence,
-            Self::GaussianProcess(process) => process,
-            Self::ClosedForm(form) => form,
-            Self::Digit(digit) => digit,
-            Self::Neighbours(neighbours) => neighbours,
-            Self::Centroid(centroid) => centroid,
-        }
     }
 }
 
@@ -373,16 +281,7 @@ impl Locator {
 
     /// The `kind` under which a rig names its estimator.
     pub fn kind(&self) -> &'static str {
-        match self.method {
-            Method::Network(_) => "network",
-            Method::NetworkLm(_) => "network-lm",
-            Method::Influence(_) => "influence",
-            Method::GaussianProcess(_) => "gaussian-process",
-            Method::ClosedForm(_) => "closed-form",
-            Method::Digit(_) => "digit",
-            Method::Neighbours(_) => "neighbours",
-            Method::Centroid(_) => "centroid",
-        }
+        self.method.kind()
     }
 
     /// The weights of a network; nothing for another method.
@@ -474,24 +373,6 @@ pub fn choose(task: FitTask) -> Result<Choice, FitError> {
     }
 }
 
-/// The sensors of a bench, by mechanics.
-///
-/// # Errors
-/// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
-pub fn setup_load_sensors(setup: &Setup) -> Result<LoadSensors<'_>, LoadSensorsError> {
-    LoadSensors::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
-}
-
-impl<'a> Profiler<'a> {
-    /// For readings of a setup, by mechanics.
-    ///
-    /// # Errors
-    /// [`LoadSensorsError`] as for [`setup_load_sensors`].
-    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
-        Ok(Self::new(setup_load_sensors(setup)?))
-    }
-}
-
 impl Locator {
     /// What a spread load reads: by the fitted influence functions of an influence locator, with its offsets and noise, and
     /// by the mechanics of the bench for any other.
@@ -507,7 +388,7 @@ impl Locator {
                 });
                 Ok(LoadSensors { extent: self.setup.surface.extent(), channels: channels.collect() })
             }
-            _ => setup_load_sensors(&self.setup),
+            _ => LoadSensors::of(&self.setup),
         }
     }
 }

@@ -183,7 +183,7 @@ struct Queue<M> {
     fitted: Vec<(u64, Fitted<M>)>,
 }
 
-impl<M> SeedQueue<M> for Queue<M> {
+impl<M> SeedQueue<Fitted<M>> for Queue<M> {
     fn next_seed(&mut self) -> Option<u64> {
         self.seeds.pop_front()
     }

@@ -1,7 +1,7 @@
 //! Load profiles: how force is spread over a surface, from one reading.
 //!
-//! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. BoundedList readings
-//! do not tell a whole function, so p is sought among the non-negative ones that are as smooth as the reading allows:
+//! A load p(a) ≥ 0 is read as y_i = ∫ f_i(a)·p(a) da + noise, where f_i is the influence function of sensor i. A few readings do
+//! not tell a whole function, so p is sought among the non-negative ones that are as smooth as the reading allows:
 //!
 //! 1. p is a force in each of n cells ([`Cells`]); A holds each sensor's mean influence over each cell, in units of its noise.
 //! 2. For a smoothness λ, x minimises ½·‖A·x − y‖² + ½·λ·xᵀP·x + μ·Σx over x ≥ 0, where xᵀP·x sums the squares of second
@@ -25,11 +25,13 @@ use serde::Serialize;
 use std::sync::Arc;
 
 use crate::fit::ReadingError;
+use crate::setup::Setup;
+use crate::status::{FALSE_ALARM_RATE, misfit_bound};
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface, UniformLoad};
-use palpate_numerics::{Cholesky, chi_squared_bound, median, normal_interval_95, normal_quantile};
+use palpate_numerics::{Cholesky, median, normal_interval_95, normal_quantile};
 use smoothness::{Mixture, Problem};
 
 /// One channel of a reading.
@@ -80,15 +82,19 @@ impl<'a> LoadSensors<'a> {
         Ok(Self { extent: surface.extent(), channels })
     }
 
+    /// The sensors of a setup, by mechanics.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
+    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+        Self::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
+    }
+
     /// The channels that live.
     pub fn alive(&self) -> impl Iterator<Item = &LoadChannel<'a>> {
         self.channels.iter().flatten()
     }
 }
-
-/// Readings that noise alone makes this rarely are a contact; those that a load and noise make this rarely are not of the
-/// model.
-const RARE: f64 = 1e-4;
 
 /// Turns readings of one bench into load profiles.
 pub struct Profiler<'a> {
@@ -125,7 +131,7 @@ pub struct LoadProfile {
     pub residuals: Vec<Option<f64>>,
     /// The least sum of squared residuals that any smoothness leaves.
     pub misfit: f64,
-    /// What it seldom exceeds by noise: once in 10,000 readings, whatever the load.
+    /// What it seldom exceeds by noise: in [`FALSE_ALARM_RATE`] of all readings, whatever the load.
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
@@ -143,6 +149,14 @@ pub struct CentreOfPressure {
 }
 
 impl<'a> Profiler<'a> {
+    /// For readings of a setup, by mechanics.
+    ///
+    /// # Errors
+    /// [`LoadSensorsError`] as for [`LoadSensors::of`].
+    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+        Ok(Self::new(LoadSensors::of(setup)?))
+    }
+
     /// For readings of these sensors.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::over(sensors.extent);
@@ -157,7 +171,7 @@ impl<'a> Profiler<'a> {
             })
             .collect();
         let influence = Array2::from_shape_fn((rows.len(), cells.len()), |(i, cell)| rows[i][cell]);
-        let worst_misfit = chi_squared_bound(RARE, rows.len().max(1));
+        let worst_misfit = misfit_bound(rows.len().max(1));
         Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), worst_misfit }
     }
 
@@ -185,62 +199,42 @@ impl<'a> Profiler<'a> {
         let y: Array1<f64> = whitened.collect();
         let silent = y.dot(&y) <= self.worst_misfit;
         let mixture = if silent { None } else { self.problem.solve(&y) };
-        Ok(match mixture {
-            Some(mixture) => self.loaded(&y, &mixture),
-            None => self.unloaded(&y, if silent { Status::NoContact } else { Status::OutsideModel }),
+        let status = match &mixture {
+            Some(mixture) if mixture.least_misfit <= self.worst_misfit => Status::Located,
+            None if silent => Status::NoContact,
+            _ => Status::OutsideModel,
+        };
+        let smoothness = mixture.as_ref().map(|mixture| mixture.smoothness);
+        let cells = self.cells.len();
+        let Mixture { forces, covariance, least_misfit, .. } = mixture.unwrap_or_else(|| Mixture {
+            forces: Array1::zeros(cells),
+            covariance: Array2::zeros((cells, cells)),
+            smoothness: 0.0,
+            least_misfit: y.dot(&y),
+        });
+        let forces_n = forces.to_vec();
+        let everything: Vec<usize> = (0..cells).collect();
+        let (fitted, residuals) = self.fitted(&y, &forces);
+        Ok(LoadProfile {
+            status,
+            cells: self.cells,
+            total_n: forces.sum(),
+            total_sd_n: covariance.sum().sqrt(),
+            centre: centre_of(&self.cells, &everything, &forces_n, &covariance),
+            patches: find_patches(&self.cells, &forces_n, &covariance),
+            forces_n,
+            covariance_n2: covariance,
+            fitted,
+            residuals,
+            misfit: least_misfit,
+            worst_misfit: self.worst_misfit,
+            smoothness,
         })
     }
 
     /// What this layout resolves at the smoothness of a profile; `None` for a profile without load.
     pub fn resolution(&self, profile: &LoadProfile) -> Option<Resolution> {
         Resolution::of(&self.problem, self.cells, profile.smoothness?)
-    }
-
-    fn loaded(&self, y: &Array1<f64>, mixture: &Mixture) -> LoadProfile {
-        let Mixture { forces, covariance, smoothness, least_misfit } = mixture;
-        let total_n = forces.sum();
-        let outside = *least_misfit > self.worst_misfit;
-        let status = if outside { Status::OutsideModel } else { Status::Located };
-        let forces_n = forces.to_vec();
-        let patches = find_patches(&self.cells, &forces_n, covariance);
-        let everything: Vec<usize> = (0..self.cells.len()).collect();
-        let centre = centre_of(&self.cells, &everything, &forces_n, covariance);
-        let (fitted, residuals) = self.fitted(y, forces);
-        LoadProfile {
-            status,
-            cells: self.cells,
-            forces_n,
-            total_n,
-            total_sd_n: covariance.sum().sqrt(),
-            covariance_n2: covariance.clone(),
-            centre,
-            patches,
-            fitted,
-            residuals,
-            misfit: *least_misfit,
-            worst_misfit: self.worst_misfit,
-            smoothness: Some(*smoothness),
-        }
-    }
-
-    fn unloaded(&self, y: &Array1<f64>, status: Status) -> LoadProfile {
-        let cells = self.cells.len();
-        let (fitted, residuals) = self.fitted(y, &Array1::zeros(cells));
-        LoadProfile {
-            status,
-            cells: self.cells,
-            forces_n: vec![0.0; cells],
-            covariance_n2: Array2::zeros((cells, cells)),
-            total_n: 0.0,
-            total_sd_n: 0.0,
-            centre: None,
-            patches: Vec::new(),
-            fitted,
-            residuals,
-            misfit: y.dot(y),
-            worst_misfit: self.worst_misfit,
-            smoothness: None,
-        }
     }
 
     /// What the channels would read of the load, and what is left of the reading, channel by channel.
@@ -320,8 +314,6 @@ fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 
 
 /// A patch is where the load is above this share of its highest density.
 pub const PATCH_SHARE: f64 = 0.1;
-/// A patch that noise alone makes with more than this probability is none of its own.
-const CHANCE: f64 = 1e-3;
 /// Cells between a patch and another that it may be part of.
 const REACH_CELLS: usize = 2;
 
@@ -374,12 +366,17 @@ struct Part {
 /// where there is none, is none.
 fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
-    let least_ratio = normal_quantile(1.0 - CHANCE);
+    let least_ratio = normal_quantile(1.0 - FALSE_ALARM_RATE);
     let stands_out = |part: &Part| {
         let (force, sd) = force_of(&part.all, forces_n, covariance);
         force > least_ratio * sd
     };
-    while let Some(weak) = weakest(&parts, |part| !stands_out(part), forces_n) {
+    let force = |part: &Part| force_of(&part.all, forces_n, covariance).0;
+    let weakest = |parts: &[Part]| {
+        let weak = (0..parts.len()).filter(|number| !stands_out(&parts[*number]));
+        weak.min_by(|a, b| force(&parts[*a]).total_cmp(&force(&parts[*b])))
+    };
+    while let Some(weak) = weakest(&parts) {
         let part = parts.swap_remove(weak);
         if let Some(beside) = parts.iter_mut().find(|other| touches(cells, &part.all, &other.all)) {
             beside.all.extend(part.all);
@@ -433,13 +430,6 @@ fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     parts
 }
 
-/// The part with the least force among those that are meant.
-fn weakest(parts: &[Part], meant: impl Fn(&Part) -> bool, forces_n: &[f64]) -> Option<usize> {
-    let force = |part: &Part| part.all.iter().map(|cell| forces_n[*cell]).sum::<f64>();
-    let those = parts.iter().enumerate().filter(|(_, part)| meant(part));
-    those.min_by(|(_, a), (_, b)| force(a).total_cmp(&force(b))).map(|(number, _)| number)
-}
-
 /// Whether no more than a few cells lie between two sets of cells.
 fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
     let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
@@ -459,20 +449,12 @@ fn force_of(listed: &[usize], forces_n: &[f64], covariance: &Array2<f64>) -> (f6
 fn patch(cells: &Cells, part: &Part, forces_n: &[f64], covariance: &Array2<f64>) -> Option<Patch> {
     let centre = centre_of(cells, &part.all, forces_n, covariance)?;
     let (force_n, force_sd_n) = force_of(&part.all, forces_n, covariance);
-    let corners = || part.core.iter().map(|cell| cells.corners(*cell));
-    let least = |coordinate: fn(Position) -> f64| {
-        corners().map(|(from, _)| coordinate(from)).fold(f64::INFINITY, f64::min)
-    };
-    let most = |coordinate: fn(Position) -> f64| {
-        corners().map(|(_, to)| coordinate(to)).fold(f64::NEG_INFINITY, f64::max)
-    };
-    Some(Patch {
-        from: Position { x_m: least(|p| p.x_m), y_m: least(|p| p.y_m) },
-        to: Position { x_m: most(|p| p.x_m), y_m: most(|p| p.y_m) },
-        centre,
-        force_n,
-        force_sd_n,
-    })
+    let corners = part.core.iter().map(|cell| cells.corners(*cell));
+    let (from, to) = corners.reduce(|(from, to), (low, high)| {
+        let least = Position { x_m: from.x_m.min(low.x_m), y_m: from.y_m.min(low.y_m) };
+        (least, Position { x_m: to.x_m.max(high.x_m), y_m: to.y_m.max(high.y_m) })
+    })?;
+    Some(Patch { from, to, centre, force_n, force_sd_n })
 }
 
 /// Least standard deviations for one of several patches.
@@ -545,9 +527,7 @@ impl Resolution {
         let widths_m = (0..cells.len()).map(|cell| width_m(&cells, &kernels.row(cell).to_vec())).collect();
         Some(Self { cells, kernels, widths_m })
     }
-}
 
-impl Resolution {
     /// The median of the kernels' widths, in metres.
     pub fn median_width_m(&self) -> f64 {
         median(self.widths_m.clone()).unwrap_or(0.0)

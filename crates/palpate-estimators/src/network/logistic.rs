@@ -66,10 +66,7 @@ pub(crate) fn activate<V: Vector<N>, const N: usize>(activation: Activation, val
 
 /// [`activate`] for B sums, in step.
 #[inline(always)]
-fn activate_block<V: Vector<N>, const N: usize, const B: usize>(
-    activation: Activation,
-    values: &mut [V; B],
-) {
+fn activate_block<V: Vector<N>, const N: usize, const B: usize>(activation: Activation, values: &mut [V; B]) {
     let one = V::splat(V::Real::from_f64(1.0));
     match activation {
         Activation::Logistic => logistic_block(values),

@@ -19,14 +19,14 @@ pub use levenberg_marquardt::{
 };
 pub use palpate_core::Activation;
 pub use prepared::PreparedNetwork;
-pub use train::{Precision, TrainingQueue, TrainingTask, train_many, train_one};
+pub use train::{Precision, TrainingTask, train_many, train_one};
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, SeedQueue};
-use crate::recording::Recording;
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::surface::{Extent, Surface};
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean_and_variance;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::Cancelled;
@@ -203,7 +203,7 @@ impl Topology {
 
 /// Training patterns, already scaled and coded.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Patterns {
+pub struct TrainingSet {
     /// Inputs of a pattern.
     pub inputs: usize,
     /// Outputs of a pattern.
@@ -214,23 +214,13 @@ pub struct Patterns {
     pub target_values: Vec<f64>,
 }
 
-impl Patterns {
+impl TrainingSet {
     /// The largest number of patterns that the presentation order can number.
     pub const MOST: usize = 1 << 16;
 
     /// Number of patterns.
     pub fn count(&self) -> usize {
         self.target_values.len() / self.outputs.max(1)
-    }
-
-    /// The inputs of pattern `p`.
-    pub fn input(&self, p: usize) -> &[f64] {
-        &self.input_values[p * self.inputs..][..self.inputs]
-    }
-
-    /// The targets of pattern `p`.
-    pub fn target(&self, p: usize) -> &[f64] {
-        &self.target_values[p * self.outputs..][..self.outputs]
     }
 }
 
@@ -268,41 +258,27 @@ pub enum NetworkFitError {
     Cancelled(#[from] Cancelled),
 }
 
-/// A network that is ready to be trained: its patterns and how readings and positions were coded into them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NetworkFitting {
-    /// Shape of the network.
-    pub topology: Topology,
-    /// What it is shown.
-    pub patterns: Patterns,
-    /// How its weights are found.
-    pub rule: BackPropagation,
-    scaling: Vec<ChannelScaling>,
-    output_scale_m: Vec<f64>,
-    extent: Extent,
-}
-
 impl Fit for Network {
     type Method = NetworkLocator;
     type Error = NetworkFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<NetworkLocator, NetworkFitError> {
-        let fitting = NetworkFitting::of(self, task)?;
-        let network = train_one(self.precision, &fitting.task(), task.seed, task.watch)?;
-        Ok(fitting.locator(network))
+        let coded = Coded::new(self, task)?;
+        let network = train_one(self.precision, &coded.task(), task.seed, task.watch)?;
+        Ok(coded.locator(network))
     }
 
     /// Trains as many networks side by side as there are lanes.
     fn fit_many(
         &self,
         task: FitTask,
-        queue: &mut dyn SeedQueue<NetworkLocator>,
+        queue: &mut dyn SeedQueue<Fitted<NetworkLocator>>,
     ) -> Result<(), NetworkFitError> {
         task.check_channels()?;
-        let fitting = NetworkFitting::of(self, task)?;
-        let mut queue = Coded { fitting: &fitting, task, queue };
+        let coded = Coded::new(self, task)?;
+        let map = |seed, network| Fitted::new(task.seed(seed), coded.locator(network));
         let set = InstructionSet::best();
-        Ok(train_many(set, self.precision, &fitting.task(), &mut queue, task.watch)?)
+        Ok(train_many(set, self.precision, &coded.task(), &mut Mapped { queue, map }, task.watch)?)
     }
 }
 
@@ -318,114 +294,76 @@ impl Network {
         outcome: TrainingOutcome,
     ) -> Result<Option<Fitted<NetworkLocator>>, NetworkFitError> {
         task.check_channels()?;
-        let fitting = NetworkFitting::of(self, task)?;
-        let topology = fitting.topology.clone();
+        let coded = Coded::new(self, task)?;
+        let topology = coded.topology.clone();
         Ok((weights.len() == topology.weight_count()).then(|| {
             let network = TrainedNetwork { topology, weights, outcome };
-            Fitted::new(task, fitting.locator(network))
+            Fitted::new(task, coded.locator(network))
         }))
     }
 }
 
-/// A queue of trained networks in front of a queue of locators.
+/// A recording coded into training patterns, with the scales of readings and positions.
 struct Coded<'a> {
-    fitting: &'a NetworkFitting,
-    task: FitTask<'a>,
-    queue: &'a mut dyn SeedQueue<NetworkLocator>,
+    topology: Topology,
+    patterns: TrainingSet,
+    rule: &'a BackPropagation,
+    scaling: Vec<ChannelScaling>,
+    output_scale_m: Vec<f64>,
+    extent: Extent,
 }
 
-impl TrainingQueue for Coded<'_> {
-    fn next_seed(&mut self) -> Option<u64> {
-        self.queue.next_seed()
-    }
-
-    fn finished(&mut self, seed: u64, network: TrainedNetwork) {
-        self.queue.fitted(seed, Fitted::new(self.task.seed(seed), self.fitting.locator(network)));
-    }
-}
-
-impl NetworkFitting {
-    /// Codes the recording of a fit.
-    ///
-    /// # Errors
-    /// [`NetworkFitError`] as for [`NetworkFitting::prepare`].
-    pub fn of(config: &Network, task: FitTask) -> Result<Self, NetworkFitError> {
-        let surface = &task.setup.surface;
-        Self::prepare(config, surface.extent(), surface.model(), task.setup.force_n, task.recording)
-    }
-
-    /// Codes a recording of a surface (with its model, where it has one, and its known force in newtons).
-    ///
-    /// # Errors
-    /// [`NetworkFitError`] when there are no rows, too many, or a channel whose scale is 0.
-    pub fn prepare(
-        config: &Network,
-        extent: Extent,
-        model: Option<&dyn Surface>,
-        force_n: Option<f64>,
-        recording: &Recording,
-    ) -> Result<Self, NetworkFitError> {
+impl<'a> Coded<'a> {
+    fn new(config: &'a Network, FitTask { setup, recording, .. }: FitTask) -> Result<Self, NetworkFitError> {
         let rows = recording.rows.len();
         if rows == 0 {
             return Err(NetworkFitError::NoRows);
         }
-        if rows > Patterns::MOST {
-            return Err(NetworkFitError::TooManyRows { found: rows, most: Patterns::MOST });
+        if rows > TrainingSet::MOST {
+            return Err(NetworkFitError::TooManyRows { found: rows, most: TrainingSet::MOST });
         }
-        let scaling = channel_scaling(config.input_scale, model, force_n, recording)?;
-        let output_scale_m = output_scale_m(config.output, extent);
-        let mut patterns = Patterns {
+        let scaling = channel_scaling(config.input_scale, setup, recording)?;
+        let extent = setup.surface.extent();
+        let scale_m = |size_m| if config.output == OutputCoding::Position { 1.0 } else { size_m };
+        let output_scale_m: Vec<f64> =
+            std::iter::once(extent.length_m).chain(extent.width_m).map(scale_m).collect();
+        let inputs = |row: &Row| -> Vec<f64> {
+            row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value)).collect()
+        };
+        let targets = |row: &Row| -> Vec<f64> {
+            let coordinates = [row.position.x_m, row.position.y_m];
+            coordinates.iter().zip(&output_scale_m).map(|(x, scale)| x / scale).collect()
+        };
+        let patterns = TrainingSet {
             inputs: recording.channels.len(),
             outputs: output_scale_m.len(),
-            input_values: Vec::with_capacity(rows * recording.channels.len()),
-            target_values: Vec::with_capacity(rows * output_scale_m.len()),
+            input_values: recording.rows.iter().flat_map(inputs).collect(),
+            target_values: recording.rows.iter().flat_map(targets).collect(),
         };
-        for row in &recording.rows {
-            let scaled = row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value));
-            patterns.input_values.extend(scaled);
-            let coordinates = [row.position.x_m, row.position.y_m];
-            patterns
-                .target_values
-                .extend(coordinates.iter().zip(&output_scale_m).map(|(x, scale)| x / scale));
-        }
         let topology = Topology::new(config, patterns.inputs, patterns.outputs);
-        Ok(Self { topology, patterns, rule: config.training, scaling, output_scale_m, extent })
+        Ok(Self { topology, patterns, rule: &config.training, scaling, output_scale_m, extent })
     }
 
-    /// What a trainer asks for.
-    pub fn task(&self) -> TrainingTask<'_> {
-        TrainingTask { topology: &self.topology, patterns: &self.patterns, rule: &self.rule }
+    fn task(&self) -> TrainingTask<'_> {
+        TrainingTask { topology: &self.topology, patterns: &self.patterns, rule: self.rule }
     }
 
-    /// The locator that a trained network makes.
-    pub fn locator(&self, network: TrainedNetwork) -> NetworkLocator {
-        NetworkLocator::from(NetworkParts {
-            topology: network.topology,
-            weights: network.weights,
-            scaling: self.scaling.clone(),
-            output_scale_m: self.output_scale_m.clone(),
-            extent: self.extent,
-            outcome: network.outcome,
-        })
+    fn locator(&self, TrainedNetwork { topology, weights, outcome }: TrainedNetwork) -> NetworkLocator {
+        let (scaling, output_scale_m) = (self.scaling.clone(), self.output_scale_m.clone());
+        let extent = self.extent;
+        NetworkParts { topology, weights, scaling, output_scale_m, extent, outcome }.into()
     }
-}
-
-/// The length that an output of 1 stands for, by coordinate.
-fn output_scale_m(coding: OutputCoding, extent: Extent) -> Vec<f64> {
-    let sizes = std::iter::once(extent.length_m).chain(extent.width_m);
-    sizes.map(|size_m| if coding == OutputCoding::Position { 1.0 } else { size_m }).collect()
 }
 
 fn channel_scaling(
     scale: InputScale,
-    model: Option<&dyn Surface>,
-    force_n: Option<f64>,
+    setup: &Setup,
     recording: &Recording,
 ) -> Result<Vec<ChannelScaling>, NetworkFitError> {
     let column = |c: usize| recording.rows.iter().map(move |row| row.reading[c]);
     let largest = || recording.rows.iter().flat_map(|row| &row.reading).fold(0.0, |m: f64, r| m.max(r.abs()));
-    let one = |c: usize| -> Result<ChannelScaling, NetworkFitError> {
-        let (offset, divisor, what) = match (scale, model.zip(force_n)) {
+    let one = |c: usize| {
+        let (offset, divisor, what) = match (scale, setup.surface.model().zip(setup.force_n)) {
             (InputScale::DivideBy(divisor), _) => (0.0, divisor, "divisor"),
             (InputScale::FullScale, Some((surface, force_n))) => {
                 (0.0, surface.full_scale(recording.kinds[c]) * force_n, "full scale")
@@ -436,11 +374,11 @@ fn channel_scaling(
                 (mean, variance.sqrt(), "standard deviation")
             }
         };
-        if !(divisor.is_finite() && divisor > 0.0) {
-            let channel = recording.channels[c].clone();
-            return Err(NetworkFitError::Unscalable { channel, what, value: divisor });
+        if divisor.is_finite() && divisor > 0.0 {
+            return Ok(ChannelScaling { offset, divisor });
         }
-        Ok(ChannelScaling { offset, divisor })
+        let channel = recording.channels[c].clone();
+        Err(NetworkFitError::Unscalable { channel, what, value: divisor })
     };
     (0..recording.channels.len()).map(one).collect()
 }

@@ -13,9 +13,10 @@ mod order;
 use std::mem::swap;
 
 use super::{
-    Activation, BackPropagation, Patterns, PresentationOrder, Topology, TrainedNetwork, TrainingOutcome,
+    Activation, BackPropagation, PresentationOrder, Topology, TrainedNetwork, TrainingOutcome, TrainingSet,
     logistic,
 };
+use crate::fit::SeedQueue;
 use order::{OrderDrawer, Streams, column_len};
 use palpate_numerics::simd::{InstructionSet, Kernel, LOOK_UP, Real, Simd, Vector, run_loops};
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -46,18 +47,10 @@ impl Precision {
 pub struct TrainingTask<'a> {
     /// Shape of the network; its inputs and outputs are those of the patterns.
     pub topology: &'a Topology,
-    /// What it is shown: between 1 and [`Patterns::MOST`] patterns.
-    pub patterns: &'a Patterns,
+    /// What it is shown: between 1 and [`TrainingSet::MOST`] patterns.
+    pub patterns: &'a TrainingSet,
     /// How its weights are found.
     pub rule: &'a BackPropagation,
-}
-
-/// Where a lane group takes its seeds from and leaves its networks.
-pub trait TrainingQueue {
-    /// The next network to train.
-    fn next_seed(&mut self) -> Option<u64>;
-    /// Takes a network whose training ended.
-    fn finished(&mut self, seed: u64, network: TrainedNetwork);
 }
 
 /// Trains the queue's networks, as many at once as `precision` has lanes. A seed gives the same network in whatever lane, thread or company
@@ -69,7 +62,7 @@ pub fn train_many(
     set: InstructionSet,
     precision: Precision,
     task: &TrainingTask,
-    queue: &mut dyn TrainingQueue,
+    queue: &mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch,
 ) -> Result<(), Cancelled> {
     set.run(InLanes(Training { precision, task, queue, watch }))
@@ -93,7 +86,7 @@ pub fn train_one(
 struct Training<'a> {
     precision: Precision,
     task: &'a TrainingTask<'a>,
-    queue: &'a mut dyn TrainingQueue,
+    queue: &'a mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch<'a>,
 }
 
@@ -136,11 +129,11 @@ struct OneSeed {
     network: Option<TrainedNetwork>,
 }
 
-impl TrainingQueue for OneSeed {
+impl SeedQueue<TrainedNetwork> for OneSeed {
     fn next_seed(&mut self) -> Option<u64> {
         self.seed.take()
     }
-    fn finished(&mut self, _: u64, network: TrainedNetwork) {
+    fn fitted(&mut self, _: u64, network: TrainedNetwork) {
         self.network = Some(network);
     }
 }
@@ -149,7 +142,7 @@ impl TrainingQueue for OneSeed {
 #[inline(always)]
 fn train<S: Simd, V: Vector<N>, const N: usize>(
     task: &TrainingTask,
-    queue: &mut dyn TrainingQueue,
+    queue: &mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch,
 ) -> Result<(), Cancelled> {
     let topology = task.topology;
@@ -177,7 +170,7 @@ fn row_len<const KNOWN: usize>(len: usize) -> usize {
 #[inline(always)]
 fn train_shape<V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize>(
     task: &TrainingTask,
-    queue: &mut dyn TrainingQueue,
+    queue: &mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch,
 ) -> Result<(), Cancelled> {
     let mut group = Group::<V, N, FIRST, UPPER>::new(task);
@@ -269,7 +262,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
     }
 
     /// Puts the queue's next network into a lane, or leaves the lane idle.
-    fn start_next(&mut self, lane: usize, queue: &mut dyn TrainingQueue) {
+    fn start_next(&mut self, lane: usize, queue: &mut dyn SeedQueue<TrainedNetwork>) {
         let Some(seed) = queue.next_seed() else {
             self.occupants[lane] = None;
             return;
@@ -294,7 +287,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
     }
 
     /// Hands over the networks whose training ended with this epoch; true when a lane has a new one.
-    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn TrainingQueue) -> bool {
+    fn retire(&mut self, errors: [V::Real; N], queue: &mut dyn SeedQueue<TrainedNetwork>) -> bool {
         let mut replaced = false;
         for (lane, error) in errors.into_iter().enumerate() {
             let Some(occupant) = &mut self.occupants[lane] else { continue };
@@ -305,7 +298,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
             };
             let weights = self.layers.iter().flat_map(|layer| &layer.weights);
             let weights = weights.map(|weight| weight.to_array()[lane].to_f64()).collect();
-            queue.finished(seed, TrainedNetwork { topology: self.task.topology.clone(), weights, outcome });
+            queue.fitted(seed, TrainedNetwork { topology: self.task.topology.clone(), weights, outcome });
             self.start_next(lane, queue);
             replaced = true;
         }

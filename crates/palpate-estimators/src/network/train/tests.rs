@@ -32,21 +32,21 @@ struct Seeds {
     networks: Vec<(u64, TrainedNetwork)>,
 }
 
-impl TrainingQueue for Seeds {
+impl SeedQueue<TrainedNetwork> for Seeds {
     fn next_seed(&mut self) -> Option<u64> {
         let seed = (self.next < self.end).then_some(self.next)?;
         self.next += 1;
         Some(seed)
     }
-    fn finished(&mut self, seed: u64, network: TrainedNetwork) {
+    fn fitted(&mut self, seed: u64, network: TrainedNetwork) {
         self.networks.push((seed, network));
     }
 }
 
 /// y = sin x on a few points: enough to train on, and no symmetry to hide a mix-up of inputs.
-fn patterns(count: usize, inputs: usize, outputs: usize) -> Patterns {
+fn patterns(count: usize, inputs: usize, outputs: usize) -> TrainingSet {
     let value = |k: usize| 0.5 + 0.4 * (1.0 + k as f64 * 0.7).sin();
-    Patterns {
+    TrainingSet {
         inputs,
         outputs,
         input_values: (0..count * inputs).map(value).collect(),
@@ -67,7 +67,7 @@ fn networks(
     queue.networks.into_iter().map(|(_, network)| network).collect()
 }
 
-fn compare_with_twin(config: &Network, patterns: &Patterns, seeds: u64) {
+fn compare_with_twin(config: &Network, patterns: &TrainingSet, seeds: u64) {
     let topology = Topology::new(config, patterns.inputs, patterns.outputs);
     let task = TrainingTask { topology: &topology, patterns, rule: &config.training };
     for precision in [Precision::F64, Precision::F32] {
@@ -146,7 +146,7 @@ fn a_wild_step_diverges_and_says_so() {
 }
 
 /// E = ½ Σ (t − a)², by the forward pass of the core.
-fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &Patterns, pattern: usize) -> f64 {
+fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &TrainingSet, pattern: usize) -> f64 {
     let network = palpate_core::Network {
         sizes: &topology.sizes,
         biases: topology.biases,
@@ -156,8 +156,10 @@ fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &Patterns,
     };
     let mut outputs = vec![0.0; topology.outputs()];
     let mut scratch = vec![0.0; network.scratch_len()];
-    network.forward_into(patterns.input(pattern), &mut outputs, &mut scratch).unwrap();
-    outputs.iter().zip(patterns.target(pattern)).map(|(a, t)| (t - a).powi(2) / 2.0).sum()
+    let inputs = &patterns.input_values[pattern * patterns.inputs..][..patterns.inputs];
+    network.forward_into(inputs, &mut outputs, &mut scratch).unwrap();
+    let targets = &patterns.target_values[pattern * patterns.outputs..];
+    outputs.iter().zip(targets).map(|(a, t)| (t - a).powi(2) / 2.0).sum()
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn value<V: Vector<1>>(x: f64) -> V {
 /// Every pattern's inputs, each row followed by the 1 that the biases weigh.
 fn inputs_with_bias<V: Vector<1>>(task: &TrainingTask) -> Vec<V> {
     let bias = task.topology.biases.then_some(1.0);
-    let rows = (0..task.patterns.count()).map(|p| task.patterns.input(p));
+    let rows = task.patterns.input_values.chunks_exact(task.patterns.inputs);
     rows.flat_map(|row| row.iter().copied().chain(bias)).map(value).collect()
 }
 
