@@ -28,8 +28,8 @@ impl ContactPrior {
         let last = |size_m: f64| (size_m - every_m).max(0.5 * size_m);
         let first = |size_m: f64| every_m.min(0.5 * size_m);
         Self {
-            from: Position { x_m: first(extent.length_m), y_m: extent.width_m.map_or(0.0, first) },
-            to: Position { x_m: last(extent.length_m), y_m: extent.width_m.map_or(0.0, last) },
+            from: Position { x_m: first(extent.length_m()), y_m: extent.width_m().map_or(0.0, first) },
+            to: Position { x_m: last(extent.length_m()), y_m: extent.width_m().map_or(0.0, last) },
             every_m,
             weights: Vec::new(),
         }
@@ -44,9 +44,9 @@ impl ContactPrior {
 
 /// The distance that so many make along a line, or along the longer side of a plane.
 pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> f64 {
-    match extent.width_m {
-        None => extent.length_m / along_a_line,
-        Some(width_m) => extent.length_m.max(width_m) / along_a_plane,
+    match extent.width_m() {
+        None => extent.length_m() / along_a_line,
+        Some(width_m) => extent.length_m().max(width_m) / along_a_plane,
     }
 }
 

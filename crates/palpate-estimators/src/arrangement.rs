@@ -139,18 +139,19 @@ impl Arrangement {
         if count == 0 {
             return Err(ArrangementError::NoPositions);
         }
-        match self {
-            Self::Even | Self::EvenOver { .. } | Self::EdgeDense { .. } | Self::Chebyshev
-                if extent.is_plane() =>
-            {
-                Err(ArrangementError::LineOnPlane { count })
+        match (self, extent) {
+            (Self::Explicit(positions), _) => explicit(positions, count, extent),
+            (&Self::Grid { columns, rows }, Extent::Plane { .. }) => grid(count, columns, rows, extent),
+            (&Self::Grid { columns, rows }, Extent::Line { .. }) => {
+                Err(ArrangementError::GridOnLine { columns, rows })
             }
-            Self::Even => Ok(cells(extent, count, 1)),
-            Self::Chebyshev => Ok(warped_cells(extent, count, 1, chebyshev)),
-            Self::EvenOver { portion } => even_over(count, *portion, extent.length_m),
-            Self::EdgeDense { middle, portion } => edge_dense(count, *middle, *portion, extent.length_m),
-            Self::Grid { columns, rows } => grid(count, *columns, *rows, extent),
-            Self::Explicit(positions) => explicit(positions, count, extent),
+            (_, Extent::Plane { .. }) => Err(ArrangementError::LineOnPlane { count }),
+            (Self::Even, _) => Ok(cells(extent, count, 1)),
+            (Self::Chebyshev, _) => Ok(warped_cells(extent, count, 1, chebyshev)),
+            (Self::EvenOver { portion }, Extent::Line { length_m }) => even_over(count, *portion, length_m),
+            (Self::EdgeDense { middle, portion }, Extent::Line { length_m }) => {
+                edge_dense(count, *middle, *portion, length_m)
+            }
         }
     }
 }
@@ -205,9 +206,6 @@ fn grid(
     rows: usize,
     extent: Extent,
 ) -> Result<Vec<Position>, ArrangementError> {
-    if !extent.is_plane() {
-        return Err(ArrangementError::GridOnLine { columns, rows });
-    }
     let listed = columns.saturating_mul(rows);
     if listed != count {
         return Err(ArrangementError::CountDiffers { listed, count });
@@ -307,9 +305,9 @@ impl EveryError {
 /// Where an estimator is judged, all over a surface: on a line 399 positions, 1/400 of the length apart; on a plane about
 /// 400, in the middles of equal cells that are as square as they can be, so that a share of them is a share of the area.
 pub fn all_over(extent: Extent) -> Vec<Position> {
-    let Some(width_m) = extent.width_m else { return inner_grid(extent, ALONG_A_LINE, 1) };
+    let Some(width_m) = extent.width_m() else { return inner_grid(extent, ALONG_A_LINE, 1) };
     let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().round().clamp(2.0, 0.5 * ON_A_PLANE) as usize;
-    cells(extent, side(extent.length_m / width_m), side(width_m / extent.length_m))
+    cells(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
 }
 
 /// Positions `every_m` (metres) apart, the first of them `every_m` from the edge, and none on an edge; on a plane row by
@@ -319,7 +317,7 @@ pub fn all_over(extent: Extent) -> Vec<Position> {
 /// [`EveryError`] where those are none or more than 1,000,000.
 pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> {
     let inside = |size_m: f64| (size_m / every_m - 1e-6).floor().max(0.0);
-    let (columns, rows) = (inside(extent.length_m), extent.width_m.map_or(1.0, inside));
+    let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
     let count = columns * rows;
     if !(1.0..=EveryError::MOST).contains(&count) {
         return Err(EveryError { every_m, count });
@@ -331,14 +329,14 @@ pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> 
 /// The middles of equal cells: x_i = (i + ½)·length/columns, and y_j = (j + ½)·width/rows on a plane.
 pub fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
     let middle = |i: usize, size_m: f64, count: usize| (i as f64 + 0.5) * size_m / count as f64;
-    let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
+    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
 }
 
 /// The same middles with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
 pub fn warped_cells(extent: Extent, columns: usize, rows: usize, warp: impl Fn(f64) -> f64) -> Vec<Position> {
     let middle = |i: usize, size_m: f64, count: usize| size_m * warp((i as f64 + 0.5) / count as f64);
-    let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
+    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
 }
 
@@ -349,10 +347,10 @@ pub fn chebyshev(share: f64) -> f64 {
 
 /// The grid of `count` positions whose cells are the closest to squares: columns and rows.
 pub fn squarest(extent: Extent, count: usize) -> (usize, usize) {
-    let Some(width_m) = extent.width_m else { return (count, 1) };
+    let Some(width_m) = extent.width_m() else { return (count, 1) };
     let elongation = |columns: usize| {
         let (columns, rows) = (columns as f64, (count / columns) as f64);
-        ((extent.length_m / columns) / (width_m / rows)).ln().abs()
+        ((extent.length_m() / columns) / (width_m / rows)).ln().abs()
     };
     let columns = (1..=count)
         .filter(|columns| count.is_multiple_of(*columns))
@@ -364,7 +362,7 @@ pub fn squarest(extent: Extent, count: usize) -> (usize, usize) {
 /// The inner crossings of a grid: x_i = i·length/(columns + 1) from i = 1, and y_j = j·width/(rows + 1) on a plane.
 pub fn inner_grid(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
     let crossing = |i: usize, size_m: f64, count: usize| (i + 1) as f64 / (count + 1) as f64 * size_m;
-    let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(0.0));
+    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
     rows_of(extent, columns, rows, |i| crossing(i, length_m, columns), |j| crossing(j, width_m, rows))
 }
 
@@ -376,13 +374,12 @@ fn rows_of(
     x_m: impl Fn(usize) -> f64,
     y_m: impl Fn(usize) -> f64,
 ) -> Vec<Position> {
-    let rows = if extent.is_plane() { rows } else { 1 };
-    let mut positions = Vec::with_capacity(columns * rows);
-    for row in 0..rows {
-        let y_m = if extent.is_plane() { y_m(row) } else { 0.0 };
-        positions.extend((0..columns).map(|column| Position { x_m: x_m(column), y_m }));
+    let x_m = &x_m;
+    let row = |y_m: f64| (0..columns).map(move |column| Position { x_m: x_m(column), y_m });
+    match extent {
+        Extent::Line { .. } => row(0.0).collect(),
+        Extent::Plane { .. } => (0..rows).flat_map(|j| row(y_m(j))).collect(),
     }
-    positions
 }
 
 #[cfg(test)]

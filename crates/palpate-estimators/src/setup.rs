@@ -155,7 +155,7 @@ impl Setup {
     /// # Errors
     /// [`SetupError`] without channels, or for a length that is not greater than 0 and finite.
     pub fn measured(length_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
-        Self::of_extent(Extent { length_m, width_m: None }, channels)
+        Self::of_extent(Extent::Line { length_m }, channels)
     }
 
     /// A plane without a model, known by recordings only; see [`Setup::measured`].
@@ -163,13 +163,13 @@ impl Setup {
     /// # Errors
     /// [`SetupError`] without channels, or for a length or width that is not greater than 0 and finite.
     pub fn measured_plane(length_m: f64, width_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
-        Self::of_extent(Extent { length_m, width_m: Some(width_m) }, channels)
+        Self::of_extent(Extent::Plane { length_m, width_m }, channels)
     }
 
     fn of_extent(extent: Extent, channels: &[&str]) -> Result<Self, SetupError> {
         let sizes = [
-            ("the length in metres", extent.length_m),
-            ("the width in metres", extent.width_m.unwrap_or(1.0)),
+            ("the length in metres", extent.length_m()),
+            ("the width in metres", extent.width_m().unwrap_or(1.0)),
         ];
         for (what, value) in sizes {
             check(what, value, |size| size > 0.0, "greater than 0 and finite")?;
@@ -281,14 +281,12 @@ fn check(
 }
 
 fn positions_of(placement: Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {
-    let positions = match placement {
-        Placement::Evenly(count) if extent.is_plane() => {
-            return Err(SetupError::EvenlyOnPlane { count });
-        }
-        Placement::Evenly(count) => even_positions(count, extent.length_m).collect(),
-        Placement::Grid(..) if !extent.is_plane() => return Err(SetupError::GridOnLine),
-        Placement::Grid(columns, rows) => inner_grid(extent, columns, rows),
-        Placement::At(positions) => positions,
+    let positions = match (placement, extent) {
+        (Placement::Evenly(count), Extent::Line { length_m }) => even_positions(count, length_m).collect(),
+        (Placement::Evenly(count), Extent::Plane { .. }) => return Err(SetupError::EvenlyOnPlane { count }),
+        (Placement::Grid(columns, rows), Extent::Plane { .. }) => inner_grid(extent, columns, rows),
+        (Placement::Grid(..), Extent::Line { .. }) => return Err(SetupError::GridOnLine),
+        (Placement::At(positions), _) => positions,
     };
     if positions.is_empty() { Err(SetupError::NoSensors) } else { Ok(positions) }
 }

@@ -165,8 +165,8 @@ pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout 
             |at_m: f64, size_m: f64| (at_m + error_m * rng.random_range(-1.0..=1.0)).clamp(0.0, size_m);
         if error_m > 0.0 {
             let Position { x_m, y_m } = sensor.position;
-            let y_m = extent.width_m.map_or(y_m, |width_m| beside(y_m, width_m));
-            sensor.position = Position { x_m: beside(x_m, extent.length_m), y_m };
+            let y_m = extent.width_m().map_or(y_m, |width_m| beside(y_m, width_m));
+            sensor.position = Position { x_m: beside(x_m, extent.length_m()), y_m };
         }
     }
     placed

@@ -10,6 +10,7 @@ use super::{Axis, Chart, Series};
 use palpate_estimators::estimator::Comparison;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio, percentage_error};
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::surface::Extent;
 
 /// Stretches of the surface over which errors are summed up.
 const STRETCHES: usize = 40;
@@ -37,10 +38,9 @@ pub struct ComparisonReport<'a> {
 
 /// Reports a comparison: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
-    let (heading, errors) = if report.is_plane() {
-        ("Errors over the surface", report.errors_map())
-    } else {
-        ("Errors along the surface", report.along_figure())
+    let (heading, errors) = match report.extent() {
+        Extent::Line { .. } => ("Errors along the surface", report.along_figure()),
+        Extent::Plane { .. } => ("Errors over the surface", report.errors_map()),
     };
     let sections = vec![
         Section::new("table", "The estimators").table(report.table()).text(report.left_out_in_words()),
@@ -51,8 +51,8 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
 }
 
 impl ComparisonReport<'_> {
-    fn is_plane(&self) -> bool {
-        self.setup.surface.extent().is_plane()
+    fn extent(&self) -> Extent {
+        self.setup.surface.extent()
     }
 
     fn summary(&self) -> Markup {
@@ -103,10 +103,14 @@ impl ComparisonReport<'_> {
             numeric("fit, ms"),
             numeric("a reading, µs"),
         ];
+        let small = match self.extent() {
+            Extent::Line { .. } => "1/200",
+            Extent::Plane { .. } => "1/20",
+        };
         let caption = html! {
             "Location errors in mm, best mean first; 95th percentile and root mean square (RMS). Effective: share of the readings within "
             (number(self.tolerance_m * 1e3)) " mm. Covered: share of the 95 % intervals that hold the contact. × limit: mean \
-             error over what physics allows, where the limit is at most " (if self.is_plane() { "1/20" } else { "1/200" })
+             error over what physics allows, where the limit is at most " (small)
             " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
         };
         Table::new(columns, rows, caption)
@@ -146,7 +150,7 @@ impl ComparisonReport<'_> {
     }
 
     fn along_figure(&self) -> Figure {
-        let length_mm = self.setup.surface.extent().length_m * 1e3;
+        let length_mm = self.setup.surface.extent().length_m() * 1e3;
         let mut series = self.series(|evaluation| in_milli(evaluation.median_by_stretch_m(STRETCHES)));
         series.extend(limit_line(self.setup));
         let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);

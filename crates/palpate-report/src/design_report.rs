@@ -17,6 +17,7 @@ use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitCurve;
+use palpate_mechanics::surface::Extent;
 
 /// Cells of a map, about, and the least and the most of them along each side.
 const CELLS: f64 = 1600.0;
@@ -45,14 +46,15 @@ pub struct SensorDesignReport<'a> {
 pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
     let layouts = Section::new("layouts", "The layouts").table(report.table()).table(report.places());
     let limit = Section::new("limit", "The limit with the best of them");
-    let mut sections = if report.problem.is_plane() {
-        vec![layouts, limit.figures(report.limit_maps())]
-    } else {
-        let setup = report.best().and_then(|best| {
-            let what = "The bench with the best layout";
-            bench_figure(what, &report.setup.surface, &best.layout, report.problem.force_n())
-        });
-        vec![layouts.figure(report.sites_figure()), limit.figure(setup).figure(report.limit_figure())]
+    let mut sections = match report.problem.extent() {
+        Extent::Line { .. } => {
+            let setup = report.best().and_then(|best| {
+                let what = "The bench with the best layout";
+                bench_figure(what, &report.setup.surface, &best.layout, report.problem.force_n())
+            });
+            vec![layouts.figure(report.sites_figure()), limit.figure(setup).figure(report.limit_figure())]
+        }
+        Extent::Plane { .. } => vec![layouts, limit.figures(report.limit_maps())],
     };
     sections.extend(report.counts_figure().map(|figure| {
         let section = Section::new("counts", "How many sensors are enough");
@@ -77,7 +79,7 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn length_mm(&self) -> f64 {
-        self.setup.surface.extent().length_m * 1e3
+        self.setup.surface.extent().length_m() * 1e3
     }
 
     fn summary(&self) -> Markup {
@@ -100,7 +102,7 @@ impl<'a> SensorDesignReport<'a> {
             li {
                 "Best of " (counted(self.designed.len(), "layout", "layouts")) " of "
                 (counted(best.layout.len(), "sensor", "sensors")) ": " b { (best.method.name()) } ", "
-                (best.layout.places_in_words(self.problem.is_plane())) "."
+                (best.layout.places_in_words(self.problem.extent())) "."
             }
             li {
                 "Its mean limit is " b { (number(limit(best))) " mm" }
@@ -165,11 +167,10 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn places(&self) -> Table {
-        let plane = self.problem.is_plane();
-        let rows = self
-            .designed
-            .iter()
-            .map(|designed| vec![text(designed.method.name()), text(designed.layout.places_in_words(plane))]);
+        let extent = self.problem.extent();
+        let rows = self.designed.iter().map(|designed| {
+            vec![text(designed.method.name()), text(designed.layout.places_in_words(extent))]
+        });
         Table::new([short("layout"), wide("sensors")], rows, html! { "Where their sensors sit." })
     }
 
@@ -302,13 +303,10 @@ impl<'a> SensorDesignReport<'a> {
 
     fn given(&self) -> Markup {
         let design = self.problem.design();
-        let plane = self.problem.is_plane();
         let zone = |from: Position, to: Position| {
-            if plane {
-                format!("{}–{} × {}–{} mm", mm(from.x_m), mm(to.x_m), mm(from.y_m), mm(to.y_m))
-            } else {
-                format!("{}–{} mm", mm(from.x_m), mm(to.x_m))
-            }
+            let [from_m, to_m] = [from, to].map(|end| self.problem.extent().coordinates_m(end));
+            let sides = from_m.zip(to_m).map(|(from_m, to_m)| format!("{}–{}", mm(from_m), mm(to_m)));
+            sides.collect::<Vec<_>>().join(" × ") + " mm"
         };
         let kinds: Vec<String> = design
             .offers

@@ -63,7 +63,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     let points = in_milli(unknown.by_x(|bound| bound.sd_force_n.unwrap_or(f64::NAN)));
     let chart = Chart::new(
         "The least standard deviation of an estimated force",
-        Axis::linear("contact position, mm").from_to(0.0, unknown.extent.length_m * 1e3),
+        Axis::linear("contact position, mm").from_to(0.0, unknown.extent.length_m() * 1e3),
         Axis::log10("limit, mN"),
         vec![Series::line("position unknown, estimated along", 1, points)],
     );

@@ -11,7 +11,7 @@ use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Portion, Spread, percentage_error};
 use palpate_estimators::recording::Provenance;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::surface::SurfaceSpec;
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
 /// More positions than this are drawn as a line: markers would hide each other.
@@ -52,13 +52,14 @@ pub enum Judged<'a> {
 
 /// Reports an evaluation: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn evaluation_report(report: &EvaluationReport) -> Vec<ReportFile> {
-    let (heading, errors) = if report.is_plane() {
-        let evaluations = [("the locator", report.evaluation)];
-        let title = "Median location error over the surface";
-        let map = error_map(report.setup(), title, "Median of the location errors", &evaluations);
-        ("Errors over the surface", map)
-    } else {
-        ("Errors along the surface", report.error_figure())
+    let (heading, errors) = match report.extent() {
+        Extent::Line { .. } => ("Errors along the surface", report.error_figure()),
+        Extent::Plane { .. } => {
+            let evaluations = [("the locator", report.evaluation)];
+            let title = "Median location error over the surface";
+            let map = error_map(report.setup(), title, "Median of the location errors", &evaluations);
+            ("Errors over the surface", map)
+        }
     };
     let sections = vec![
         Section::new("errors", heading).figure(errors).figure(report.estimate_figure()),
@@ -111,8 +112,8 @@ impl EvaluationReport<'_> {
         }
     }
 
-    fn is_plane(&self) -> bool {
-        self.setup().surface.extent().is_plane()
+    fn extent(&self) -> Extent {
+        self.setup().surface.extent()
     }
 
     fn judged_heading(&self) -> &'static str {
@@ -155,11 +156,14 @@ impl EvaluationReport<'_> {
         let length_mm = self.evaluation.length_m * 1e3;
         let identity = vec![(0.0, 0.0), (length_mm, length_mm)];
         let mut series = vec![Series::dashes("estimated = true", 6, identity)];
-        let along = if self.is_plane() { "along the surface" } else { "estimated" };
-        series.extend(self.estimates(along, 0, |located| (located.truth.x_m, located.estimate.x_m)));
-        if self.is_plane() {
-            let across = |located: &Located| (located.truth.y_m, located.estimate.y_m);
-            series.extend(self.estimates("across the surface", 1, across));
+        let along = |located: &Located| (located.truth.x_m, located.estimate.x_m);
+        let across = |located: &Located| (located.truth.y_m, located.estimate.y_m);
+        match self.extent() {
+            Extent::Line { .. } => series.extend(self.estimates("estimated", 0, along)),
+            Extent::Plane { .. } => {
+                series.extend(self.estimates("along the surface", 0, along));
+                series.extend(self.estimates("across the surface", 1, across));
+            }
         }
         let banded = series.iter().any(Series::is_band);
         let (x, y) = (self.axis("true position, mm"), Axis::linear("estimated position, mm"));
@@ -207,7 +211,10 @@ impl EvaluationReport<'_> {
             .into_iter()
             .chain(["average", "median", "95th percentile", "largest", "root mean square"].map(in_units))
             .chain([numeric(format!("within {} mm, %", mm(self.tolerance_m)))]);
-        let effective = if self.is_plane() { "area" } else { "length" };
+        let effective = match self.extent() {
+            Extent::Line { .. } => "length",
+            Extent::Plane { .. } => "area",
+        };
         let caption = html! {
             "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly over the surface, the \
              share within the tolerance is the effective " (effective) "."
@@ -256,8 +263,8 @@ impl EvaluationReport<'_> {
             SurfaceSpec::Digit(_) => "flexible digit".to_owned(),
             SurfaceSpec::Measured(_) => "measured, without a model".to_owned(),
         };
-        let width = extent.width_m.map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));
-        format!("{kind}, {} mm{width}", mm(extent.length_m))
+        let width = extent.width_m().map_or(String::new(), |width_m| format!(" × {} mm", mm(width_m)));
+        format!("{kind}, {} mm{width}", mm(extent.length_m()))
     }
 
     fn sensors_in_words(&self) -> String {

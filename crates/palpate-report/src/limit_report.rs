@@ -17,7 +17,7 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::Sensor;
-use palpate_mechanics::surface::SurfaceSpec;
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 /// Where the surface ends, errors do: limits beyond this many lengths are cut off.
 const MOST_LENGTHS: f64 = 10.0;
@@ -74,10 +74,9 @@ pub struct LimitReport<'a> {
 /// ```
 pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
     let (layout, force_n) = (&report.setup.layout, report.known.force_n);
-    let (heading, figure) = if report.known.extent.is_plane() {
-        ("The limit over the surface", report.limit_map())
-    } else {
-        ("The limit along the surface", report.limit_figure())
+    let (heading, figure) = match report.known.extent {
+        Extent::Line { .. } => ("The limit along the surface", report.limit_figure()),
+        Extent::Plane { .. } => ("The limit over the surface", report.limit_map()),
     };
     let sections = vec![
         Section::new("bench", "The bench")
@@ -104,7 +103,7 @@ impl LimitReport<'_> {
 
     fn summary(&self) -> Markup {
         let extent = self.known.extent;
-        let percent = |limit_m: f64| number(100.0 * limit_m / extent.length_m);
+        let percent = |limit_m: f64| number(100.0 * limit_m / extent.length_m());
         let at = |(position, limit_m): (Position, f64)| {
             format!("{} mm at {} mm", number(limit_m * 1e3), place(position, extent))
         };
@@ -127,7 +126,7 @@ impl LimitReport<'_> {
     }
 
     fn limit_figure(&self) -> Figure {
-        let length_mm = self.known.extent.length_m * 1e3;
+        let length_mm = self.known.extent.length_m() * 1e3;
         let line = |curve: &LimitCurve, label, colour| {
             Series::line(label, colour, in_milli(curve.by_x(|bound| bound.sd_position_m)))
         };
@@ -155,7 +154,7 @@ impl LimitReport<'_> {
 
     /// The zones of the warnings, and the length of the surface where limits reach `beyond` it, which means "anywhere".
     fn marks(&self, beyond: bool) -> Vec<Mark> {
-        let length_m = self.known.extent.length_m;
+        let length_m = self.known.extent.length_m();
         let label = format!("length of the surface, {} mm", mm(length_m));
         let length = beyond.then_some(Mark::HorizontalLine { y: length_m * 1e3, label });
         let zones = self.warnings.iter().flat_map(|warning| {
@@ -184,7 +183,7 @@ impl LimitReport<'_> {
         let panels =
             vec![panel("force known", Force::Known), panel("force unknown, estimated along", Force::Unknown)];
         let limits = || panels.iter().flat_map(|panel| &panel.values);
-        let length_mm = extent.length_m * 1e3;
+        let length_mm = extent.length_m() * 1e3;
         let cut_off = limits().any(|limit_mm| *limit_mm > length_mm);
         let nowhere = limits().any(|limit_mm| limit_mm.is_nan());
         let map = HeatMap {

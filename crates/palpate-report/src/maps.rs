@@ -65,8 +65,8 @@ fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
         values.dedup_by(|a, b| (*a - *b).abs() < 1e-6 * size_m);
         values.len().max(1)
     };
-    let columns = distinct(|place| place.x_m, extent.length_m);
-    let rows = distinct(|place| place.y_m, extent.width_m.unwrap_or(extent.length_m));
+    let columns = distinct(|place| place.x_m, extent.length_m());
+    let rows = distinct(|place| place.y_m, extent.width_m().unwrap_or(extent.length_m()));
     let is_grid = columns.saturating_mul(rows) < SPARSE * places.len();
     if is_grid && columns <= MOST_SIDE && rows <= MOST_SIDE {
         return Cells { extent, columns, rows };

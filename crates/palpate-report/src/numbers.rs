@@ -59,10 +59,7 @@ pub(crate) fn mm(length_m: f64) -> String {
 
 /// A position in millimetres: "50", or "50, 20" on a plane.
 pub(crate) fn place(position: Position, extent: Extent) -> String {
-    match extent.width_m {
-        Some(_) => format!("{}, {}", mm(position.x_m), mm(position.y_m)),
-        None => mm(position.x_m),
-    }
+    extent.coordinates_m(position).map(mm).collect::<Vec<_>>().join(", ")
 }
 
 /// A portion of the surface: "20–380 mm".

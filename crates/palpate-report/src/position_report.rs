@@ -11,7 +11,7 @@ use super::{Axis, Chart, Marker, Series};
 use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
-use palpate_mechanics::contact::in_words;
+use palpate_mechanics::surface::Extent;
 
 /// What a report of training positions is made from.
 #[derive(Clone, Copy)]
@@ -32,10 +32,11 @@ pub struct PositionDesignReport<'a> {
 pub fn position_design_report(report: &PositionDesignReport) -> Vec<ReportFile> {
     let positions = Section::new("positions", "The arrangements").table(report.table());
     let errors = Section::new("errors", "Where the locator is off");
-    let (positions, errors) = if report.problem.is_plane() {
-        (positions, errors.figures(report.maps()))
-    } else {
-        (positions.figure(report.rows_figure()), errors.figure(report.errors_figure()))
+    let (positions, errors) = match report.problem.extent() {
+        Extent::Line { .. } => {
+            (positions.figure(report.rows_figure()), errors.figure(report.errors_figure()))
+        }
+        Extent::Plane { .. } => (positions, errors.figures(report.maps())),
     };
     let meaning = Section::new("meaning", "How positions are found and judged").text(report.meaning());
     let sections = vec![positions.table(report.places()), errors, meaning];
@@ -107,11 +108,8 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn places(&self) -> Table {
-        let plane = self.problem.is_plane();
-        let rows = self
-            .placed
-            .iter()
-            .map(|placed| vec![text(placed.placement.name()), text(in_words(&placed.positions, plane))]);
+        let places = |placed: &Placed| self.problem.extent().places_in_words(&placed.positions);
+        let rows = self.placed.iter().map(|placed| vec![text(placed.placement.name()), text(places(placed))]);
         Table::new([short("positions"), wide("where")], rows, html! { "Where to press." })
     }
 
@@ -172,7 +170,7 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn axis(&self, label: &str) -> Axis {
-        Axis::linear(label).from_to(0.0, self.setup.surface.extent().length_m * 1e3)
+        Axis::linear(label).from_to(0.0, self.setup.surface.extent().length_m() * 1e3)
     }
 
     fn meaning(&self) -> Markup {

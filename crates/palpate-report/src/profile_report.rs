@@ -8,7 +8,7 @@ use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text
 use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
 use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
 use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_mechanics::surface::UniformLoad;
+use palpate_mechanics::surface::{Extent, UniformLoad};
 
 /// Places whose averaging kernels are drawn, as shares of the length, and on a plane of the width.
 const KERNEL_PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
@@ -37,18 +37,21 @@ pub struct ProfileReport<'a> {
 
 /// Reports a load profile: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
-    let load = if report.is_plane() { report.pressure_map() } else { report.load_figure() };
-    let resolved = report.resolution.map(|resolution| {
-        if report.is_plane() {
-            (report.width_map(resolution), report.kernel_map(resolution))
-        } else {
-            (report.width_figure(resolution), report.kernel_figure(resolution))
-        }
-    });
-    let (widths, kernels) = resolved.unzip();
+    let (load, resolved) = match report.extent() {
+        Extent::Line { .. } => (
+            report.load_figure(),
+            report
+                .resolution
+                .map(|resolution| [report.width_figure(resolution), report.kernel_figure(resolution)]),
+        ),
+        Extent::Plane { .. } => (
+            report.pressure_map(),
+            report.resolution.map(|resolution| [report.width_map(resolution), report.kernel_map(resolution)]),
+        ),
+    };
     let sections = vec![
         Section::new("profile", "The load").figure(load).table(report.patch_table()),
-        Section::new("resolution", "What this layout resolves").figure(widths).figure(kernels),
+        Section::new("resolution", "What this layout resolves").figures(resolved.into_iter().flatten()),
         Section::new("readings", "Readings and what is left of them")
             .figure(report.residual_figure())
             .table(report.reading_table()),
@@ -58,8 +61,8 @@ pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
 }
 
 impl ProfileReport<'_> {
-    fn is_plane(&self) -> bool {
-        self.profile.cells.extent.is_plane()
+    fn extent(&self) -> Extent {
+        self.profile.cells.extent
     }
 
     fn summary(&self) -> Markup {
@@ -72,7 +75,7 @@ impl ProfileReport<'_> {
                 li {
                     "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
                     (interval_mm(centre.x_95_m())) " mm"
-                    @if self.is_plane() {
+                    @if let Extent::Plane { .. } = self.extent() {
                         "; across at " b { (number(centre.position.y_m * 1e3)) " mm" } ", 95 % interval "
                         (interval_mm(centre.y_95_m())) " mm"
                     }
@@ -90,7 +93,7 @@ impl ProfileReport<'_> {
     }
 
     fn axis(&self, label: &str) -> Axis {
-        Axis::linear(label).from_to(0.0, self.profile.cells.extent.length_m * 1e3)
+        Axis::linear(label).from_to(0.0, self.profile.cells.extent.length_m() * 1e3)
     }
 
     fn load_figure(&self) -> Figure {
@@ -130,7 +133,7 @@ impl ProfileReport<'_> {
             let density = load.force_n / (to - from);
             [(from, 0.0), (from, density), (to, density), (to, 0.0)]
         });
-        let end = (self.profile.cells.extent.length_m * 1e3, 0.0);
+        let end = (self.profile.cells.extent.length_m() * 1e3, 0.0);
         std::iter::once((0.0, 0.0)).chain(steps).chain([end]).collect()
     }
 
@@ -225,17 +228,19 @@ impl ProfileReport<'_> {
         let of_kind = |(colour, kind): (usize, &SensorKind)| {
             let sensors = self.layout.sensors.iter().enumerate().filter(|(_, sensor)| sensor.kind == *kind);
             let points = sensors.filter_map(|(i, sensor)| {
-                let at = if self.is_plane() { (i + 1) as f64 } else { sensor.position.x_m * 1e3 };
+                let at = match self.extent() {
+                    Extent::Line { .. } => sensor.position.x_m * 1e3,
+                    Extent::Plane { .. } => (i + 1) as f64,
+                };
                 Some((at, self.profile.residuals.get(i).copied().flatten()?))
             });
             let marker = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Cross][colour % 4];
             Series::markers(kind.name(), colour, points.collect(), marker)
         };
         let series = kinds.iter().enumerate().map(of_kind).collect();
-        let x = if self.is_plane() {
-            Axis::linear("sensor").from_to(0.0, self.layout.len() as f64 + 1.0)
-        } else {
-            self.axis("sensor position, mm")
+        let x = match self.extent() {
+            Extent::Line { .. } => self.axis("sensor position, mm"),
+            Extent::Plane { .. } => Axis::linear("sensor").from_to(0.0, self.layout.len() as f64 + 1.0),
         };
         let y = Axis::linear("residual, standard deviations of the noise");
         let line_at = |y, label: &str| Mark::HorizontalLine { y, label: label.to_owned() };
@@ -259,11 +264,12 @@ impl ProfileReport<'_> {
             ]
         };
         let mut columns = vec![short("patch")];
-        if self.is_plane() {
-            columns.extend(columns_of("along, mm", "centre x, mm"));
-            columns.extend(columns_of("across, mm", "centre y, mm"));
-        } else {
-            columns.extend(columns_of("stretch, mm", "centre, mm"));
+        match self.extent() {
+            Extent::Line { .. } => columns.extend(columns_of("stretch, mm", "centre, mm")),
+            Extent::Plane { .. } => {
+                columns.extend(columns_of("along, mm", "centre x, mm"));
+                columns.extend(columns_of("across, mm", "centre y, mm"));
+            }
         }
         columns.extend([numeric("force, N"), numeric("95 %, N"), numeric("limit, N")]);
         let row = |(i, patch): (usize, &Patch)| {
@@ -272,7 +278,7 @@ impl ProfileReport<'_> {
             let mut row = vec![text((i + 1).to_string())];
             let sd_x_m = limit.map(|limit| limit.sd_x_m);
             row.extend(cells_of(from.x_m, to.x_m, centre.position.x_m, centre.x_95_m(), sd_x_m));
-            if self.is_plane() {
+            if let Extent::Plane { .. } = self.extent() {
                 let sd_y_m = limit.map(|limit| limit.sd_y_m);
                 row.extend(cells_of(from.y_m, to.y_m, centre.position.y_m, centre.y_95_m(), sd_y_m));
             }

@@ -58,7 +58,7 @@ impl<'a> StudyReport<'a> {
 
     /// Length of the surface in metres; that of the first arm.
     pub(crate) fn length_m(&self) -> f64 {
-        self.study.study.arms.first().map_or(f64::NAN, |arm| arm.rig.setup.surface.extent().length_m)
+        self.study.study.arms.first().map_or(f64::NAN, |arm| arm.rig.setup.surface.extent().length_m())
     }
 
     /// A sentence on the networks that did not converge; none where all did.

@@ -12,6 +12,7 @@ use super::study_parts::{
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::evaluation::Spread;
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
 /// So many arms are told apart in a table; more are also drawn side by side.
@@ -41,7 +42,7 @@ pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
         vec![Section::new("arms", "All arms").figures(overview(report)).table(arms_table(report))];
     if layouts.len() > 1 {
         let section = Section::new("layouts", "The layouts").figure(layouts_figure(report, &layouts));
-        sections.push(section.table(layouts_table(&layouts)));
+        sections.push(section.table(layouts_table(&layouts, Extent::Line { length_m: report.length_m() })));
     }
     sections.extend([
         Section::new("errors", "Errors along the surface").figures(along_the_surface(report)),
@@ -192,9 +193,10 @@ fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Fig
 }
 
 /// Which arms have which layout.
-fn layouts_table(layouts: &[(Vec<&str>, &Layout)]) -> Table {
-    let rows =
-        layouts.iter().map(|(arms, layout)| vec![text(arms.join(", ")), text(layout.places_in_words(false))]);
+fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
+    let rows = layouts
+        .iter()
+        .map(|(arms, layout)| vec![text(arms.join(", ")), text(layout.places_in_words(extent))]);
     Table::new([wide("arms"), wide("sensors")], rows, html! { "Where the sensors of every arm sit." })
 }
 

@@ -42,7 +42,10 @@ pub struct TrackReport<'a> {
 
 /// Reports a track: `report.html`, one self-contained page, and its figures as SVG files.
 pub fn track_report(report: &TrackReport) -> Vec<ReportFile> {
-    let track = if report.extent.is_plane() { report.path_figure() } else { report.track_figure() };
+    let track = match report.extent {
+        Extent::Line { .. } => report.track_figure(),
+        Extent::Plane { .. } => report.path_figure(),
+    };
     let mut sections = vec![
         Section::new("track", "The track").figure(track),
         Section::new("errors", "Errors").figure(report.errors_figure()).table(report.errors_table()),
@@ -88,7 +91,7 @@ impl TrackReport<'_> {
             let label = if k == 0 { "true position" } else { "true position of the second" };
             series.push(Series::dashes(label, 6 + k, points));
         }
-        let y = Axis::linear("position, mm").from_to(0.0, self.extent.length_m * 1e3);
+        let y = Axis::linear("position, mm").from_to(0.0, self.extent.length_m() * 1e3);
         let chart = Chart::new("The contact over time", Axis::linear("time, s"), y, series).with_height(520);
         let caption = html! { "Where the contact was, where readings by themselves see it, and the track." };
         Figure::chart(&chart, caption)
@@ -106,7 +109,7 @@ impl TrackReport<'_> {
             let mut truths = self.truths.iter().map(|truths| touching(truths.first()));
             series.push(Series::dashes("true position", 6, path(&mut truths)));
         }
-        let sides_m = [self.extent.length_m, self.extent.width_m.unwrap_or_default()];
+        let sides_m = [self.extent.length_m(), self.extent.width_m().unwrap_or_default()];
         let [length_mm, width_mm] = sides_m.map(|side_m| side_m * 1e3);
         let x = Axis::linear("x, mm").from_to(0.0, length_mm);
         let y = Axis::linear("y, mm").from_to(0.0, width_mm);
@@ -159,12 +162,13 @@ impl TrackReport<'_> {
 
     /// What the figure of errors has a line for: each contact, or both coordinates of a plane.
     fn coordinates(&self) -> Vec<Coordinate> {
-        if self.extent.is_plane() {
-            let named = |name, across| Coordinate { name, contact: 0, across };
-            return vec![named(" in x", false), named(" in y", true)];
+        let named = |name, contact, across| Coordinate { name, contact, across };
+        match self.extent {
+            Extent::Line { .. } => (0..self.most_contacts())
+                .map(|contact| named(of_two(contact, self), contact, false))
+                .collect(),
+            Extent::Plane { .. } => vec![named(" in x", 0, false), named(" in y", 0, true)],
         }
-        let of = |contact| Coordinate { name: of_two(contact, self), contact, across: false };
-        (0..self.most_contacts()).map(of).collect()
     }
 
     /// The track at reading `i` and both ends of its 95 % interval in mm, less the truth, or less the track where that is not known.

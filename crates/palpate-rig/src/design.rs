@@ -205,7 +205,7 @@ impl At<SitesKeys> {
         match &**self {
             SitesKeys::Text(every) => {
                 let along = |size_m: f64| (size_m / every.si).floor() + 1.0;
-                let sites = along(extent.length_m) * extent.width_m.map_or(1.0, along);
+                let sites = along(extent.length_m()) * extent.width_m().map_or(1.0, along);
                 if sites > MOST_SITES as f64 {
                     return Err(self
                         .place
@@ -213,7 +213,7 @@ impl At<SitesKeys> {
                 }
                 Ok(Sites::Every(every.si))
             }
-            SitesKeys::Number(_) if extent.is_plane() => {
+            SitesKeys::Number(_) if let Extent::Plane { .. } = extent => {
                 Err(self.place.refuse("a distance such as \"10 mm\", or a list of pairs, on a plane"))
             }
             SitesKeys::Number(count) => Ok(Sites::Count(count.get())),

@@ -67,7 +67,7 @@ pub(crate) fn build(
     if let (None, Some(damping)) = (beam, &first.damping) {
         return Err(damping.place.unused("a plate, which is in balance at every reading"));
     }
-    if let (true, Some(second)) = (extent.is_plane(), second) {
+    if let (Extent::Plane { .. }, Some(second)) = (extent, second) {
         return Err(second.place.refuse_as("a list of two", "one on a plane"));
     }
     let rate_hz = first.rate.as_ref().ok_or_else(|| first.place.missing("rate"))?.si;

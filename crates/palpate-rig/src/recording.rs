@@ -98,26 +98,29 @@ impl At<RecordingKeys> {
         match positions.clone().chain(values).chain(channels).find(named) {
             _ if self.header => Ok(()),
             Some(key) => Err(key.place.refuse("a column's number where `header = false`")),
-            None if positions.count() == 0 => {
-                Err(self.place.missing(if extent.is_plane() { "x" } else { "position" }))
-            }
+            None if positions.count() == 0 => Err(self.place.missing(match extent {
+                Extent::Line { .. } => "position",
+                Extent::Plane { .. } => "x",
+            })),
             None if self.channels.is_none() => Err(self.place.missing("channels")),
             None => Ok(()),
         }
     }
 
     fn positions(&self, extent: Extent) -> Result<Option<PositionColumns>, RigError> {
-        match (&self.position, &self.x, &self.y, extent.is_plane()) {
-            (None, None, None, _) => Ok(None),
-            (Some(_), Some(key), _, _) | (Some(_), None, Some(key), _) => Err(key.place.unused("`position`")),
-            (Some(x), None, None, false) => Ok(Some(PositionColumns::Along(x.column()))),
-            (Some(x), None, None, true) => Err(x.place.unused("a surface that has a width; use `x` and `y`")),
-            (None, Some(_), None, _) => Err(self.place.missing("y")),
-            (None, None, Some(_), _) => Err(self.place.missing("x")),
-            (None, Some(_), Some(y), false) => Err(y.place.unused("a surface without a width")),
-            (None, Some(x), Some(y), true) => {
-                Ok(Some(PositionColumns::Plane { x: x.column(), y: y.column() }))
-            }
+        match (&self.position, &self.x, &self.y) {
+            (None, None, None) => Ok(None),
+            (Some(_), Some(key), _) | (Some(_), None, Some(key)) => Err(key.place.unused("`position`")),
+            (None, Some(_), None) => Err(self.place.missing("y")),
+            (None, None, Some(_)) => Err(self.place.missing("x")),
+            (Some(x), None, None) => match extent {
+                Extent::Line { .. } => Ok(Some(PositionColumns::Along(x.column()))),
+                Extent::Plane { .. } => Err(x.place.unused("a surface that has a width; use `x` and `y`")),
+            },
+            (None, Some(x), Some(y)) => match extent {
+                Extent::Line { .. } => Err(y.place.unused("a surface without a width")),
+                Extent::Plane { .. } => Ok(Some(PositionColumns::Plane { x: x.column(), y: y.column() })),
+            },
         }
     }
 
@@ -125,11 +128,11 @@ impl At<RecordingKeys> {
     fn frame(&self, extent: Extent) -> Result<Frame, RigError> {
         let origin = match &self.origin {
             None => Position::default(),
-            Some(origin) => match (origin.as_slice(), extent.is_plane()) {
-                ([x], false) => Position::along(x.si),
-                ([x, y], true) => Position { x_m: x.si, y_m: y.si },
-                (_, false) => return Err(origin.place.refuse("a list of 1")),
-                (_, true) => return Err(origin.place.refuse("a list of 2, x and y")),
+            Some(origin) => match (extent, origin.as_slice()) {
+                (Extent::Line { .. }, [x]) => Position::along(x.si),
+                (Extent::Line { .. }, _) => return Err(origin.place.refuse("a list of 1")),
+                (Extent::Plane { .. }, [x, y]) => Position { x_m: x.si, y_m: y.si },
+                (Extent::Plane { .. }, _) => return Err(origin.place.refuse("a list of 2, x and y")),
             },
         };
         Ok(Frame { origin, round_m: self.round.map(|round| round.si) })

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use palpate_estimators::arrangement::inner_grid;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind, even_positions};
-use palpate_mechanics::surface::SurfaceSpec;
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 use crate::document::At;
 use crate::error::{RigError, RigProblem};
@@ -108,7 +108,7 @@ impl At<SensorsKeys> {
         channel_count: Option<usize>,
     ) -> Result<Vec<Position>, RigError> {
         let (extent, kind) = (surface.extent(), *self.measure);
-        let even = |count| even_positions(count, extent.length_m).collect();
+        let even = |count| even_positions(count, extent.length_m()).collect();
         let (positions, place): (Vec<_>, _) = match (&self.count, &self.grid, &self.positions) {
             (Some(_), _, Some(listed)) => return Err(listed.place.unused("`count`")),
             (_, Some(_), Some(listed)) => return Err(listed.place.unused("`grid`")),
@@ -125,13 +125,16 @@ impl At<SensorsKeys> {
                 (inner_grid(extent, columns, rows), &grid.place)
             }
             // Where a raw channel is means nothing.
-            (Some(count), None, None) if extent.is_plane() && kind != SensorKind::Raw => {
-                return Err(count.place.unused(ON_A_PLANE));
-            }
-            (Some(count), None, None) => (even(count.get()), &count.place),
-            (None, None, None) => match (channel_count, kind) {
-                (Some(count), SensorKind::Raw) => (even(count), &self.place),
-                _ => return Err(self.place.missing(if extent.is_plane() { "grid" } else { "count" })),
+            (Some(count), None, None) => match extent {
+                Extent::Plane { .. } if kind != SensorKind::Raw => {
+                    return Err(count.place.unused(ON_A_PLANE));
+                }
+                _ => (even(count.get()), &count.place),
+            },
+            (None, None, None) => match (channel_count, kind, extent) {
+                (Some(count), SensorKind::Raw, _) => (even(count), &self.place),
+                (_, _, Extent::Line { .. }) => return Err(self.place.missing("count")),
+                (_, _, Extent::Plane { .. }) => return Err(self.place.missing("grid")),
             },
         };
         for (i, &position) in positions.iter().enumerate() {

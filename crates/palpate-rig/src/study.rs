@@ -6,6 +6,7 @@ use palpate_design::sensors::Method;
 use palpate_estimators::evaluation::Portion;
 use palpate_estimators::network::Precision;
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -254,11 +255,11 @@ impl StudyFile {
     /// Without an `[evaluation]`: 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
         let extent = first.rig.setup.surface.extent();
-        if let (Some(surface), true) = (&self.surface, extent.is_plane()) {
+        if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {
             return Err(surface.place.refuse_as("a plane", "a line, along which a study judges"));
         }
         let default = Judging {
-            positions: (1..400).map(|i| Position::along(f64::from(i) / 400.0 * extent.length_m)).collect(),
+            positions: (1..400).map(|i| Position::along(f64::from(i) / 400.0 * extent.length_m())).collect(),
             readings: 5,
             tolerance_m: 2e-3,
             portions: Vec::new(),
@@ -266,7 +267,7 @@ impl StudyFile {
         };
         let Some(keys) = &self.evaluation else { return Ok(default) };
         Ok(Judging {
-            positions: keys.positions(extent.length_m)?,
+            positions: keys.positions(extent.length_m())?,
             readings: keys.readings.map_or(default.readings, Count::get),
             tolerance_m: keys.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),
             portions: keys.portions.iter().map(At::<PortionKeys>::build).collect::<Result<_, _>>()?,

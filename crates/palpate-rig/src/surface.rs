@@ -202,10 +202,9 @@ impl At<SurfaceKeys> {
                 digit.validate().map_err(|error| RigProblem::Digit(error).at(&self.place))?;
                 Ok(SurfaceSpec::Digit(digit))
             }
-            SurfaceKeys::Measured(keys) => Ok(SurfaceSpec::Measured(Extent {
-                length_m: keys.length.si,
-                width_m: keys.width.map(|width| width.si),
-            })),
+            SurfaceKeys::Measured(keys) => {
+                Ok(Extent::new(keys.length.si, keys.width.map(|width| width.si)).into())
+            }
         }
     }
 
@@ -309,7 +308,7 @@ impl BeamSupportKeys {
 
 impl PlateKeys {
     fn build(&self, place: &Place) -> Result<Plate, RigError> {
-        let extent = Extent { length_m: self.length.si, width_m: Some(self.width.si) };
+        let extent = Extent::Plane { length_m: self.length.si, width_m: self.width.si };
         let edges = match self.edges.as_deref() {
             None => Edges::default(),
             Some(EdgesKeys::Text(edge)) => Edges::all(*edge),

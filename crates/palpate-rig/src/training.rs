@@ -84,7 +84,7 @@ impl At<TrainingKeys> {
             (None, None, None) => Rule::Even,
         };
         self.refuse_unused(rule)?;
-        if extent.is_plane() && !matches!(rule, Rule::Grid | Rule::Explicit) {
+        if let (Extent::Plane { .. }, Rule::Even | Rule::EdgeDense | Rule::Chebyshev) = (extent, rule) {
             return Err(self.count.as_ref().map_or(need("grid"), |count| count.place.unused(ON_A_PLANE)));
         }
         let portion = self.portion.as_ref().map(|portion| (portion.0.si, portion.1.si));

@@ -147,7 +147,7 @@ pub(crate) struct Grid<const MOST: i64>(Count<1, MOST>, Count<1, MOST>);
 impl<const MOST: i64> At<Grid<MOST>> {
     /// Columns and rows.
     pub fn sides(&self, extent: Extent) -> Result<(usize, usize), RigError> {
-        if !extent.is_plane() {
+        if let Extent::Line { .. } = extent {
             return Err(self.place.unused("a surface that is a line; say `count`"));
         }
         let (columns, rows) = (self.0.get(), self.1.get());
@@ -170,11 +170,13 @@ pub(crate) enum Point {
 impl At<Point> {
     /// The position on a surface of this `extent`, or beside it.
     pub fn position(&self, extent: Extent) -> Result<Position, RigError> {
-        match (&**self, extent.is_plane()) {
-            (Point::Scalar(x), false) => Ok(Position::along(x.si)),
-            (Point::List(_), false) => Err(self.place.refuse("one length along the surface")),
-            (Point::List(list), true) if list.len() == 2 => Ok(Position { x_m: list[0].si, y_m: list[1].si }),
-            (_, true) => {
+        match (extent, &**self) {
+            (Extent::Line { .. }, Point::Scalar(x)) => Ok(Position::along(x.si)),
+            (Extent::Line { .. }, Point::List(_)) => Err(self.place.refuse("one length along the surface")),
+            (Extent::Plane { .. }, Point::List(list)) if list.len() == 2 => {
+                Ok(Position { x_m: list[0].si, y_m: list[1].si })
+            }
+            (Extent::Plane { .. }, _) => {
                 Err(self.place.refuse("a pair of lengths, along and across, such as [\"75 mm\", \"40 mm\"]"))
             }
         }
@@ -199,7 +201,7 @@ pub(crate) fn check_order(
     extent: Extent,
     place: &Place,
 ) -> Result<(), RigError> {
-    if from.x_m < to.x_m && (!extent.is_plane() || from.y_m < to.y_m) {
+    if extent.coordinates_m(from).zip(extent.coordinates_m(to)).all(|(from_m, to_m)| from_m < to_m) {
         return Ok(());
     }
     let bound = format!("beyond `from`, {}", extent.place_in_words(from));

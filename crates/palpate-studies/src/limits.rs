@@ -15,7 +15,7 @@ use palpate_mechanics::limit::{Bound, Force};
 pub(super) fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Option<Vec<f64>> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let length_m = setup.surface.extent().length_m;
+    let length_m = setup.surface.extent().length_m();
     let at = |&position: &Position| {
         let bound = limit.at(Contact { position, force_n }, force);
         expected_error_m(bound.as_ref(), length_m)

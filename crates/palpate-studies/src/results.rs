@@ -200,7 +200,7 @@ impl ArmResults {
         let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
             spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
         };
-        let length_m = arm.rig.setup.surface.extent().length_m;
+        let length_m = arm.rig.setup.surface.extent().length_m();
         let allowed = allowed(arm, judging);
         let portions = judging.portions.iter().filter_map(|portion| {
             Some(PortionResults {

@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         trials: trials.len(),
         readings: trials.iter().map(|trial| trial.judged.rows.len()).sum(),
         seed: arguments.seed,
-        length_mm: rig.setup.surface.extent().length_m * 1e3,
+        length_mm: rig.setup.surface.extent().length_m() * 1e3,
         tolerance_mm: arguments.tolerance * 1e3,
         estimators: rows.collect(),
         left_out,

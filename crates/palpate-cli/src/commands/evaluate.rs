@@ -11,6 +11,7 @@ use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_va
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
@@ -54,7 +55,7 @@ struct Findings {
     length_mm: f64,
     tolerance_mm: f64,
     #[serde(skip)]
-    is_plane: bool,
+    extent: Extent,
     effective_percent: f64,
     errors: Vec<Errors>,
 }
@@ -89,12 +90,12 @@ enum Subject {
 }
 
 impl Answers {
-    fn is_plane(&self) -> bool {
+    fn extent(&self) -> Extent {
         let setup = match &self.subject {
             Subject::Locator(locator) => &locator.setup,
             Subject::Rig(rig) => &rig.setup,
         };
-        setup.surface.extent().is_plane()
+        setup.surface.extent()
     }
 }
 
@@ -198,7 +199,7 @@ fn findings(arguments: &Arguments, answers: &Answers) -> Result<Findings, Failur
         seed: arguments.seed,
         length_mm: evaluation.length_m * 1e3,
         tolerance_mm: arguments.tolerance * 1e3,
-        is_plane: answers.is_plane(),
+        extent: answers.extent(),
         effective_percent: evaluation.effective_percent(arguments.tolerance),
         errors: errors.collect::<Result<_, Failure>>()?,
         data,
@@ -239,7 +240,10 @@ fn print(findings: &Findings, arguments: &Arguments) -> Result<(), Failure> {
     let heading = ["error, mm (% of length)", "contacts", "average", "median", "95th percentile", "largest"];
     output::say(table(&heading, rows))?;
     let (share, tolerance) = (findings.effective_percent, findings.tolerance_mm);
-    let what = if findings.is_plane { "effective area" } else { "effective" };
+    let what = match findings.extent {
+        Extent::Line { .. } => "effective",
+        Extent::Plane { .. } => "effective area",
+    };
     output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
     match &arguments.out {
         Some(out) => output::say(format!("Report: {}", out.join("report.html").display())),

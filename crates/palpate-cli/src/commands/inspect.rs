@@ -68,7 +68,7 @@ fn setup(setup: &Setup) -> Vec<String> {
         ),
         SurfaceSpec::SupportedBeam(beam) => format!(
             "beam, {} long, {}; section {}; Young's modulus {}",
-            format_length_mm(extent.length_m),
+            format_length_mm(extent.length_m()),
             beam.spec().supports_in_words(),
             beam.spec().sections_in_words(),
             Quantity {
@@ -99,11 +99,11 @@ fn setup(setup: &Setup) -> Vec<String> {
             digit.direction.name(),
             digit.characteristic_force_n()
         ),
-        SurfaceSpec::Measured(_) => match extent.width_m {
+        SurfaceSpec::Measured(_) => match extent.width_m() {
             Some(width_m) => {
-                format!("measured, {} × {}", format_length_mm(extent.length_m), format_length_mm(width_m))
+                format!("measured, {} × {}", format_length_mm(extent.length_m()), format_length_mm(width_m))
             }
-            None => format!("measured, {} long", format_length_mm(extent.length_m)),
+            None => format!("measured, {} long", format_length_mm(extent.length_m())),
         },
     };
     let force = setup.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
@@ -123,7 +123,11 @@ fn layout(layout: &Layout, extent: Extent) -> String {
             kind => format!("{kind} at {}", extent.place_in_words(sensor.position)),
         })
         .collect();
-    format!("{}: {}", layout.len(), names.join(if extent.is_plane() { "; " } else { ", " }))
+    let separator = match extent {
+        Extent::Line { .. } => ", ",
+        Extent::Plane { .. } => "; ",
+    };
+    format!("{}: {}", layout.len(), names.join(separator))
 }
 
 fn training_words(training: &Training) -> String {
@@ -278,14 +282,13 @@ fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failu
         let (low, high) = range(&mut positions.iter().map(of));
         format!("{} to {}", format_length_mm(low), format_length_mm(high))
     };
-    let across = if setup.surface.extent().is_plane() {
-        format!(" along, {} across", ends(|position| position.y_m))
-    } else {
-        String::new()
+    let positioned = match setup.surface.extent() {
+        Extent::Line { .. } => ends(|at| at.x_m),
+        Extent::Plane { .. } => format!("{} along, {} across", ends(|at| at.x_m), ends(|at| at.y_m)),
     };
     let mut lines = vec![
         format!("a recording: {} rows at {} positions", recording.rows.len(), positions.len()),
-        format!("positions: {}{across}", ends(|position| position.x_m)),
+        format!("positions: {positioned}"),
     ];
     for (i, (name, kind)) in recording.channels.iter().zip(&recording.kinds).enumerate() {
         let (low, high) = range(&mut recording.rows.iter().map(|row| row.reading[i]));

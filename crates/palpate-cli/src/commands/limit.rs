@@ -185,8 +185,8 @@ fn limits<'a>(
 fn a_few(extent: Extent) -> Vec<Position> {
     const ON_A_LINE: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
     const ON_A_PLANE: [f64; 7] = [0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95];
-    let x_m = |share: &f64| share * extent.length_m;
-    let Some(width_m) = extent.width_m else {
+    let x_m = |share: &f64| share * extent.length_m();
+    let Some(width_m) = extent.width_m() else {
         return ON_A_LINE.iter().map(|share| Position::along(x_m(share))).collect();
     };
     let row = |y: &f64| {
@@ -233,7 +233,7 @@ fn findings(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Findings {
     Findings {
         palpate: env!("CARGO_PKG_VERSION"),
         rig: arguments.rig.display().to_string(),
-        length_mm: setup.surface.extent().length_m * 1e3,
+        length_mm: setup.surface.extent().length_m() * 1e3,
         sensors: setup.layout.len(),
         sensors_alive: limits.limit.alive(),
         force_n: limits.force_n,
@@ -285,10 +285,9 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
         limits.force_n,
         limits.force.name()
     ))?;
-    if setup.surface.extent().is_plane() {
-        print_plane(limits)?;
-    } else {
-        print_line(limits, setup.surface.extent())?;
+    match limits.known.extent {
+        line @ Extent::Line { .. } => print_line(limits, line)?,
+        Extent::Plane { .. } => print_plane(limits)?,
     }
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;

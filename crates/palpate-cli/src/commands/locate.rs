@@ -7,6 +7,7 @@ use crate::{input, output};
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::surface::Extent;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -73,7 +74,7 @@ impl Stream<'_> {
         let mut out = std::io::stdout().lock();
         let mut parser = ReadingParser::new(&lines.name, columns);
         if !self.json {
-            output::print(&mut out, estimate_line::heading(self.is_plane()).as_bytes())?;
+            output::print(&mut out, estimate_line::heading(self.extent()).as_bytes())?;
         }
         while let Some(line) = lines.next()? {
             match parser.parse_line(line) {
@@ -99,9 +100,9 @@ impl Stream<'_> {
                 let text = if self.json {
                     let shape =
                         self.shape.and_then(|points| self.locator.shape(&estimate, usize::from(points) - 1));
-                    estimate_line::json(&estimate, line, self.is_plane(), shape.as_ref())?
+                    estimate_line::json(&estimate, line, self.extent(), shape.as_ref())?
                 } else {
-                    estimate_line::csv(&estimate, self.is_plane())
+                    estimate_line::csv(&estimate, self.extent())
                 };
                 output::print(out, text.as_bytes())?;
                 // A reader at the other end of a pipe wants each estimate now.
@@ -119,7 +120,7 @@ impl Stream<'_> {
         eprintln!("palpate: skipped: {error}");
     }
 
-    fn is_plane(&self) -> bool {
-        self.locator.setup.surface.extent().width_m.is_some()
+    fn extent(&self) -> Extent {
+        self.locator.setup.surface.extent()
     }
 }

@@ -64,10 +64,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .tracking(&config)
         .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
     let extent = tracking.likelihood().extent();
-    let columns = match tracking.likelihood().most_contacts() {
-        _ if extent.is_plane() => Columns::Plane,
-        1 => Columns::One,
-        _ => Columns::Two,
+    let columns = match (extent, tracking.likelihood().most_contacts()) {
+        (Extent::Plane { .. }, _) => Columns::Plane,
+        (Extent::Line { .. }, 1) => Columns::One,
+        (Extent::Line { .. }, _) => Columns::Two,
     };
     let keeps = arguments.smooth || arguments.report.is_some();
     let follower = if keeps {
@@ -208,7 +208,7 @@ impl Stream<'_> {
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
         let line = if self.arguments.json {
-            track_line::json(track, line, self.extent.is_plane())? + "\n"
+            track_line::json(track, line, self.extent)? + "\n"
         } else {
             self.columns.csv(track)
         };

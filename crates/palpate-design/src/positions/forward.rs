@@ -45,7 +45,10 @@ impl ForwardModel {
         let surface = setup.surface.model().ok_or(PositionError::NoModel)?;
         let force_n = setup.force_n.ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
-        let side = if extent.is_plane() { ASKED_ON_A_PLANE } else { ASKED };
+        let side = match extent {
+            Extent::Line { .. } => ASKED,
+            Extent::Plane { .. } => ASKED_ON_A_PLANE,
+        };
         let positions = cells(extent, side, side);
         let sensors = CleanSensors::new(surface, &setup.layout);
         let clean: Vec<Vec<f64>> =
@@ -152,8 +155,8 @@ impl ForwardModel {
             }
         };
         let prior = |side_m: f64| 12.0 / (side_m * side_m);
-        let xx = information(0, 0) + prior(self.extent.length_m);
-        let Some(width_m) = self.extent.width_m else { return 1.0 / xx.sqrt() };
+        let xx = information(0, 0) + prior(self.extent.length_m());
+        let Some(width_m) = self.extent.width_m() else { return 1.0 / xx.sqrt() };
         let (yy, xy) = (information(1, 1) + prior(width_m), information(0, 1));
         ((xx + yy) / (xx * yy - xy * xy)).sqrt()
     }

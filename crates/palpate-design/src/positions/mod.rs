@@ -146,9 +146,9 @@ impl PositionProblem {
         self.force
     }
 
-    /// Whether contacts have two coordinates.
-    pub fn is_plane(&self) -> bool {
-        self.extent.is_plane()
+    /// Where contacts may be.
+    pub fn extent(&self) -> Extent {
+        self.extent
     }
 
     /// Every arrangement, by rule and by search, each verified.
@@ -182,7 +182,7 @@ impl PositionProblem {
             }
         }
         arrangements.insert(0, (Placement::Even, even));
-        if !extent.is_plane() && count > IN_THE_MIDDLE && count.is_multiple_of(2) {
+        if matches!(extent, Extent::Line { .. }) && count > IN_THE_MIDDLE && count.is_multiple_of(2) {
             let dense = Arrangement::EdgeDense { middle: IN_THE_MIDDLE, portion: Arrangement::PAPER_PORTION };
             arrangements.push((Placement::EdgeDense, dense.positions(count, extent)?));
         }
@@ -234,7 +234,7 @@ impl PositionProblem {
     fn is_mirrored(&self) -> bool {
         let Setup { surface, layout, force_n, .. } = &self.pressed;
         let (Some(surface), Some(force_n)) = (surface.model(), *force_n) else { return false };
-        !self.extent.is_plane() && search::reads_mirrored(surface, layout, force_n)
+        matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, layout, force_n)
     }
 
     /// What calibrations with fresh noise give.

@@ -57,8 +57,11 @@ impl PatternSearch {
     ) -> Result<Vec<Position>, PositionError> {
         let (mut best, mut best_score) = (start, start_score);
         let groups = self.groups(&best);
-        let length_m = self.extent.length_m;
-        let per_side = if self.extent.is_plane() { (best.len() as f64).sqrt() } else { best.len() as f64 };
+        let length_m = self.extent.length_m();
+        let per_side = match self.extent {
+            Extent::Line { .. } => best.len() as f64,
+            Extent::Plane { .. } => (best.len() as f64).sqrt(),
+        };
         let mut step_m = 0.25 * length_m / per_side;
         let mut trials = 0;
         while step_m >= FINEST_STEP * length_m {
@@ -88,9 +91,9 @@ impl PatternSearch {
     /// Positions that are moved together, by their places in the list: pairs where all of them mirror each other.
     fn groups(&self, positions: &[Position]) -> Vec<(usize, Option<usize>)> {
         let last = positions.len() - 1;
-        let slack_m = 1e-9 * self.extent.length_m;
+        let slack_m = 1e-9 * self.extent.length_m();
         let mirrors = |(i, at): (usize, &Position)| {
-            (positions[last - i].x_m - (self.extent.length_m - at.x_m)).abs() < slack_m
+            (positions[last - i].x_m - (self.extent.length_m() - at.x_m)).abs() < slack_m
         };
         if self.mirrored && positions.iter().enumerate().all(mirrors) {
             // A position in the middle stays there.
@@ -122,12 +125,16 @@ impl PatternSearch {
     }
 
     fn is_sound(&self, positions: &[Position]) -> bool {
-        let Extent { length_m, width_m } = self.extent;
         let inside = |at_m: f64, side_m: f64| (EDGE * side_m..=(1.0 - EDGE) * side_m).contains(&at_m);
-        let on_surface =
-            |at: &Position| inside(at.x_m, length_m) && width_m.is_none_or(|width_m| inside(at.y_m, width_m));
-        let in_order = || positions.windows(2).all(|pair| pair[0].x_m + EDGE * length_m <= pair[1].x_m);
-        positions.iter().all(on_surface) && (self.extent.is_plane() || in_order())
+        match self.extent {
+            Extent::Line { length_m } => {
+                let in_order = |pair: &[Position]| pair[0].x_m + EDGE * length_m <= pair[1].x_m;
+                positions.iter().all(|at| inside(at.x_m, length_m)) && positions.windows(2).all(in_order)
+            }
+            Extent::Plane { length_m, width_m } => {
+                positions.iter().all(|at| inside(at.x_m, length_m) && inside(at.y_m, width_m))
+            }
+        }
     }
 }
 
@@ -135,7 +142,7 @@ impl PatternSearch {
 /// and the like change.
 pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f64) -> bool {
     const ASKED: usize = 7;
-    let length_m = surface.extent().length_m;
+    let length_m = surface.extent().length_m();
     let sensors = CleanSensors::new(surface, layout);
     let reading = |x_m: f64| sensors.reading(Contact { position: Position::along(x_m), force_n });
     (1..=ASKED).all(|i| {

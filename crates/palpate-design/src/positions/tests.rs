@@ -25,7 +25,7 @@ fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<f64, PositionErr
     }
 }
 
-const BEAM: Extent = Extent { length_m: 0.4, width_m: None };
+const BEAM: Extent = Extent::Line { length_m: 0.4 };
 
 #[test]
 fn positions_move_to_where_the_score_is_least() {

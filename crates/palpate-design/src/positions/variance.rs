@@ -33,7 +33,10 @@ pub(super) struct ExpectedError {
 
 impl ExpectedError {
     pub fn new(forward: &ForwardModel, contacts: &WeightedContacts, extent: Extent) -> Self {
-        let side = if extent.is_plane() { SITES_ON_A_PLANE } else { SITES };
+        let side = match extent {
+            Extent::Line { .. } => SITES,
+            Extent::Plane { .. } => SITES_ON_A_PLANE,
+        };
         let mut places = cells(extent, side, side);
         let sites = places.len();
         let step = contacts.len().div_ceil(MOST_CONTACTS);

@@ -17,6 +17,7 @@ use palpate_estimators::evaluation::{Calibration, EvaluationError};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 
 /// Training positions along a line, and along each side of a plane, of the calibrations that verify a layout; each is pressed as
@@ -127,7 +128,7 @@ impl SensorProblem<'_> {
             .collect();
         let Some(placed) = placed else { return false };
         let same = |a: &PlacedSensor, b: &PlacedSensor| {
-            a.offer == b.offer && a.position.distance_m(b.position) <= 1e-6 * extent.length_m
+            a.offer == b.offer && a.position.distance_m(b.position) <= 1e-6 * extent.length_m()
         };
         let apart = placed.iter().enumerate().all(|(i, a)| {
             placed[..i].iter().all(|b| !same(a, b) && exclusion(a, b, design, extent).is_none())
@@ -179,7 +180,10 @@ impl SensorProblem<'_> {
             (_, Some(guess)) => guess,
         };
         let extent = self.pool.extent;
-        let side = if extent.is_plane() { TRAINING_ALONG_A_PLANE } else { TRAINING_ALONG_A_LINE };
+        let side = match extent {
+            Extent::Line { .. } => TRAINING_ALONG_A_LINE,
+            Extent::Plane { .. } => TRAINING_ALONG_A_PLANE,
+        };
         let calibration = Calibration::new(&setup, Some(*force_n))
             .pressed_at(&cells(extent, side, side), PRESSES)
             .judged_at(&contacts.positions, READINGS.div_ceil(contacts.len()));

@@ -90,14 +90,14 @@ impl Candidates {
     /// The candidate of an offer at a place.
     fn at(&self, offer: usize, position: Position, extent: Extent) -> Option<usize> {
         let same = |other: &PlacedSensor| {
-            other.offer == offer && other.position.distance_m(position) <= SAME * extent.length_m
+            other.offer == offer && other.position.distance_m(position) <= SAME * extent.length_m()
         };
         self.sensors.iter().position(same)
     }
 
     /// For each candidate the one that is its mirror image, itself in the middle.
     pub fn twins(&self, extent: Extent) -> Vec<Option<usize>> {
-        let grain_m = SAME * extent.length_m;
+        let grain_m = SAME * extent.length_m();
         let key = |sensor: &PlacedSensor| {
             let cell = |at_m: f64| (at_m / grain_m).round() as i64;
             (sensor.offer, cell(sensor.position.x_m), cell(sensor.position.y_m))
@@ -116,7 +116,7 @@ impl Candidates {
 
 /// The mirror image across the middle of the length.
 pub(super) fn mirrored(position: Position, extent: Extent) -> Position {
-    Position { x_m: extent.length_m - position.x_m, ..position }
+    Position { x_m: extent.length_m() - position.x_m, ..position }
 }
 
 /// Candidate sites; on a plane row by row.
@@ -127,9 +127,9 @@ fn sites(sites: &Sites, extent: Extent) -> Vec<Position> {
     };
     match sites {
         Sites::At(positions) => positions.clone(),
-        Sites::Count(count) => even_positions(*count, extent.length_m).collect(),
-        Sites::Every(every_m) => every(*every_m, extent.width_m.unwrap_or(0.0))
-            .flat_map(|y_m| every(*every_m, extent.length_m).map(move |x_m| Position { x_m, y_m }))
+        Sites::Count(count) => even_positions(*count, extent.length_m()).collect(),
+        Sites::Every(every_m) => every(*every_m, extent.width_m().unwrap_or(0.0))
+            .flat_map(|y_m| every(*every_m, extent.length_m()).map(move |x_m| Position { x_m, y_m }))
             .collect(),
     }
 }
@@ -313,7 +313,7 @@ pub(super) fn exclusion(
         return None;
     }
     let takes_room = |sensor: &PlacedSensor| design.offers[sensor.offer].kind != SensorKind::Reaction;
-    let slack_m = 1e-9 * extent.length_m;
+    let slack_m = 1e-9 * extent.length_m();
     let (spacing_m, distance_m) = (design.spacing_m, a.position.distance_m(b.position));
     if distance_m < spacing_m - slack_m && takes_room(a) && takes_room(b) {
         return Some(Exclusion::Spacing { distance_m, spacing_m });
@@ -332,10 +332,10 @@ pub(super) fn exclusion(
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
     let pitch_m = match &design.sites {
         Sites::Every(every_m) => *every_m,
-        Sites::Count(count) => extent.length_m / (*count + 1) as f64,
+        Sites::Count(count) => extent.length_m() / (*count + 1) as f64,
         Sites::At(_) => 0.0,
     };
-    design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m)
+    design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m())
 }
 
 /// Pairs of candidates that mirror each other, and those in the middle alone.

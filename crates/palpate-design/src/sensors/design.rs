@@ -80,9 +80,9 @@ pub struct KeepOut {
 impl KeepOut {
     /// Whether a position lies inside it; rounding errors are forgiven.
     pub fn holds(&self, position: Position, extent: Extent) -> bool {
-        let slack_m = 1e-9 * extent.length_m;
+        let slack_m = 1e-9 * extent.length_m();
         let inside = |at_m: f64, low_m: f64, high_m: f64| low_m + slack_m < at_m && at_m < high_m - slack_m;
-        let across = extent.width_m.is_none() || inside(position.y_m, self.from.y_m, self.to.y_m);
+        let across = extent.width_m().is_none_or(|_| inside(position.y_m, self.from.y_m, self.to.y_m));
         inside(position.x_m, self.from.x_m, self.to.x_m) && across
     }
 }

@@ -59,6 +59,7 @@ use candidates::{Candidates, Pool};
 use objective::{Block, Objective};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Force, LimitError};
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use sensitivity::Sensitivity;
 
@@ -139,9 +140,9 @@ impl<'a> SensorProblem<'a> {
         self.sensitivity.force_n
     }
 
-    /// Whether contacts have two coordinates.
-    pub fn is_plane(&self) -> bool {
-        self.pool.extent.is_plane()
+    /// Where contacts may be.
+    pub fn extent(&self) -> Extent {
+        self.pool.extent
     }
 
     /// How many candidates there are.

@@ -6,6 +6,7 @@ use super::design::{Sites, Symmetry};
 use super::objective::{Block, ForceBelief, State};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Steps begin at the distance of sites and are halved as often; on a plane, where each is a solution, less often.
@@ -27,10 +28,13 @@ pub(super) fn refine(
         .iter()
         .map(|unit| pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect())
         .collect();
-    let Some(mut step_m) = site_distance(&pool.design.sites, pool.extent.length_m) else {
+    let Some(mut step_m) = site_distance(&pool.design.sites, pool.extent.length_m()) else {
         return Ok(groups.concat());
     };
-    let halvings = if pool.extent.is_plane() { HALVINGS_ON_A_PLANE } else { HALVINGS };
+    let halvings = match pool.extent {
+        Extent::Line { .. } => HALVINGS,
+        Extent::Plane { .. } => HALVINGS_ON_A_PLANE,
+    };
     for halving in 0..halvings {
         for _ in 0..MOST_ROUNDS {
             watch.stage("refining", halving as f64 / halvings as f64)?;
@@ -92,8 +96,8 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
     let x_m = if is_mirrored && group.len() == 1 { 0.0 } else { x_m };
     let Position { x_m: at_m, y_m: beside_m } = group[0].position;
     let position = Position {
-        x_m: (at_m + x_m).clamp(0.0, extent.length_m),
-        y_m: (beside_m + y_m).clamp(0.0, extent.width_m.unwrap_or(0.0)),
+        x_m: (at_m + x_m).clamp(0.0, extent.length_m()),
+        y_m: (beside_m + y_m).clamp(0.0, extent.width_m().unwrap_or(0.0)),
     };
     let twin = |sensor: &PlacedSensor| PlacedSensor { position: mirrored(position, extent), ..*sensor };
     std::iter::once(PlacedSensor { position, ..group[0] }).chain(group[1..].iter().map(twin)).collect()
@@ -102,8 +106,8 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
 fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
     let pool = &problem.pool;
     // Sites keep sensors of a kind apart; without them nothing would stop them from meeting in one place.
-    let apart_m = site_distance(&pool.design.sites, pool.extent.length_m).unwrap_or(0.0);
-    let slack_m = 1e-9 * pool.extent.length_m;
+    let apart_m = site_distance(&pool.design.sites, pool.extent.length_m()).unwrap_or(0.0);
+    let slack_m = 1e-9 * pool.extent.length_m();
     let together = |a: &PlacedSensor, b: &PlacedSensor| {
         let crowded = a.offer == b.offer && a.position.distance_m(b.position) < apart_m - slack_m;
         !crowded && exclusion(a, b, &pool.design, pool.extent).is_none()

@@ -61,14 +61,14 @@ pub(super) fn spread(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
     let place = |unit: usize| pool.sensors[pool.units[unit].first].position;
     // Units that mirror each other are known by their left halves.
     let paired = pool.design.symmetry == Symmetry::Wanted;
-    let room_m = if paired { 0.5 * pool.extent.length_m } else { pool.extent.length_m };
+    let room_m = if paired { 0.5 * pool.extent.length_m() } else { pool.extent.length_m() };
     let left = pool.design.count - pool.size(&selection);
     let steps = if paired { left.div_ceil(2) } else { left };
     for step in 1..=steps {
         let wanted_m = room_m * step as f64 / (steps + 1) as f64;
         let off_m = |unit: usize| {
             let at = place(unit);
-            let beside_m = pool.extent.width_m.map_or(0.0, |width_m| (at.y_m - 0.5 * width_m).abs());
+            let beside_m = pool.extent.width_m().map_or(0.0, |width_m| (at.y_m - 0.5 * width_m).abs());
             (at.x_m - wanted_m).abs() + beside_m
         };
         let joinable = pool.joinable(&selection, among, None);

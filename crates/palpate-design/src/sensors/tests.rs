@@ -84,7 +84,7 @@ fn random_problem(setup: &Setup, design: &SensorDesign, rng: &mut impl Rng) -> S
     } else {
         vec![kinds[0].clone(), kinds[rng.random_range(1..3)].clone()]
     };
-    let length_m = setup.surface.extent().length_m;
+    let length_m = setup.surface.extent().length_m();
     let sites: Vec<Position> =
         (0..20 / offers.len()).map(|_| Position::along(rng.random_range(0.01..0.99) * length_m)).collect();
     let from = rng.random_range(0.02..0.3) * length_m;

@@ -1,8 +1,8 @@
 use super::*;
 
 /// The founding paper's beam.
-const LINE: Extent = Extent { length_m: 0.4, width_m: None };
-const PLANE: Extent = Extent { length_m: 0.3, width_m: Some(0.2) };
+const LINE: Extent = Extent::Line { length_m: 0.4 };
+const PLANE: Extent = Extent::Plane { length_m: 0.3, width_m: 0.2 };
 
 fn millimetres(arrangement: &Arrangement, count: usize) -> Vec<f64> {
     let positions = arrangement.positions(count, LINE).unwrap();
@@ -144,7 +144,7 @@ fn chebyshevs_nodes_are_the_zeros_of_his_polynomial() {
     let found = Arrangement::Chebyshev.positions(7, LINE).unwrap();
     for at in &found {
         // T_7 over the length, mapped to −1…1.
-        let x = 2.0 * at.x_m / LINE.length_m - 1.0;
+        let x = 2.0 * at.x_m / LINE.length_m() - 1.0;
         assert!((7.0 * x.acos()).cos().abs() < 1e-12, "{found:?}");
     }
     assert!(found.is_sorted_by(|a, b| a.x_m < b.x_m));

@@ -58,7 +58,7 @@ impl Fit for Centroid {
 
     fn fit_method(&self, task: FitTask) -> Result<CentroidLocator, CentroidFitError> {
         let mut locator = uncalibrated(task.setup, task.recording)?;
-        let terms = locator.weighing.terms(locator.channel_scales.len(), locator.extent.width_m.is_some());
+        let terms = locator.terms();
         task.recording.check_distinct_positions(terms)?;
         let rows: Vec<&Row> = task.recording.rows.iter().collect();
         locator.map = calibrate(&locator, &rows)?;
@@ -126,8 +126,7 @@ fn calibrate(locator: &CentroidLocator, rows: &[&Row]) -> Result<Vec<Vec<f64>>, 
     let ridge = 1e-12 * normal.diag().iter().fold(0.0, |m: f64, d: &f64| m.max(*d));
     normal.diag_mut().iter_mut().for_each(|d| *d += ridge);
     let cholesky = Cholesky::factor(normal)?;
-    let axes = if locator.extent.width_m.is_some() { 2 } else { 1 };
-    Ok(right[..axes].iter().map(|right| cholesky.solve(right).to_vec()).collect())
+    Ok(right[..locator.extent.dimensions()].iter().map(|right| cholesky.solve(right).to_vec()).collect())
 }
 
 /// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; none where
@@ -191,19 +190,12 @@ pub enum Weighing {
     Channels,
 }
 
-impl Weighing {
-    /// Unknowns of the map for a coordinate.
-    fn terms(&self, channels: usize, plane: bool) -> usize {
-        match self {
-            Self::Positions(_) => 2 + usize::from(plane),
-            Self::Channels => channels,
-        }
-    }
-}
-
 impl CentroidLocator {
     fn terms(&self) -> usize {
-        self.weighing.terms(self.channel_scales.len(), self.extent.width_m.is_some())
+        match self.weighing {
+            Weighing::Positions(_) => 1 + self.extent.dimensions(),
+            Weighing::Channels => self.channel_scales.len(),
+        }
     }
 
     /// What the map multiplies; `None` where every reading is 0 and nothing weighs.
@@ -220,7 +212,7 @@ impl CentroidLocator {
             weights.iter().zip(positions).map(|(w, p)| w * coordinate(p)).sum::<f64>()
         };
         let along = mean(|p| p.x_m);
-        Some(match self.extent.width_m {
+        Some(match self.extent.width_m() {
             None => vec![along, 1.0],
             Some(_) => vec![along, mean(|p| p.y_m), 1.0],
         })
@@ -259,11 +251,7 @@ impl Locate for CentroidLocator {
             let coordinates = positions.iter().flat_map(|p| [p.x_m, p.y_m]);
             LocatorFault::check_numbers("sensor position", coordinates, |_| true, "a finite number")?;
         }
-        LocatorFault::check_count(
-            "rows of the map",
-            1 + usize::from(self.extent.width_m.is_some()),
-            self.map.len(),
-        )?;
+        LocatorFault::check_count("rows of the map", self.extent.dimensions(), self.map.len())?;
         for row in &self.map {
             LocatorFault::check_count("numbers in a row of the map", self.terms(), row.len())?;
             LocatorFault::check_numbers("map", row.iter().copied(), |_| true, "a finite number")?;

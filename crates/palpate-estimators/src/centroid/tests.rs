@@ -30,12 +30,7 @@ fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     for (i, sensor) in layout.sensors.iter_mut().enumerate() {
         sensor.name = format!("c{i}");
     }
-    Setup {
-        surface: SurfaceSpec::Measured(Extent { length_m: 0.1, width_m }),
-        layout,
-        force_n: None,
-        columns: None,
-    }
+    Setup { surface: SurfaceSpec::Measured(Extent::new(0.1, width_m)), layout, force_n: None, columns: None }
 }
 
 /// Two supports share a force by the lever: their centroid is the contact itself.

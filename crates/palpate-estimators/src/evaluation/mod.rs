@@ -94,7 +94,7 @@ pub fn percentage_error(error_m: f64, length_m: f64) -> f64 {
 /// (e − t)ᵀ·C⁻¹·(e − t) ≤ [`ELLIPSE_95`].
 pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<bool> {
     let uncertainty = contact.uncertainty?;
-    if extent.width_m.is_none() {
+    if let Extent::Line { .. } = extent {
         let (low, high) = uncertainty.x_95_m;
         return Some((low..=high).contains(&truth.x_m));
     }
@@ -120,7 +120,7 @@ impl Evaluation {
             })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { length_m: locator.setup.surface.extent().length_m, located })
+        Ok(Self { length_m: locator.setup.surface.extent().length_m(), located })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.
@@ -164,7 +164,7 @@ impl Evaluation {
     /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
     /// for a stretch without contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
-        let extent = Extent { length_m: self.length_m, width_m: None };
+        let extent = Extent::Line { length_m: self.length_m };
         let cells = Cells { extent, columns: count, rows: 1 };
         let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
         for located in &self.located {
@@ -214,14 +214,17 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let within =
         |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
     let is_inner = |at: Position| {
-        within(at.x_m, extent.length_m) && extent.width_m.is_none_or(|width_m| within(at.y_m, width_m))
+        within(at.x_m, extent.length_m()) && extent.width_m().is_none_or(|width_m| within(at.y_m, width_m))
     };
-    let large = if extent.is_plane() { LARGE_LIMIT_ON_A_PLANE } else { LARGE_LIMIT };
+    let large = match extent {
+        Extent::Line { .. } => LARGE_LIMIT,
+        Extent::Plane { .. } => LARGE_LIMIT_ON_A_PLANE,
+    };
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
         let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
         let bound = limit.at(Contact { position: located.truth, force_n }, force);
-        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m) else {
+        let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m()) else {
             continue;
         };
         if is_inner(located.truth) {
@@ -307,7 +310,7 @@ pub fn try_estimator<E: Fit>(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<Tried, EvaluationError<E::Error>> {
-    let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m, located: Vec::new() };
+    let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m(), located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for trial in trials {
         let start = clock();

@@ -57,7 +57,7 @@ fn positions_gather_their_repeats() {
 #[test]
 fn errors_are_summed_up_by_cells_stretches_and_shares() {
     let evaluation = evaluation();
-    let extent = Extent { length_m: 0.1, width_m: Some(0.05) };
+    let extent = Extent::Plane { length_m: 0.1, width_m: 0.05 };
     let medians = evaluation.median_by_cell_m(&Cells { extent, columns: 5, rows: 2 });
     assert_eq!(medians.len(), 10);
     for (cell, median) in medians.iter().enumerate() {

@@ -74,7 +74,7 @@ impl Fit for GaussianProcessEstimator {
         for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
             out.iter_mut().zip(features.apply(&row.reading)).for_each(|(out, feature)| *out = feature);
         }
-        let outputs = Array2::from_shape_fn((rows, extent.width_m.map_or(1, |_| 2)), |(row, j)| {
+        let outputs = Array2::from_shape_fn((rows, extent.width_m().map_or(1, |_| 2)), |(row, j)| {
             let position = recording.rows[row].position;
             if j == 0 { position.x_m } else { position.y_m }
         });
@@ -127,10 +127,14 @@ impl Locate for GaussianProcessLocator {
         self.features.check(setup.layout.len())?;
         let coordinates = self.process.coordinates();
         LocatorFault::check_count("coordinates of its Gaussian process", self.features.len(), coordinates)?;
-        let outputs = 1 + usize::from(setup.surface.extent().width_m.is_some());
+        let outputs = setup.surface.extent().dimensions();
         LocatorFault::check_count("outputs", outputs, self.process.outputs())?;
-        let sizes = [self.extent.length_m].into_iter().chain(self.extent.width_m);
-        LocatorFault::check_numbers("extent", sizes, |size| size > 0.0, "finite and greater than 0")?;
+        LocatorFault::check_numbers(
+            "extent",
+            self.extent.sides_m(),
+            |size| size > 0.0,
+            "finite and greater than 0",
+        )?;
         LocatorFault::check_numbers("force", self.force_n, |force| force > 0.0, "finite and greater than 0")
     }
 }

@@ -14,10 +14,10 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_testing::data::recording;
 
-const EXTENT: Extent = Extent { length_m: 0.4, width_m: None };
+const EXTENT: Extent = Extent::Line { length_m: 0.4 };
 
 fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
-    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m);
+    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
     Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
 }
 
@@ -76,7 +76,7 @@ fn it_locates_and_its_intervals_cover() {
 
 #[test]
 fn a_pad_is_two_dimensional() {
-    let extent = Extent { length_m: 0.2, width_m: Some(0.1) };
+    let extent = Extent::Plane { length_m: 0.2, width_m: 0.1 };
     let rows = (0..120).map(|i| {
         let (x_m, y_m) = (0.02 * f64::from(i % 11), 0.01 * f64::from(i / 11));
         let (u, v) = (x_m / 0.2, y_m / 0.1);
@@ -137,7 +137,10 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let (here, there) = (locator.locate(&reading), back.locate(&reading));
     assert!((here.contact.position.x_m - there.contact.position.x_m).abs() < 1e-9);
     assert!(back.check(&setup(EXTENT, 2, Some(1.0))).is_err());
-    assert!(back.check(&setup(Extent { width_m: Some(0.1), ..EXTENT }, 4, Some(1.0))).is_err());
+    assert!(
+        back.check(&setup(Extent::Plane { length_m: EXTENT.length_m(), width_m: 0.1 }, 4, Some(1.0)))
+            .is_err()
+    );
     let mut damaged = back;
     damaged.features.features.pop();
     assert!(damaged.check(&bench_4).is_err());
@@ -190,7 +193,7 @@ fn strip(file: &str) -> Option<(Setup, Recording)> {
         reading: cells[1..3].to_vec(),
     };
     let rows = numbers(&format!("tactile-fsi/{file}"))?.iter().map(row).collect();
-    Some((setup(Extent { length_m: 0.1, width_m: None }, 2, None), recording_of(rows)))
+    Some((setup(Extent::Line { length_m: 0.1 }, 2, None), recording_of(rows)))
 }
 
 /// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
@@ -236,7 +239,7 @@ fn a_magnetic_pad_is_as_scikit_learn_has_it() {
         Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, reading: reading[1..].to_vec() }
     });
     let recording = recording_of(rows.collect());
-    let setup = setup(Extent { length_m: 0.03, width_m: Some(0.03) }, 15, None);
+    let setup = setup(Extent::Plane { length_m: 0.03, width_m: 0.03 }, 15, None);
     let Pooled { median_mm, mean_mm, rmse_mm, coverage } = five_folds(&setup, &recording);
     eprintln!("eflesh: median {median_mm:.3} mean {mean_mm:.3} rmse {rmse_mm:.3} mm, coverage {coverage:.3}");
     assert!(median_mm <= SLACK * 0.312 && mean_mm <= SLACK * 0.343, "{median_mm} {mean_mm}");

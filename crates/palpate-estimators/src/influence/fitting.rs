@@ -81,7 +81,7 @@ pub enum InfluenceFitError {
 /// Fits the influence functions of a one-dimensional surface with a model.
 pub(super) fn fit_modelled(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
     let sensors = task.setup.layout.len();
-    let mut table = empty_table(sensors, task.setup.surface.extent().length_m);
+    let mut table = empty_table(sensors, task.setup.surface.extent().length_m());
     let places = around_nodes(&table);
     let fill = &mut |s: usize, learnt: &Learnt| fill(&mut table, s, learnt, &places);
     let channels = learn(config.from, task, &places, fill)?;

@@ -46,10 +46,10 @@ pub(super) fn learn(
     let layout = &task.setup.layout;
     check_sensors(layout)?;
     let presses = Presses::of(task.recording)?;
-    let needed = match (from, surface.extent().is_plane()) {
-        (InfluenceSource::Recording, false) => 3,
+    let needed = match (from, surface.extent().dimensions()) {
+        (InfluenceSource::Recording, 1) => 3,
         // A plane's simplest curved surface has six numbers.
-        (InfluenceSource::Recording, true) => 6,
+        (InfluenceSource::Recording, _) => 6,
         _ => 1,
     };
     let found = presses.distinct_positions();

@@ -191,7 +191,7 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: self.table.length_m, width_m: None }
+        Extent::Line { length_m: self.table.length_m }
     }
 
     fn known_force_n(&self) -> Option<f64> {

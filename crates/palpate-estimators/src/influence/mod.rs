@@ -41,6 +41,7 @@ use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
 use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
+use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
 /// Influence functions, inverted: of a surface with a model, or of one that is known by its recording alone.
@@ -65,7 +66,7 @@ impl Fit for Influence {
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
-        if task.setup.surface.extent().is_plane() {
+        if let Extent::Plane { .. } = task.setup.surface.extent() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));
         }
         Ok(InfluenceLocator::Beam(Box::new(self.fit_beam(task)?)))

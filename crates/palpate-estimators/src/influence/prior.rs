@@ -72,8 +72,8 @@ impl<'a> Prior<'a> {
         let around = |at_m: f64, size_m: f64| {
             moves.then(|| ((at_m - 1e-4 * size_m).max(0.0), (at_m + 1e-4 * size_m).min(size_m)))
         };
-        let along = around(position.x_m, extent.length_m);
-        let across = extent.width_m.and_then(|width_m| around(position.y_m, width_m));
+        let along = around(position.x_m, extent.length_m());
+        let across = extent.width_m().and_then(|width_m| around(position.y_m, width_m));
         let mut places = vec![position];
         places.extend(along.iter().flat_map(|(a, b)| [*a, *b]).map(|x_m| Position { x_m, ..position }));
         places.extend(across.iter().flat_map(|(a, b)| [*a, *b]).map(|y_m| Position { y_m, ..position }));
@@ -167,9 +167,9 @@ impl<'a> Mixture<'a> {
         let mixed = if reacts { SensorKind::Deflection } else { kind };
         let extent = surface.extent();
         let side = |ratio: f64| (MIXED_ON_A_PLANE * ratio).sqrt().round().clamp(4.0, MIXED as f64) as usize;
-        let (columns, rows) = match extent.width_m {
+        let (columns, rows) = match extent.width_m() {
             None => (MIXED, 1),
-            Some(width_m) => (side(extent.length_m / width_m), side(width_m / extent.length_m)),
+            Some(width_m) => (side(extent.length_m() / width_m), side(width_m / extent.length_m())),
         };
         Self {
             functions: surface.influence_functions(mixed, &cells(extent, columns, rows)),
@@ -194,13 +194,13 @@ impl<'a> Mixture<'a> {
 /// Places all over a surface, its boundary included.
 fn everywhere(extent: Extent) -> Vec<Position> {
     let share = |i: usize, stretches: usize| i as f64 / stretches as f64;
-    match extent.width_m {
-        None => (0..=STRETCHES).map(|i| Position::along(extent.length_m * share(i, STRETCHES))).collect(),
+    match extent.width_m() {
+        None => (0..=STRETCHES).map(|i| Position::along(extent.length_m() * share(i, STRETCHES))).collect(),
         Some(width_m) => (0..(STRETCHES_OF_A_SIDE + 1).pow(2))
             .map(|i| {
                 let (row, column) = (i / (STRETCHES_OF_A_SIDE + 1), i % (STRETCHES_OF_A_SIDE + 1));
                 Position {
-                    x_m: extent.length_m * share(column, STRETCHES_OF_A_SIDE),
+                    x_m: extent.length_m() * share(column, STRETCHES_OF_A_SIDE),
                     y_m: width_m * share(row, STRETCHES_OF_A_SIDE),
                 }
             })

@@ -29,18 +29,18 @@ pub struct Cells {
 impl Cells {
     /// 80 cells on a line; on a plane 20 along the longer side, as square as they come.
     pub fn over(extent: Extent) -> Self {
-        let Some(width_m) = extent.width_m else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
+        let Some(width_m) = extent.width_m() else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
         let most = ON_A_PLANE as f64;
         let count = |side_m: f64| {
             // A strip gets one row of cells at least, whatever its sides.
-            (most * side_m / extent.length_m.max(width_m)).round().clamp(1.0, most) as usize
+            (most * side_m / extent.length_m().max(width_m)).round().clamp(1.0, most) as usize
         };
-        Self { extent, columns: count(extent.length_m), rows: count(width_m) }
+        Self { extent, columns: count(extent.length_m()), rows: count(width_m) }
     }
 
     /// About `count` cells of a plane, as square as they come, with a number along each side within `sides`.
     pub fn about(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
-        let aspect = extent.width_m.unwrap_or(extent.length_m) / extent.length_m;
+        let aspect = extent.width_m().unwrap_or(extent.length_m()) / extent.length_m();
         let side = |ratio: f64| ((count * ratio).sqrt().round() as usize).clamp(*sides.start(), *sides.end());
         Self { extent, columns: side(1.0 / aspect), rows: side(aspect) }
     }
@@ -53,14 +53,17 @@ impl Cells {
 
     /// The sides of a cell in metres; on a line the second is 0.
     pub fn sides_m(&self) -> [f64; 2] {
-        let across = self.extent.width_m.map_or(0.0, |width_m| width_m / self.rows as f64);
-        [self.extent.length_m / self.columns as f64, across]
+        let across = self.extent.width_m().map_or(0.0, |width_m| width_m / self.rows as f64);
+        [self.extent.length_m() / self.columns as f64, across]
     }
 
     /// The length of a cell in metres, or on a plane its area in square metres.
     pub fn measure(&self) -> f64 {
         let [along, across] = self.sides_m();
-        if self.extent.width_m.is_some() { along * across } else { along }
+        match self.extent {
+            Extent::Line { .. } => along,
+            Extent::Plane { .. } => along * across,
+        }
     }
 
     /// The middles of all cells.
@@ -73,8 +76,8 @@ impl Cells {
         let number = |at_m: f64, size_m: f64, count: usize| {
             ((at_m / size_m * count as f64).max(0.0) as usize).min(count - 1)
         };
-        let column = number(position.x_m, self.extent.length_m, self.columns);
-        let row = self.extent.width_m.map_or(0, |width_m| number(position.y_m, width_m, self.rows));
+        let column = number(position.x_m, self.extent.length_m(), self.columns);
+        let row = self.extent.width_m().map_or(0, |width_m| number(position.y_m, width_m, self.rows));
         row * self.columns + column
     }
 
@@ -124,7 +127,10 @@ impl Cells {
     /// Points of a cell whose mean is the mean over the cell.
     pub(super) fn points(&self, cell: usize) -> Vec<Position> {
         let (from, to) = self.corners(cell);
-        let counts = if self.extent.width_m.is_some() { POINTS_ON_A_PLANE } else { POINTS_ON_A_LINE };
+        let counts = match self.extent {
+            Extent::Line { .. } => POINTS_ON_A_LINE,
+            Extent::Plane { .. } => POINTS_ON_A_PLANE,
+        };
         midpoints(from, to, counts)
     }
 
@@ -140,7 +146,7 @@ impl Cells {
         for [i, j] in self.cells_and_rim() {
             add_square(&mut roughness, &bend([i, j], [1, 0]), 1.0);
         }
-        if self.extent.width_m.is_some() {
+        if let Extent::Plane { .. } = self.extent {
             let ratio = along / across;
             for [i, j] in self.cells_and_rim() {
                 add_square(&mut roughness, &bend([i, j], [0, 1]), ratio.powi(4));
@@ -180,7 +186,7 @@ mod tests {
     use ndarray::Array1;
 
     fn line(columns: usize) -> Cells {
-        Cells { extent: Extent { length_m: 0.4, width_m: None }, columns, rows: 1 }
+        Cells { extent: Extent::Line { length_m: 0.4 }, columns, rows: 1 }
     }
 
     #[test]
@@ -194,7 +200,7 @@ mod tests {
 
     #[test]
     fn every_cell_holds_its_middle() {
-        let plane = Extent { length_m: 0.3, width_m: Some(0.15) };
+        let plane = Extent::Plane { length_m: 0.3, width_m: 0.15 };
         let cells = Cells::about(plane, 200.0, 5..=60);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         assert!(cells.centres().enumerate().all(|(cell, centre)| cells.cell_of(centre) == cell));
@@ -207,7 +213,7 @@ mod tests {
         let at = |x_m, y_m| Position { x_m, y_m };
         let on_line = UniformLoad { from: at(0.05, 0.0), to: at(0.17, 0.0), force_n: 3.0 };
         let on_plane = UniformLoad { from: at(0.05, 0.02), to: at(0.17, 0.09), force_n: 3.0 };
-        let plane = Cells::over(Extent { length_m: 0.3, width_m: Some(0.15) });
+        let plane = Cells::over(Extent::Plane { length_m: 0.3, width_m: 0.15 });
         for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
             let density = cells.mean_density(&[load, load]);
             assert!((density.iter().sum::<f64>() * cells.measure() - 6.0).abs() < 1e-12);
@@ -216,7 +222,7 @@ mod tests {
 
     #[test]
     fn on_a_plane_a_tilt_costs_nothing_inside() {
-        let extent = Extent { length_m: 0.3, width_m: Some(0.15) };
+        let extent = Extent::Plane { length_m: 0.3, width_m: 0.15 };
         let cells = Cells::over(extent);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         let tilt = Array1::from_shape_fn(cells.len(), |cell| {

@@ -346,8 +346,8 @@ impl Patch {
             let half = (0.5 * (to - from)).min(centre).min(size - centre).max(0.0);
             (centre - half, centre + half)
         };
-        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m);
-        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m.unwrap_or(0.0));
+        let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m());
+        let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m().unwrap_or(0.0));
         let corner = |x_m, y_m| Position { x_m, y_m };
         UniformLoad { from: corner(left, low), to: corner(right, high), force_n: self.force_n }
     }
@@ -473,18 +473,16 @@ pub struct PatchLimit {
 /// (Kay, *Fundamentals of Statistical Signal Processing: Estimation Theory*, 1993, section 3.9). `None` where the readings do
 /// not tell them all.
 pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<PatchLimit>> {
-    let plane = sensors.extent.width_m.is_some();
-    let each = if plane { 3 } else { 2 };
+    // Force, and the coordinates of the centre.
+    let each = 1 + sensors.extent.dimensions();
     let alive: Vec<_> = sensors.alive().collect();
     let mut slopes = Array2::zeros((alive.len(), each * loads.len()));
     for (channel, mut row) in alive.iter().zip(slopes.outer_iter_mut()) {
         for (number, load) in loads.iter().enumerate() {
-            let [along, across] = load.mean_gradient(&*channel.influence);
             let first = each * number;
             row[first] = load.mean(&*channel.influence) / channel.noise_sd;
-            row[first + 1] = load.force_n * along / channel.noise_sd;
-            if plane {
-                row[first + 2] = load.force_n * across / channel.noise_sd;
+            for (i, slope) in load.mean_gradient(&*channel.influence).into_iter().take(each - 1).enumerate() {
+                row[first + 1 + i] = load.force_n * slope / channel.noise_sd;
             }
         }
     }
@@ -497,7 +495,7 @@ pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<
     let sd = |parameter: usize| inverse[[parameter, parameter]].sqrt() / lengths[parameter];
     let limit = |number: usize| {
         let first = each * number;
-        let sd_y_m = if plane { sd(first + 2) } else { 0.0 };
+        let sd_y_m = sensors.extent.width_m().map_or(0.0, |_| sd(first + 2));
         PatchLimit { sd_x_m: sd(first + 1), sd_y_m, sd_force_n: sd(first) }
     };
     Some((0..loads.len()).map(limit).collect())
@@ -538,7 +536,7 @@ impl Resolution {
 fn width_m(cells: &Cells, kernel: &[f64]) -> f64 {
     let Some(top) = (0..kernel.len()).max_by(|a, b| kernel[*a].total_cmp(&kernel[*b])) else { return 0.0 };
     let half = 0.5 * kernel[top];
-    if cells.extent.width_m.is_some() {
+    if let Extent::Plane { .. } = cells.extent {
         let above = kernel.iter().filter(|value| **value > half).count();
         return (above as f64 * cells.measure()).sqrt();
     }

@@ -247,7 +247,7 @@ impl Surface for Foam {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: 0.2, width_m: Some(0.1) }
+        Extent::Plane { length_m: 0.2, width_m: 0.1 }
     }
 }
 

@@ -326,7 +326,7 @@ impl<'a> Coded<'a> {
         let extent = setup.surface.extent();
         let scale_m = |size_m| if config.output == OutputCoding::Position { 1.0 } else { size_m };
         let output_scale_m: Vec<f64> =
-            std::iter::once(extent.length_m).chain(extent.width_m).map(scale_m).collect();
+            std::iter::once(extent.length_m()).chain(extent.width_m()).map(scale_m).collect();
         let inputs = |row: &Row| -> Vec<f64> {
             row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value)).collect()
         };
@@ -518,7 +518,7 @@ impl NetworkParts {
         count("inputs", channels, self.topology.inputs())?;
         count("channel scalings", channels, self.scaling.len())?;
         count("output scales", self.topology.outputs(), self.output_scale_m.len())?;
-        count("outputs", 1 + usize::from(self.extent.width_m.is_some()), self.topology.outputs())?;
+        count("outputs", self.extent.dimensions(), self.topology.outputs())?;
         let weights = self.topology.checked_weight_count();
         count("weights", weights.unwrap_or(usize::MAX), self.weights.len())?;
         let finite = "a finite number";

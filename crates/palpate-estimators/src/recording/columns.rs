@@ -206,7 +206,7 @@ impl Columns {
     pub fn own(channels: &[String], kinds: &[SensorKind], extent: Extent) -> Self {
         let millimetre = SensorKind::Deflection.unit();
         let name = |name: &str| Column::Name(name.to_owned());
-        let position = match extent.width_m {
+        let position = match extent.width_m() {
             None => PositionColumns::Along(name("position_mm")),
             Some(_) => PositionColumns::Plane { x: name("x_mm"), y: name("y_mm") },
         };

@@ -5,7 +5,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
+const STRIP: Extent = Extent::Line { length_m: 0.1 };
 
 fn named(name: &str) -> Column {
     Column::Name(name.to_owned())
@@ -66,7 +66,7 @@ fn columns_are_mapped_and_others_ignored() {
 #[test]
 fn readings_and_contacts_in_two_files_without_headers_pair_row_by_row() {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    let extent = Extent { length_m: 0.1, width_m: Some(0.1) };
+    let extent = Extent::Plane { length_m: 0.1, width_m: 0.1 };
     let columns = numbered();
     let schema = Schema { columns: &columns, layout: &layout, extent, known_force_n: Some(2.0) };
     let readings = "1.0,7,8,9\n1.1,5,6,7\n";

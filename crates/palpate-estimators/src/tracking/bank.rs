@@ -469,7 +469,7 @@ impl Dynamics<PLANE_NUMBERS, MOTIONS> for OnPlane<'_> {
 
 /// Length and width, in metres; a line has no width.
 pub(super) fn sides_m(extent: Extent) -> [f64; 2] {
-    [extent.length_m, extent.width_m.unwrap_or(0.0)]
+    [extent.length_m(), extent.width_m().unwrap_or(0.0)]
 }
 
 #[cfg(test)]

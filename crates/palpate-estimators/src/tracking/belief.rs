@@ -84,7 +84,7 @@ impl Belief {
     /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
     pub fn updated(&self, seen: Seen) -> Option<(Self, f64)> {
         let extent = seen.likelihood.extent();
-        let length_m = extent.length_m;
+        let length_m = extent.length_m();
         Some(match (self, seen.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
                 let expand = |about: &[f64; 1]| seen.fit_nothing(about);

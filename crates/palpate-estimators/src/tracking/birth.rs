@@ -159,7 +159,7 @@ impl Births<'_, dyn LineLikelihood + '_> {
     }
 
     fn length_m(&self) -> f64 {
-        self.seen.likelihood.extent().length_m
+        self.seen.likelihood.extent().length_m()
     }
 
     fn balance_n(&self, contact: Contact) -> f64 {

@@ -173,16 +173,16 @@ impl Tracked {
         let (true, [first]) = (*weight < SURE * sum, best.as_slice()) else {
             return Self::of(best, likelihood);
         };
-        if likelihood.extent().is_plane() {
+        let Extent::Line { length_m } = likelihood.extent() else {
             return Self::of(&[spread(first, beliefs, sum)], likelihood);
-        }
+        };
         let mut all = Self::of(best, likelihood);
         if let [one] = all.as_mut_slice() {
             let floor_m2 = one.sd[0].powi(2) - first.variance[0];
             let parts = beliefs.iter().map(|(weight, contacts)| {
                 (weight / sum, contacts[0].mean[0], (contacts[0].variance[0] + floor_m2).sqrt())
             });
-            one.x_95_m = interval(&parts.collect::<Vec<_>>(), likelihood.extent().length_m);
+            one.x_95_m = interval(&parts.collect::<Vec<_>>(), length_m);
         }
         all
     }
@@ -191,7 +191,7 @@ impl Tracked {
     fn of(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
         let floors_m2 = likelihood.calibration_m2(&contacts);
-        let Extent { length_m, width_m } = likelihood.extent();
+        let extent = likelihood.extent();
         let tracked = |(moments, [xx, xy, yy]): (&Moments, [f64; 3])| {
             let [x_m, speed_m_per_s, force_n, y_m, speed_across] = moments.mean;
             let [along, speed, force, across, across_speed] = moments.variance;
@@ -206,8 +206,8 @@ impl Tracked {
                     covariance_m2: moments.covariance_m2 + xy,
                 }
             };
-            let x_95_m = held_interval(normal_interval_95(x_m, sd[0]), length_m);
-            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: width_m.map(across) }
+            let x_95_m = held_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
+            Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: extent.width_m().map(across) }
         };
         belief.iter().zip(floors_m2).map(tracked).collect()
     }

@@ -22,20 +22,20 @@ pub(super) struct Grid {
 impl Grid {
     /// Fine enough to see what a limit does.
     pub fn over(extent: Extent) -> Self {
-        let Some(width_m) = extent.width_m else { return Self::new(extent, ALONG_A_LINE, 1) };
+        let Some(width_m) = extent.width_m() else { return Self::new(extent, ALONG_A_LINE, 1) };
         let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().clamp(5.0, ON_A_PLANE / 5.0).round() as usize;
-        Self::new(extent, side(extent.length_m / width_m), side(width_m / extent.length_m))
+        Self::new(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
     }
 
     /// `every_m` apart, from `every_m` to as far as the surface reaches.
     pub fn every(extent: Extent, every_m: f64) -> Result<Self, LimitError> {
         let inside = |size_m: f64| (size_m / every_m - 1e-6).floor();
-        let (columns, rows) = (inside(extent.length_m), extent.width_m.map_or(1.0, inside));
+        let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
         let count = columns * rows;
         if !(columns >= 1.0 && rows >= 1.0 && count <= MOST as f64) {
             return Err(LimitError::Positions { count: count.max(0.0), most: MOST });
         }
-        let y_m = |row: usize| if extent.width_m.is_some() { row as f64 * every_m } else { 0.0 };
+        let y_m = |row: usize| extent.width_m().map_or(0.0, |_| row as f64 * every_m);
         let row =
             |row| (1..=columns as usize).map(move |i| Position { x_m: i as f64 * every_m, y_m: y_m(row) });
         Ok(Self { positions: (1..=rows as usize).flat_map(row).collect(), columns: columns as usize })
@@ -43,8 +43,8 @@ impl Grid {
 
     fn new(extent: Extent, columns: usize, rows: usize) -> Self {
         let share = |i: usize, count: usize| i as f64 / (count + 1) as f64;
-        let y_m = |row: usize| extent.width_m.map_or(0.0, |width_m| share(row, rows) * width_m);
-        let x_m = |column: usize| share(column, columns) * extent.length_m;
+        let y_m = |row: usize| extent.width_m().map_or(0.0, |width_m| share(row, rows) * width_m);
+        let x_m = |column: usize| share(column, columns) * extent.length_m();
         let row = |row| (1..=columns).map(move |column| Position { x_m: x_m(column), y_m: y_m(row) });
         Self { positions: (1..=rows).flat_map(row).collect(), columns }
     }

@@ -144,7 +144,7 @@ impl<'a> CramerRaoBound<'a> {
             columns.along.push(weight * along_x);
             across.push(weight * along_y);
         }
-        columns.across = self.surface.extent().width_m.is_some().then_some(across);
+        columns.across = self.surface.extent().across(across);
         columns
     }
 }

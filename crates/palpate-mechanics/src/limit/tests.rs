@@ -111,7 +111,7 @@ impl Surface for Pad {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: 0.06, width_m: Some(0.04) }
+        Extent::Plane { length_m: 0.06, width_m: 0.04 }
     }
 }
 

@@ -112,7 +112,7 @@ impl Survey<'_> {
     }
 
     fn blind_from_m(&self) -> f64 {
-        BLIND_SHARE * self.limit.surface.extent().length_m
+        BLIND_SHARE * self.limit.surface.extent().length_m()
     }
 
     fn blind(&self) -> Vec<LimitWarning> {

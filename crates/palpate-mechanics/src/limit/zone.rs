@@ -84,8 +84,8 @@ pub(super) fn zones(
     holds: impl Fn(Position) -> bool,
 ) -> Vec<(Zone, Vec<Position>)> {
     let flags: Vec<bool> = grid.positions.iter().map(|&position| holds(position)).collect();
-    if let Some(width_m) = extent.width_m {
-        return patches(extent.length_m, width_m, grid, flags);
+    if let Some(width_m) = extent.width_m() {
+        return patches(extent.length_m(), width_m, grid, flags);
     }
     let mut found = Vec::new();
     let mut start = 0;
@@ -96,7 +96,8 @@ pub(super) fn zones(
             let before = start.checked_sub(1).map(|i| grid.positions[i].x_m);
             let after = grid.positions.get(end).map(|position| position.x_m);
             let from_m = before.map_or(0.0, |out_m| edge(inside[0].x_m, out_m, &holds));
-            let to_m = after.map_or(extent.length_m, |out_m| edge(inside[run.len() - 1].x_m, out_m, &holds));
+            let to_m =
+                after.map_or(extent.length_m(), |out_m| edge(inside[run.len() - 1].x_m, out_m, &holds));
             let zone = Zone { from: Position::along(from_m), to: Position::along(to_m), filled: 1.0 };
             found.push((zone, inside.to_vec()));
         }

@@ -5,7 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::ChannelModel;
-use crate::contact::{Position, in_words};
+use crate::contact::Position;
+use crate::surface::Extent;
 use crate::units::{Dimension, Unit};
 
 /// What a sensor measures.
@@ -123,11 +124,11 @@ impl Layout {
 
     /// Where the sensors of each kind sit, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
     /// "reaction (10, 20), (10, 180) mm" on a plane.
-    pub fn places_in_words(&self, plane: bool) -> String {
+    pub fn places_in_words(&self, extent: Extent) -> String {
         let of = |kind: SensorKind| {
             let sensors = self.sensors.iter().filter(|sensor| sensor.kind == kind);
             let positions: Vec<Position> = sensors.map(|sensor| sensor.position).collect();
-            (!positions.is_empty()).then(|| format!("{kind} {}", in_words(&positions, plane)))
+            (!positions.is_empty()).then(|| format!("{kind} {}", extent.places_in_words(&positions)))
         };
         SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
     }

@@ -231,6 +231,6 @@ impl Surface for Beam {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: self.length_m, width_m: None }
+        Extent::Line { length_m: self.length_m }
     }
 }

@@ -194,7 +194,7 @@ impl Surface for Digit {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: self.length_m, width_m: None }
+        Extent::Line { length_m: self.length_m }
     }
 }
 

@@ -81,7 +81,7 @@ pub trait Surface: Send + Sync {
 
     /// Length l of the surface along x, in metres.
     fn length_m(&self) -> f64 {
-        self.extent().length_m
+        self.extent().length_m()
     }
 
     /// Whether `position` is on the surface, its boundary included.

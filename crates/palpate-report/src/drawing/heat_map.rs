@@ -72,7 +72,7 @@ impl HeatPanel {
 /// use palpate_mechanics::surface::Extent;
 /// use palpate_report::{HeatMap, HeatPanel, heat_map_to_svg};
 ///
-/// let cells = Cells { extent: Extent { length_m: 0.3, width_m: Some(0.2) }, columns: 3, rows: 2 };
+/// let cells = Cells { extent: Extent::Plane { length_m: 0.3, width_m: 0.2 }, columns: 3, rows: 2 };
 /// let values = (0..6).map(f64::from).collect();
 /// let svg = heat_map_to_svg(&HeatMap {
 ///     title: "Errors over a plate".to_owned(),
@@ -102,7 +102,7 @@ pub fn heat_map_to_svg(map: &HeatMap) -> String {
 /// Length and width of the plane in millimetres.
 fn sides_mm(map: &HeatMap) -> [f64; 2] {
     let extent = map.cells.extent;
-    [extent.length_m * 1e3, extent.width_m.unwrap_or(extent.length_m) * 1e3]
+    [extent.length_m() * 1e3, extent.width_m().unwrap_or(extent.length_m()) * 1e3]
 }
 
 /// Where everything goes.

@@ -55,7 +55,7 @@ impl ArraySensor {
             channel: ChannelModel { noise_sd, ..ChannelModel::default() },
         };
         let setup = Setup {
-            surface: SurfaceSpec::Measured(Extent { length_m, width_m: None }),
+            surface: SurfaceSpec::Measured(Extent::Line { length_m }),
             layout: Layout { sensors: (0..count).map(sensor).collect() },
             force_n: Some(force_n),
             columns: None,
@@ -85,7 +85,7 @@ impl ArraySensor {
 
     /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Trial> {
-        let length_m = self.rig.setup.surface.extent().length_m;
+        let length_m = self.rig.setup.surface.extent().length_m();
         let pressed: Vec<Position> =
             self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
         let judged: Vec<Position> =

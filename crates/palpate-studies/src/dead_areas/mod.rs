@@ -118,7 +118,7 @@ impl DeadAreas {
     /// The rig with so many sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
-        let length_m = rig.setup.surface.extent().length_m;
+        let length_m = rig.setup.surface.extent().length_m();
         if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors.first().cloned() {
             rig.setup.layout = Layout::even(kind, count, length_m);
             rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel = channel);

@@ -327,9 +327,9 @@ impl TrialSetup<'_> {
 }
 
 /// Whether a contact lies within the inner part of a plate.
-fn is_inner(position: Position, Extent { length_m, width_m }: Extent) -> bool {
-    let inner = |at_m: f64, size_m: f64| (at_m / size_m - 0.5).abs() <= 0.5 * INNER;
-    inner(position.x_m, length_m) && width_m.is_none_or(|width_m| inner(position.y_m, width_m))
+fn is_inner(position: Position, extent: Extent) -> bool {
+    let inner = |(at_m, side_m): (f64, f64)| (at_m / side_m - 0.5).abs() <= 0.5 * INNER;
+    extent.coordinates_m(position).zip(extent.sides_m()).all(inner)
 }
 
 #[cfg(test)]

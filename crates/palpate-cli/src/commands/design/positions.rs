@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     drop(observer);
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
-        rig_file::write(path, &text, best, problem.design().repeats, problem.is_plane())?;
+        rig_file::write(path, &text, best, problem.design().repeats, problem.extent())?;
     }
     if let Some(out) = &arguments.out {
         write_report(&outcome, &rig, out)?;

@@ -3,7 +3,7 @@
 use palpate_estimators::estimator::{
     CentreOfPressure, LoadProfile, Patch, PatchLimit, Profiler, patch_limits,
 };
-use palpate_mechanics::surface::UniformLoad;
+use palpate_mechanics::surface::{Extent, UniformLoad};
 
 /// All that a reading tells of the load; what it does not tell is null.
 #[derive(serde::Serialize)]
@@ -25,6 +25,8 @@ pub struct Findings {
     pub profile: Vec<CellFound>,
     /// Residual of each channel over its noise; null for dead ones.
     pub residuals: Vec<Option<f64>>,
+    #[serde(skip)]
+    pub extent: Extent,
 }
 
 /// A value, its standard deviation and the ends of its 95 % interval.
@@ -93,7 +95,7 @@ impl Findings {
         truth: &[UniformLoad],
         line: Option<u64>,
     ) -> Self {
-        let plane = profile.cells.extent.width_m.is_some();
+        let extent = profile.cells.extent;
         let of_truth = patch_limits(profiler.sensors(), truth);
         let limit =
             |limits: Option<&[PatchLimit]>, i: usize| limits.and_then(|limits| limits.get(i).copied());
@@ -106,22 +108,23 @@ impl Findings {
             worst_misfit: profile.worst_misfit,
             total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.total_95_n(), 1.0),
             centre_x_mm: profile.centre.map(|centre| x_mm(&centre)),
-            centre_y_mm: profile.centre.filter(|_| plane).map(|centre| y_mm(&centre)),
+            centre_y_mm: profile.centre.and_then(|centre| extent.across(y_mm(&centre))),
             resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
-            patches: patches.map(|(i, patch)| PatchFound::of(patch, limit(limits, i), plane)).collect(),
-            loads: loads.map(|(i, load)| TrueLoad::of(load, limit(of_truth.as_deref(), i), plane)).collect(),
+            patches: patches.map(|(i, patch)| PatchFound::of(patch, limit(limits, i), extent)).collect(),
+            loads: loads.map(|(i, load)| TrueLoad::of(load, limit(of_truth.as_deref(), i), extent)).collect(),
             profile: (0..profile.cells.len()).map(|cell| CellFound::of(profile, cell)).collect(),
             residuals: profile.residuals.clone(),
+            extent,
         }
     }
 }
 
 impl PatchFound {
-    fn of(patch: &Patch, limit: Option<PatchLimit>, plane: bool) -> Self {
+    fn of(patch: &Patch, limit: Option<PatchLimit>, extent: Extent) -> Self {
         Self {
             stretch_mm: [patch.from.x_m * 1e3, patch.to.x_m * 1e3],
             centre_x_mm: x_mm(&patch.centre),
-            across: plane.then(|| Across {
+            across: extent.across(Across {
                 stretch_y_mm: [patch.from.y_m * 1e3, patch.to.y_m * 1e3],
                 centre_y_mm: y_mm(&patch.centre),
                 limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
@@ -134,11 +137,11 @@ impl PatchFound {
 }
 
 impl TrueLoad {
-    fn of(load: &UniformLoad, limit: Option<PatchLimit>, plane: bool) -> Self {
+    fn of(load: &UniformLoad, limit: Option<PatchLimit>, extent: Extent) -> Self {
         Self {
             stretch_mm: [load.from.x_m * 1e3, load.to.x_m * 1e3],
             centre_x_mm: load.centre().x_m * 1e3,
-            across: plane.then(|| Across {
+            across: extent.across(Across {
                 stretch_y_mm: [load.from.y_m * 1e3, load.to.y_m * 1e3],
                 centre_y_mm: load.centre().y_m * 1e3,
                 limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
@@ -152,12 +155,15 @@ impl TrueLoad {
 
 impl CellFound {
     fn of(profile: &LoadProfile, cell: usize) -> Self {
-        let plane = profile.cells.extent.width_m.is_some();
-        let per_mm = if plane { 1e-6 } else { 1e-3 };
+        let extent = profile.cells.extent;
+        let per_mm = match extent {
+            Extent::Line { .. } => 1e-3,
+            Extent::Plane { .. } => 1e-6,
+        };
         let (centre, (density, (low, high))) = (profile.cells.centre(cell), profile.density(cell));
         Self {
             x_mm: centre.x_m * 1e3,
-            y_mm: plane.then_some(centre.y_m * 1e3),
+            y_mm: extent.across(centre.y_m * 1e3),
             density: density * per_mm,
             low: low * per_mm,
             high: high * per_mm,

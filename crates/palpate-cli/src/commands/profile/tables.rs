@@ -4,6 +4,7 @@ use super::findings::{Findings, Interval, PatchFound, TrueLoad};
 use crate::failure::Failure;
 use crate::output;
 use crate::table::table;
+use palpate_mechanics::surface::Extent;
 
 pub fn print(findings: &Findings) -> Result<(), Failure> {
     let interval = |value: &Interval, unit: &str| {
@@ -29,22 +30,22 @@ pub fn print(findings: &Findings) -> Result<(), Failure> {
             "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
         ))?;
     }
-    let plane = findings.centre_y_mm.is_some();
+    let extent = findings.extent;
     let rows = findings.patches.iter().enumerate().map(|(i, patch)| patch_row(i + 1, patch));
-    output::say(format!("\n{}", table(&columns("patch", plane), rows)))?;
+    output::say(format!("\n{}", table(&columns("patch", extent), rows)))?;
     if findings.loads.is_empty() {
         return Ok(());
     }
     let rows = findings.loads.iter().enumerate().map(|(i, load)| load_row(i + 1, load));
-    output::say(format!("\n{}", table(&columns("true load", plane), rows)))
+    output::say(format!("\n{}", table(&columns("true load", extent), rows)))
 }
 
-fn columns(what: &'static str, plane: bool) -> Vec<&'static str> {
-    if plane {
-        vec![what, "x, mm", "y, mm", "centre x, mm", "limit", "centre y, mm", "limit", "force, N", "limit"]
-    } else {
-        vec![what, "stretch, mm", "centre, mm", "limit", "force, N", "limit"]
-    }
+fn columns(what: &'static str, extent: Extent) -> Vec<&'static str> {
+    let places: &[_] = match extent {
+        Extent::Line { .. } => &["stretch, mm", "centre, mm", "limit"],
+        Extent::Plane { .. } => &["x, mm", "y, mm", "centre x, mm", "limit", "centre y, mm", "limit"],
+    };
+    [&[what], places, &["force, N", "limit"]].concat()
 }
 
 fn patch_row(number: usize, patch: &PatchFound) -> Vec<String> {

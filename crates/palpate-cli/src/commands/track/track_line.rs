@@ -3,6 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::estimator::{Across, Track, Tracked};
 use palpate_estimators::recording::csv_row;
+use palpate_mechanics::surface::Extent;
 
 /// What a line of CSV has room for; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]
@@ -84,14 +85,14 @@ struct JsonTrack {
     #[serde(skip_serializing_if = "Option::is_none")]
     second: Option<JsonContact>,
     /// Where the reading by itself shows the contact; on a plane its x and y.
-    single_mm: JsonPlace,
+    single_mm: JsonPosition,
     single_status: &'static str,
 }
 
 #[derive(serde::Serialize)]
 #[serde(untagged)]
-enum JsonPlace {
-    Along(f64),
+enum JsonPosition {
+    OnLine(f64),
     OnPlane([f64; 2]),
 }
 
@@ -118,8 +119,8 @@ struct JsonAcross {
     covariance_mm2: f64,
 }
 
-/// A line of JSON: all that is known of the reading in line `line` of its source; `plane` says on what it was taken.
-pub fn json(track: &Track, line: u64, plane: bool) -> Result<String, Failure> {
+/// A line of JSON: all that is known of the reading in line `line` of its source.
+pub fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
     let position = track.alone.contact.position;
     let object = JsonTrack {
         line,
@@ -128,10 +129,9 @@ pub fn json(track: &Track, line: u64, plane: bool) -> Result<String, Failure> {
         contact: track.contacts.first().map(json_contact),
         two_touching: track.numbers[2],
         second: track.contacts.get(1).map(json_contact),
-        single_mm: if plane {
-            JsonPlace::OnPlane([position.x_m * 1e3, position.y_m * 1e3])
-        } else {
-            JsonPlace::Along(position.x_m * 1e3)
+        single_mm: match extent {
+            Extent::Line { .. } => JsonPosition::OnLine(position.x_m * 1e3),
+            Extent::Plane { .. } => JsonPosition::OnPlane([position.x_m * 1e3, position.y_m * 1e3]),
         },
         single_status: track.alone.status.name(),
     };

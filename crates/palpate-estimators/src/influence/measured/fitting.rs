@@ -12,6 +12,7 @@ use super::{Axis, MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRol
 use crate::fit::{Fit, FitTask};
 use crate::recording::Recording;
 use crate::setup::Setup;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::chi_squared_bound;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
 
@@ -132,13 +133,12 @@ impl Presses {
         for ((i, j), output) in outputs.indexed_iter_mut() {
             *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
         }
-        let wide = setup.surface.extent().width_m.is_some();
+        let extent = setup.surface.extent();
         let mut distinct: Vec<Vec<f64>> = Vec::new();
         let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
         let mut places = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
-            let mut at = vec![row.position.x_m];
-            at.extend(wide.then_some(row.position.y_m));
+            let mut at: Vec<f64> = extent.coordinates_m(row.position).collect();
             if let Some(nuisance) = nuisance {
                 at.push(scaled(nuisance_scale, "the nuisance coordinate", i, nuisance[i])?);
             }
@@ -232,11 +232,13 @@ impl Presses {
             let values = self.coordinates.column(k).to_vec();
             Axis::over(values, bounds, lengths[k], most)
         };
-        let plane = extent.width_m.is_some();
+        let (most, most_nuisance) = match extent {
+            Extent::Line { .. } => (MOST_ALONG, MOST_HIDDEN),
+            Extent::Plane { .. } => (MOST_OF_PLANE, MOST_HIDDEN_OF_PLANE),
+        };
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
-        let along = axis(0, (0.0, extent.length_m), if plane { MOST_OF_PLANE } else { MOST_ALONG });
-        let across = extent.width_m.map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
-        let most_nuisance = if plane { MOST_HIDDEN_OF_PLANE } else { MOST_HIDDEN };
+        let along = axis(0, (0.0, extent.length_m()), most);
+        let across = extent.width_m().map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
         let nuisance =
             self.has_nuisance.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance));
         [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]

@@ -20,11 +20,11 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_testing::data::recording;
 
-const STRIP: Extent = Extent { length_m: 0.1, width_m: None };
-const PAD: Extent = Extent { length_m: 0.03, width_m: Some(0.03) };
+const STRIP: Extent = Extent::Line { length_m: 0.1 };
+const PAD: Extent = Extent::Plane { length_m: 0.03, width_m: 0.03 };
 
 fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
-    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m);
+    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
     Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
 }
 
@@ -238,7 +238,7 @@ fn five_folds(setup: &Setup, recording: &Recording) -> Pooled {
             let within = |(low, high): (f64, f64), value| usize::from(low <= value && value <= high);
             covered += within(uncertainty.x_95_m, row.position.x_m);
             intervals += 1;
-            if setup.surface.extent().width_m.is_some() {
+            if let Extent::Plane { .. } = setup.surface.extent() {
                 covered += within(uncertainty.y_95_m, row.position.y_m);
                 intervals += 1;
             }

@@ -73,7 +73,7 @@ impl Likelihood for PlateLikelihood {
 
     fn extent(&self) -> Extent {
         let [length_m, width_m] = self.search.size_m;
-        Extent { length_m, width_m: Some(width_m) }
+        Extent::Plane { length_m, width_m }
     }
 
     fn known_force_n(&self) -> Option<f64> {

@@ -36,7 +36,7 @@ impl PlaneTable {
 
     /// A table of zeros over a surface; nodes are about as far apart along as across.
     pub(super) fn empty(sensors: usize, extent: Extent) -> Self {
-        let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(extent.length_m));
+        let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(extent.length_m()));
         let side = |ratio: f64| {
             let half = (0.5 * (Self::NODES * ratio).sqrt()).floor();
             2 * half.clamp(0.5 * (Self::LEAST_SIDE - 1) as f64, 250.0) as usize + 1

@@ -169,7 +169,7 @@ fn input_rows(
 fn truths<'a>(setup: &Setup, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
     let rows = &recording.rows;
     let mut truths: Vec<Box<dyn Fn(usize) -> f64>> = vec![Box::new(|i| rows[i].position.x_m)];
-    if setup.surface.extent().width_m.is_some() {
+    if let Extent::Plane { .. } = setup.surface.extent() {
         truths.push(Box::new(|i| rows[i].position.y_m));
     }
     if setup.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
@@ -405,7 +405,7 @@ impl LevenbergMarquardtLocator {
         let value = |k: usize| self.scales[k].mean + self.scales[k].sd * prediction.mean[k];
         let covariance =
             |i: usize, j: usize| self.scales[i].sd * self.scales[j].sd * prediction.covariance[i][j];
-        let y = self.extent.width_m.map(|_| 1);
+        let y = self.extent.width_m().map(|_| 1);
         let force = (self.scales.len() > 1 + usize::from(y.is_some())).then(|| self.scales.len() - 1);
         let both = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j));
         let interval = |k: usize| normal_interval_95(value(k), covariance(k, k).sqrt());
@@ -452,7 +452,7 @@ impl Locate for LevenbergMarquardtLocator {
         LocatorFault::check_numbers("count of layers", [sizes.len() as f64], |n| n >= 2.0, "at least 2")?;
         LocatorFault::check_count("inputs", self.inputs.axes.len(), self.topology.inputs())?;
         LocatorFault::check_count("outputs", self.scales.len(), self.topology.outputs())?;
-        let axes = 1 + usize::from(self.extent.width_m.is_some());
+        let axes = self.extent.dimensions();
         let most = axes + usize::from(self.force_n.is_none());
         LocatorFault::check_count("outputs", self.scales.len().clamp(axes, most), self.scales.len())?;
         let scales = self.scales.iter().map(|s| s.mean);

@@ -214,7 +214,7 @@ fn strip(name: &str) -> Option<(Setup, Recording)> {
     };
     let rows: Vec<Row> = text.lines().skip(1).map(row).collect();
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    let surface = SurfaceSpec::Measured(Extent { length_m: 0.1, width_m: None });
+    let surface = SurfaceSpec::Measured(Extent::Line { length_m: 0.1 });
     let setup = Setup { surface, layout, force_n: None, columns: None };
     let provenance = Provenance { source: name.into(), rows: rows.len(), digests: vec![], seed: None };
     let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());

@@ -52,7 +52,7 @@ impl Mesh {
     /// `elements` along the longer side of `extent`, and along the shorter one as many as keep them from being longer
     /// than wide, but at least four.
     pub fn new(extent: Extent, elements: usize) -> Self {
-        let (length_m, width_m) = (extent.length_m, extent.width_m.unwrap_or(extent.length_m));
+        let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(extent.length_m()));
         let side_m = length_m.max(width_m) / elements as f64;
         let along = |size_m: f64| ((size_m / side_m - 1e-9).ceil() as usize).max(FEWEST);
         let (across, up) = (along(length_m), along(width_m));

@@ -90,7 +90,7 @@ impl PlateSpec {
 
     /// The area that can be touched.
     pub fn extent(&self) -> Extent {
-        Extent { length_m: self.length_m, width_m: Some(self.width_m) }
+        Extent::Plane { length_m: self.length_m, width_m: self.width_m }
     }
 }
 

@@ -163,7 +163,7 @@ impl Surface for SupportedBeam {
     }
 
     fn extent(&self) -> Extent {
-        Extent { length_m: self.spec.length_m, width_m: None }
+        Extent::Line { length_m: self.spec.length_m }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::progress::Observer;
 use crate::table::table;
 use palpate_design::positions::{Advice, next_press};
 use palpate_estimators::recording::Recording;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 
@@ -48,7 +49,7 @@ pub fn run(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<()
     if arguments.json {
         return output::say_json(&told(arguments, &advice));
     }
-    print(&advice, rig.setup.surface.extent().is_plane())
+    print(&advice, rig.setup.surface.extent())
 }
 
 fn told(arguments: &Arguments, advice: &Advice) -> Findings {
@@ -74,7 +75,7 @@ fn told(arguments: &Arguments, advice: &Advice) -> Findings {
     }
 }
 
-fn print(advice: &Advice, plane: bool) -> Result<(), Failure> {
+fn print(advice: &Advice, extent: Extent) -> Result<(), Failure> {
     output::say(format!(
         "{} presses at {} positions: expected error {:.4} mm; with endless presses {:.4} mm, {:.1} % less",
         advice.presses,
@@ -91,7 +92,10 @@ fn print(advice: &Advice, plane: bool) -> Result<(), Failure> {
         let gain = 100.0 * (1.0 - press.error_m / before_m);
         before_m = press.error_m;
         let (x, y) = (press.position.x_m * 1e3, press.position.y_m * 1e3);
-        let place = if plane { format!("({x:.1}, {y:.1})") } else { format!("{x:.1}") };
+        let place = match extent {
+            Extent::Line { .. } => format!("{x:.1}"),
+            Extent::Plane { .. } => format!("({x:.1}, {y:.1})"),
+        };
         vec![place, format!("{:.4}", press.error_m * 1e3), format!("{gain:.2}")]
     });
     let rows: Vec<_> = rows.collect();

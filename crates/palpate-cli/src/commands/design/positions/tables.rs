@@ -5,7 +5,6 @@ use crate::failure::Failure;
 use crate::output;
 use crate::table::table;
 use palpate_design::positions::{Placed, Placement, best_placed};
-use palpate_mechanics::contact::in_words;
 use palpate_mechanics::units::{format_count, format_length_mm};
 
 pub fn print(outcome: &Outcome) -> Result<(), Failure> {
@@ -24,7 +23,7 @@ pub fn print(outcome: &Outcome) -> Result<(), Failure> {
     output::say(errors(outcome))?;
     output::say("")?;
     for placed in &outcome.placed {
-        let places = in_words(&placed.positions, problem.is_plane());
+        let places = problem.extent().places_in_words(&placed.positions);
         output::say(format!("{}: {places}", placed.placement.name()))?;
     }
     match best_placed(&outcome.placed) {

@@ -29,7 +29,7 @@ pub fn print(outcome: &Outcome) -> Result<(), Failure> {
         output::say(format!(
             "{}: {}",
             designed.method.name(),
-            designed.layout.places_in_words(outcome.problem.is_plane())
+            designed.layout.places_in_words(outcome.problem.extent())
         ))?;
     }
     if let Some(best) = best_design(&outcome.designed) {
