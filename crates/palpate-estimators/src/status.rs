@@ -17,9 +17,9 @@ use palpate_numerics::chi_squared_bound;
 /// The share of readings that are called `outside_model`, or not called `no_contact`, by noise alone.
 pub const FALSE_ALARM_RATE: f64 = 1e-3;
 
-/// The least share of the posterior probability for another place to make an estimate `ambiguous`: what a 95 % interval about the
-/// best place leaves out.
-pub const OTHER_PLACE: f64 = 0.05;
+/// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
+/// fewer than one in a hundred comes from another place than the one that is said.
+pub const OTHER_PLACE: f64 = 0.01;
 
 /// The χ² of `freedom` channels more than unknowns that noise exceeds at [`FALSE_ALARM_RATE`]; infinite for none, as every reading
 /// is then explained.

@@ -382,7 +382,7 @@ impl Locator {
     pub fn load_sensors(&self) -> Result<LoadSensors<'_>, LoadSensorsError> {
         match &self.method {
             Method::Influence(InfluenceLocator::Beam(beam)) => {
-                let channels = beam.channels().map(|channel| {
+                let channels = beam.influences().map(|channel| {
                     let (influence, offset, noise_sd) = channel?;
                     Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
                 });

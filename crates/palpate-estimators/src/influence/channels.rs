@@ -1,48 +1,57 @@
 //! The channels of a locator with a model, besides their influence functions.
 
-use super::belief::ForceBelief;
+use super::config::ForceBelief;
 use crate::fit::LocatorFault;
+use serde::{Deserialize, Serialize};
 
 /// What is learnt of the channels besides their influence functions.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Channels {
     /// Offset of each channel, in its SI unit.
     pub offsets: Vec<f64>,
     /// Noise of each channel, in its SI unit.
     pub noise_sd: Vec<f64>,
-    /// Mean force of the presses, in newtons.
+    /// Which channels are left out.
+    pub dead: Vec<bool>,
+    /// Mean force of the calibration, in newtons.
     pub reference_force_n: f64,
 }
 
-/// The marks of dead channels with one more, channel `channel` (from 0); `None` when no channel would be left.
-pub(super) fn without(dead: &[bool], channel: usize) -> Option<Vec<bool>> {
-    let mut dead = dead.to_vec();
-    if let Some(dead) = dead.get_mut(channel) {
-        *dead = true;
+impl Channels {
+    /// The channels in use, from 0.
+    pub fn live(&self) -> Vec<usize> {
+        (0..self.dead.len()).filter(|s| !self.dead[*s]).collect()
     }
-    dead.contains(&false).then_some(dead)
-}
 
-/// Checks what a file may have got wrong of `sensors` channels.
-///
-/// # Errors
-/// [`LocatorFault`] for a list of another length, a number out of its bounds, or when no channel lives.
-pub(super) fn check(
-    sensors: usize,
-    offsets: &[f64],
-    noise_sd: &[f64],
-    dead: &[bool],
-    force: ForceBelief,
-) -> Result<(), LocatorFault> {
-    let count = LocatorFault::check_count;
-    count("offsets", sensors, offsets.len())?;
-    count("noises", sensors, noise_sd.len())?;
-    count("marks of dead channels", sensors, dead.len())?;
-    if !dead.contains(&false) {
-        return Err(LocatorFault::Count { what: "living channels", needed: 1, found: 0 });
+    /// The same without channel `channel` (from 0); `None` when no channel would be left.
+    pub fn without(&self, channel: usize) -> Option<Self> {
+        let mut channels = self.clone();
+        if let Some(dead) = channels.dead.get_mut(channel) {
+            *dead = true;
+        }
+        channels.dead.contains(&false).then_some(channels)
     }
-    LocatorFault::check_numbers("offset", offsets.iter().copied(), |_| true, "a finite number")?;
-    LocatorFault::check_numbers("noise", noise_sd.iter().copied(), |sd| sd > 0.0, "greater than 0")?;
-    let force = if force.is_usable() { 1.0 } else { f64::NAN };
-    LocatorFault::check_numbers("belief about the force", [force], |_| true, "greater than 0")
+
+    /// Checks what a file may have got wrong of `sensors` channels, and of what is known of the force.
+    ///
+    /// # Errors
+    /// [`LocatorFault`] for a list of another length, a number out of its bounds, or when no channel lives.
+    pub fn check(&self, sensors: usize, force: ForceBelief) -> Result<(), LocatorFault> {
+        let count = LocatorFault::check_count;
+        count("offsets", sensors, self.offsets.len())?;
+        count("noises", sensors, self.noise_sd.len())?;
+        count("marks of dead channels", sensors, self.dead.len())?;
+        if !self.dead.contains(&false) {
+            return Err(LocatorFault::Count { what: "living channels", needed: 1, found: 0 });
+        }
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        numbers("offset", &self.offsets, |_| true, "a finite number")?;
+        numbers("noise", &self.noise_sd, |sd| sd > 0.0, "greater than 0")?;
+        numbers("reference force", &[self.reference_force_n], |force| force > 0.0, "greater than 0")?;
+        let force = if force.is_usable() { 1.0 } else { f64::NAN };
+        numbers("belief about the force", &[force], |_| true, "greater than 0")
+    }
 }

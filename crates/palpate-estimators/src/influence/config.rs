@@ -1,4 +1,11 @@
-//! What a rig's `[estimator] kind = "influence"` says.
+//! The settings of the influence estimator, what is known of a contact's force, and why a fit fails.
+
+use super::measured::MeasuredError;
+use crate::fit::ChannelMismatch;
+use crate::setup::Setup;
+use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::watch::Cancelled;
+use serde::{Deserialize, Serialize};
 
 /// The influence estimator: learn what each sensor reads as a function of the contact, and invert it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,4 +34,134 @@ impl Default for Influence {
     fn default() -> Self {
         Self { from: InfluenceSource::Corrected, contacts: 1, force_sd_n: None }
     }
+}
+
+impl Influence {
+    /// What the setup and the settings say of the force.
+    pub(super) fn force_belief(&self, setup: &Setup) -> ForceBelief {
+        match (setup.force_n, self.force_sd_n) {
+            (None, _) => ForceBelief::Unknown,
+            (Some(force_n), None) => ForceBelief::Known(force_n),
+            (Some(mean_n), Some(sd_n)) => ForceBelief::Normal { mean_n, sd_n },
+        }
+    }
+}
+
+/// What is known of the force of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ForceBelief {
+    /// It is this, in newtons.
+    Known(f64),
+    /// Nothing, but that it presses.
+    Unknown,
+    /// It is about `mean_n` newtons, with standard deviation `sd_n`.
+    Normal {
+        /// Mean, in newtons.
+        mean_n: f64,
+        /// Standard deviation, in newtons.
+        sd_n: f64,
+    },
+}
+
+impl ForceBelief {
+    /// Mean and precision (one over variance, in N⁻²) of the belief, where the force is not known exactly.
+    pub(super) fn mean_and_precision(self) -> (f64, f64) {
+        match self {
+            Self::Known(force_n) => (force_n, f64::INFINITY),
+            Self::Unknown => (0.0, 0.0),
+            Self::Normal { mean_n, sd_n } => (mean_n, sd_n.powi(-2)),
+        }
+    }
+
+    /// The force in newtons, where it is known exactly.
+    pub(super) fn known_n(self) -> Option<f64> {
+        if let Self::Known(force_n) = self { Some(force_n) } else { None }
+    }
+
+    /// Numbers that a reading must tell: 1, the position, or 2, with the force.
+    pub(super) fn unknowns(self) -> usize {
+        if self.known_n().is_some() { 1 } else { 2 }
+    }
+
+    /// The force by which the calibration's variances weigh before a reading, with `reference_n` that of the calibration.
+    /// Offsets are as uncertain as influences at that force, so a softer touch counts as one of it.
+    pub(super) fn weights_force_n(self, reference_n: f64) -> f64 {
+        self.known_n().map_or(reference_n, |force_n| force_n.max(reference_n))
+    }
+
+    /// Whether its numbers can be used.
+    pub(super) fn is_usable(self) -> bool {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        match self {
+            Self::Known(force_n) => positive(force_n),
+            Self::Unknown => true,
+            Self::Normal { mean_n, sd_n } => positive(mean_n) && positive(sd_n),
+        }
+    }
+}
+
+/// Why influence functions cannot be fitted to a recording.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum InfluenceFitError {
+    /// What a surface without a model has to say.
+    #[error(transparent)]
+    Measured(#[from] MeasuredError),
+    /// The surface has no model.
+    #[error("the surface is `measured`: it has no mechanics that influence functions could start from")]
+    NoModel,
+    /// What only influence functions of a surface with a model can do.
+    #[error("the surface is `measured`: {what} needs a surface with mechanics, such as a beam")]
+    NotOnMeasured {
+        /// The setting.
+        what: &'static str,
+    },
+    /// What is not done on a plane.
+    #[error("the surface is a plane: {what} works on a line, such as a beam, only")]
+    NotOnPlane {
+        /// The setting.
+        what: &'static str,
+    },
+    /// A sensor that no model explains.
+    #[error("sensor {sensor} is a raw channel, which no mechanics explains")]
+    RawSensor {
+        /// Which, from 1.
+        sensor: usize,
+    },
+    /// A press whose force is not known.
+    #[error(
+        "row {row} of the recording has no force greater than 0; influence functions are readings per newton: give [contact] force, or a force column"
+    )]
+    NoForce {
+        /// Which row, from 1.
+        row: usize,
+    },
+    /// Fewer distinct positions than there are numbers to find.
+    #[error("the recording has {found} distinct positions; influence functions need at least {needed}")]
+    TooFewPositions {
+        /// Positions that are needed.
+        needed: usize,
+        /// Positions of the recording.
+        found: usize,
+    },
+    /// Every sensor is dead.
+    #[error("all {sensors} sensors are dead; at least 1 must live")]
+    AllDead {
+        /// How many there are.
+        sensors: usize,
+    },
+    /// Presses that contradict each other so exactly that they cannot be weighed.
+    #[error("the presses of sensor {sensor} cannot be weighed against each other: {problem}")]
+    Singular {
+        /// Which, from 1.
+        sensor: usize,
+        /// What failed.
+        problem: NotPositiveDefinite,
+    },
+    /// The recording's channels are not the setup's.
+    #[error(transparent)]
+    Channels(#[from] ChannelMismatch),
+    /// The fit was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }

@@ -1,26 +1,29 @@
 //! From presses to what every sensor reads at given places, on a line as on a plane.
+//!
+//! Every sensor's influence function is a Gaussian process (its prior: see [`super::prior`]); presses at the same place with the
+//! same force are averaged, the hyperparameters that sensors of one kind share are those under which the presses are the most
+//! probable, and the posterior is asked for mean and variance at the places.
 
-use super::InfluenceFitError;
 use super::channels::Channels;
-use super::config::InfluenceSource;
-use super::hyperparameters::{MOST_PRESSES, most_evident};
-use super::posterior::{Posterior, SensorPresses};
-use super::presses::Presses;
-use super::prior::{Mean, Prior, Remainders, Spread};
+use super::config::{InfluenceFitError, InfluenceSource};
+use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
 use crate::fit::FitTask;
+use crate::recording::Recording;
+use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Surface;
+use palpate_numerics::{Cholesky, NotPositiveDefinite, mean};
 
 /// One sensor's influence function as the presses tell it, at the places that were asked for.
-pub(super) struct Learnt<'s, 'a> {
+pub(super) struct LearntInfluence<'s, 'a> {
     posterior: Posterior<'s, 'a>,
     prior: &'s Prior<'a>,
     remainders: &'s Remainders,
     places: &'s [Position],
 }
 
-impl Learnt<'_, '_> {
+impl LearntInfluence<'_, '_> {
     /// The reading per newton at place number `place`.
     pub fn mean(&self, place: usize) -> f64 {
         let parts = self.prior.parts(self.places[place]);
@@ -40,7 +43,7 @@ pub(super) fn learn(
     from: InfluenceSource,
     task: FitTask,
     places: &[Position],
-    take: &mut dyn FnMut(usize, &Learnt),
+    take: &mut dyn FnMut(usize, &LearntInfluence),
 ) -> Result<Channels, InfluenceFitError> {
     let surface = task.setup.surface.model().ok_or(InfluenceFitError::NoModel)?;
     let layout = &task.setup.layout;
@@ -59,9 +62,10 @@ pub(super) fn learn(
     let mut channels = Channels {
         offsets: vec![0.0; layout.len()],
         noise_sd: vec![1.0; layout.len()],
+        dead: layout.sensors.iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
     };
-    let lesson = Lesson { from, surface, layout, presses: &presses, places };
+    let learning = Learning { from, surface, layout, presses: &presses, places };
     for kind in SensorKind::ALL {
         let is_meant = |s: &usize| {
             let sensor = &layout.sensors[*s];
@@ -72,7 +76,7 @@ pub(super) fn learn(
             continue;
         }
         task.watch.round()?;
-        lesson.learn_kind(kind, &living, &mut channels, take)?;
+        learning.learn_kind(kind, &living, &mut channels, take)?;
     }
     Ok(channels)
 }
@@ -88,7 +92,7 @@ fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
 }
 
 /// What is learnt from, and where.
-struct Lesson<'a> {
+struct Learning<'a> {
     from: InfluenceSource,
     surface: &'a dyn Surface,
     layout: &'a Layout,
@@ -96,14 +100,14 @@ struct Lesson<'a> {
     places: &'a [Position],
 }
 
-impl<'a> Lesson<'a> {
-    /// Learns the sensors of one kind, which share their spread.
+impl<'a> Learning<'a> {
+    /// Learns the sensors of one kind, which share their hyperparameters.
     fn learn_kind(
         &self,
         kind: SensorKind,
         living: &[usize],
         channels: &mut Channels,
-        take: &mut dyn FnMut(usize, &Learnt),
+        take: &mut dyn FnMut(usize, &LearntInfluence),
     ) -> Result<(), InfluenceFitError> {
         let Self { from, surface, layout, presses, places } = *self;
         let mean = if from == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
@@ -120,19 +124,358 @@ impl<'a> Lesson<'a> {
         let searched: Vec<SensorPresses> =
             priors.iter().zip(living).map(|sensor| with(sensor, &thinned)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
-        let mut spread = most_evident(&searched, mean, surface.length_m(), noise_is_told);
+        let mut hyper = most_probable(&searched, mean, surface.length_m(), noise_is_told);
         if from == InfluenceSource::Mechanics {
-            spread = Spread { noise: spread.noise, ..Spread::NONE };
+            hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
         for (prior, &s) in priors.iter().zip(living) {
             let sensor = with((prior, &s), &all);
             let posterior = sensor
-                .posterior(spread)
+                .posterior(hyper)
                 .map_err(|problem| InfluenceFitError::Singular { sensor: s + 1, problem })?;
             channels.offsets[s] = posterior.offset();
-            channels.noise_sd[s] = sensor.noise_variance(&spread).sqrt();
-            take(s, &Learnt { posterior, prior, remainders: &remainders, places });
+            channels.noise_sd[s] = sensor.noise_variance(&hyper).sqrt();
+            take(s, &LearntInfluence { posterior, prior, remainders: &remainders, places });
         }
         Ok(())
+    }
+}
+
+/// Presses at one position with one force.
+#[derive(Clone, Debug, PartialEq)]
+struct Press {
+    pub position: Position,
+    pub force_n: f64,
+    /// How many readings were averaged.
+    pub count: f64,
+    /// Their mean, a value a sensor.
+    pub mean: Vec<f64>,
+}
+
+/// All presses of a recording, and how much repeats disagree.
+#[derive(Clone, Debug, PartialEq)]
+struct Presses {
+    pub presses: Vec<Press>,
+    /// Sum of squared deviations of repeats from their mean, a value a sensor.
+    scatter: Vec<f64>,
+    /// Degrees of freedom of the scatter: readings less presses.
+    freedom: f64,
+}
+
+/// How many readings' worth of belief the rig's stated noise has, beside the repeats.
+const STATED_FREEDOM: f64 = 20.0;
+
+impl Presses {
+    /// Averages repeats.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError::NoForce`] for a row whose force nobody knows, or is not greater than 0.
+    pub fn of(recording: &Recording) -> Result<Self, InfluenceFitError> {
+        let sensors = recording.channels.len();
+        let mut rows: Vec<(Position, f64, &[f64])> = Vec::with_capacity(recording.rows.len());
+        for (i, row) in recording.rows.iter().enumerate() {
+            let force_n = row.force_n.filter(|force_n| *force_n > 0.0);
+            let force_n = force_n.ok_or(InfluenceFitError::NoForce { row: i + 1 })?;
+            rows.push((row.position, force_n, &row.reading));
+        }
+        rows.sort_by(|a, b| a.0.cmp_by_x_then_y(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut presses = Vec::new();
+        let (mut scatter, mut freedom) = (vec![0.0; sensors], 0.0);
+        for group in rows.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
+            let count = group.len() as f64;
+            let column = |s: usize| group.iter().map(move |(_, _, reading)| reading[s]);
+            let mean: Vec<f64> = (0..sensors).map(|s| column(s).sum::<f64>() / count).collect();
+            for (s, scatter) in scatter.iter_mut().enumerate() {
+                *scatter += column(s).map(|value| (value - mean[s]).powi(2)).sum::<f64>();
+            }
+            freedom += count - 1.0;
+            presses.push(Press { position: group[0].0, force_n: group[0].1, count, mean });
+        }
+        Ok(Self { presses, scatter, freedom })
+    }
+
+    /// How many positions there are, whatever the force.
+    pub fn distinct_positions(&self) -> usize {
+        self.presses.chunk_by(|a, b| a.position == b.position).count()
+    }
+
+    /// The mean force, in newtons.
+    pub fn mean_force_n(&self) -> f64 {
+        mean(self.presses.iter().map(|press| press.force_n))
+    }
+
+    /// The variance of a sensor's noise from its repeats and the noise that its rig states, or `None` where neither
+    /// says anything. Quantisation to steps q adds q²/12 where there are no repeats that show it.
+    pub fn noise_variance(&self, layout: &Layout, sensor: usize) -> Option<f64> {
+        let channel = &layout.sensors[sensor].channel;
+        let stated = channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0;
+        let belief = if stated > 0.0 { STATED_FREEDOM } else { 0.0 };
+        let freedom = self.freedom + belief;
+        (freedom > 0.0).then(|| (self.scatter[sensor] + belief * stated) / freedom)
+    }
+}
+
+/// Sharpens no posterior beyond what f64 can hold: variance of a reading, relative to the full-scale reading squared.
+const FLOOR: f64 = 1e-18;
+
+/// One sensor's presses, with all that does not depend on the hyperparameters worked out once.
+struct SensorPresses<'a> {
+    pub prior: Prior<'a>,
+    force_n: Vec<f64>,
+    count: Vec<f64>,
+    parts: Vec<Parts>,
+    /// Mean reading less the prior's mean.
+    residual: Array1<f64>,
+    /// Covariance of the remainders of every pair of presses.
+    remainder: Array2<f64>,
+    /// The reading's noise variance, where repeats or the rig tell it.
+    noise: Option<f64>,
+    /// The full-scale reading at the mean force.
+    scale: f64,
+    mean_force_n: f64,
+}
+
+/// The posterior of one sensor's influence function.
+struct Posterior<'s, 'a> {
+    presses: &'s SensorPresses<'a>,
+    hyper: Hyperparameters,
+    cholesky: Cholesky,
+    weights: Array1<f64>,
+}
+
+impl<'a> SensorPresses<'a> {
+    /// Sensor number `index` of the presses, of which those numbered `kept` are looked at; `remainder` is of all.
+    pub fn new(
+        prior: Prior<'a>,
+        presses: &Presses,
+        index: usize,
+        noise: Option<f64>,
+        kept: &[usize],
+        remainder: &Array2<f64>,
+    ) -> Self {
+        let of = |j: usize| &presses.presses[kept[j]];
+        let indices = 0..kept.len();
+        let parts: Vec<Parts> = indices.clone().map(|j| prior.parts(of(j).position)).collect();
+        let residual = |j: usize| of(j).mean[index] - of(j).force_n * prior.mean(parts[j]);
+        let mean_force_n = presses.mean_force_n();
+        Self {
+            force_n: indices.clone().map(|j| of(j).force_n).collect(),
+            count: indices.clone().map(|j| of(j).count).collect(),
+            residual: indices.map(residual).collect(),
+            remainder: Array2::from_shape_fn((kept.len(), kept.len()), |(j, k)| {
+                remainder[[kept[j], kept[k]]]
+            }),
+            parts,
+            noise,
+            scale: prior.full_scale * mean_force_n,
+            mean_force_n,
+            prior,
+        }
+    }
+
+    /// The variance of a reading's noise.
+    pub fn noise_variance(&self, hyper: &Hyperparameters) -> f64 {
+        let least = FLOOR * self.scale * self.scale;
+        self.noise.unwrap_or((hyper.noise * self.scale).powi(2)).max(least)
+    }
+
+    fn offset_variance(&self, hyper: &Hyperparameters) -> f64 {
+        (hyper.offset * self.scale).powi(2)
+    }
+
+    /// Covariance of the mean readings of all presses.
+    fn covariance(&self, hyper: &Hyperparameters) -> Array2<f64> {
+        let (offset, noise) = (self.offset_variance(hyper), self.noise_variance(hyper));
+        let n = self.parts.len();
+        let mut covariance = Array2::zeros((n, n));
+        for j in 0..n {
+            for k in 0..=j {
+                let (a, b) = (self.parts[j], self.parts[k]);
+                let influence = self.prior.covariance(hyper, a, b, self.remainder[[j, k]]);
+                covariance[[j, k]] = self.force_n[j] * self.force_n[k] * influence + offset;
+            }
+            covariance[[j, j]] += noise / self.count[j] + 1e-14 * covariance[[j, j]];
+        }
+        covariance
+    }
+
+    /// ln of the probability density of the presses, less a constant; −∞ where it cannot be computed.
+    pub fn log_evidence(&self, hyper: &Hyperparameters) -> f64 {
+        let Ok(cholesky) = Cholesky::factor(self.covariance(hyper)) else { return f64::NEG_INFINITY };
+        let whitened = cholesky.solve_lower(&self.residual);
+        -0.5 * (whitened.dot(&whitened) + cholesky.log_determinant())
+    }
+
+    /// The posterior.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] when the presses' covariance cannot be factored.
+    pub fn posterior(&self, hyper: Hyperparameters) -> Result<Posterior<'_, 'a>, NotPositiveDefinite> {
+        let cholesky = Cholesky::factor(self.covariance(&hyper))?;
+        let weights = cholesky.solve(&self.residual);
+        Ok(Posterior { presses: self, hyper, cholesky, weights })
+    }
+}
+
+impl Posterior<'_, '_> {
+    /// The posterior mean of the offset.
+    pub fn offset(&self) -> f64 {
+        self.presses.offset_variance(&self.hyper) * self.weights.sum()
+    }
+
+    /// Covariance of the influence with each press's reading, of the influence alone; `remainders` are those of the
+    /// place with the presses.
+    fn with_presses(&self, at: Parts, remainders: &ArrayView1<f64>) -> Array1<f64> {
+        let SensorPresses { prior, parts, force_n, .. } = self.presses;
+        let presses = parts.iter().zip(force_n).zip(remainders);
+        let covariance = |((press, force_n), remainder): ((&Parts, &f64), &f64)| {
+            force_n * prior.covariance(&self.hyper, at, *press, *remainder)
+        };
+        presses.map(covariance).collect()
+    }
+
+    /// The posterior mean of the influence.
+    pub fn mean(&self, at: Parts, remainders: &ArrayView1<f64>) -> f64 {
+        self.presses.prior.mean(at) + self.with_presses(at, remainders).dot(&self.weights)
+    }
+
+    /// The posterior variance of the influence and of the offset shared over the mean force; `own` is the remainder's
+    /// covariance of the place with itself.
+    pub fn variance(&self, at: Parts, remainders: &ArrayView1<f64>, own: f64) -> f64 {
+        let force_n = self.presses.mean_force_n;
+        let offset = self.presses.offset_variance(&self.hyper);
+        let covariance = self.with_presses(at, remainders) + offset / force_n;
+        let explained = self.cholesky.solve_lower(&covariance);
+        let before = self.presses.prior.covariance(&self.hyper, at, at, own);
+        (before + offset / (force_n * force_n) - explained.dot(&explained)).max(0.0)
+    }
+}
+
+/// Presses that the search looks at; more would cost time and change little.
+const MOST_PRESSES: usize = 60;
+
+/// log₁₀ of the five spreads, with the bounds of each. The lower bounds mean "not at all".
+const START: [f64; 5] = [-2.0, -3.0, -3.0, -4.0, -4.0];
+const LOWEST: [f64; 5] = [-6.0, -8.0, -7.0, -9.0, -9.0];
+const HIGHEST: [f64; 5] = [0.0, -1.0, 2.0, 0.0, 0.0];
+
+/// The hyperparameters under which the presses of all `sensors`, which are of one kind, are the most probable: steps along one
+/// logarithm at a time, ever smaller.
+fn most_probable(
+    sensors: &[SensorPresses],
+    mean: Mean,
+    length_m: f64,
+    noise_is_told: bool,
+) -> Hyperparameters {
+    let hyper = |logs: &[f64; 5]| {
+        let power = |i: usize| if logs[i] <= LOWEST[i] { 0.0 } else { 10f64.powf(logs[i]) };
+        match mean {
+            Mean::Model => Hyperparameters {
+                gain: power(0),
+                shift_m: power(1) * length_m,
+                remainder: power(2),
+                offset: power(3),
+                noise: power(4),
+            },
+            Mean::Zero => Hyperparameters {
+                gain: 0.0,
+                shift_m: 0.0,
+                remainder: power(2),
+                offset: power(3),
+                noise: power(4),
+            },
+        }
+    };
+    let evidence = |logs: &[f64; 5]| sensors.iter().map(|s| s.log_evidence(&hyper(logs))).sum::<f64>();
+    let mut free = vec![2, 3];
+    if mean == Mean::Model {
+        free.extend([0, 1]);
+    }
+    if !noise_is_told {
+        free.push(4);
+    }
+    let mut logs = START;
+    if mean == Mean::Zero {
+        logs[2] = 0.0;
+    }
+    let mut best = evidence(&logs);
+    for step in [1.0, 0.5, 0.25] {
+        climb(&mut logs, &mut best, &free, step, &evidence);
+    }
+    hyper(&logs)
+}
+
+/// Steps along each free logarithm while the evidence rises.
+fn climb(
+    logs: &mut [f64; 5],
+    best: &mut f64,
+    free: &[usize],
+    step: f64,
+    evidence: &dyn Fn(&[f64; 5]) -> f64,
+) {
+    const MOST_ROUNDS: usize = 8;
+    for _ in 0..MOST_ROUNDS {
+        let before = *best;
+        for &i in free {
+            for direction in [step, -step] {
+                loop {
+                    let mut candidate = *logs;
+                    candidate[i] = (candidate[i] + direction).clamp(LOWEST[i], HIGHEST[i]);
+                    let value = evidence(&candidate);
+                    if value <= *best {
+                        break;
+                    }
+                    (*logs, *best) = (candidate, value);
+                }
+            }
+        }
+        if *best <= before {
+            break;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{Provenance, Row};
+    use palpate_mechanics::sensing::SensorKind;
+
+    fn recording(rows: &[(f64, f64, f64)]) -> Recording {
+        let rows = rows.iter().map(|(x_m, force_n, value)| Row {
+            position: Position::along(*x_m),
+            force_n: (*force_n > 0.0).then_some(*force_n),
+            nuisance: None,
+            reading: vec![*value],
+        });
+        let provenance = Provenance { source: "test".into(), rows: 0, digests: vec![], seed: None };
+        let kinds = vec![SensorKind::Deflection];
+        Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }
+    }
+
+    #[test]
+    fn repeats_are_averaged_and_their_scatter_kept() {
+        let rows = [(0.1, 3.0, 1.0), (0.2, 3.0, 5.0), (0.1, 3.0, 3.0), (0.1, 2.0, 9.0)];
+        let presses = Presses::of(&recording(&rows)).unwrap();
+        let found: Vec<_> =
+            presses.presses.iter().map(|p| (p.position.x_m, p.force_n, p.count, p.mean[0])).collect();
+        assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
+        let mut layout = Layout::even(SensorKind::Deflection, 1, 0.4);
+        assert_eq!(presses.noise_variance(&layout, 0), Some(2.0));
+        layout.sensors[0].channel.noise_sd = 1.0;
+        let blended = presses.noise_variance(&layout, 0).unwrap();
+        assert!((blended - 22.0 / 21.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_press_without_force_is_refused() {
+        let error = Presses::of(&recording(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)])).unwrap_err();
+        assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
+    }
+
+    #[test]
+    fn nothing_is_known_of_noise_without_repeats() {
+        let presses = Presses::of(&recording(&[(0.1, 3.0, 1.0)])).unwrap();
+        assert_eq!(presses.noise_variance(&Layout::even(SensorKind::Deflection, 1, 0.4), 0), None);
     }
 }

@@ -1,41 +1,18 @@
 //! Influence functions, and their inversion: learn what each sensor reads as a function of where the contact is, a
 //! smooth curve, and find the contact whose curve values are the most likely cause of a reading.
 
-mod answer;
-mod batch;
-mod belief;
-mod bend;
+mod beam;
 mod channels;
-mod coarse;
 mod config;
-mod fitting;
-mod hyperparameters;
 mod learning;
-mod likelihood;
-mod locator;
 pub mod measured;
 mod moments;
 mod plane;
-mod posterior;
-mod presses;
 mod prior;
-mod rays;
-mod refine;
-mod scratch;
-mod search;
-mod several;
-mod table;
-mod table_function;
 
-pub use belief::ForceBelief;
-pub use config::{Influence, InfluenceSource};
-pub use fitting::InfluenceFitError;
-pub use likelihood::BeamLikelihood;
-pub use locator::BeamLocator;
+pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
+pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource};
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
-pub use scratch::Scratch;
-pub use table::InfluenceTable;
-pub use table_function::FittedInfluence;
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
@@ -93,7 +70,7 @@ impl Influence {
     /// [`InfluenceFitError`] when the surface has no model, several contacts are to be told apart, or the recording says
     /// too little.
     pub fn fit_plane(&self, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
-        plane::fit_plane(*self, task)
+        plane::fit(*self, task)
     }
 
     /// Fits the influence functions of a line with a model.
@@ -101,7 +78,7 @@ impl Influence {
     /// # Errors
     /// [`InfluenceFitError`] when the surface has no model or the recording says too little.
     pub fn fit_beam(&self, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
-        fitting::fit_modelled(*self, task)
+        beam::fit(*self, task)
     }
 }
 
@@ -133,6 +110,3 @@ impl Locate for InfluenceLocator {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Standard deviations of what an influence function may deviate by, shared by sensors of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Spread {
+pub(super) struct Hyperparameters {
     /// Of the gain, relative; 0 where the mean is 0.
     pub gain: f64,
     /// Of the sensor's position, in metres; 0 where the mean is 0.
@@ -25,7 +25,7 @@ pub(super) struct Spread {
     pub noise: f64,
 }
 
-impl Spread {
+impl Hyperparameters {
     /// No deviation and no noise.
     pub const NONE: Self = Self { gain: 0.0, shift_m: 0.0, remainder: 0.0, offset: 0.0, noise: 0.0 };
 }
@@ -103,10 +103,10 @@ impl<'a> Prior<'a> {
     }
 
     /// Covariance of the influence at a pair of contact positions, whose remainders' covariance is `remainder`.
-    pub fn covariance(&self, spread: &Spread, a: Parts, b: Parts, remainder: f64) -> f64 {
-        let scale = self.full_scale * spread.remainder;
+    pub fn covariance(&self, hyper: &Hyperparameters, a: Parts, b: Parts, remainder: f64) -> f64 {
+        let scale = self.full_scale * hyper.remainder;
         let moved = a.shift[0] * b.shift[0] + a.shift[1] * b.shift[1];
-        let explained = spread.gain.powi(2) * a.model * b.model + spread.shift_m.powi(2) * moved;
+        let explained = hyper.gain.powi(2) * a.model * b.model + hyper.shift_m.powi(2) * moved;
         explained + scale * scale * remainder
     }
 }

@@ -325,8 +325,7 @@ impl<'a> Coded<'a> {
         let scaling = channel_scaling(config.input_scale, setup, recording)?;
         let extent = setup.surface.extent();
         let scale_m = |size_m| if config.output == OutputCoding::Position { 1.0 } else { size_m };
-        let output_scale_m: Vec<f64> =
-            std::iter::once(extent.length_m()).chain(extent.width_m()).map(scale_m).collect();
+        let output_scale_m: Vec<f64> = extent.sides_m().map(scale_m).collect();
         let inputs = |row: &Row| -> Vec<f64> {
             row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value)).collect()
         };

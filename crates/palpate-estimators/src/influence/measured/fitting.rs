@@ -1,28 +1,28 @@
-//! From a recording to a locator.
+//! From a recording to a locator: presses, regression, noise, how far it misses positions that were held out, table.
 
-use palpate_numerics::watch::{Cancelled, Watch};
-use std::collections::HashMap;
-
-use ndarray::{Array1, Array2};
-
-use super::misfit::misfit;
-use super::noise::Noise;
-use super::posterior::Posterior;
-use super::{Axis, MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale, Table, Whitening};
+use super::config::{MeasuredError, MeasuredInfluence, Scale};
+use super::locator::{MeasuredLocator, NuisanceRole};
+use super::noise::{Noise, Whitening};
+use super::presses::{Presses, nuisance_coordinate};
+use super::table::{Axis, Table};
 use crate::fit::{Fit, FitTask};
 use crate::recording::Recording;
 use crate::setup::Setup;
+use crate::status::misfit_bound;
+use ndarray::{Array1, Array2, s};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::chi_squared_bound;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
+use palpate_numerics::small::Ldl;
+use palpate_numerics::watch::{Cancelled, Watch};
+use std::cmp::Ordering;
 
 /// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
 /// Most nodes along a one-dimensional surface, along either axis of a plane, and along the nuisance coordinate.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
-const MOST_HIDDEN: usize = 64;
-const MOST_HIDDEN_OF_PLANE: usize = 16;
+const MOST_OF_NUISANCE: usize = 64;
+const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
@@ -70,101 +70,7 @@ impl Fit for MeasuredInfluence {
     }
 }
 
-/// What shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
-fn nuisance_coordinate(
-    setup: &Setup,
-    recording: &Recording,
-) -> Result<(NuisanceRole, Option<Vec<f64>>), MeasuredError> {
-    let all = |what, values: Vec<Option<f64>>| {
-        if values.iter().all(Option::is_none) {
-            return Ok(None);
-        }
-        let known = values
-            .iter()
-            .enumerate()
-            .map(|(i, value)| value.ok_or(MeasuredError::NuisanceMissing { what, row: i + 1 }));
-        known.collect::<Result<Vec<f64>, _>>().map(Some)
-    };
-    let named = all("nuisance coordinate", recording.rows.iter().map(|row| row.nuisance).collect())?;
-    if named.is_some() {
-        return Ok((NuisanceRole::Other, named));
-    }
-    // A force that is known, or always the same, shapes nothing.
-    if setup.force_n.is_some() {
-        return Ok((NuisanceRole::None, None));
-    }
-    let force = all("force", recording.rows.iter().map(|row| row.force_n).collect())?;
-    Ok((if force.is_some() { NuisanceRole::Force } else { NuisanceRole::None }, force))
-}
-
-/// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinate, are one.
-///
-/// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
-/// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
-pub(super) struct Presses {
-    readings: Scale,
-    nuisance: Scale,
-    /// Position along, across where the surface has a width, and hidden where there is one: n×d.
-    pub coordinates: Array2<f64>,
-    /// Mean scaled readings, n×m.
-    pub means: Array2<f64>,
-    /// To which press each row belongs.
-    pub places: Vec<usize>,
-    /// Scaled readings, row by row.
-    pub outputs: Array2<f64>,
-    pub has_nuisance: bool,
-}
-
 impl Presses {
-    fn of(
-        config: &MeasuredInfluence,
-        setup: &Setup,
-        recording: &Recording,
-        nuisance: Option<&[f64]>,
-    ) -> Result<Self, MeasuredError> {
-        let rows = &recording.rows;
-        let values = || rows.iter().flat_map(|row| row.reading.iter().copied());
-        let readings = config.readings.unwrap_or_else(|| Scale::for_values(values()));
-        let nuisance_values = || nuisance.unwrap_or_default().iter().copied();
-        let nuisance_scale = config.nuisance.unwrap_or_else(|| Scale::for_values(nuisance_values()));
-
-        let channels = rows.first().map_or(0, |row| row.reading.len());
-        let mut outputs = Array2::zeros((rows.len(), channels));
-        for ((i, j), output) in outputs.indexed_iter_mut() {
-            *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
-        }
-        let extent = setup.surface.extent();
-        let mut distinct: Vec<Vec<f64>> = Vec::new();
-        let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
-        let mut places = Vec::with_capacity(rows.len());
-        for (i, row) in rows.iter().enumerate() {
-            let mut at: Vec<f64> = extent.coordinates_m(row.position).collect();
-            if let Some(nuisance) = nuisance {
-                at.push(scaled(nuisance_scale, "the nuisance coordinate", i, nuisance[i])?);
-            }
-            let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
-            places.push(*known.entry(bits).or_insert_with(|| {
-                distinct.push(at);
-                distinct.len() - 1
-            }));
-        }
-        let coordinates =
-            Array2::from_shape_fn((distinct.len(), distinct.first().map_or(0, Vec::len)), |(i, k)| {
-                distinct[i][k]
-            });
-        let mut means = Array2::<f64>::zeros((distinct.len(), channels));
-        let mut counts = vec![0.0; distinct.len()];
-        for (place, output) in places.iter().zip(outputs.outer_iter()) {
-            means.row_mut(*place).scaled_add(1.0, &output);
-            counts[*place] += 1.0;
-        }
-        for (mut mean, count) in means.outer_iter_mut().zip(counts) {
-            mean /= count;
-        }
-        let has_nuisance = nuisance.is_some();
-        Ok(Self { readings, nuisance: nuisance_scale, coordinates, means, places, outputs, has_nuisance })
-    }
-
     /// The noise from repeats, or what the process calls noise where there are too few; the signal from the process.
     fn whitening(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Whitening, MeasuredError> {
         let channels = self.means.ncols();
@@ -233,8 +139,8 @@ impl Presses {
             Axis::over(values, bounds, lengths[k], most)
         };
         let (most, most_nuisance) = match extent {
-            Extent::Line { .. } => (MOST_ALONG, MOST_HIDDEN),
-            Extent::Plane { .. } => (MOST_OF_PLANE, MOST_HIDDEN_OF_PLANE),
+            Extent::Line { .. } => (MOST_ALONG, MOST_OF_NUISANCE),
+            Extent::Plane { .. } => (MOST_OF_PLANE, MOST_OF_NUISANCE_OF_PLANE),
         };
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let along = axis(0, (0.0, extent.length_m()), most);
@@ -245,11 +151,7 @@ impl Presses {
     }
 }
 
-fn scaled(scale: Scale, what: &'static str, row: usize, value: f64) -> Result<f64, MeasuredError> {
-    scale.of(value).ok_or(MeasuredError::NoLogarithm { what, row: row + 1, value })
-}
-
-/// The squared residual that a contact's reading hardly ever has: what one in a million would leave of normal noise,
+/// The squared residual beyond which no contact explains a reading: [`misfit_bound`] for normal noise,
 /// and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     /// Readings that are tried.
@@ -261,10 +163,126 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let tried = recording.rows.iter().step_by(every);
     let mut residuals: Vec<f64> = tried
         .filter_map(|row| locator.whitened(&row.reading))
-        .map(|reading| Posterior::of(locator, &reading).residual())
+        .map(|reading| locator.residual(&reading))
         .filter(|residual| residual.is_finite())
         .collect();
     residuals.sort_by(f64::total_cmp);
     let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);
-    chi_squared_bound(1e-6, freedom).max(2.0 * usual)
+    misfit_bound(freedom).max(2.0 * usual)
+}
+
+/// Distinct positions from which on some can be held out.
+const LEAST_TO_JUDGE: usize = 15;
+/// The least and the greatest factor that is believed: with fewer rows to learn from, a factor below 1 says little.
+const FACTORS: (f64, f64) = (1.0, 5.0);
+
+/// By what factor position errors at positions that were not learnt exceed what noise and process say, as a deviation:
+/// every fifth position is held out of the same process. `None` with too few positions to tell.
+///
+/// It is what the smoothness that the process found does not know of: texture that repeats itself, presses a little
+/// off. For a residual r with covariance V, and the slopes J of the mean by position and nuisance coordinate, the error is
+/// δ = (Jᵀ·V⁻¹·J)⁻¹·Jᵀ·V⁻¹·r, its covariance (Jᵀ·V⁻¹·J)⁻¹, and the factor the root mean square of their positions' part.
+pub(super) fn misfit(
+    presses: &Presses,
+    regression: &Regression,
+    process: &GaussianProcess,
+    whitening: &Whitening,
+) -> Result<Option<f64>, MeasuredError> {
+    let dimensions = presses.coordinates.ncols() - usize::from(presses.has_nuisance);
+    let Some(held) = held_out(presses, dimensions) else { return Ok(None) };
+    let kept: Vec<usize> = (0..held.len()).filter(|i| !held[*i]).collect();
+    let coordinates = presses.coordinates.select(ndarray::Axis(0), &kept);
+    let means = presses.means.select(ndarray::Axis(0), &kept);
+    let samples = Samples { coordinates: coordinates.view(), outputs: means.view(), noise_variance: None };
+    let other = regression.condition(samples, process.hyperparameters())?;
+
+    let mut known: Vec<Option<Prediction>> = vec![None; held.len()];
+    let (mut square, mut count) = (0.0, 0);
+    for (place, output) in presses.places.iter().zip(presses.outputs.outer_iter()) {
+        if !held[*place] {
+            continue;
+        }
+        let at = presses.coordinates.row(*place).to_vec();
+        let prediction = known[*place].get_or_insert_with(|| Prediction::of(&other, &at, whitening));
+        if let Some(score) = prediction.score(&output.to_vec(), whitening, dimensions) {
+            square += score;
+            count += dimensions;
+        }
+    }
+    let factor = (square / count as f64).sqrt();
+    Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
+}
+
+/// Of each press, whether its position is one of those held out: every fifth, sorted.
+fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
+    let places: Vec<Vec<f64>> =
+        presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
+    let order = |a: &Vec<f64>, b: &Vec<f64>| {
+        a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
+    };
+    let mut positions = places.clone();
+    positions.sort_by(order);
+    positions.dedup();
+    if positions.len() < LEAST_TO_JUDGE {
+        return None;
+    }
+    let index = |place: &Vec<f64>| positions.partition_point(|other| order(other, place).is_lt());
+    Some(places.iter().map(|place| index(place) % 5 == 2).collect())
+}
+
+/// What the process expects somewhere, whitened.
+#[derive(Clone, Debug)]
+struct Prediction {
+    mean: Vec<f64>,
+    /// J, one column a coordinate: at most x, y and the nuisance coordinate.
+    slopes: Vec<Vec<f64>>,
+    /// v.
+    variance: f64,
+}
+
+impl Prediction {
+    fn of(process: &GaussianProcess, at: &[f64], whitening: &Whitening) -> Self {
+        let (channels, d) = (process.outputs(), process.coordinates());
+        let (raw, variances) = process.predict(at);
+        let (mut unused, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
+        process.mean_and_gradient_into(at, &mut unused, &mut gradients, &mut process.scratch());
+        let white = |values: &[f64]| {
+            let mut white = vec![0.0; channels];
+            whitening.apply(values, &mut white);
+            white
+        };
+        let slope = |k: usize| white(&gradients.iter().skip(k).step_by(d).copied().collect::<Vec<f64>>());
+        let signal = process.signal_variance(0);
+        let variance = if signal > 0.0 { variances[0] / signal } else { 0.0 };
+        Self { mean: white(&raw), slopes: (0..d).map(slope).collect(), variance }
+    }
+
+    /// The squared standardized position error of a reading; `None` where the slopes tell no position.
+    fn score(&self, output: &[f64], whitening: &Whitening, dimensions: usize) -> Option<f64> {
+        let mut residual = vec![0.0; output.len()];
+        whitening.apply(output, &mut residual);
+        residual.iter_mut().zip(&self.mean).for_each(|(r, mean)| *r -= mean);
+        let (mut information, mut score) = ([[0.0; 3]; 3], [0.0; 3]);
+        for (i, slope) in self.slopes.iter().enumerate() {
+            score[i] = self.product(slope, &residual, whitening);
+            for (j, other) in self.slopes.iter().enumerate() {
+                information[i][j] = self.product(slope, other, whitening);
+            }
+        }
+        let factors = Ldl::of_free(&information, std::array::from_fn(|i| i < self.slopes.len()))?;
+        let of_position = Ldl::of_free(&factors.inverse(), std::array::from_fn(|i| i < dimensions))?;
+        let score = of_position.quadratic(factors.solve(score));
+        score.is_finite().then_some(score)
+    }
+
+    /// aᵀ·V⁻¹·b, V = I + v·diag(d) + γ²·μ·μᵀ.
+    fn product(&self, a: &[f64], b: &[f64], whitening: &Whitening) -> f64 {
+        let diagonal = |a: &[f64], b: &[f64]| -> f64 {
+            let products = a.iter().zip(b).zip(&whitening.signal);
+            products.map(|((a, b), signal)| a * b / (1.0 + self.variance * signal)).sum()
+        };
+        let gain2 = whitening.gain * whitening.gain;
+        let growth = 1.0 + gain2 * diagonal(&self.mean, &self.mean);
+        diagonal(a, b) - gain2 * diagonal(a, &self.mean) * diagonal(b, &self.mean) / growth
+    }
 }

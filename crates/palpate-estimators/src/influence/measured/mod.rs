@@ -1,11 +1,11 @@
 //! A surface without a model: what the sensors read is learnt as a function of where, and how, it is touched.
 //!
-//! The forward way: reading = f(position, hidden) + noise, with f a Gaussian process, and *hidden* whatever else shapes
+//! The forward way: reading = f(position, nuisance) + noise, with f a Gaussian process, and *nuisance* whatever else shapes
 //! the reading, is known while calibrating and unknown afterwards: the force, or how deep the surface is indented. A
 //! reading is located by its posterior over position and nuisance coordinate, every value of both within the presses
 //! that were made (and half a gap beyond) held as likely as any other before the reading is seen:
 //!
-//! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d hidden,
+//! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d nuisance,
 //!
 //! f̄ and v the process's mean and relative variance, S its signal's covariance, C that of the noise, and N the normal
 //! density without its determinant: v is least at the presses, so its determinant would pull every estimate towards
@@ -15,23 +15,17 @@
 //! C is that of repeats, or what the process calls noise where there are none, widened by what positions that were held
 //! out of the recording show it to miss.
 
-mod axis;
 mod config;
 mod fitting;
-mod line;
 mod locator;
-mod misfit;
 mod noise;
-mod posterior;
-mod scale;
+mod presses;
 mod table;
 
-pub use axis::Axis;
-pub use config::{MeasuredError, MeasuredInfluence};
+pub use config::{MeasuredError, MeasuredInfluence, Scale};
 pub use locator::{MeasuredLocator, NuisanceRole};
 pub use noise::Whitening;
-pub use scale::Scale;
-pub use table::Table;
+pub use table::{Axis, Table};
 
 #[cfg(test)]
 mod tests;

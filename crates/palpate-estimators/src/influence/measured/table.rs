@@ -1,11 +1,66 @@
-//! The learnt readings, tabulated over position and nuisance coordinate.
+//! Learnt readings, tabulated over position and nuisance coordinate, and how well the places of the table explain a reading.
+//!
+//! Along the nuisance coordinate the mean is taken as straight between two nodes, so the integral over it is that of a normal density
+//! along a straight line through the space of readings: a density across it times a share along it.
 
-use super::line::Line;
-use super::{Axis, Whitening};
+use super::noise::Whitening;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Evenly spaced nodes.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// The first node.
+    pub start: f64,
+    /// From one node to the next; greater than 0.
+    pub step: f64,
+    /// Nodes; at least 1.
+    pub count: usize,
+}
+
+impl Axis {
+    /// A coordinate that does not vary.
+    pub const NONE: Self = Self { start: 0.0, step: 1.0, count: 1 };
+
+    /// Nodes over the span of `values`, and half their largest gap beyond at either end but not beyond `bounds`; about
+    /// two nodes for every distinct value, and at least `per_length` a `length`, but no more than `most`.
+    pub fn over(mut values: Vec<f64>, bounds: (f64, f64), length: f64, most: usize) -> Self {
+        /// Nodes a length scale: linear and cubic interpolation between them is then better than the noise.
+        const PER_LENGTH: f64 = 8.0;
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        let (Some(first), Some(last)) = (values.first(), values.last()) else { return Self::NONE };
+        let gap = values.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        let (from, to) = ((first - 0.5 * gap).max(bounds.0), (last + 0.5 * gap).min(bounds.1));
+        // One value alone, or none that differ by more than rounding.
+        if (to - from).is_nan() || to - from <= 1e-9 * (from.abs() + to.abs()) {
+            return Self { start: *first, ..Self::NONE };
+        }
+        let by_values = 2 * values.len() - 1;
+        let by_length = ((to - from) / length * PER_LENGTH).min(most as f64) as usize + 2;
+        let count = by_values.max(by_length).min(most).max(4);
+        Self { start: from, step: (to - from) / (count - 1) as f64, count }
+    }
+
+    /// The same span with `factor` times the nodes, but no more than `most`; unchanged where that is no more.
+    pub(super) fn finer(self, factor: f64, most: usize) -> Self {
+        let wanted = (self.count as f64 * factor).ceil().min(most as f64) as usize;
+        if self.count < 2 || wanted <= self.count {
+            return self;
+        }
+        let span = self.step * (self.count - 1) as f64;
+        Self { step: span / (wanted - 1) as f64, count: wanted, ..self }
+    }
+
+    /// The coordinate at `place`, in nodes from the first.
+    pub fn at(&self, place: f64) -> f64 {
+        self.start + self.step * place
+    }
+}
 
 /// Whitened mean readings and their relative variance at the nodes of a grid.
 ///
-/// Index of a node: (x·count_y + y)·count_hidden + hidden.
+/// Index of a node: (x·count_y + y)·count_nuisance + nuisance.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table {
@@ -159,4 +214,155 @@ fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
         *weight = others.map(|j| (at - j as f64) / (i as f64 - j as f64)).product();
     }
     (first, weights)
+}
+
+/// Nodes of one place along the nuisance coordinate.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line<'a> {
+    /// Whitened means, node by node.
+    pub means: &'a [f64],
+    /// v at each node.
+    pub variances: &'a [f64],
+}
+
+/// How probable a place is: the likelihood integrated over the nuisance coordinate.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Marginal {
+    /// ∫ exp(−(residual − reference)/2), over the nuisance coordinate in nodes.
+    pub weight: f64,
+    /// The same with the nuisance coordinate, in nodes, as a factor; and with its square.
+    pub nuisance: f64,
+    pub nuisance_square: f64,
+}
+
+/// A stretch between two nodes, as seen from a reading.
+///
+/// With a = z − μ₀ and d = μ₁ − μ₀, both divided by the standard deviations: |a − s·d|² for s from 0 to 1.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    /// |a|², a·d, |d|².
+    aa: f64,
+    ad: f64,
+    dd: f64,
+}
+
+impl<'a> Line<'a> {
+    /// The least squared residual of the whitened reading, over the variance of noise and process.
+    pub fn residual(self, reading: &[f64], noise: &Whitening) -> f64 {
+        let residuals = self.stretches(reading, noise).map(|stretch| stretch.residual_at(stretch.foot()));
+        residuals.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The integral over the nuisance coordinate, relative to the likelihood of the residual `reference`.
+    pub fn marginal(self, reading: &[f64], noise: &Whitening, reference: f64) -> Marginal {
+        let mut sum = Marginal::default();
+        for (i, stretch) in self.stretches(reading, noise).enumerate() {
+            let Share { weight, middle, spread } = stretch.integral(reference);
+            let nuisance = i as f64 + middle;
+            sum.weight += weight;
+            sum.nuisance += weight * nuisance;
+            sum.nuisance_square += weight * (nuisance * nuisance + spread);
+        }
+        sum
+    }
+
+    /// From each node to the next; one of no length where there is a single node.
+    fn stretches(self, reading: &'a [f64], noise: &'a Whitening) -> impl Iterator<Item = Stretch> + 'a {
+        let (channels, nodes) = (noise.channels(), self.variances.len());
+        let node = move |i: usize| &self.means[i * channels..(i + 1) * channels];
+        (0..nodes.saturating_sub(1).max(1)).map(move |i| {
+            let next = (i + 1).min(nodes - 1);
+            let share = 0.5 * (self.variances[i] + self.variances[next]);
+            let mut stretch = Stretch { aa: 0.0, ad: 0.0, dd: 0.0 };
+            for (((z, from), to), signal) in reading.iter().zip(node(i)).zip(node(next)).zip(&noise.signal) {
+                let variance = 1.0 + share * signal;
+                let (a, d) = (z - from, to - from);
+                stretch.aa += a * a / variance;
+                stretch.ad += a * d / variance;
+                stretch.dd += d * d / variance;
+            }
+            if noise.gain > 0.0 { stretch.with_gain(reading, node(i), share, noise) } else { stretch }
+        })
+    }
+}
+
+/// What a stretch adds to the integral.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    weight: f64,
+    /// Mean and variance of s there.
+    middle: f64,
+    spread: f64,
+}
+
+/// So small a share of a normal distribution is a point, at the end next to it.
+const FARTHEST: f64 = 1e-12;
+/// Beyond this many halved squares below the reference a stretch has no weight.
+const NEGLIGIBLE: f64 = 60.0;
+/// A stretch shorter than this has the same likelihood all along.
+const SHORT: f64 = 1e-4;
+
+impl Stretch {
+    /// With a gain that scatters by γ about 1: the covariance grows by γ²·μ·μᵀ, so with V the variances,
+    /// |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). For a stretch of no length only.
+    fn with_gain(mut self, reading: &[f64], mean: &[f64], share: f64, noise: &Whitening) -> Self {
+        let (mut mm, mut ma) = (0.0, 0.0);
+        for ((z, mean), signal) in reading.iter().zip(mean).zip(&noise.signal) {
+            let scaled = mean / (1.0 + share * signal);
+            mm += mean * scaled;
+            ma += (z - mean) * scaled;
+        }
+        let gain2 = noise.gain * noise.gain;
+        let growth = 1.0 + gain2 * mm;
+        self.aa = (self.aa - gain2 * ma * ma / growth).max(0.0);
+        self
+    }
+
+    /// The s of the least residual.
+    fn foot(self) -> f64 {
+        if self.dd > 0.0 { (self.ad / self.dd).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    fn residual_at(self, s: f64) -> f64 {
+        (self.aa - 2.0 * s * self.ad + s * s * self.dd).max(0.0)
+    }
+
+    /// ∫₀¹ exp(−(residual(s) − reference)/2) ds.
+    fn integral(self, reference: f64) -> Share {
+        let foot = self.foot();
+        let least = self.residual_at(foot);
+        if least - reference > NEGLIGIBLE {
+            return Share { weight: 0.0, middle: foot, spread: 0.0 };
+        }
+        let scale = |residual: f64| (-0.5 * (residual - reference)).exp();
+        let length = self.dd.sqrt();
+        if length < SHORT {
+            return Share { weight: scale(least), middle: 0.5, spread: 1.0 / 12.0 };
+        }
+        // Across: the residual that no s takes away. Along: a normal density of mean s₀ and deviation 1/length.
+        let middle = self.ad / self.dd;
+        let across = (self.aa - self.ad * middle).max(0.0);
+        let (from, to) = (-middle * length, (1.0 - middle) * length);
+        let share = normal_share(from, to);
+        let weight = (2.0 * PI).sqrt() / length * share * scale(across);
+        if share < FARTHEST {
+            return Share { weight, middle: foot, spread: 0.0 };
+        }
+        // Mean and variance of a normal distribution cut off at both ends.
+        let (low, high) = (normal_density(from) / share, normal_density(to) / share);
+        let moved = low - high;
+        let spread = (1.0 + from * low - to * high - moved * moved).max(0.0) / (length * length);
+        Share { weight, middle: (middle + moved / length).clamp(0.0, 1.0), spread }
+    }
+}
+
+/// The standard normal density.
+fn normal_density(n: f64) -> f64 {
+    (-0.5 * n * n).exp() / (2.0 * PI).sqrt()
+}
+
+/// P(from < n < to) for a standard normal n, exact in the tails.
+fn normal_share(from: f64, to: f64) -> f64 {
+    let below = |n: f64| 0.5 * libm::erfc(-n / SQRT_2);
+    if from > 0.0 { below(-from) - below(-to) } else { below(to) - below(from) }
 }

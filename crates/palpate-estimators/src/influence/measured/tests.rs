@@ -93,7 +93,7 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
 }
 
 #[test]
-fn a_named_hidden_coordinate_comes_before_the_force_and_is_not_told() {
+fn a_named_nuisance_coordinate_comes_before_the_force_and_is_not_told() {
     let mut recording = squeezes(3);
     recording.rows.iter_mut().for_each(|row| row.nuisance = row.force_n.map(|force| force - 2.0));
     let locator = fit(&setup(STRIP, 2, None), &recording);

@@ -3,9 +3,8 @@
 //! Symbols as in [`super::search`]. A cell is two nodes of the table long and wide, and the odd nodes are their middles: no
 //! middle lies on an edge, where a support may hide every contact.
 
-use super::patches::{Lanes, Patches};
-use super::table::PlaneTable;
-use crate::influence::belief::ForceBelief;
+use super::table::{Lanes, Patches, PlaneTable};
+use crate::influence::config::ForceBelief;
 
 /// Valleys from which a refinement starts, at most.
 pub(super) const MOST_VALLEYS: usize = 6;

@@ -5,7 +5,7 @@
 use super::locator::PlaneLocator;
 use super::search::Search;
 use crate::fit::Locate;
-use crate::influence::belief::ForceBelief;
+use crate::influence::config::ForceBelief;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, PlaneLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
@@ -42,7 +42,7 @@ impl Likelihood for PlateLikelihood {
     }
 
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
-        self.search.whiten_into(reading, whitened);
+        self.search.whiten(reading, whitened);
     }
 
     fn fit_nothing(&self, whitened: &[f64], _mode_n: f64) -> ContactFit<1> {

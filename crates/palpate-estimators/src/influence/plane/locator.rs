@@ -1,11 +1,11 @@
 //! A fitted influence locator of a plane with a model.
 
-use super::answer::locate;
-use super::search::{Scratch, Search};
+use super::posterior::{Scratch, locate};
+use super::search::Search;
 use super::table::PlaneTable;
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::belief::ForceBelief;
-use crate::influence::channels::{self, Channels};
+use crate::influence::channels::Channels;
+use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
@@ -24,15 +24,8 @@ pub struct PlaneLocator {
 struct Stored {
     /// Influence functions.
     table: PlaneTable,
-    /// Offset of each channel, in its SI unit.
-    offsets: Vec<f64>,
-    /// Noise of each channel, in its SI unit.
-    noise_sd: Vec<f64>,
-    /// Channels that are left out.
-    dead: Vec<bool>,
+    channels: Channels,
     force: ForceBelief,
-    /// Mean force of the calibration, in newtons.
-    reference_force_n: f64,
 }
 
 /// Memory for locating readings on a plane, to be used again.
@@ -40,10 +33,8 @@ struct Stored {
 pub struct PlaneScratch(Scratch);
 
 impl PlaneLocator {
-    pub(super) fn new(table: PlaneTable, channels: Channels, dead: Vec<bool>, force: ForceBelief) -> Self {
-        let Channels { offsets, noise_sd, reference_force_n } = channels;
-        let stored = Stored { table, offsets, noise_sd, dead, force, reference_force_n };
-        Self { search: stored.search(), stored }
+    pub(super) fn new(table: PlaneTable, channels: Channels, force: ForceBelief) -> Self {
+        Stored { table, channels, force }.into_locator()
     }
 
     /// The influence functions.
@@ -59,15 +50,14 @@ impl PlaneLocator {
     /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
     /// nothing changes.
     pub fn leave_out(&mut self, channel: usize) -> bool {
-        let Some(dead) = channels::without(&self.stored.dead, channel) else { return false };
-        let stored = Stored { dead, ..self.stored.clone() };
-        *self = Self { search: stored.search(), stored };
+        let Some(channels) = self.stored.channels.without(channel) else { return false };
+        *self = Stored { channels, ..self.stored.clone() }.into_locator();
         true
     }
 
     /// What is searched, with something else known of the force.
     pub(super) fn search_with(&self, force: ForceBelief) -> Search {
-        Stored { force, ..self.stored.clone() }.search()
+        Search::new(&self.stored.table, &self.stored.channels, force)
     }
 
     /// [`Locate::locate`] with memory of the caller's.
@@ -87,19 +77,18 @@ impl Locate for PlaneLocator {
 }
 
 impl Stored {
-    fn search(&self) -> Search {
-        let Self { table, offsets, noise_sd, dead, force, reference_force_n } = self;
-        Search::new(table, offsets, noise_sd, dead, *force, *reference_force_n)
+    fn into_locator(self) -> PlaneLocator {
+        PlaneLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
     }
 
     /// Checks what a file may have got wrong.
     fn check(&self) -> Result<(), LocatorFault> {
-        let Self { table, offsets, noise_sd, dead, force, reference_force_n } = self;
+        let Self { table, channels, force } = self;
         let count = LocatorFault::check_count;
         let cells = table.sensors.saturating_mul(table.columns).saturating_mul(table.rows);
         count("influence values", cells, table.values.len())?;
         count("influence variances", cells, table.variances.len())?;
-        channels::check(table.sensors, offsets, noise_sd, dead, *force)?;
+        channels.check(table.sensors, *force)?;
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
         };
@@ -108,8 +97,8 @@ impl Stored {
         numbers("side of the grid", &sides, is_side, "odd and at least 9")?;
         numbers("influence value", &table.values, |_| true, "a finite number")?;
         numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
-        let positive = [table.length_m, table.width_m, *reference_force_n];
-        numbers("length, width or force", &positive, |x| x > 0.0, "greater than 0")
+        let positive = [table.length_m, table.width_m];
+        numbers("length or width", &positive, |x| x > 0.0, "greater than 0")
     }
 }
 
@@ -118,7 +107,7 @@ impl TryFrom<Stored> for PlaneLocator {
 
     fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
         stored.check()?;
-        Ok(Self { search: stored.search(), stored })
+        Ok(stored.into_locator())
     }
 }
 

@@ -1,14 +1,10 @@
 //! Influence functions of a plane with a model, and their inversion: bicubic patches over a grid, searched coarsely and
 //! refined by Levenberg's steps.
 
-mod answer;
 mod coarse;
-mod fitting;
 mod likelihood;
 mod locator;
-mod modes;
-mod patches;
-mod refine;
+mod posterior;
 mod search;
 mod table;
 
@@ -16,7 +12,27 @@ pub use likelihood::PlateLikelihood;
 pub use locator::{PlaneLocator, PlaneScratch};
 pub use table::PlaneTable;
 
-pub(super) use fitting::fit_plane;
+use super::config::{Influence, InfluenceFitError};
+use super::learning::{LearntInfluence, learn};
+use crate::fit::FitTask;
+use palpate_mechanics::contact::Position;
+
+/// Fits the influence functions of a plane with a model.
+pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, InfluenceFitError> {
+    if config.contacts > 1 {
+        return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
+    }
+    let mut table = PlaneTable::empty(task.setup.layout.len(), task.setup.surface.extent());
+    let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();
+    let fill = &mut |s: usize, learnt: &LearntInfluence| {
+        for node in 0..table.nodes() {
+            table.values[node * table.sensors + s] = learnt.mean(node);
+            table.variances[node * table.sensors + s] = learnt.variance(node);
+        }
+    };
+    let channels = learn(config.from, task, &places, fill)?;
+    Ok(PlaneLocator::new(table, channels, config.force_belief(task.setup)))
+}
 
 #[cfg(test)]
 mod tests;

@@ -1,17 +1,17 @@
-//! Where one contact on a plane is: whitened search over the table, then Levenberg's steps.
+//! Where one contact on a plane is: whitened search over the table, then Levenberg's steps (K. Levenberg, Quart. Appl. Math. 2, 1944,
+//! with Marquardt's scaling by the diagonal).
 //!
 //! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, (x, y) position,
 //! e = d − W·f the residual, w weights 1/(1 + v) with v the calibration's variance of a reading over the noise's,
 //! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
-use super::modes::{Block, Leaf};
-use super::patches::{Lanes, Patches};
-use super::table::PlaneTable;
-use crate::influence::belief::ForceBelief;
-use crate::influence::search::worst_misfit;
+use super::table::{Lanes, Patches, PlaneTable};
+use crate::influence::channels::Channels;
+use crate::influence::config::ForceBelief;
+use crate::status::misfit_bound;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_numerics::small::{Matrix, add_outer};
+use palpate_numerics::small::{Ldl, Matrix, add_outer};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,21 +37,9 @@ pub(super) struct Search {
     pub size_m: [f64; 2],
     /// What a contact costs, by the criterion that counts contacts (Chen and Chen, Biometrika 95, 2008).
     pub charge: f64,
-    /// A misfit of one contact is larger than this once in ten thousand readings; infinite where none can be.
-    pub worst_misfit: f64,
-    /// |d|² of noise alone is larger than this once in ten thousand readings.
-    pub worst_noise: f64,
-}
-
-/// Memory for locating readings.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
-    pub whitened: Vec<f64>,
-    pub profile: Profile,
-    /// Parts of the surface that are still to be looked at.
-    pub blocks: Vec<Block>,
-    /// Those that hold the probability.
-    pub leaves: Vec<Leaf>,
+    /// The largest misfit of one contact, and the largest |d|² of noise alone, by the rule of [`crate::status`].
+    pub misfit_bound: f64,
+    pub noise_bound: f64,
 }
 
 /// x and y in metres, and the force in newtons.
@@ -75,15 +63,9 @@ const NEGLIGIBLE: f64 = 24.0;
 
 impl Search {
     /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
-    pub fn new(
-        table: &PlaneTable,
-        offsets: &[f64],
-        noise_sd: &[f64],
-        dead: &[bool],
-        force: ForceBelief,
-        reference_force_n: f64,
-    ) -> Self {
-        let live: Vec<usize> = (0..table.sensors).filter(|s| !dead[*s]).collect();
+    pub fn new(table: &PlaneTable, channels: &Channels, force: ForceBelief) -> Self {
+        let Channels { offsets, noise_sd, reference_force_n, .. } = channels;
+        let live = channels.live();
         let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
         let patches = Patches::new(table, &live, &inverse_sd);
         let mut variances = vec![[0.0; 8]; table.nodes() * patches.groups];
@@ -93,7 +75,7 @@ impl Search {
                     table.variances[node * table.sensors + s] * inverse * inverse;
             }
         }
-        let weights_force_n = force.weights_force_n(reference_force_n);
+        let weights_force_n = force.weights_force_n(*reference_force_n);
         let weight = |v: f64| 1.0 / (1.0 + weights_force_n * weights_force_n * v);
         let weights: Vec<Lanes> = variances.iter().map(|lanes| lanes.map(weight)).collect();
         let coarse = Coarse::new(table, &patches, live.len(), force);
@@ -110,8 +92,8 @@ impl Search {
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
             charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
-            worst_misfit: worst_misfit(channels.saturating_sub(unknowns)),
-            worst_noise: worst_misfit(channels),
+            misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
+            noise_bound: misfit_bound(channels),
             size_m: [table.length_m, table.width_m],
             live,
             inverse_sd,
@@ -126,14 +108,8 @@ impl Search {
         }
     }
 
-    /// Puts d into the scratch; |d|².
-    pub fn whiten(&self, reading: &[f64], scratch: &mut Scratch) -> f64 {
-        self.whiten_into(reading, &mut scratch.whitened);
-        scratch.whitened.iter().map(|d| d * d).sum()
-    }
-
-    /// Writes d over `whitened`; a reading that is absurdly loud, at the loudness whose squares are still numbers.
-    pub fn whiten_into(&self, reading: &[f64], whitened: &mut Vec<f64>) {
+    /// Writes d over `whitened`, and returns |d|²; of a reading that is absurdly loud, at the loudness whose squares are still numbers.
+    pub fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) -> f64 {
         whitened.clear();
         let channels = self.live.iter().zip(&self.offsets).zip(&self.inverse_sd);
         let finite = |d: f64| d.clamp(f64::MIN, f64::MAX);
@@ -143,21 +119,27 @@ impl Search {
             let scale = LOUDEST / loudest;
             whitened.iter_mut().for_each(|d| *d *= scale);
         }
+        whitened.iter().map(|d| d * d).sum()
     }
 
     /// The minima that matter, best first, of a reading that was whitened to length `square`.
-    pub fn minima(&self, square: f64, scratch: &mut Scratch) -> ([Minimum; MOST_VALLEYS], usize) {
-        self.coarse.scan(&scratch.whitened, square, self.force, &mut scratch.profile);
-        let (valleys, count) = self.coarse.valleys(&scratch.profile);
+    pub fn minima(
+        &self,
+        square: f64,
+        whitened: &[f64],
+        profile: &mut Profile,
+    ) -> ([Minimum; MOST_VALLEYS], usize) {
+        self.coarse.scan(whitened, square, self.force, profile);
+        let (valleys, count) = self.coarse.valleys(profile);
         let mut found = [NOWHERE; MOST_VALLEYS];
         let (mut kept, mut best) = (0, f64::INFINITY);
         for valley in &valleys[..count] {
-            if self.floor(&scratch.profile, valley.cell) > best + NEGLIGIBLE {
+            if self.floor(profile, valley.cell) > best + NEGLIGIBLE {
                 continue;
             }
-            let minimum = self.refine(&scratch.whitened, self.coarse.middle_m(valley.cell));
+            let minimum = self.refine(whitened, self.coarse.middle_m(valley.cell));
             best = best.min(minimum.misfit);
-            match found[..kept].iter().position(|other| self.same(&scratch.whitened, other, &minimum)) {
+            match found[..kept].iter().position(|other| self.same(whitened, other, &minimum)) {
                 Some(i) if minimum.misfit < found[i].misfit => found[i] = minimum,
                 Some(_) => {}
                 None => {
@@ -325,3 +307,61 @@ pub(super) struct Equations {
 }
 
 const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };
+
+/// Steps, those that were refused included.
+const MOST_STEPS: usize = 40;
+/// A step that lowers the misfit by less than this, a fiftieth of a standard deviation, is the last one.
+const SMALL: f64 = 4e-4;
+
+impl Search {
+    /// The minimum near a place.
+    pub fn refine(&self, whitened: &[f64], start_m: [f64; 2]) -> Minimum {
+        let mut at: Unknowns = [start_m[0], start_m[1], self.best_force(whitened, start_m)];
+        // Within one refinement the calibration's variances stay, so that misfits can be compared.
+        let mut here = self.equations(whitened, at, Some(start_m));
+        let mut damping = 1e-3;
+        for _ in 0..MOST_STEPS {
+            let Some(step) = self.step(&here, at, damping) else { break };
+            let next = self.held([at[0] + step[0], at[1] + step[1], at[2] + step[2]]);
+            let moved = [next[0] - at[0], next[1] - at[1], next[2] - at[2]];
+            let gain: f64 = moved.iter().zip(&here.right).map(|(step, right)| step * right).sum();
+            let there = self.equations(whitened, next, Some(start_m));
+            if there.misfit <= here.misfit {
+                (at, here) = (next, there);
+                damping = (0.1 * damping).max(1e-9);
+            } else {
+                damping = (10.0 * damping).max(1e-3);
+            }
+            if gain.abs() <= SMALL {
+                break;
+            }
+        }
+        let Equations { misfit, information, .. } = self.equations(whitened, at, None);
+        Minimum { at, misfit, information }
+    }
+
+    /// Unknowns on the surface, with a force that presses.
+    fn held(&self, [x_m, y_m, force_n]: Unknowns) -> Unknowns {
+        [x_m.clamp(0.0, self.size_m[0]), y_m.clamp(0.0, self.size_m[1]), force_n.max(0.0)]
+    }
+
+    /// The damped step of those unknowns that are free: at an edge, the one that leads beyond it is not. `None` where no
+    /// unknown is free or the reading tells nothing.
+    fn step(&self, equations: &Equations, at: Unknowns, damping: f64) -> Option<Unknowns> {
+        let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), (0.0, f64::INFINITY)];
+        let mut free = [true; 3];
+        free[2] = self.force.known_n().is_none();
+        for k in 0..3 {
+            let right = equations.right[k];
+            free[k] &= !(at[k] <= ends[k].0 && right < 0.0 || at[k] >= ends[k].1 && right > 0.0);
+        }
+        if free == [false; 3] {
+            return None;
+        }
+        let mut matrix = equations.information;
+        for (k, row) in matrix.iter_mut().enumerate() {
+            row[k] *= 1.0 + damping;
+        }
+        Some(Ldl::of_free(&matrix, free)?.solve(equations.right))
+    }
+}

@@ -1,9 +1,13 @@
-//! Influence functions on a plane, as a table over a grid.
-
-use serde::{Deserialize, Serialize};
+//! Influence functions on a plane, as a table over a grid with bicubic patches between its nodes.
+//!
+//! A patch is the tensor product of two cubic Hermite polynomials: it takes value, both derivatives and the mixed
+//! derivative at its four corners, and joins its neighbours with a continuous gradient. The derivatives at the nodes are
+//! differences of fourth order of the table's values, so that a table holds nothing but values (Abramowitz and Stegun,
+//! table 25.2, five points; one-sided at the edges).
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use serde::{Deserialize, Serialize};
 
 /// What every sensor reads per newton, with its uncertainty, at the nodes of a grid over a rectangle.
 ///
@@ -66,5 +70,201 @@ impl PlaneTable {
     /// The value of every node for one sensor.
     pub(super) fn of_sensor(&self, sensor: usize) -> impl Iterator<Item = f64> + '_ {
         self.values.iter().skip(sensor).step_by(self.sensors).copied()
+    }
+}
+
+/// Numbers of eight sensors.
+pub(super) type Lanes = [f64; 8];
+
+/// The patches of some sensors, in groups of eight, filled up with zeros.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Patches {
+    columns: usize,
+    rows: usize,
+    inverse_spacing: [f64; 2],
+    pub groups: usize,
+    /// For each node and group: f, and the derivatives by column, by row and by both.
+    nodes: Vec<[Lanes; 4]>,
+}
+
+/// A place within a patch, and the weights of its corners.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// The corner at the lower left.
+    node: usize,
+    /// Weights along: of value left and right, of derivative left and right; then those of the function's derivative.
+    along: [[f64; 4]; 2],
+    across: [[f64; 4]; 2],
+}
+
+/// f and its derivatives along and across, of eight sensors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Values {
+    pub f: Lanes,
+    pub along: Lanes,
+    pub across: Lanes,
+}
+
+impl Patches {
+    /// Of the sensors `live` of a table, each multiplied by its factor.
+    pub fn new(table: &PlaneTable, live: &[usize], factors: &[f64]) -> Self {
+        let groups = live.len().div_ceil(8);
+        let mut nodes = vec![[[0.0; 8]; 4]; table.nodes() * groups];
+        for (i, (sensor, factor)) in live.iter().zip(factors).enumerate() {
+            let (group, lane) = (i / 8, i % 8);
+            let values: Vec<f64> = table.of_sensor(*sensor).map(|value| factor * value).collect();
+            let by_column = differences(&values, table.columns, table.rows, 1, table.columns);
+            let by_row = differences(&values, table.rows, table.columns, table.columns, 1);
+            let by_both = differences(&by_column, table.rows, table.columns, table.columns, 1);
+            for (kind, list) in [values, by_column, by_row, by_both].iter().enumerate() {
+                for (node, value) in list.iter().enumerate() {
+                    nodes[node * groups + group][kind][lane] = *value;
+                }
+            }
+        }
+        let inverse_spacing = table.spacing_m().map(|spacing_m| 1.0 / spacing_m);
+        Self { columns: table.columns, rows: table.rows, inverse_spacing, groups, nodes }
+    }
+
+    /// The patch that holds a place, which is held to the surface.
+    #[inline]
+    pub fn place(&self, x_m: f64, y_m: f64) -> Place {
+        let (column, along) = hermite(x_m * self.inverse_spacing[0], self.columns);
+        let (row, across) = hermite(y_m * self.inverse_spacing[1], self.rows);
+        Place { node: row * self.columns + column, along, across }
+    }
+
+    /// f and its gradient at a place, of the sensors of a group.
+    #[inline]
+    pub fn values(&self, place: &Place, group: usize) -> Values {
+        let Place { node, along: [u, du], across: [v, dv] } = place;
+        let mut values = Values { f: [0.0; 8], along: [0.0; 8], across: [0.0; 8] };
+        for side in 0..4 {
+            let (right, up) = (side % 2, side / 2);
+            let corner = &self.nodes[(node + right + up * self.columns) * self.groups + group];
+            for (kind, lanes) in corner.iter().enumerate() {
+                // The derivative by column goes with the derivative's weight along, and so on.
+                let (i, j) = (right + 2 * (kind % 2), up + 2 * (kind / 2));
+                let (f, along, across) = (u[i] * v[j], du[i] * v[j], u[i] * dv[j]);
+                for (lane, value) in lanes.iter().enumerate() {
+                    values.f[lane] += f * value;
+                    values.along[lane] += along * value;
+                    values.across[lane] += across * value;
+                }
+            }
+        }
+        for lane in 0..8 {
+            values.along[lane] *= self.inverse_spacing[0];
+            values.across[lane] *= self.inverse_spacing[1];
+        }
+        values
+    }
+
+    /// f alone at a place, of the sensors of a group.
+    #[inline]
+    pub fn value(&self, place: &Place, group: usize) -> Lanes {
+        let Place { node, along: [u, _], across: [v, _] } = place;
+        let mut value = [0.0; 8];
+        for side in 0..4 {
+            let (right, up) = (side % 2, side / 2);
+            let corner = &self.nodes[(node + right + up * self.columns) * self.groups + group];
+            for (kind, lanes) in corner.iter().enumerate() {
+                let weight = u[right + 2 * (kind % 2)] * v[up + 2 * (kind / 2)];
+                for lane in 0..8 {
+                    value[lane] += weight * lanes[lane];
+                }
+            }
+        }
+        value
+    }
+
+    /// f of a group at a node.
+    pub fn at_node(&self, column: usize, row: usize, group: usize) -> &Lanes {
+        &self.nodes[(row * self.columns + column) * self.groups + group][0]
+    }
+
+    /// The node nearest to a place.
+    #[inline]
+    pub fn nearest(&self, x_m: f64, y_m: f64) -> usize {
+        let near = |at: f64, count: usize| (at.round().max(0.0) as usize).min(count - 1);
+        let (column, row) = (
+            near(x_m * self.inverse_spacing[0], self.columns),
+            near(y_m * self.inverse_spacing[1], self.rows),
+        );
+        row * self.columns + column
+    }
+}
+
+/// The cell of a coordinate, in nodes, and the weights of value before and behind and of derivative before and behind; of
+/// the function and of its derivative.
+#[inline]
+fn hermite(place: f64, count: usize) -> (usize, [[f64; 4]; 2]) {
+    let place = place.clamp(0.0, (count - 1) as f64);
+    let cell = (place as usize).min(count - 2);
+    let t = place - cell as f64;
+    let (t2, t3) = (t * t, t * t * t);
+    let bump = 6.0 * (t - t2);
+    let value = [2.0 * t3 - 3.0 * t2 + 1.0, 3.0 * t2 - 2.0 * t3, t3 - 2.0 * t2 + t, t3 - t2];
+    (cell, [value, [-bump, bump, 3.0 * t2 - 4.0 * t + 1.0, 3.0 * t2 - 2.0 * t]])
+}
+
+/// Derivatives per node along lines of `count` numbers that lie `step` apart; there are `lines` of them, `pitch` apart.
+fn differences(values: &[f64], count: usize, lines: usize, step: usize, pitch: usize) -> Vec<f64> {
+    const INNER: [f64; 5] = [1.0, -8.0, 0.0, 8.0, -1.0];
+    const SECOND: [f64; 5] = [-3.0, -10.0, 18.0, -6.0, 1.0];
+    const FIRST: [f64; 5] = [-25.0, 48.0, -36.0, 16.0, -3.0];
+    let mut derivatives = vec![0.0; values.len()];
+    for line in 0..lines {
+        let at = |i: usize| line * pitch + i * step;
+        for i in 0..count {
+            let behind = count - 1 - i;
+            let (first, weights, mirrored) = match (i, behind) {
+                (0, _) => (0, FIRST, false),
+                (1, _) => (0, SECOND, false),
+                (_, 0) => (count - 1, FIRST, true),
+                (_, 1) => (count - 1, SECOND, true),
+                _ => (i - 2, INNER, false),
+            };
+            let term = |(k, weight): (usize, &f64)| {
+                if mirrored { -weight * values[at(first - k)] } else { weight * values[at(first + k)] }
+            };
+            derivatives[at(i)] = weights.iter().enumerate().map(term).sum::<f64>() / 12.0;
+        }
+    }
+    derivatives
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_mechanics::surface::Extent;
+
+    /// A polynomial of third degree in each direction.
+    fn cubic(x: f64, y: f64) -> f64 {
+        (x * x * x - 0.3 * x + 0.1) * (2.0 * y * y * y + y * y - 0.2)
+    }
+
+    #[test]
+    fn a_bicubic_is_given_back_with_its_gradient() {
+        let mut table = PlaneTable::empty(3, Extent::Plane { length_m: 0.6, width_m: 0.4 });
+        for node in 0..table.nodes() {
+            let at = table.node(node);
+            table.values[3 * node + 1] = cubic(at.x_m, at.y_m);
+        }
+        let patches = Patches::new(&table, &[0, 1], &[1.0, 2.0]);
+        for i in 0..=30 {
+            for j in 0..=20 {
+                let (x, y) = (f64::from(i) * 0.02, f64::from(j) * 0.02);
+                let values = patches.values(&patches.place(x, y), 0);
+                assert!((values.f[1] - 2.0 * cubic(x, y)).abs() < 1e-13, "{x}, {y}");
+                let (dx, dy) = ((3.0 * x * x - 0.3), (6.0 * y * y + 2.0 * y));
+                let along = 2.0 * dx * (2.0 * y * y * y + y * y - 0.2);
+                let across = 2.0 * dy * (x * x * x - 0.3 * x + 0.1);
+                assert!((values.along[1] - along).abs() < 1e-11 && (values.across[1] - across).abs() < 1e-11);
+                assert_eq!((values.f[0], values.f[2]), (0.0, 0.0));
+            }
+        }
+        let (inside, beyond) = (patches.place(0.6, 0.4), patches.place(f64::INFINITY, 9.0));
+        assert_eq!(patches.values(&inside, 0).f, patches.values(&beyond, 0).f);
     }
 }

@@ -175,9 +175,10 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
     for force_n in [Some(5.0), None] {
         let setup = Setup { force_n, ..rig.setup.clone() };
         let locator = fit(Influence::default(), &setup, &recording);
+        let mut false_alarms = 0;
         for _ in 0..50 {
             let nothing = locator.locate(&noisy(&rig.setup, &clean, &[], &mut rng));
-            assert_eq!(nothing.status, Status::NoContact, "{force_n:?}: {nothing:?}");
+            false_alarms += usize::from(nothing.status != Status::NoContact);
             let two = locator.locate(&noisy(
                 &rig.setup,
                 &clean,
@@ -189,6 +190,8 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
             assert_eq!(one.status, Status::Located);
             assert!((one.contact.force_n.unwrap() - 5.0).abs() < 0.5, "{force_n:?}: {one:?}");
         }
+        // One in a thousand readings of noise: of fifty more than one in a thousand tests.
+        assert!(false_alarms <= 1, "{force_n:?}: {false_alarms} of 50");
     }
 }
 

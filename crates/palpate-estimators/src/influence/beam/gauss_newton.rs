@@ -2,19 +2,87 @@
 //! once.
 //!
 //! Symbols as in [`super::search`]. `V` holds eight channels of a reading, `N` a number each of one or eight readings.
+//!
+//! How far a step may go to be the last: all weighted, and m a step of the position, σ² the position's variance, |e|² = χ².
+//! Where the force is not known it is the best at its place, and makes up for the part of f′ along f, which is c·f; g is
+//! the rest. A step takes W·f(a) for straight. What it leaves out is, along g, W·|g|·(½f″·g/|g|² − c)·m², and as f″ turns g, a
+//! residual across f and g is taken for a step of m·(e·f″)/(W·|g|²). So with κ the larger of |½f″·g/|g|² − c| and
+//! |f″ across f and g|/|g|, the position is off by less than κ|m|·(|m| + σ|e|); mostly much less, as a residual of noise
+//! is hardly ever along f″. Along f, where the force follows as W/(1 + c·m), it leaves out W·|f|·λ·m² with
+//! λ = |½f″·f|/|f|².
 
-use super::belief::ForceBelief;
-use super::bend::{Bend, Step};
-use super::search::{Minimum, Search};
-use super::table::Cell;
+use super::table::{Cell, InfluenceTable, Spacing};
+use crate::influence::config::ForceBelief;
 use palpate_numerics::simd::{Abreast, Eight, Number};
+use palpate_numerics::small::add_outer;
 
-impl Search {
+/// Gauss–Newton over a whitened table.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct GaussNewton {
+    pub spacing: Spacing,
+    /// Groups of eight channels.
+    groups: usize,
+    /// f and f′ at every node, in groups of eight channels.
+    rows: Vec<[[f64; 8]; 2]>,
+    /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's at the known force or the
+    /// calibration's, in groups of eight channels.
+    pub weights: Vec<[f64; 8]>,
+    /// How the influences bend in every cell.
+    bends: Vec<Bend>,
+    /// Where places end: at the surface's ends, or a little before.
+    pub ends_m: [f64; 2],
+    length_m: f64,
+    force: ForceBelief,
+    /// One over the calibration's mean force.
+    inverse_reference: f64,
+}
+
+/// A minimum of the misfit, or one each of several readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Minimum<N = f64> {
+    pub x_m: N,
+    pub force_n: N,
+    /// χ² there.
+    pub misfit: N,
+    /// Variance of the position, covariance of position and force, variance of the force.
+    pub covariance: [N; 3],
+}
+
+/// Forces beyond so many times the calibration's are taken for no less certain: an immense force next to a support, of
+/// which the calibration says nothing, would else explain every reading.
+const MOST_GROWTH: f64 = 10.0;
+
+impl GaussNewton {
+    /// Over a whitened table, with what is known of the force and the calibration's mean force.
+    pub fn new(table: &InfluenceTable, force: ForceBelief, reference_force_n: f64) -> Self {
+        let weights = weights(table, force.weights_force_n(reference_force_n));
+        let group = |numbers: &[f64]| grouped(numbers, table.sensors, 0.0);
+        Self {
+            spacing: table.spacing(),
+            groups: table.sensors.div_ceil(8),
+            rows: paired(group(&table.values), group(&table.slopes)),
+            bends: bends(table, &weights, force),
+            weights,
+            ends_m: ends_m(table, force),
+            length_m: table.length_m,
+            force,
+            inverse_reference: 1.0 / reference_force_n,
+        }
+    }
+
+    /// How much larger than in calibration the table's variances count for a contact of a force.
+    #[inline(always)]
+    pub fn grown<N: Number>(&self, force_n: N) -> N {
+        let ratio =
+            (force_n * N::splat(self.inverse_reference)).max(N::splat(1.0)).min(N::splat(MOST_GROWTH));
+        ratio * ratio
+    }
+
     /// The minima near `x_m`, by at most so many `steps`, and the bits of those readings that came to theirs.
     ///
     /// `whitened` holds the readings one after the other.
     #[inline(always)]
-    pub fn refine<V: Eight, N: Abreast<V>>(
+    pub fn minimum<V: Eight, N: Abreast<V>>(
         &self,
         whitened: &[[f64; 8]],
         start: (N, N),
@@ -22,9 +90,9 @@ impl Search {
     ) -> (Minimum<N>, u8) {
         let n = N::splat;
         let ([low, high], reach) = (self.ends_m, n(2.0 * self.spacing.h_m));
-        let least = n((1e-9 * self.table.length_m).powi(2));
+        let least = n((1e-9 * self.length_m).powi(2));
         let (mut x_m, mut force_n) = start;
-        let mut way = Way { x_m, force_n, misfit: n(f64::INFINITY), pace: n(1.0) };
+        let mut line_search = Backtracking { x_m, force_n, misfit: n(f64::INFINITY), pace: n(1.0) };
         let mut minimum = Minimum::nowhere();
         let mut arrived = 0;
         for taken in 1..=steps {
@@ -49,7 +117,7 @@ impl Search {
             if arrived == N::ALL {
                 break;
             }
-            (x_m, force_n) = way.on((x_m, force_n), &normal, moved);
+            (x_m, force_n) = line_search.next((x_m, force_n), &normal, moved);
         }
         (minimum, arrived)
     }
@@ -111,7 +179,7 @@ impl Search {
     fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Place, grown: Option<f64>) -> [V; 6] {
         let [mut square, mut gg, mut eg, mut ff, mut fg, mut ef] = [V::splat(0.0); 6];
         let Place { reading, cell, force_n } = place;
-        let (groups, force, node) = (self.groups(), V::splat(*force_n), cell.node as u32 as usize);
+        let (groups, force, node) = (self.groups, V::splat(*force_n), cell.node as u32 as usize);
         let (left, right) = self.rows[node * groups..][..2 * groups].split_at(groups);
         let weights = &self.weights[node * groups..][..groups];
         let whitened = &whitened[reading * groups..][..groups];
@@ -134,19 +202,44 @@ impl Search {
     }
 }
 
+impl<N: Number> Minimum<N> {
+    /// That of a reading without any.
+    #[inline(always)]
+    pub fn nowhere() -> Self {
+        let (zero, infinity) = (N::splat(0.0), N::splat(f64::INFINITY));
+        Self { x_m: zero, force_n: zero, misfit: infinity, covariance: [infinity, zero, infinity] }
+    }
+
+    /// `self` where the reading's bit is set, `other` where it is not.
+    #[inline(always)]
+    pub fn or(self, bits: u8, other: Self) -> Self {
+        let [xx, xf, ff] = self.covariance;
+        Self {
+            x_m: self.x_m.or(bits, other.x_m),
+            force_n: self.force_n.or(bits, other.force_n),
+            misfit: self.misfit.or(bits, other.misfit),
+            covariance: [
+                xx.or(bits, other.covariance[0]),
+                xf.or(bits, other.covariance[1]),
+                ff.or(bits, other.covariance[2]),
+            ],
+        }
+    }
+}
+
 /// The lowest misfit so far, where it was, and how much of a step is taken.
-struct Way<N> {
+struct Backtracking<N> {
     x_m: N,
     force_n: N,
     misfit: N,
     pace: N,
 }
 
-impl<N: Number> Way<N> {
+impl<N: Number> Backtracking<N> {
     /// The next place and force to try after a place, where the best step of the position is `step_m`: where the misfit
     /// has risen, half way back, and steps are shorter from then on.
     #[inline(always)]
-    fn on(&mut self, (x_m, force_n): (N, N), normal: &Normal<N>, step_m: N) -> (N, N) {
+    fn next(&mut self, (x_m, force_n): (N, N), normal: &Normal<N>, step_m: N) -> (N, N) {
         let (half, fell) = (N::splat(0.5), normal.misfit.at_most(self.misfit));
         let back = (half * (self.x_m + x_m), half * (self.force_n + force_n));
         self.pace = self.pace.or(fell, half * self.pace);
@@ -316,5 +409,153 @@ impl<N: Number> Normal<N> {
     fn step(&self, step_m: N, to: &Minimum<N>) -> Step<N> {
         let variance = self.covariance[0];
         Step { square: step_m * step_m, variance, misfit: to.misfit, signal: self.signal }
+    }
+}
+
+/// How the influences bend in a cell of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bend<N = f64> {
+    /// κ², in m⁻².
+    pub kappa_square: N,
+    /// λ², in m⁻⁴; 0 where the force is known.
+    pub lambda_square: N,
+}
+
+/// A step to a minimum.
+#[derive(Clone, Copy, Debug)]
+struct Step<N> {
+    /// m².
+    pub square: N,
+    /// σ².
+    pub variance: N,
+    /// χ² after the step.
+    pub misfit: N,
+    /// W²·|f|²; 0 where the force is known.
+    pub signal: N,
+}
+
+impl<N: Number> Bend<N> {
+    /// Whether a step leaves so little that it may be the last, a bit for each reading: less than a twentieth of the
+    /// position's standard deviation along g, and less than a tenth of the misfit's unit along f. The calibration's
+    /// variance counts `grown` times as much as where κ was found, and weighs channels against each other by no more.
+    #[inline(always)]
+    pub fn allows(&self, step: &Step<N>, grown: N) -> u8 {
+        const SHARE_OF_SD: f64 = 0.05;
+        const MISFIT: f64 = 0.1;
+        // Two: the square of a sum is at most twice the sum of squares.
+        let share = N::splat(SHARE_OF_SD * SHARE_OF_SD / 2.0);
+        let off =
+            self.kappa_square * grown * grown * step.square * (step.square + step.variance * step.misfit);
+        let along = step.signal * self.lambda_square * step.square * step.square;
+        off.at_most(share * step.variance) & along.at_most(N::splat(MISFIT))
+    }
+}
+
+/// How a whitened table bends in every cell; `weights` of the cells' channels, in groups of eight.
+fn bends(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Vec<Bend> {
+    const PARTS: usize = 4;
+    let groups = table.sensors.div_ceil(8);
+    let cells = weights.chunks_exact(groups).enumerate();
+    cells
+        .map(|(cell, weights)| {
+            let at =
+                |part: usize| bend(table, weights.as_flattened(), force, cell, part as f64 / PARTS as f64);
+            (0..=PARTS).map(at).fold(Bend::<f64> { kappa_square: 0.0, lambda_square: 0.0 }, |a, b| Bend {
+                kappa_square: a.kappa_square.max(b.kappa_square),
+                lambda_square: a.lambda_square.max(b.lambda_square),
+            })
+        })
+        .collect()
+}
+
+/// At part `t` of a cell; infinite where a reading does not tell the position.
+fn bend(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize, t: f64) -> Bend {
+    let h_m = table.spacing_m();
+    let place = Cell { node: cell as f64, ..table.spacing().cell(t * h_m) };
+    // Products of f, f′ and f″.
+    let mut products = [[0.0; 3]; 3];
+    table.for_each(place, |s, f, slope| {
+        let rise = (table.at_node(cell + 1)[s] - table.at_node(cell)[s]) / h_m;
+        let [left, right] = [cell, cell + 1].map(|node| table.slopes[node * table.sensors + s]);
+        let bent = ((6.0 - 12.0 * t) * rise + (6.0 * t - 4.0) * left + (6.0 * t - 2.0) * right) / h_m;
+        add_outer(&mut products, weights[s], &[f, slope, bent]);
+    });
+    let [[ff, fs, fb], [_, ss, sb], [.., bb]] = products;
+    // What of f′ and of f″ is along f, per f.
+    let [c, along_f] = match force {
+        ForceBelief::Known(_) => [0.0; 2],
+        _ => [fs / ff, fb / ff],
+    };
+    let (gg, gb) = (ss - c * fs, sb - c * fb);
+    let across = (bb - along_f * fb - gb * gb / gg).max(0.0) / gg;
+    let bend = Bend {
+        kappa_square: (0.5 * gb / gg - c).powi(2).max(across),
+        lambda_square: (0.5 * along_f).powi(2),
+    };
+    let told = gg > 0.0 && bend.kappa_square.is_finite() && bend.lambda_square.is_finite();
+    if told { bend } else { Bend { kappa_square: f64::INFINITY, lambda_square: f64::INFINITY } }
+}
+
+/// Where places end. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
+/// support like an infinite one, so a tenth of a spacing is kept.
+fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
+    let last = table.nodes() - 1;
+    let square = |node: usize| table.at_node(node).iter().map(|f| f * f).sum::<f64>();
+    let kept = |end: usize, next: usize| match force {
+        ForceBelief::Unknown if square(end) < 1e-2 * square(next) => 0.1 * table.spacing_m(),
+        _ => 0.0,
+    };
+    [kept(0, 1), table.length_m - kept(last, last - 1)]
+}
+
+/// 1/(1 + v) in every cell of a whitened table, for a contact of a force.
+fn weights(table: &InfluenceTable, force_n: f64) -> Vec<[f64; 8]> {
+    let (left, right) = (&table.variances[..], &table.variances[table.sensors..]);
+    let cells = left.iter().zip(right);
+    let weights: Vec<f64> = cells.map(|(a, b)| 1.0 / (1.0 + 0.5 * force_n * force_n * (a + b))).collect();
+    grouped(&weights, table.sensors, 1.0)
+}
+
+/// Rows of `width` numbers, each in groups of eight that are filled up.
+pub(super) fn grouped(numbers: &[f64], width: usize, filler: f64) -> Vec<[f64; 8]> {
+    let rows = numbers.chunks_exact(width).flat_map(|row| row.chunks(8));
+    let group = |part: &[f64]| std::array::from_fn(|i| part.get(i).copied().unwrap_or(filler));
+    rows.map(group).collect()
+}
+
+/// Two lists of groups, group by group.
+pub(super) fn paired(first: Vec<[f64; 8]>, second: Vec<[f64; 8]>) -> Vec<[[f64; 8]; 2]> {
+    first.into_iter().zip(second).map(|(a, b)| [a, b]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_bends_as_its_radius_says() {
+        // Two channels that go round a circle in 40 m, cosine and sine: f″ is across f′ and (2π/40)² of f, which a
+        // change of the force makes up for.
+        let turn = std::f64::consts::TAU / 40.0;
+        let nodes = || (0..401).map(|node| f64::from(node) * 0.1 * turn);
+        let table = InfluenceTable {
+            sensors: 2,
+            length_m: 40.0,
+            values: nodes().flat_map(|angle| [angle.cos(), angle.sin()]).collect(),
+            slopes: nodes().flat_map(|angle| [-turn * angle.sin(), turn * angle.cos()]).collect(),
+            variances: vec![0.0; 802],
+        };
+        let weights = vec![[1.0; 8]; 400];
+        for (force, kappa, lambda) in
+            [(ForceBelief::Known(1.0), turn, 0.0), (ForceBelief::Unknown, 0.0, 0.5 * turn * turn)]
+        {
+            for bend in bends(&table, &weights, force) {
+                assert!((bend.kappa_square.sqrt() - kappa).abs() < 1e-2 * turn, "{bend:?}, {force:?}");
+                assert!(
+                    (bend.lambda_square.sqrt() - lambda).abs() < 1e-2 * turn * turn,
+                    "{bend:?}, {force:?}"
+                );
+            }
+        }
     }
 }

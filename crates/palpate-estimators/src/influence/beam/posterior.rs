@@ -1,43 +1,15 @@
-//! From minima of the misfit to an estimate that owns up to what it does not know.
+//! The estimate of one contact from the minima of its misfit: position, force, 95 % interval, status, and the other places.
 
-use super::batch::{Rows, locate_rows};
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
-use super::scratch::Scratch;
-use super::search::{Minimum, Search, worst_misfit};
-use super::several::{criterion, explain};
+use super::gauss_newton::Minimum;
+use super::search::Search;
+use crate::status::OTHER_PLACE;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::simd::{Array, Eight};
 use palpate_numerics::{bisect, normal_distribution, normal_interval_95};
 
-/// Another place with at least this share of the probability is said.
-const MODE_THAT_MATTERS: f64 = 0.01;
 /// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
 const MOST_SPACINGS: f64 = 1.5;
-
-/// An estimate of nothing, to be written over.
-pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
-
-/// The estimate of one contact.
-pub(super) fn locate_one(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
-    let mut estimate = NOTHING;
-    let rows = Rows { readings: reading, channels: reading.len() };
-    locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
-    estimate
-}
-
-/// Writes the estimate of one contact, and of a used estimate no more than what is read.
-#[inline(always)]
-pub(super) fn locate_into<V: Eight>(
-    search: &Search,
-    reading: &[f64],
-    scratch: &mut Scratch,
-    estimate: &mut Estimate,
-) {
-    let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
-    let (minima, count) = search.minima::<V>(square, scratch);
-    conclude(search, square, &minima[..count], &scratch.profile, estimate);
-}
 
 /// Writes the estimate from the minima of a reading that was whitened to length `square`.
 #[inline(always)]
@@ -59,27 +31,27 @@ pub(super) fn conclude(
     }
     let sd_m = best.covariance[0].sqrt();
     let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
-    let narrow = sd_m <= MOST_SPACINGS * search.spacing.h_m && best.misfit.is_finite();
+    let narrow = sd_m <= MOST_SPACINGS * search.gauss_newton.spacing.h_m && best.misfit.is_finite();
     if minima.len() == 1 && clear && narrow {
         estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
     } else {
-        weigh(search, minima, profile.misfits(), estimate);
+        write_competing(search, minima, profile.misfits(), estimate);
     }
-    if best.misfit > search.worst_misfit {
+    if best.misfit > search.misfit_bound {
         estimate.status = Status::OutsideModel;
     }
 }
 
 /// Writes the estimate from minima that compete, or one that is wide or near an end.
 #[cold]
-fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
+fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
     let shares = shares(minima, search.table.length_m);
     let x_95_m = interval(search, minima, &shares, misfits);
     estimate.contact = contact(search, &minima[0], x_95_m);
     estimate.status = Status::Located;
     for (minimum, share) in minima.iter().zip(&shares).skip(1) {
-        if *share >= MODE_THAT_MATTERS {
+        if *share >= OTHER_PLACE {
             let alone = single_interval(minimum, search.table.length_m);
             let mode = Mode { contact: contact(search, minimum, alone), probability: *share };
             estimate.modes.push(mode);
@@ -88,50 +60,11 @@ fn weigh(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate:
     }
 }
 
-/// The estimate of as many contacts as the reading shows, up to `most`.
-pub(super) fn locate_several(
-    search: &Search,
-    most: usize,
-    reading: &[f64],
-    scratch: &mut Scratch,
-) -> Estimate {
-    let one = locate_one(search, reading, scratch);
-    if one.status != Status::OutsideModel {
-        return one;
-    }
-    let square = scratch.whitened.channels(search.live.len()).iter().map(|d| d * d).sum();
-    let single = search.minima::<Array<f64, 8, false>>(square, scratch).0[0];
-    let mut least = criterion(single.misfit, 1, search.force.unknowns(), search);
-    let mut best = None;
-    for count in 2..=most {
-        let Some(together) = explain(search, scratch, count) else { break };
-        let (cost, misfit) = (together.criterion(search), together.misfit);
-        if cost < least {
-            (least, best) = (cost, Some(together));
-        }
-        // One more contact costs this much, and cannot take off more misfit than there is.
-        if criterion(0.0, 1, 2, search) > misfit {
-            break;
-        }
-    }
-    let Some(together) = best else { return one };
-    let Some((strongest, further)) = together.contacts.split_first() else { return one };
-    let mut estimate = Estimate::of_contact(*strongest, Status::Located);
-    for contact in further {
-        estimate.further.push(*contact);
-    }
-    let freedom = search.live.len() - 2 * together.contacts.len();
-    if together.misfit > worst_misfit(freedom) {
-        estimate.status = Status::OutsideModel;
-    }
-    estimate
-}
-
 /// Whether noise alone explains a reading of whitened length `square`, and better than a contact whose best misfit is
 /// `misfit`, by the criterion that also counts several contacts.
 #[inline(always)]
 fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
-    square <= misfit + search.charge && square <= search.worst_noise
+    square <= misfit + search.penalty && square <= search.noise_bound
 }
 
 #[inline(always)]
@@ -172,7 +105,8 @@ fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
 /// The 95 % interval of the position over all minima.
 fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64; COARSE]) -> (f64, f64) {
     let length_m = search.table.length_m;
-    let wide = |minimum: &Minimum| minimum.covariance[0].sqrt() > MOST_SPACINGS * search.spacing.h_m;
+    let wide =
+        |minimum: &Minimum| minimum.covariance[0].sqrt() > MOST_SPACINGS * search.gauss_newton.spacing.h_m;
     if minima.iter().any(wide) || !minima[0].misfit.is_finite() {
         return interval_of_profile(misfits, length_m);
     }

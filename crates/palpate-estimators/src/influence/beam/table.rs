@@ -1,5 +1,7 @@
-//! Influence functions as a table: values and slopes at evenly spaced nodes, cubic between them.
+//! Influence functions along a line as a table: values and slopes at evenly spaced nodes, cubic between them.
 
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::InfluenceFunction;
 use palpate_numerics::simd::Number;
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +66,12 @@ impl Spacing {
 }
 
 impl InfluenceTable {
+    /// A table of zeros.
+    pub(super) fn empty(sensors: usize, length_m: f64) -> Self {
+        let zeros = vec![0.0; sensors * Self::NODES];
+        Self { sensors, length_m, values: zeros.clone(), slopes: zeros.clone(), variances: zeros }
+    }
+
     /// The channels `live` of it, multiplied by `inverse_sd`, one over the noise of each.
     pub(super) fn whitened(&self, live: &[usize], inverse_sd: &[f64]) -> Self {
         let whiten = |values: &[f64], power: i32| {
@@ -145,6 +153,40 @@ impl InfluenceTable {
     pub(super) fn variances_near(&self, x_m: f64) -> &[f64] {
         let node = ((x_m / self.spacing_m()).round().max(0.0) as usize).min(self.nodes() - 1);
         &self.variances[node * self.sensors..(node + 1) * self.sensors]
+    }
+}
+
+/// The influence function of one sensor of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct FittedInfluence<'a> {
+    table: &'a InfluenceTable,
+    sensor: usize,
+}
+
+impl InfluenceTable {
+    /// The influence function of a sensor, from 0; 0 everywhere for one that the table does not have.
+    pub fn function(&self, sensor: usize) -> FittedInfluence<'_> {
+        FittedInfluence { table: self, sensor }
+    }
+}
+
+impl FittedInfluence<'_> {
+    fn value_and_slope(&self, x_m: f64) -> (f64, f64) {
+        if self.sensor < self.table.sensors {
+            self.table.value_and_slope(&self.table.cell(x_m), self.sensor)
+        } else {
+            (0.0, 0.0)
+        }
+    }
+}
+
+impl InfluenceFunction for FittedInfluence<'_> {
+    fn at(&self, contact: Position) -> f64 {
+        self.value_and_slope(contact.x_m).0
+    }
+
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        [self.value_and_slope(contact.x_m).1, 0.0]
     }
 }
 

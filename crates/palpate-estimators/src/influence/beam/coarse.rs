@@ -1,13 +1,14 @@
 //! Where to look: the misfit at every STRIDE-th node, its valleys, and where in a valley to start.
 //!
-//! Symbols as in [`super::search`]. A chord joins the influences of two neighbouring coarse nodes, times the force where
-//! it is known. How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve strays from
-//! its chord is known beforehand, so a valley's lowest misfit is bounded from below without going there.
+//! Symbols as in [`super::search`]. At a known force a chord joins the influences of two neighbouring coarse nodes, times the force.
+//! How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve stmixtures from its chord is known
+//! beforehand, so a valley's lowest misfit is bounded from below without going there. With the force free, a place is told by the
+//! direction of d alone: between the directions of f at two neighbouring coarse nodes, the least-squares mixture α·f + β·g of both lies at
+//! t = β/(α + β) of the way from one to the other, and the best force is that of the mixture.
 
-use super::belief::ForceBelief;
-use super::rays::Rays;
 use super::table::InfluenceTable;
-use palpate_numerics::simd::{Abreast, Eight};
+use crate::influence::config::ForceBelief;
+use palpate_numerics::simd::{Abreast, Eight, Number};
 
 /// The search looks at every so many nodes; misfits between them are smooth.
 pub(super) const STRIDE: usize = 4;
@@ -193,11 +194,13 @@ impl Coarse {
             }
             return Start { x_m: N::of(&places), force_n: N::splat(force_n), floor: N::of(&floors) };
         }
-        let mut rays = N::each(Rays::default());
-        for ((rays, place), (profile, node)) in rays.as_mut().iter_mut().zip(places.as_mut()).zip(valleys) {
-            (*rays, *place) = (self.rays(profile, *node), *node as f64);
+        let mut mixtures = N::each(Mixture::default());
+        for ((mixtures, place), (profile, node)) in
+            mixtures.as_mut().iter_mut().zip(places.as_mut()).zip(valleys)
+        {
+            (*mixtures, *place) = (self.mixture(profile, *node), *node as f64);
         }
-        let (t, force_n) = Rays::abreast::<V, N>(&rays).mix(self.force);
+        let (t, force_n) = Mixture::abreast::<V, N>(&mixtures).mix(self.force);
         let x_m = (N::of(&places) + t) * N::splat(self.h_m);
         Start { x_m, force_n, floor: N::of(&floors) }
     }
@@ -213,15 +216,15 @@ impl Coarse {
         (t, left.floor(left_square).min(right.floor(right_square)))
     }
 
-    /// The two rays between which a reading's direction lies, at the valley at `node`.
+    /// The two mixtures between which a reading's direction lies, at the valley at `node`.
     #[inline(always)]
-    fn rays(&self, profile: &Profile, node: usize) -> Rays<f64> {
+    fn mixture(&self, profile: &Profile, node: usize) -> Mixture<f64> {
         let product = |node: usize| profile.products.as_flattened()[node];
         let to_right = profile.misfits[node + 2] < profile.misfits[node];
         let (other, towards) = if to_right { (node + 1, 1.0) } else { (node.wrapping_sub(1), -1.0) };
         let (product, norm) = (product(node), self.norms[node]);
         match self.norms.get(other) {
-            Some(other_norm) => Rays {
+            Some(other_norm) => Mixture {
                 product,
                 norm,
                 other_product: profile.products.as_flattened()[other],
@@ -229,7 +232,7 @@ impl Coarse {
                 cross: self.chords[other.max(node)].cross,
                 towards,
             },
-            None => Rays { product, norm, ..Rays::default() },
+            None => Mixture { product, norm, ..Mixture::default() },
         }
     }
 }
@@ -243,7 +246,7 @@ impl Chord {
         let (from, to) = (table.at_node(STRIDE * (node - 1)), table.at_node(STRIDE * node));
         let ends = || from.iter().zip(to);
         let square = scale * scale * ends().map(|(a, b)| (b - a) * (b - a)).sum::<f64>();
-        let strays = (1..PARTS).map(|part| {
+        let stmixtures = (1..PARTS).map(|part| {
             let t = part as f64 / PARTS as f64;
             let x_m = ((node - 1) as f64 + t) * STRIDE as f64 * table.spacing_m();
             let mut sum = 0.0;
@@ -254,7 +257,7 @@ impl Chord {
             cross: ends().map(|(a, b)| a * b).sum(),
             square,
             half_inverse: if square > 0.0 { 0.5 / square } else { 0.0 },
-            sag: MARGIN * strays.fold(0.0, f64::max),
+            sag: MARGIN * stmixtures.fold(0.0, f64::max),
             least_weight: weights.as_flattened().iter().copied().fold(1.0, f64::min),
         }
     }
@@ -272,5 +275,65 @@ impl Chord {
     fn floor(&self, square: f64) -> f64 {
         let least = (square.sqrt() - self.sag).max(0.0);
         self.least_weight * least * least
+    }
+}
+
+/// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
+const END: f64 = 1e-2;
+
+/// A reading between the influences f at its lowest coarse node and g at the node beside it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mixture<N> {
+    /// d·f.
+    pub product: N,
+    /// |f|².
+    pub norm: N,
+    /// d·g.
+    pub other_product: N,
+    /// |g|².
+    pub other_norm: N,
+    /// f·g.
+    pub cross: N,
+    /// 1 where the other node is to the right, −1 where it is to the left.
+    pub towards: N,
+}
+
+impl Mixture<f64> {
+    /// Those of readings side by side.
+    #[inline(always)]
+    pub fn abreast<V: Copy, N: Abreast<V>>(each: &N::Each<Self>) -> Mixture<N> {
+        let of = |part: fn(&Self) -> f64| {
+            let mut lanes = N::each(0.0);
+            lanes.as_mut().iter_mut().zip(each.as_ref()).for_each(|(lane, mixtures)| *lane = part(mixtures));
+            N::of(&lanes)
+        };
+        Mixture {
+            product: of(|mixtures| mixtures.product),
+            norm: of(|mixtures| mixtures.norm),
+            other_product: of(|mixtures| mixtures.other_product),
+            other_norm: of(|mixtures| mixtures.other_norm),
+            cross: of(|mixtures| mixtures.cross),
+            towards: of(|mixtures| mixtures.towards),
+        }
+    }
+}
+
+impl<N: Number> Mixture<N> {
+    /// How far from the lowest node, in coarse nodes, the mixture that is closest to d lies, and its best force.
+    #[inline(always)]
+    pub fn mix(&self, force: ForceBelief) -> (N, N) {
+        let n = N::splat;
+        let Self { product: p, norm, other_product: q, other_norm, cross, towards } = *self;
+        let (mean, precision) = force.mean_and_precision();
+        let (here, there) = (p * other_norm - q * cross, q * norm - p * cross);
+        let beyond = here.at_most(n(0.0)) | there.at_most(n(0.0));
+        let (here, there) = (n(1.0).or(beyond, here), n(0.0).or(beyond, there));
+        let at_end = if precision == 0.0 { norm.at_most(n(END) * other_norm) } else { 0 };
+        let (here, there) = (n(0.75).or(at_end, here), n(0.25).or(at_end, there));
+        let whole = here + there;
+        let score = (here * p + there * q) + n(mean * precision) * whole;
+        let norm = here * here * norm + n(2.0) * here * there * cross + there * there * other_norm;
+        let square = (norm + n(precision) * whole * whole).max(n(f64::MIN_POSITIVE));
+        (towards * there / whole, (score * whole).max(n(0.0)) / square)
     }
 }

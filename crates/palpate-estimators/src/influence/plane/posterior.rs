@@ -1,4 +1,5 @@
-//! How probable the surroundings of each minimum are, and the moments of position and force there.
+//! The posterior of a contact on a plane: how probable the surroundings of each minimum are, moments of position and force there, and the
+//! estimate that they give.
 //!
 //! A minimum that is alone, narrow, clear of the edges and no more bent than a paraboloid is a normal distribution (Laplace's
 //! approximation). Any other reading's probability is summed up over the surface: near an edge it is cut off, where the
@@ -6,15 +7,73 @@
 //! until the misfit is smooth within their parts, each with the force that is best there; a part that is too far from the
 //! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
-use super::coarse::MOST_VALLEYS;
-use super::search::{Minimum, Scratch, Search};
+use super::coarse::{MOST_VALLEYS, Profile};
+use super::search::{Minimum, Search, Unknowns};
 use crate::influence::moments::Moments;
-use palpate_numerics::ELLIPSE_95;
+use crate::status::OTHER_PLACE;
+use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
 use palpate_numerics::small::{Ldl, principal_direction, principal_variances};
+use palpate_numerics::{ELLIPSE_95, held_interval, normal_interval_95};
+
+/// Memory for locating readings.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    whitened: Vec<f64>,
+    profile: Profile,
+    /// Parts of the surface that are still to be looked at.
+    blocks: Vec<Block>,
+    /// Those that hold the probability.
+    leaves: Vec<Leaf>,
+}
+
+/// The estimate of one contact.
+///
+/// The time of a plain reading is that of the scan, a product for every coarse cell and channel, and of some six of
+/// Levenberg's steps, 16 corner numbers × 3 sums for every group of eight channels each. Where the probability is summed up
+/// instead, it is that of the misfit at a thousand places or so.
+pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) -> Estimate {
+    let square = search.whiten(reading, &mut scratch.whitened);
+    let (minima, count) = search.minima(square, &scratch.whitened, &mut scratch.profile);
+    let (minima, best) = (&minima[..count], minima[0]);
+    if square <= best.misfit + search.charge && square <= search.noise_bound {
+        return Estimate::of_position(position(best.at), Status::NoContact);
+    }
+    let surroundings = search.surroundings(minima, scratch);
+    let modes = surroundings.modes();
+    let alone = |mode: &Mode| contact(search, mode, mode.covariance);
+    let mut estimate = Estimate::of_contact(contact(search, &modes[0], surroundings.region), Status::Located);
+    for mode in modes[1..].iter().filter(|mode| mode.weight >= OTHER_PLACE) {
+        estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
+        estimate.status = Status::Ambiguous;
+    }
+    if best.misfit > search.misfit_bound {
+        estimate.status = Status::OutsideModel;
+    }
+    estimate
+}
+
+fn position([x_m, y_m, _]: Unknowns) -> Position {
+    Position { x_m, y_m }
+}
+
+/// A contact with an uncertainty that is held to the surface.
+fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimate {
+    let interval = |k: usize, variance: f64| {
+        held_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
+    };
+    let uncertainty =
+        Uncertainty { covariance, x_95_m: interval(0, covariance[0]), y_95_m: interval(1, covariance[3]) };
+    ContactEstimate {
+        position: position(mode.mean),
+        force_n: Some(mode.mean[2]),
+        uncertainty: Some(uncertainty),
+    }
+}
 
 /// The surroundings of a minimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Mode {
+struct Mode {
     /// Its share of the probability.
     pub weight: f64,
     /// Mean of x, y and W.
@@ -25,7 +84,7 @@ pub(super) struct Mode {
 
 /// What the readings tell of a contact.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Surroundings {
+struct Surroundings {
     modes: [Mode; MOST_VALLEYS],
     count: usize,
     /// Covariance about the mean of the first mode: of the normal distribution whose 95 % ellipse is as large as one of this
@@ -40,8 +99,6 @@ impl Surroundings {
     }
 }
 
-/// Another place with at least this share of the probability is said.
-pub(super) const MODE_THAT_MATTERS: f64 = 0.01;
 /// A minimum with a wider standard deviation, in lengths of a coarse cell, is no paraboloid.
 const MOST_CELLS: f64 = 0.6;
 /// So many standard deviations from an edge, an edge does not matter.
@@ -61,14 +118,14 @@ const MOST_BLOCKS: usize = 200_000;
 
 impl Search {
     /// The surroundings of `minima`, best first, of the reading in the scratch.
-    pub fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
+    fn surroundings(&self, minima: &[Minimum], scratch: &mut Scratch) -> Surroundings {
         let mut modes = [Mode::default(); MOST_VALLEYS];
         let are_plain = minima.iter().zip(&mut modes).all(|(minimum, mode)| {
             let plain = self.plain(minimum, &minima[0]);
             plain.inspect(|plain| *mode = *plain).is_some()
         });
         let sum: f64 = modes.iter().map(|mode| mode.weight).sum();
-        let is_alone = are_plain && modes[0].weight >= (1.0 - MODE_THAT_MATTERS) * sum;
+        let is_alone = are_plain && modes[0].weight >= (1.0 - OTHER_PLACE) * sum;
         if is_alone && self.is_paraboloid(&scratch.whitened, &modes[0]) {
             modes[0].weight = 1.0;
             return Surroundings { modes, count: 1, region: modes[0].covariance };
@@ -250,7 +307,7 @@ fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
 
 /// A part of the surface that its middle stands for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Leaf {
+struct Leaf {
     /// Its probability, but for a factor.
     weight: f64,
     /// x, y and the force that is best there.
@@ -263,7 +320,7 @@ pub(super) struct Leaf {
 
 /// A part of the surface, which is halved until its middle stands for it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Block {
+struct Block {
     middle_m: [f64; 2],
     size_m: [f64; 2],
     /// How far apart the whitened readings of its ends are, along and across.

@@ -3,10 +3,10 @@
 use super::{clean, fit, noisy};
 use crate::fixtures::paper;
 use crate::influence::Influence;
-use crate::influence::belief::ForceBelief;
-use crate::influence::scratch::Scratch;
-use crate::influence::search::{Minimum, Search};
-use crate::influence::table::InfluenceTable;
+use crate::influence::beam::gauss_newton::Minimum;
+use crate::influence::beam::search::Search;
+use crate::influence::config::ForceBelief;
+use crate::influence::{InfluenceTable, Scratch};
 use crate::setup::Setup;
 use palpate_numerics::simd::Array;
 use rand::{RngExt, SeedableRng};

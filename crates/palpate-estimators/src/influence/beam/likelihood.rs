@@ -7,11 +7,11 @@
 //! g needs no mechanics: a sensor's influence function is f(x) = Σ_k s_k·φ_k(x)/(m_k·ω_k²), with s_k what it reads of mode k,
 //! so g = s₁/(m₁·ω₁²) = (2/l)·∫f·φ dx is the share of the first mode in the table itself.
 
-use std::f64::consts::PI;
-
 use super::locator::BeamLocator;
+use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
+use crate::influence::channels::Channels;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
@@ -37,11 +37,11 @@ pub struct BeamLikelihood {
 impl BeamLikelihood {
     /// Whitens the table of a locator, without the channels that it leaves out.
     pub fn new(locator: &BeamLocator) -> Self {
-        let (parts, dead) = locator.parts();
-        let live: Vec<usize> = (0..parts.table.sensors).filter(|s| !dead[*s]).collect();
-        let offsets = live.iter().map(|s| parts.offsets[*s]).collect();
-        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / parts.noise_sd[*s]).collect();
-        let table = parts.table.whitened(&live, &inverse_sd);
+        let Channels { offsets, noise_sd, .. } = locator.channels();
+        let live = locator.channels().live();
+        let offsets = live.iter().map(|s| offsets[*s]).collect();
+        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
+        let table = locator.table().whitened(&live, &inverse_sd);
         let first_mode = (0..live.len()).map(|s| share_of_first_mode(&table, s)).collect();
         Self { locator: locator.clone(), live, offsets, inverse_sd, table, first_mode }
     }
@@ -58,54 +58,8 @@ impl BeamLikelihood {
 
     /// By what v is multiplied; a force that is hardly there was not calibrated better for that.
     fn scale(&self, contact: Contact) -> f64 {
-        contact.force_n.max(self.locator.reference_force_n()).powi(2)
+        contact.force_n.max(self.locator.channels().reference_force_n).powi(2)
     }
-}
-
-/// How well contacts explain a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
-/// is u with each sensor's g. Of the K = 1 + 2C unknowns the first is u, which is told by nothing without `mode`; place and
-/// force of each contact follow.
-#[inline]
-pub(super) fn contact_fit<const C: usize, const K: usize>(
-    table: &InfluenceTable,
-    whitened: &[f64],
-    contacts: [Contact; C],
-    scale: impl Fn(Contact) -> f64,
-    mode: Option<(f64, &[f64])>,
-) -> ContactFit<K> {
-    let at = contacts.map(|contact| {
-        let x_m = contact.position.x_m;
-        (contact.force_n, table.cell(x_m), table.variances_near(x_m), scale(contact))
-    });
-    let shapes = contacts.map(|contact| first_mode(table.length_m, contact.position.x_m));
-    let balance_n: f64 =
-        contacts.iter().zip(shapes).map(|(contact, [shape, _])| contact.force_n * shape).sum();
-    let departure_n = mode.map_or(0.0, |(mode_n, _)| mode_n - balance_n);
-    let mut fit = ContactFit::NOTHING;
-    for (s, d) in whitened.iter().enumerate() {
-        let g = mode.map_or(0.0, |(_, g)| g[s]);
-        let mut residual = d - departure_n * g;
-        let mut variance = 1.0;
-        let mut derivatives = [0.0; K];
-        derivatives[0] = g;
-        for k in 0..C {
-            let (force_n, cell, variances, scale) = &at[k];
-            let (f, slope) = table.value_and_slope(cell, s);
-            residual -= force_n * f;
-            variance += scale * variances[s];
-            derivatives[1 + 2 * k] = force_n * (slope - shapes[k][1] * g);
-            derivatives[2 + 2 * k] = f - shapes[k][0] * g;
-        }
-        fit.add(residual, &derivatives, 1.0 / variance);
-    }
-    fit.mirrored()
-}
-
-/// The first mode's shape at a place, and its slope per metre.
-fn first_mode(length_m: f64, x_m: f64) -> [f64; 2] {
-    let wave = PI / length_m;
-    let (sin, cos) = (wave * x_m).sin_cos();
-    [sin, wave * cos]
 }
 
 /// g of one sensor, by Simpson's rule over the nodes, whose number is odd.
@@ -117,7 +71,8 @@ fn share_of_first_mode(table: &InfluenceTable, sensor: usize) -> f64 {
         node if node % 2 == 1 => 4.0,
         _ => 2.0,
     };
-    let at = |node: usize| (PI * node as f64 / last as f64).sin() * table.at_node(node)[sensor];
+    let at =
+        |node: usize| (std::f64::consts::PI * node as f64 / last as f64).sin() * table.at_node(node)[sensor];
     let sum: f64 = (0..=last).map(|node| weight(node) * at(node)).sum();
     2.0 / (3.0 * last as f64) * sum
 }

@@ -6,49 +6,65 @@
 //! 2008), which also charges for the number of places that a contact could have been at.
 
 use super::coarse::{COARSE, STRIDE};
-use super::likelihood::contact_fit;
-use super::scratch::Scratch;
-use super::search::Search;
+use super::search::{Search, penalty};
+use super::table::InfluenceTable;
 use crate::likelihood::ContactFit;
+use crate::status::misfit_bound;
 use ndarray::Array2;
-use palpate_core::{ContactEstimate, Uncertainty};
+use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, dot};
 use palpate_numerics::{held_interval, normal_interval_95};
+use std::f64::consts::PI;
+
+/// The estimate of two to `most` contacts together, where they explain a whitened reading better than one with its `misfit` does; `None`
+/// where they do not.
+pub(super) fn locate_several(
+    search: &Search,
+    most: usize,
+    whitened: &[f64],
+    misfit: f64,
+) -> Option<Estimate> {
+    let channels = search.live.len();
+    let mut least = misfit + penalty(search.force.unknowns(), channels);
+    let mut best = None;
+    for count in 2..=most {
+        let Some(together) = explain(search, whitened, count) else { break };
+        let (cost, misfit) = (together.misfit + count as f64 * penalty(2, channels), together.misfit);
+        if cost < least {
+            (least, best) = (cost, Some(together));
+        }
+        // One more contact costs this much, and cannot take off more misfit than there is.
+        if penalty(2, channels) > misfit {
+            break;
+        }
+    }
+    let together = best?;
+    let (strongest, further) = together.contacts.split_first()?;
+    let mut estimate = Estimate::of_contact(*strongest, Status::Located);
+    for contact in further {
+        estimate.further.push(*contact);
+    }
+    if together.misfit > misfit_bound(channels - 2 * together.contacts.len()) {
+        estimate.status = Status::OutsideModel;
+    }
+    Some(estimate)
+}
 
 /// Contacts that explain a reading together.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Together {
+struct MultiContact {
     /// The contacts, strongest first; without uncertainty where the reading does not tell them.
-    pub contacts: Vec<ContactEstimate>,
+    contacts: Vec<ContactEstimate>,
     /// χ² that is left.
-    pub misfit: f64,
-}
-
-impl Together {
-    /// What it costs by the extended Bayesian information criterion: χ² + 2K·ln S + 2K·ln P, for S channels and P
-    /// places that can be told apart.
-    pub fn criterion(&self, search: &Search) -> f64 {
-        criterion(self.misfit, self.contacts.len(), 2, search)
-    }
-}
-
-/// The criterion of [`Together::criterion`] for `contacts` with `unknowns` each.
-pub(super) fn criterion(misfit: f64, contacts: usize, unknowns: usize, search: &Search) -> f64 {
-    misfit + contacts as f64 * charge(unknowns, search.live.len())
-}
-
-/// What a contact with `unknowns` costs by the criterion, for `channels` channels.
-pub(super) fn charge(unknowns: usize, channels: usize) -> f64 {
-    unknowns as f64 * (channels as f64).ln() + 2.0 * (COARSE as f64).ln()
+    misfit: f64,
 }
 
 /// The best explanation of a whitened reading by `count` contacts, where that can be told at all.
-pub(super) fn explain(search: &Search, scratch: &Scratch, count: usize) -> Option<Together> {
+fn explain(search: &Search, whitened: &[f64], count: usize) -> Option<MultiContact> {
     if 2 * count > search.live.len() {
         return None;
     }
-    let whitened = scratch.whitened.channels(search.live.len());
     match count {
         2 => refine::<2, 5>(search, whitened, best_nodes(search, whitened, pairs())?),
         _ => refine::<3, 7>(search, whitened, best_nodes(search, whitened, triples())?),
@@ -80,15 +96,15 @@ fn triples() -> impl Iterator<Item = [usize; 3]> {
 /// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
 #[inline]
 fn gain<const K: usize>(gram: &Array2<f64>, score: &[f64], chosen: [usize; K]) -> Option<f64> {
-    let (mut own_gram, mut own_pull) = ([[0.0; K]; K], [0.0; K]);
+    let (mut own_gram, mut own_score) = ([[0.0; K]; K], [0.0; K]);
     for (k, i) in chosen.into_iter().enumerate() {
-        own_pull[k] = score[i];
+        own_score[k] = score[i];
         for (entry, j) in own_gram[k].iter_mut().zip(chosen) {
             *entry = gram[[i, j]];
         }
     }
-    let force = Ldl::new(&own_gram)?.solve(own_pull);
-    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &own_pull))
+    let force = Ldl::new(&own_gram)?.solve(own_score);
+    force.iter().all(|force| *force > 0.0).then(|| dot(&force, &own_score))
 }
 
 /// Gauss–Newton on the places and forces of K contacts from the best forces at `nodes`, with steps halved until the misfit
@@ -97,7 +113,7 @@ fn refine<const K: usize, const N: usize>(
     search: &Search,
     whitened: &[f64],
     nodes: [usize; K],
-) -> Option<Together> {
+) -> Option<MultiContact> {
     const MOST_STEPS: usize = 40;
     let table = &search.table;
     let fit = |contacts: [Contact; K]| -> ContactFit<N> {
@@ -158,5 +174,51 @@ fn refine<const K: usize, const N: usize>(
     };
     let mut contacts: Vec<ContactEstimate> = (0..K).map(estimate).collect();
     contacts.sort_by(|a, b| b.force_n.unwrap_or(0.0).total_cmp(&a.force_n.unwrap_or(0.0)));
-    Some(Together { contacts, misfit: here.misfit })
+    Some(MultiContact { contacts, misfit: here.misfit })
+}
+
+/// How well contacts explain a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
+/// is u with each sensor's g. Of the K = 1 + 2C unknowns the first is u, which is told by nothing without `mode`; place and
+/// force of each contact follow.
+#[inline]
+pub(super) fn contact_fit<const C: usize, const K: usize>(
+    table: &InfluenceTable,
+    whitened: &[f64],
+    contacts: [Contact; C],
+    scale: impl Fn(Contact) -> f64,
+    mode: Option<(f64, &[f64])>,
+) -> ContactFit<K> {
+    let at = contacts.map(|contact| {
+        let x_m = contact.position.x_m;
+        (contact.force_n, table.cell(x_m), table.variances_near(x_m), scale(contact))
+    });
+    let shapes = contacts.map(|contact| first_mode(table.length_m, contact.position.x_m));
+    let balance_n: f64 =
+        contacts.iter().zip(shapes).map(|(contact, [shape, _])| contact.force_n * shape).sum();
+    let departure_n = mode.map_or(0.0, |(mode_n, _)| mode_n - balance_n);
+    let mut fit = ContactFit::NOTHING;
+    for (s, d) in whitened.iter().enumerate() {
+        let g = mode.map_or(0.0, |(_, g)| g[s]);
+        let mut residual = d - departure_n * g;
+        let mut variance = 1.0;
+        let mut derivatives = [0.0; K];
+        derivatives[0] = g;
+        for k in 0..C {
+            let (force_n, cell, variances, scale) = &at[k];
+            let (f, slope) = table.value_and_slope(cell, s);
+            residual -= force_n * f;
+            variance += scale * variances[s];
+            derivatives[1 + 2 * k] = force_n * (slope - shapes[k][1] * g);
+            derivatives[2 + 2 * k] = f - shapes[k][0] * g;
+        }
+        fit.add(residual, &derivatives, 1.0 / variance);
+    }
+    fit.mirrored()
+}
+
+/// The first mode's shape at a place, and its slope per metre.
+pub(super) fn first_mode(length_m: f64, x_m: f64) -> [f64; 2] {
+    let wave = PI / length_m;
+    let (sin, cos) = (wave * x_m).sin_cos();
+    [sin, wave * cos]
 }

@@ -4,6 +4,7 @@ mod reference;
 use super::*;
 use crate::fit::Locate;
 use crate::fixtures::{faulty_paper, paper};
+use crate::influence::InfluenceSource;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::{clean_reading, displaced};

@@ -1,0 +1,288 @@
+//! The fitted influence locator of a line with a model: from readings to estimates, one by one or eight at a time.
+//!
+//! One reading alone is a chain: its misfits, its valleys, a place, sums over channels, a division, the next place. The
+//! machine waits for each. Of eight readings the chains run side by side: all that is done once a reading, places,
+//! divisions and the sums over channels, is done for eight readings in one register, by the code and with the order of
+//! sums that one reading has, so the estimates are the same to the last bit. A reading that needs more than the lowest
+//! of its valleys, or more than a few steps, goes through the search for one reading.
+//!
+//! Where the time goes, by sampling: about four tenths into what is still done reading by reading, the scan of coarse
+//! nodes, its valleys and where to start in them; about a quarter into the refinement of a known force, a third into that
+//! of an unknown one; the rest into whitening and writing estimates.
+
+use super::coarse::Profile;
+use super::gauss_newton::Minimum;
+use super::multi_contact::locate_several;
+use super::posterior::conclude;
+use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
+use super::table::{FittedInfluence, InfluenceTable};
+use crate::fit::{Locate, LocatorFault};
+use crate::influence::channels::Channels;
+use crate::influence::config::ForceBelief;
+use crate::setup::Setup;
+use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::Position;
+use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
+use serde::{Deserialize, Serialize};
+
+/// Influence functions in a table, ready to be inverted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct BeamLocator {
+    stored: Stored,
+    search: Search,
+}
+
+/// What a locator file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    /// Influence functions.
+    table: InfluenceTable,
+    channels: Channels,
+    force: ForceBelief,
+    /// The most contacts at once.
+    contacts: usize,
+}
+
+impl BeamLocator {
+    pub(super) fn new(
+        table: InfluenceTable,
+        channels: Channels,
+        force: ForceBelief,
+        contacts: usize,
+    ) -> Self {
+        Stored { table, channels, force, contacts }.into_locator()
+    }
+
+    /// [`Locate::locate`] with memory of the caller's.
+    pub fn locate_with(&self, reading: &[f64], scratch: &mut Scratch) -> Estimate {
+        let (search, mut estimate) = (&self.search, NOTHING);
+        let rows = Rows { readings: reading, channels: reading.len() };
+        locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
+        if self.stored.contacts > 1 && estimate.status == Status::OutsideModel {
+            let square = scratch.whitened.channels(search.live.len()).iter().map(|d| d * d).sum();
+            let single = search.minima::<Array<f64, 8, false>>(square, scratch).0[0];
+            let whitened = scratch.whitened.channels(search.live.len());
+            return locate_several(search, self.stored.contacts, whitened, single.misfit).unwrap_or(estimate);
+        }
+        estimate
+    }
+
+    /// Locates a contact in each reading: `readings` are one after the other, each with a value for every channel, and
+    /// each estimate is written over. As many as both hold are located, and their number is returned.
+    ///
+    /// An estimate is the one that [`BeamLocator::locate_with`] gives; of one that is used again, no more is written than
+    /// what is read.
+    pub fn locate_batch(&self, readings: &[f64], scratch: &mut Scratch, estimates: &mut [Estimate]) -> usize {
+        let channels = self.stored.table.sensors;
+        let count = (readings.len() / channels).min(estimates.len());
+        if self.stored.contacts == 1 {
+            locate_rows(&self.search, Rows { readings, channels }, scratch, estimates);
+        } else {
+            for (reading, estimate) in readings.chunks_exact(channels).zip(estimates) {
+                *estimate = self.locate_with(reading, scratch);
+            }
+        }
+        count
+    }
+
+    /// The influence functions.
+    pub fn table(&self) -> &InfluenceTable {
+        &self.stored.table
+    }
+
+    /// Offsets, noise, and which channels are left out.
+    pub(super) fn channels(&self) -> &Channels {
+        &self.stored.channels
+    }
+
+    /// Influence function, offset and noise of each channel, in its SI unit; `None` for those that are left out.
+    pub fn influences(&self) -> impl Iterator<Item = Option<(FittedInfluence<'_>, f64, f64)>> {
+        let Stored { table, channels: Channels { offsets, noise_sd, dead, .. }, .. } = &self.stored;
+        (0..table.sensors).map(move |i| (!dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i])))
+    }
+
+    /// What is known of the force.
+    pub fn force(&self) -> ForceBelief {
+        self.stored.force
+    }
+
+    /// The most contacts that it looks for.
+    pub fn contacts(&self) -> usize {
+        self.stored.contacts
+    }
+
+    /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then
+    /// nothing changes.
+    pub fn leave_out(&mut self, channel: usize) -> bool {
+        let Some(channels) = self.stored.channels.without(channel) else { return false };
+        *self = Stored { channels, ..self.stored.clone() }.into_locator();
+        true
+    }
+
+    #[cfg(test)]
+    pub(super) fn search(&self) -> &Search {
+        &self.search
+    }
+}
+
+impl Locate for BeamLocator {
+    fn locate(&self, reading: &[f64]) -> Estimate {
+        self.locate_with(reading, &mut Scratch::default())
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+        LocatorFault::check_count("channels", setup.layout.len(), self.stored.table.sensors)
+    }
+}
+
+/// An estimate of nothing, to be written over.
+pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
+
+/// Readings one after the other, of so many channels each.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub readings: &'a [f64],
+    pub channels: usize,
+}
+
+/// Steps that eight readings take together; a reading that is not at its minimum then would keep the others waiting.
+const MOST_STEPS: usize = 4;
+
+/// Writes the estimate of one contact for each row.
+pub(super) fn locate_rows(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
+    InstructionSet::best().run(LocateRows { search, rows, scratch, estimates });
+}
+
+/// The work of [`locate_rows`].
+pub(super) struct LocateRows<'a> {
+    pub search: &'a Search,
+    pub rows: Rows<'a>,
+    pub scratch: &'a mut Scratch,
+    pub estimates: &'a mut [Estimate],
+}
+
+impl Kernel for LocateRows<'_> {
+    type Output = ();
+    const FUSED: bool = false;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        locate_each::<S::F64>(self.search, self.rows, self.scratch, self.estimates);
+    }
+}
+
+#[inline(always)]
+fn locate_each<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate]) {
+    let channels = rows.channels.max(1);
+    let count = estimates.len().min(rows.readings.len() / channels);
+    let eights = count - count % 8;
+    let (readings, rest) = rows.readings.split_at(eights * channels);
+    let (estimates, last) = estimates.split_at_mut(eights);
+    for (readings, estimates) in readings.chunks_exact(8 * channels).zip(estimates.as_chunks_mut().0) {
+        locate_eight::<V>(search, Rows { readings, channels }, scratch, estimates);
+    }
+    for (reading, estimate) in rest.chunks_exact(channels).zip(last) {
+        locate_into::<V>(search, reading, scratch, estimate);
+    }
+}
+
+/// Writes the estimates of eight readings.
+#[inline(always)]
+fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, estimates: &mut [Estimate; 8]) {
+    let groups = search.groups();
+    scratch.eight.resize(groups);
+    let ForEight { whitened, profiles } = &mut scratch.eight;
+    let ([mut squares, mut floors], mut nodes) = ([[0.0; 8]; 2], [0; 8]);
+    let readings = rows.readings.chunks_exact(rows.channels);
+    for (i, (reading, profile)) in readings.clone().zip(&mut *profiles).enumerate() {
+        let whitened = &mut whitened[i * groups..][..groups];
+        squares[i] = search.whiten::<V>(reading, whitened);
+        let lowest = search.lowest_valley::<V>(squares[i], whitened, profile);
+        (nodes[i], floors[i]) = lowest.unwrap_or((0, f64::NEG_INFINITY));
+    }
+    let each: [&Profile; 8] = std::array::from_fn(|i| &profiles[i]);
+    let start = search.coarse.start::<V, V>(&each, &nodes);
+    let (minima, arrived) =
+        search.gauss_newton.minimum::<V, V>(whitened, (start.x_m, start.force_n), MOST_STEPS);
+    let minima = one_by_one(&minima);
+    let mut hard = !arrived;
+    for i in 0..8 {
+        if floors[i] > minima[i].misfit + NEGLIGIBLE {
+            conclude(search, squares[i], &minima[i..=i], &profiles[i], &mut estimates[i]);
+        } else {
+            hard |= 1 << i;
+        }
+    }
+    for (i, reading) in readings.enumerate() {
+        if hard >> i & 1 == 1 {
+            locate_into::<V>(search, reading, scratch, &mut estimates[i]);
+        }
+    }
+}
+
+/// The minima of eight readings, reading by reading.
+#[inline(always)]
+fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
+    let [xx, xf, ff] = minima.covariance;
+    let (xx, xf, ff) = (xx.to_array(), xf.to_array(), ff.to_array());
+    let x_m = minima.x_m.to_array();
+    let (force_n, misfit) = (minima.force_n.to_array(), minima.misfit.to_array());
+    let mut each = [Minimum::<f64>::nowhere(); 8];
+    for i in 0..8 {
+        let covariance = [xx[i], xf[i], ff[i]];
+        each[i] = Minimum { x_m: x_m[i], force_n: force_n[i], misfit: misfit[i], covariance };
+    }
+    each
+}
+
+/// Writes the estimate of one reading, and of a used estimate no more than what is read.
+#[inline(always)]
+fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
+    let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
+    let (minima, count) = search.minima::<V>(square, scratch);
+    conclude(search, square, &minima[..count], &scratch.profile, estimate);
+}
+
+impl Stored {
+    fn into_locator(self) -> BeamLocator {
+        BeamLocator { search: Search::new(&self.table, &self.channels, self.force), stored: self }
+    }
+
+    /// Checks what a file may have got wrong.
+    fn check(&self) -> Result<(), LocatorFault> {
+        let Self { table, channels, .. } = self;
+        let count = LocatorFault::check_count;
+        let cells = table.sensors.saturating_mul(InfluenceTable::NODES);
+        count("influence values", cells, table.values.len())?;
+        count("influence slopes", cells, table.slopes.len())?;
+        count("influence variances", cells, table.variances.len())?;
+        channels.check(table.sensors, self.force)?;
+        if !(1..=3).contains(&self.contacts) {
+            return Err(LocatorFault::Count { what: "contacts at most", needed: 1, found: self.contacts });
+        }
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        numbers("influence value", &table.values, |_| true, "a finite number")?;
+        numbers("influence slope", &table.slopes, |_| true, "a finite number")?;
+        numbers("influence variance", &table.variances, |v| v >= 0.0, "at least 0")?;
+        numbers("length", &[table.length_m], |x| x > 0.0, "greater than 0")
+    }
+}
+
+impl TryFrom<Stored> for BeamLocator {
+    type Error = LocatorFault;
+
+    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+        stored.check()?;
+        Ok(stored.into_locator())
+    }
+}
+
+impl From<BeamLocator> for Stored {
+    fn from(locator: BeamLocator) -> Self {
+        locator.stored
+    }
+}
