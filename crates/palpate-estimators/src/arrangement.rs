@@ -322,22 +322,17 @@ pub fn every(extent: Extent, every_m: f64) -> Result<Vec<Position>, EveryError> 
     if !(1.0..=EveryError::MOST).contains(&count) {
         return Err(EveryError { every_m, count });
     }
-    let at = |i: usize| (i + 1) as f64 * every_m;
-    Ok(rows_of(extent, columns as usize, rows as usize, at, at))
+    Ok(rows_of(extent, columns as usize, rows as usize, |i, _, _| (i + 1) as f64 * every_m))
 }
 
 /// The middles of equal cells: x_i = (i + ½)·length/columns, and y_j = (j + ½)·width/rows on a plane.
 pub fn cells(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
-    let middle = |i: usize, size_m: f64, count: usize| (i as f64 + 0.5) * size_m / count as f64;
-    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
-    rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
+    rows_of(extent, columns, rows, |i, count, size_m| (i as f64 + 0.5) * size_m / count as f64)
 }
 
 /// The same middles with every coordinate, as a share u of its side, moved to `warp`(u): x_i = length·warp((i + ½)/columns).
 pub fn warped_cells(extent: Extent, columns: usize, rows: usize, warp: impl Fn(f64) -> f64) -> Vec<Position> {
-    let middle = |i: usize, size_m: f64, count: usize| size_m * warp((i as f64 + 0.5) / count as f64);
-    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
-    rows_of(extent, columns, rows, |i| middle(i, length_m, columns), |j| middle(j, width_m, rows))
+    rows_of(extent, columns, rows, |i, count, size_m| size_m * warp((i as f64 + 0.5) / count as f64))
 }
 
 /// (1 − cos πu)/2, which takes even shares to Chebyshev's: dense towards both ends.
@@ -361,24 +356,22 @@ pub fn squarest(extent: Extent, count: usize) -> (usize, usize) {
 
 /// The inner crossings of a grid: x_i = i·length/(columns + 1) from i = 1, and y_j = j·width/(rows + 1) on a plane.
 pub fn inner_grid(extent: Extent, columns: usize, rows: usize) -> Vec<Position> {
-    let crossing = |i: usize, size_m: f64, count: usize| (i + 1) as f64 / (count + 1) as f64 * size_m;
-    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
-    rows_of(extent, columns, rows, |i| crossing(i, length_m, columns), |j| crossing(j, width_m, rows))
+    rows_of(extent, columns, rows, |i, count, size_m| (i + 1) as f64 / (count + 1) as f64 * size_m)
 }
 
-/// Rows of positions, one above the other; a line has one row, at 0.
+/// Rows of positions, one above the other, each coordinate by its number, how many there are, and the size of its side; a line has
+/// one row, at 0.
 fn rows_of(
     extent: Extent,
     columns: usize,
     rows: usize,
-    x_m: impl Fn(usize) -> f64,
-    y_m: impl Fn(usize) -> f64,
+    place: impl Fn(usize, usize, f64) -> f64,
 ) -> Vec<Position> {
-    let x_m = &x_m;
-    let row = |y_m: f64| (0..columns).map(move |column| Position { x_m: x_m(column), y_m });
+    let x_m = |i: usize| place(i, columns, extent.length_m());
+    let row = |y_m: f64| (0..columns).map(move |i| Position { x_m: x_m(i), y_m });
     match extent {
         Extent::Line { .. } => row(0.0).collect(),
-        Extent::Plane { .. } => (0..rows).flat_map(|j| row(y_m(j))).collect(),
+        Extent::Plane { width_m, .. } => (0..rows).flat_map(|j| row(place(j, rows, width_m))).collect(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The two traits of estimators: [`Fit`] calibrates, [`Locate`] locates; and the locator that fitting gives.
 
+use std::borrow::Borrow;
+
 use palpate_core::Estimate;
 use palpate_mechanics::sensing::Layout;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -303,11 +305,12 @@ impl LocatorFault {
     /// [`LocatorFault::BadNumber`] for the first that is not finite or not `good`.
     pub fn check_numbers(
         what: &'static str,
-        numbers: impl IntoIterator<Item = f64>,
+        numbers: impl IntoIterator<Item = impl Borrow<f64>>,
         good: impl Fn(f64) -> bool,
         bound: &'static str,
     ) -> Result<(), Self> {
-        match numbers.into_iter().position(|number| !(number.is_finite() && good(number))) {
+        let bad = |number: f64| !(number.is_finite() && good(number));
+        match numbers.into_iter().position(|number| bad(*number.borrow())) {
             Some(i) => Err(Self::BadNumber { what, number: i + 1, bound }),
             None => Ok(()),
         }

@@ -12,6 +12,8 @@
 //! then gives one every ten seconds, and a tracker averages it away; a rate ten times lower moves both bounds by a tenth of their size
 //! and hides contacts that are that much stronger.
 
+use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::chi_squared_bound;
 
 /// The share of readings that are called `outside_model`, or not called `no_contact`, by noise alone.
@@ -34,6 +36,12 @@ const PLACES: f64 = 33.0;
 /// Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln P, with P the places it could have been at.
 pub fn contact_cost(unknowns: usize, channels: usize) -> f64 {
     unknowns as f64 * (channels as f64).ln() + 2.0 * PLACES.ln()
+}
+
+/// The estimate of a method that does not know the noise of its channels: located, or outside the surface.
+pub fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {
+    let status = if extent.contains(contact.position) { Status::Located } else { Status::OutsideSurface };
+    Estimate::of_contact(contact, status)
 }
 
 #[cfg(test)]

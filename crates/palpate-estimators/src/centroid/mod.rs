@@ -7,6 +7,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::held_out::HeldOutSpread;
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
+use crate::status::on_surface;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
@@ -56,19 +57,19 @@ impl Fit for Centroid {
     type Method = CentroidLocator;
     type Error = CentroidFitError;
 
-    fn fit_method(&self, task: FitTask) -> Result<CentroidLocator, CentroidFitError> {
-        let mut locator = uncalibrated(task.setup, task.recording)?;
-        let terms = locator.terms();
-        task.recording.check_distinct_positions(terms)?;
-        let rows: Vec<&Row> = task.recording.rows.iter().collect();
-        locator.map = calibrate(&locator, &rows)?;
-        let errors = held_out_errors(&locator, task.recording, terms, task.watch)?;
-        locator.spread = HeldOutSpread::of(&errors);
+    fn fit_method(
+        &self,
+        FitTask { setup, recording, watch, .. }: FitTask,
+    ) -> Result<CentroidLocator, CentroidFitError> {
+        let mut locator = uncalibrated(setup, recording)?;
+        recording.check_distinct_positions(locator.terms())?;
+        locator.map = calibrate(&locator, &recording.rows)?;
+        locator.spread = HeldOutSpread::of(&held_out_errors(&locator, recording, watch)?);
         Ok(locator)
     }
 }
 
-/// A locator that can weigh, but whose map is still empty.
+/// A locator whose map is still empty.
 fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
     let sensors = &setup.layout.sensors;
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
@@ -109,7 +110,7 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
 /// Least squares of the positions (x, and y where there is one) on the terms, row by row of the map.
 ///
 /// A ridge of 10⁻¹² of the largest diagonal entry keeps terms that a recording does not excite, such as a dead channel's, at 0.
-fn calibrate(locator: &CentroidLocator, rows: &[&Row]) -> Result<Vec<Vec<f64>>, NotPositiveDefinite> {
+fn calibrate(locator: &CentroidLocator, rows: &[Row]) -> Result<Vec<Vec<f64>>, NotPositiveDefinite> {
     let terms = locator.terms();
     let mut normal = Array2::zeros((terms, terms));
     let mut right = [Array1::zeros(terms), Array1::zeros(terms)];
@@ -130,11 +131,10 @@ fn calibrate(locator: &CentroidLocator, rows: &[&Row]) -> Result<Vec<Vec<f64>>, 
 }
 
 /// Errors (x, y) in metres at positions that the map was not calibrated on, of at most [`FOLDS`] maps; none where
-/// a fold leaves fewer positions than `terms`.
+/// a fold leaves fewer positions than terms.
 fn held_out_errors(
     locator: &CentroidLocator,
     recording: &Recording,
-    terms: usize,
     watch: Watch,
 ) -> Result<Vec<[f64; 2]>, Cancelled> {
     let positions = recording.distinct_positions().len();
@@ -142,15 +142,13 @@ fn held_out_errors(
     let mut errors = Vec::with_capacity(recording.rows.len());
     for fold in folds {
         watch.round()?;
-        let held_out: Vec<&Row> = fold.held_out.iter().map(|i| &recording.rows[*i]).collect();
         let training = recording.subset(&fold.training);
-        if training.check_distinct_positions(terms).is_err() {
+        if training.check_distinct_positions(locator.terms()).is_err() {
             return Ok(Vec::new());
         }
-        let rows: Vec<&Row> = training.rows.iter().collect();
-        let Ok(map) = calibrate(locator, &rows) else { return Ok(Vec::new()) };
+        let Ok(map) = calibrate(locator, &training.rows) else { return Ok(Vec::new()) };
         let judged = CentroidLocator { map, ..locator.clone() };
-        for row in held_out {
+        for row in fold.held_out.iter().map(|i| &recording.rows[*i]) {
             let Some(position) = judged.position(&row.reading) else { continue };
             errors.push([position.x_m - row.position.x_m, position.y_m - row.position.y_m]);
         }
@@ -161,7 +159,7 @@ fn held_out_errors(
 /// Positions are held out one by one up to this many, and in groups beyond.
 const FOLDS: usize = 20;
 
-/// A centroid that locates; see [`Centroid`](super::Centroid).
+/// A centroid that locates; see [`Centroid`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CentroidLocator {
@@ -191,6 +189,7 @@ pub enum Weighing {
 }
 
 impl CentroidLocator {
+    /// Unknowns of the map for a coordinate.
     fn terms(&self) -> usize {
         match self.weighing {
             Weighing::Positions(_) => 1 + self.extent.dimensions(),
@@ -232,20 +231,15 @@ impl Locate for CentroidLocator {
         let Some(position) = self.position(reading) else {
             return Estimate::of_position(Position::default(), Status::NoContact);
         };
-        let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };
         let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
-        Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
+        on_surface(ContactEstimate { position, force_n: self.force_n, uncertainty }, self.extent)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         let channels = setup.layout.len();
         LocatorFault::check_count("channel scales", channels, self.channel_scales.len())?;
-        LocatorFault::check_numbers(
-            "channel scale",
-            self.channel_scales.iter().copied(),
-            |scale| scale >= 0.0,
-            "a number of at least 0",
-        )?;
+        let scales = &self.channel_scales;
+        LocatorFault::check_numbers("channel scale", scales, |scale| scale >= 0.0, "a number of at least 0")?;
         if let Weighing::Positions(positions) = &self.weighing {
             LocatorFault::check_count("sensor positions", channels, positions.len())?;
             let coordinates = positions.iter().flat_map(|p| [p.x_m, p.y_m]);
@@ -254,7 +248,7 @@ impl Locate for CentroidLocator {
         LocatorFault::check_count("rows of the map", self.extent.dimensions(), self.map.len())?;
         for row in &self.map {
             LocatorFault::check_count("numbers in a row of the map", self.terms(), row.len())?;
-            LocatorFault::check_numbers("map", row.iter().copied(), |_| true, "a finite number")?;
+            LocatorFault::check_numbers("map", row, |_| true, "a finite number")?;
         }
         self.spread.map_or(Ok(()), |spread| spread.check())
     }

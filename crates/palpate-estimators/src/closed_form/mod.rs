@@ -85,7 +85,7 @@ impl Fit for ClosedForm {
     }
 }
 
-/// A closed form that locates; see [`ClosedForm`](super::ClosedForm).
+/// A closed form that locates; see [`ClosedForm`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosedFormLocator {

@@ -131,7 +131,7 @@ impl Fit for DigitEstimator {
 /// Where one gauge sees a contact alone, an interval wider than this share of the length is no place.
 const WIDE: f64 = 0.01;
 
-/// A digit's estimator that locates; see [`DigitEstimator`](super::DigitEstimator).
+/// A digit's estimator that locates; see [`DigitEstimator`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitLocator {

@@ -156,7 +156,8 @@ impl Features {
         LocatorFault::check_count("features of known sources", self.features.len().max(1), made)
     }
 
-    fn norm(&self, reading: &[f64]) -> f64 {
+    /// ‖r‖ of the scaled channels.
+    pub(crate) fn norm(&self, reading: &[f64]) -> f64 {
         let square = |scale: &ChannelScale| (value(reading, scale.channel) / scale.divisor).powi(2);
         self.channels.iter().map(square).sum::<f64>().sqrt()
     }

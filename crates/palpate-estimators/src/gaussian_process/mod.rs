@@ -10,7 +10,8 @@ use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::recording::TooFewPositions;
 use crate::setup::Setup;
-use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use crate::status::on_surface;
+use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::normal_interval_95;
@@ -74,7 +75,7 @@ impl Fit for GaussianProcessEstimator {
         for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
             out.iter_mut().zip(features.apply(&row.reading)).for_each(|(out, feature)| *out = feature);
         }
-        let outputs = Array2::from_shape_fn((rows, extent.width_m().map_or(1, |_| 2)), |(row, j)| {
+        let outputs = Array2::from_shape_fn((rows, extent.dimensions()), |(row, j)| {
             let position = recording.rows[row].position;
             if j == 0 { position.x_m } else { position.y_m }
         });
@@ -118,9 +119,8 @@ impl Locate for GaussianProcessLocator {
             y_95_m: normal_interval_95(y_m, y_m2.sqrt()),
         };
         let position = Position { x_m, y_m };
-        let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };
         let contact = ContactEstimate { position, force_n: self.force_n, uncertainty: Some(uncertainty) };
-        Estimate::of_contact(contact, status)
+        on_surface(contact, self.extent)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {

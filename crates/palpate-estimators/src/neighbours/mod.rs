@@ -7,6 +7,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::held_out::HeldOutSpread;
 use crate::recording::{Row, TooFewPositions};
 use crate::setup::Setup;
+use crate::status::on_surface;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
@@ -87,7 +88,7 @@ fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<
     Ok(errors)
 }
 
-/// Neighbours that locate; see [`Neighbours`](super::Neighbours).
+/// Neighbours that locate; see [`Neighbours`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NeighboursLocator {
@@ -121,9 +122,8 @@ impl Locate for NeighboursLocator {
         let Some(position) = means(&found).pop() else {
             return Estimate::of_position(Position::default(), Status::NoContact);
         };
-        let status = if self.extent.contains(position) { Status::Located } else { Status::OutsideSurface };
         let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
-        Estimate::of_contact(ContactEstimate { position, force_n: self.force_n, uncertainty }, status)
+        on_surface(ContactEstimate { position, force_n: self.force_n, uncertainty }, self.extent)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
@@ -133,12 +133,7 @@ impl Locate for NeighboursLocator {
         for row in &self.rows {
             let (needed, found) = (self.features.len(), row.features.len());
             LocatorFault::check_count("features of a row", needed, found)?;
-            LocatorFault::check_numbers(
-                "feature of a row",
-                row.features.iter().copied(),
-                |_| true,
-                "a finite number",
-            )?;
+            LocatorFault::check_numbers("feature of a row", &row.features, |_| true, "a finite number")?;
             let place = [row.position.x_m, row.position.y_m];
             LocatorFault::check_numbers("position", place, |_| true, "a finite number")?;
         }

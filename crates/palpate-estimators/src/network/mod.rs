@@ -24,7 +24,8 @@ pub use train::{Precision, TrainingTask, train_many, train_one};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
-use palpate_core::{Estimate, Status};
+use crate::status::on_surface;
+use palpate_core::{ContactEstimate, Estimate};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::mean_and_variance;
@@ -330,8 +331,7 @@ impl<'a> Coded<'a> {
             row.reading.iter().zip(&scaling).map(|(value, channel)| channel.apply(*value)).collect()
         };
         let targets = |row: &Row| -> Vec<f64> {
-            let coordinates = [row.position.x_m, row.position.y_m];
-            coordinates.iter().zip(&output_scale_m).map(|(x, scale)| x / scale).collect()
+            extent.coordinates_m(row.position).zip(&output_scale_m).map(|(x, scale)| x / scale).collect()
         };
         let patterns = TrainingSet {
             inputs: recording.channels.len(),
@@ -521,7 +521,7 @@ impl NetworkParts {
         let weights = self.topology.checked_weight_count();
         count("weights", weights.unwrap_or(usize::MAX), self.weights.len())?;
         let finite = "a finite number";
-        LocatorFault::check_numbers("weight", self.weights.iter().copied(), |_| true, finite)?;
+        LocatorFault::check_numbers("weight", &self.weights, |_| true, finite)?;
         let offsets = self.scaling.iter().map(|scaling| scaling.offset);
         LocatorFault::check_numbers("scaling's offset", offsets, |_| true, finite)?;
         let scales =
@@ -562,8 +562,7 @@ impl NetworkLocator {
 impl Locate for NetworkLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let position = self.position(reading).unwrap_or(Position::along(f64::NAN));
-        let on_surface = self.parts.extent.contains(position);
-        Estimate::of_position(position, if on_surface { Status::Located } else { Status::OutsideSurface })
+        on_surface(ContactEstimate { position, ..ContactEstimate::default() }, self.parts.extent)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {

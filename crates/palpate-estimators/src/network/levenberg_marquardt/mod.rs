@@ -6,11 +6,12 @@ mod training;
 use ndarray::{Array1, Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use crate::features::{FeatureKind, FeatureSource, Features, NoFeatures};
+use crate::features::{ChannelScale, FeatureKind, FeatureSource, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::network::{Activation, Topology};
-use crate::recording::{Recording, TooFewPositions};
+use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
+use crate::status::on_surface;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
@@ -82,52 +83,49 @@ impl Fit for LevenbergMarquardt {
     type Method = LevenbergMarquardtLocator;
     type Error = LevenbergMarquardtFitError;
 
-    fn fit_method(&self, task: FitTask) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
-        self.check()?;
-        task.recording.check_distinct_positions(2)?;
-        let inputs = NetworkInputs::of(&task.setup.layout, task.recording)?;
-        let input_rows = input_rows(&inputs, task.recording)?;
-        let scales = output_scales(task.setup, task.recording);
-        let targets = target_rows(task.setup, task.recording, &scales);
-        let topology = self.topology(inputs.axes.len(), scales.len());
-        let training = Training {
-            topology: &topology,
-            inputs: input_rows,
-            targets,
-            max_iterations: self.max_iterations,
-        };
-        let members = self.ensemble(&training, task.seed, task.watch)?;
-        Ok(LevenbergMarquardtLocator {
-            extent: task.setup.surface.extent(),
-            force_n: task.setup.force_n,
-            inputs,
-            topology,
-            scales,
-            members,
-        })
-    }
-}
-
-impl LevenbergMarquardt {
-    fn check(&self) -> Result<(), LevenbergMarquardtFitError> {
+    fn fit_method(
+        &self,
+        FitTask { setup, recording, seed, watch }: FitTask,
+    ) -> Result<LevenbergMarquardtLocator, LevenbergMarquardtFitError> {
         let zero = |what| Err(LevenbergMarquardtFitError::Zero { what });
-        match self {
-            Self { hidden, .. } if hidden.contains(&0) => zero("hidden nodes"),
-            Self { ensemble: 0, .. } => zero("networks in its ensemble"),
-            _ => Ok(()),
+        if self.hidden.contains(&0) {
+            return zero("hidden nodes");
         }
-    }
-
-    fn topology(&self, inputs: usize, outputs: usize) -> Topology {
-        let sizes = std::iter::once(inputs).chain(self.hidden.iter().copied()).chain([outputs]);
-        Topology {
+        if self.ensemble == 0 {
+            return zero("networks in its ensemble");
+        }
+        recording.check_distinct_positions(2)?;
+        let inputs = NetworkInputs::of(&setup.layout, recording)?;
+        if inputs.axes.is_empty() {
+            return Err(LevenbergMarquardtFitError::Alike);
+        }
+        let outputs = outputs(setup, recording);
+        let scales: Vec<OutputScale> = outputs.iter().map(|output| OutputScale::of(output)).collect();
+        let (rows, extent, force_n) = (recording.rows.len(), setup.surface.extent(), setup.force_n);
+        let sizes =
+            std::iter::once(inputs.axes.len()).chain(self.hidden.iter().copied()).chain([scales.len()]);
+        let topology = Topology {
             sizes: sizes.collect(),
             biases: true,
             hidden_activation: Activation::Tanh,
             output_activation: Activation::Linear,
-        }
+        };
+        let input_rows: Vec<Vec<f64>> =
+            recording.rows.iter().map(|row| inputs.values(&row.reading)).collect();
+        let training = Training {
+            topology: &topology,
+            inputs: Array2::from_shape_fn((rows, inputs.axes.len()), |(i, k)| input_rows[i][k]),
+            targets: Array2::from_shape_fn((rows, scales.len()), |(i, k)| {
+                (outputs[k][i] - scales[k].mean) / scales[k].sd
+            }),
+            max_iterations: self.max_iterations,
+        };
+        let members = self.ensemble(&training, seed, watch)?;
+        Ok(LevenbergMarquardtLocator { extent, force_n, inputs, topology, scales, members })
     }
+}
 
+impl LevenbergMarquardt {
     /// Trains twice the ensemble and keeps the half with the greatest evidence: a poor local minimum has little.
     fn ensemble(
         &self,
@@ -150,49 +148,17 @@ impl LevenbergMarquardt {
     }
 }
 
-fn input_rows(
-    inputs: &NetworkInputs,
-    recording: &Recording,
-) -> Result<Array2<f64>, LevenbergMarquardtFitError> {
-    let width = inputs.axes.len();
-    if width == 0 {
-        return Err(LevenbergMarquardtFitError::Alike);
-    }
-    let mut rows = Array2::zeros((recording.rows.len(), width));
-    for (i, row) in recording.rows.iter().enumerate() {
-        rows.row_mut(i).iter_mut().zip(inputs.values(&row.reading)).for_each(|(input, value)| *input = value);
-    }
-    Ok(rows)
-}
-
-/// x, y where the surface has one, and the force where it is an output.
-fn truths<'a>(setup: &Setup, recording: &'a Recording) -> Vec<Box<dyn Fn(usize) -> f64 + 'a>> {
-    let rows = &recording.rows;
-    let mut truths: Vec<Box<dyn Fn(usize) -> f64>> = vec![Box::new(|i| rows[i].position.x_m)];
+/// The outputs of all rows: x, y where the surface has one, and the force where it is an output.
+fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
+    let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
+    let mut outputs = vec![column(|row| row.position.x_m)];
     if let Extent::Plane { .. } = setup.surface.extent() {
-        truths.push(Box::new(|i| rows[i].position.y_m));
+        outputs.push(column(|row| row.position.y_m));
     }
-    if setup.force_n.is_none() && rows.iter().all(|row| row.force_n.is_some()) {
-        truths.push(Box::new(|i| rows[i].force_n.unwrap_or_default()));
+    if setup.force_n.is_none() && recording.rows.iter().all(|row| row.force_n.is_some()) {
+        outputs.push(column(|row| row.force_n.unwrap_or_default()));
     }
-    truths
-}
-
-/// Mean and standard deviation of every output over the recording.
-fn output_scales(setup: &Setup, recording: &Recording) -> Vec<OutputScale> {
-    let count = recording.rows.len();
-    let scale = |truth: &dyn Fn(usize) -> f64| {
-        let (mean, variance) = mean_and_variance((0..count).map(truth));
-        OutputScale { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
-    };
-    truths(setup, recording).iter().map(|truth| scale(truth.as_ref())).collect()
-}
-
-fn target_rows(setup: &Setup, recording: &Recording, scales: &[OutputScale]) -> Array2<f64> {
-    let truths = truths(setup, recording);
-    Array2::from_shape_fn((recording.rows.len(), scales.len()), |(i, k)| {
-        (truths[k](i) - scales[k].mean) / scales[k].sd
-    })
+    outputs
 }
 
 /// Whitened inputs: the reading's load-invariant [`Features`] along their principal axes, each with mean 0 and variance 1 over the
@@ -235,29 +201,16 @@ impl NetworkInputs {
     }
 
     /// Standard deviation of every feature's noise, where the layout says how noisy its channels are; to first order at
-    /// the mean norm where features are load-invariant: that of r/|r| is σ/|r|, that of ln |r| at most as large.
+    /// the mean norm: that of r/|r| is σ/|r|, that of ln |r| at most as large.
     fn feature_noise(&self, layout: &Layout, recording: &Recording) -> Option<Array1<f64>> {
-        let Features { kind, channels, features, .. } = &self.features;
-        let scaled: Vec<f64> = channels
-            .iter()
-            .map(|scale| {
-                let channel = &layout.sensors[scale.channel].channel;
-                channel.reading_sd() / scale.divisor
-            })
-            .collect();
+        let Features { channels, features, .. } = &self.features;
+        let sd = |scale: &ChannelScale| layout.sensors[scale.channel].channel.reading_sd() / scale.divisor;
+        let scaled: Vec<f64> = channels.iter().map(sd).collect();
         if scaled.contains(&0.0) {
             return None;
         }
         let largest = scaled.iter().fold(0.0, |m: f64, s| m.max(*s));
-        let norm = match kind {
-            FeatureKind::Readings => 1.0,
-            FeatureKind::LoadInvariant => {
-                let square = |reading: &[f64]| {
-                    channels.iter().map(|s| (reading[s.channel] / s.divisor).powi(2)).sum::<f64>()
-                };
-                mean(recording.rows.iter().map(|row| square(&row.reading).sqrt()))
-            }
-        };
+        let norm = mean(recording.rows.iter().map(|row| self.features.norm(&row.reading)));
         let of_feature = |source| match source {
             FeatureSource::Channel(i) => scaled[i],
             FeatureSource::LogNorm => largest,
@@ -275,13 +228,13 @@ impl NetworkInputs {
         self.features.check(channels)?;
         for axis in &self.axes {
             LocatorFault::check_count("numbers of an axis", self.features.len(), axis.len())?;
-            LocatorFault::check_numbers("axis", axis.iter().copied(), |_| true, "a finite number")?;
+            LocatorFault::check_numbers("axis", axis, |_| true, "a finite number")?;
         }
         Ok(())
     }
 }
 
-/// Networks that locate; see [`LevenbergMarquardt`](super::LevenbergMarquardt).
+/// Networks that locate; see [`LevenbergMarquardt`].
 ///
 /// The estimate is the mean of the members. Its covariance is that of the mixture: the spread of the members, and the mean over
 /// them of g·A⁻¹·gᵀ, by which the weights are unsure (g an output's derivatives by the weights, A the curvature), and of
@@ -313,6 +266,13 @@ pub struct OutputScale {
     pub sd: f64,
 }
 
+impl OutputScale {
+    fn of(output: &[f64]) -> Self {
+        let (mean, variance) = mean_and_variance(output.iter().copied());
+        Self { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
+    }
+}
+
 /// One network, and how sure it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -337,9 +297,7 @@ impl Member {
         let rows = lower.outer_iter().enumerate();
         Self {
             weights: trained.weights,
-            curvature_factor: rows
-                .flat_map(|(i, row)| row.iter().copied().take(i + 1).collect::<Vec<_>>())
-                .collect(),
+            curvature_factor: rows.flat_map(|(i, row)| row.to_vec().into_iter().take(i + 1)).collect(),
             noise: trained.hyperparameters.betas.iter().map(|beta| 1.0 / beta).collect(),
             effective_parameters: trained.effective_parameters,
             log_evidence: trained.log_evidence,
@@ -361,16 +319,9 @@ impl Member {
     }
 }
 
-/// Mean and covariance of the outputs.
-struct Prediction {
-    mean: Vec<f64>,
-    /// A row an output.
-    covariance: Vec<Vec<f64>>,
-}
-
 impl LevenbergMarquardtLocator {
-    /// Mean and covariance of the mixture, in units of the outputs' scales.
-    fn predict(&self, inputs: &[f64]) -> Option<Prediction> {
+    /// Mean and covariance (a row an output) of the mixture, in units of the outputs' scales.
+    fn predict(&self, inputs: &[f64]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let count = self.topology.outputs();
         let inputs = ArrayView2::from_shape((1, inputs.len()), inputs).ok()?;
         let share = 1.0 / self.members.len() as f64;
@@ -398,30 +349,21 @@ impl LevenbergMarquardtLocator {
                 }
             }
         }
-        Some(Prediction { mean, covariance })
+        Some((mean, covariance))
     }
 
-    fn contact(&self, prediction: &Prediction) -> ContactEstimate {
-        let value = |k: usize| self.scales[k].mean + self.scales[k].sd * prediction.mean[k];
-        let covariance =
-            |i: usize, j: usize| self.scales[i].sd * self.scales[j].sd * prediction.covariance[i][j];
-        let y = self.extent.width_m().map(|_| 1);
+    fn contact(&self, mean: &[f64], covariance: &[Vec<f64>]) -> ContactEstimate {
+        let value = |k: usize| self.scales[k].mean + self.scales[k].sd * mean[k];
+        let covariance = |i: usize, j: usize| self.scales[i].sd * self.scales[j].sd * covariance[i][j];
+        let (x, y) = (Some(0), self.extent.width_m().map(|_| 1));
         let force = (self.scales.len() > 1 + usize::from(y.is_some())).then(|| self.scales.len() - 1);
-        let both = |a: Option<usize>, b: Option<usize>| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j));
+        let pairs = [(x, x), (x, y), (x, force), (y, y), (y, force), (force, force)];
         let interval = |k: usize| normal_interval_95(value(k), covariance(k, k).sqrt());
-        let x = Some(0);
         ContactEstimate {
             position: Position { x_m: value(0), y_m: y.map_or(0.0, value) },
             force_n: self.force_n.or(force.map(value)),
             uncertainty: Some(Uncertainty {
-                covariance: [
-                    both(x, x),
-                    both(x, y),
-                    both(x, force),
-                    both(y, y),
-                    both(y, force),
-                    both(force, force),
-                ],
+                covariance: pairs.map(|(a, b)| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j))),
                 x_95_m: interval(0),
                 y_95_m: y.map_or((0.0, 0.0), interval),
             }),
@@ -431,24 +373,17 @@ impl LevenbergMarquardtLocator {
 
 impl Locate for LevenbergMarquardtLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
-        let prediction = self.predict(&self.inputs.values(reading));
-        let Some(prediction) = prediction else {
-            return Estimate::of_position(Position::default(), Status::NoContact);
-        };
-        let contact = self.contact(&prediction);
-        let on_surface = self.extent.contains(contact.position);
-        Estimate::of_contact(contact, if on_surface { Status::Located } else { Status::OutsideSurface })
+        match self.predict(&self.inputs.values(reading)) {
+            Some((mean, covariance)) => on_surface(self.contact(&mean, &covariance), self.extent),
+            None => Estimate::of_position(Position::default(), Status::NoContact),
+        }
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         self.inputs.check(setup.layout.len())?;
         let sizes = &self.topology.sizes;
-        LocatorFault::check_numbers(
-            "layer",
-            sizes.iter().map(|n| *n as f64),
-            |n| n >= 1.0,
-            "at least 1 node",
-        )?;
+        let nodes = sizes.iter().map(|n| *n as f64);
+        LocatorFault::check_numbers("layer", nodes, |n| n >= 1.0, "at least 1 node")?;
         LocatorFault::check_numbers("count of layers", [sizes.len() as f64], |n| n >= 2.0, "at least 2")?;
         LocatorFault::check_count("inputs", self.inputs.axes.len(), self.topology.inputs())?;
         LocatorFault::check_count("outputs", self.scales.len(), self.topology.outputs())?;
@@ -459,12 +394,8 @@ impl Locate for LevenbergMarquardtLocator {
         LocatorFault::check_numbers("output mean", scales, |_| true, "a finite number")?;
         let scales = self.scales.iter().map(|s| s.sd);
         LocatorFault::check_numbers("output scale", scales, |sd| sd > 0.0, "greater than 0")?;
-        LocatorFault::check_numbers(
-            "count of members",
-            [self.members.len() as f64],
-            |n| n >= 1.0,
-            "at least 1",
-        )?;
+        let members = [self.members.len() as f64];
+        LocatorFault::check_numbers("count of members", members, |n| n >= 1.0, "at least 1")?;
         self.members.iter().try_for_each(|member| self.check_member(member))
     }
 }
@@ -473,22 +404,14 @@ impl LevenbergMarquardtLocator {
     fn check_member(&self, member: &Member) -> Result<(), LocatorFault> {
         let weights = self.topology.weight_count();
         LocatorFault::check_count("weights", weights, member.weights.len())?;
-        LocatorFault::check_count(
-            "curvature numbers",
-            weights * (weights + 1) / 2,
-            member.curvature_factor.len(),
-        )?;
+        let (needed, found) = (weights * (weights + 1) / 2, member.curvature_factor.len());
+        LocatorFault::check_count("curvature numbers", needed, found)?;
         LocatorFault::check_count("noise variances", self.scales.len(), member.noise.len())?;
-        let finite = member.weights.iter().chain(&member.curvature_factor).copied();
+        let finite = member.weights.iter().chain(&member.curvature_factor);
         LocatorFault::check_numbers("weight or curvature", finite, |_| true, "a finite number")?;
         let pivots = (0..weights).map(|i| member.curvature_factor[i * (i + 3) / 2]);
         LocatorFault::check_numbers("curvature pivot", pivots, |d| d > 0.0, "greater than 0")?;
-        LocatorFault::check_numbers(
-            "noise variance",
-            member.noise.iter().copied(),
-            |v| v >= 0.0,
-            "at least 0",
-        )
+        LocatorFault::check_numbers("noise variance", &member.noise, |v| v >= 0.0, "at least 0")
     }
 }
 
