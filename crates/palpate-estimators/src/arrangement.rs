@@ -133,6 +133,17 @@ impl Arrangement {
     /// Lays `count` positions out: on a line from left to right, on a plane row by row; explicit positions come in the
     /// order in which they were listed.
     ///
+    /// ```
+    /// use palpate_estimators::arrangement::Arrangement;
+    /// use palpate_mechanics::surface::Extent;
+    /// use palpate_mechanics::units::mm;
+    ///
+    /// let dense = Arrangement::EdgeDense { middle: 4, portion: Arrangement::PAPER_PORTION };
+    /// let positions = dense.positions(10, Extent::Line { length_m: mm(400.0) })?;
+    /// assert!((positions[0].x_m - mm(25.0)).abs() < 1e-12 && (positions[3].x_m - mm(100.0)).abs() < 1e-12);
+    /// # Ok::<(), palpate_estimators::arrangement::ArrangementError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ArrangementError`], with the value and the bound, where the rule cannot place that many positions.
     pub fn positions(&self, count: usize, extent: Extent) -> Result<Vec<Position>, ArrangementError> {

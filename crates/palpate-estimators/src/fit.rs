@@ -135,6 +135,31 @@ pub trait Fit {
     /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same
     /// locator as [`Fit::fit_task`] does; methods that can, fit many seeds at once.
     ///
+    /// ```
+    /// use palpate_estimators::fit::{Fit, FitTask, Fitted, SeedQueue};
+    /// use palpate_estimators::neighbours::{Neighbours, NeighboursLocator};
+    /// use palpate_estimators::{arrangement::Training, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// struct Seeds(Vec<u64>, Vec<Fitted<NeighboursLocator>>);
+    /// impl SeedQueue<Fitted<NeighboursLocator>> for Seeds {
+    ///     fn next_seed(&mut self) -> Option<u64> {
+    ///         self.0.pop()
+    ///     }
+    ///     fn fitted(&mut self, _seed: u64, locator: Fitted<NeighboursLocator>) {
+    ///         self.1.push(locator);
+    ///     }
+    /// }
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let presses = setup.simulate(&Training::even(10), 0)?;
+    /// let mut queue = Seeds(vec![2, 1, 0], Vec::new());
+    /// Neighbours::default().fit_many(FitTask::new(&setup, &presses), &mut queue)?;
+    /// assert_eq!(queue.1[2].provenance.seed, 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it; what was fitted before is in the
     /// queue.

@@ -1,4 +1,22 @@
-//! From recordings to locators: recordings, estimators, tracking, load profiles, evaluation.
+//! From recordings to locators: setups, recordings, every estimator, tracking, load profiles, evaluation.
+//!
+//! A [`Setup`](setup::Setup) is a surface with its sensors. A [`Recording`](recording::Recording) of it, read from a file or
+//! [simulated](simulate), is what an estimator is fitted to ([`Fit`](fit::Fit)); what that gives locates ([`Locate`](fit::Locate)),
+//! is judged by [`evaluation`], followed in time by [`tracking`], and kept in a file by [`estimator`].
+//!
+//! ```
+//! use palpate_estimators::arrangement::Training;
+//! use palpate_estimators::evaluation::Evaluation;
+//! use palpate_estimators::{fit::Fit, influence::Influence, setup::Setup};
+//! use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+//!
+//! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+//! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+//! let locator = Influence::default().fit(&setup, &setup.simulate(&Training::even(10), 0)?)?;
+//! let errors = Evaluation::of(&locator, &setup.simulate(&Training::even(50), 1)?)?;
+//! assert!(errors.effective_percent(mm(2.0)) > 90.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![cfg_attr(
     not(test),
     deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)

@@ -152,6 +152,19 @@ impl Setup {
 
     /// A surface without a model, `length_m` metres long, with these raw channels, known by recordings only.
     ///
+    /// ```
+    /// use palpate_estimators::recording::Columns;
+    /// use palpate_estimators::setup::Setup;
+    /// use palpate_mechanics::units::mm;
+    ///
+    /// let columns = Columns::along("X", ["Pl", "Pr"]).force("F");
+    /// let setup = Setup::measured(mm(100.0), &["Pl", "Pr"])?.recorded_as(columns);
+    /// let file = "X,F,Pl,Pr\n10,1.5,0.9,0.2\n90,1.5,0.1,0.8\n";
+    /// let recording = setup.read_recording("presses.csv", file.as_bytes())?;
+    /// assert_eq!((recording.rows[1].position.x_m, recording.rows[1].reading[1]), (mm(90.0), 0.8));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SetupError`] without channels, or for a length that is not greater than 0 and finite.
     pub fn measured(length_m: f64, channels: &[&str]) -> Result<Self, SetupError> {

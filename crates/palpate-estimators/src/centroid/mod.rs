@@ -21,6 +21,18 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite};
 /// With sensors at known positions p_i the estimate is A·(Σ w_i·p_i) + b, with A and b from least squares over the
 /// training recording. Raw channels have no positions, so least squares gives each one a position of its own:
 /// the estimate is Σ w_i·p_i.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, centroid::Centroid};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(20), 0)?;
+/// let estimate = Centroid.fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(20.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Centroid;
 

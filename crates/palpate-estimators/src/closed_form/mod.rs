@@ -28,6 +28,18 @@ use polynomial::Polynomial;
 ///
 /// Uncertainty is propagated from the channels' noise (and quantisation) to first order; where the layout gives a channel no noise
 /// there is none, and a reading that is off by more than a tenth of itself is outside the model.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, closed_form::ClosedForm};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(20), 0)?;
+/// let estimate = ClosedForm.fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(2.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClosedForm;
 

@@ -31,6 +31,23 @@ use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interv
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, digit::DigitEstimator, fit::Fit, setup::Setup};
+/// use palpate_mechanics::sensing::SensorKind::Strain;
+/// use palpate_mechanics::surface::{Digit, ForceDirection::Normal};
+/// use palpate_mechanics::units::{gpa, microstrain, mm, newtons};
+///
+/// let [length_m, width_m, thickness_m] = [120.0, 10.0, 0.5].map(mm);
+/// let digit = Digit { length_m, width_m, thickness_m, youngs_modulus_pa: gpa(200.0), direction: Normal };
+/// let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
+/// let setup = Setup::new(digit).sensors(gauges)?;
+/// let presses = setup.simulate(&Training::even(12).with_force(newtons(4.0)), 0)?;
+/// let locator = DigitEstimator::default().fit(&setup, &presses)?;
+/// let estimate = locator.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(95.0)).abs() < mm(0.1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DigitEstimator {
     /// What the gauges read.

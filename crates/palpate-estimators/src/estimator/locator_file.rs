@@ -71,6 +71,18 @@ struct Read {
 impl Locator {
     /// The locator as the text of its file.
     ///
+    /// ```
+    /// use palpate_estimators::{arrangement::Training, estimator::Locator, fit::Fit, influence::Influence, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let presses = setup.simulate(&Training::even(10), 0)?;
+    /// let locator = Influence::default().fit(&setup, &presses)?.into_locator();
+    /// assert_eq!(Locator::from_json(&locator.to_json()?)?, locator);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`LocatorFileError::Json`] when a number has no JSON, which no fitted locator has.
     pub fn to_json(&self) -> Result<String, LocatorFileError> {

@@ -356,6 +356,18 @@ impl<E: From<Cancelled> + std::error::Error + 'static> From<Cancelled> for Evalu
 /// are by position, see [`Recording::folds`](crate::recording::Recording::folds). An estimator that chooses among others
 /// chooses without the held-out rows.
 ///
+/// ```
+/// use palpate_estimators::{arrangement::Training, evaluation::cross_validate, fit::FitTask, influence::Influence, setup::Setup};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10).repeated(5), 0)?;
+/// let held_out = cross_validate(&Influence::default(), FitTask::new(&setup, &presses), 5)?;
+/// assert!(held_out.summary(None).expect("50 presses").median_m < mm(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`EvaluationError`] when a fold cannot be fitted, or the watch stopped it.
 pub fn cross_validate<E: Fit>(

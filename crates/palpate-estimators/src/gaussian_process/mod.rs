@@ -19,6 +19,18 @@ use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, Regressi
 use palpate_numerics::watch::Cancelled;
 
 /// How a Gaussian process is to be fitted to a recording.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, gaussian_process::GaussianProcessEstimator};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(20), 0)?;
+/// let estimate = GaussianProcessEstimator::default().fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(2.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
     /// What it sees of a reading; `None` for [`FeatureKind::for_setup`].

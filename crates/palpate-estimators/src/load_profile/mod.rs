@@ -97,6 +97,20 @@ impl<'a> LoadSensors<'a> {
 }
 
 /// Turns readings of one bench into load profiles.
+///
+/// ```
+/// use palpate_estimators::{load_profile::Profiler, setup::Setup, simulate::simulate_loads};
+/// use palpate_mechanics::{contact::Position, surface::UniformLoad};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let load = UniformLoad { from: Position::along(mm(120.0)), to: Position::along(mm(160.0)), force_n: 2.0 };
+/// let readings = simulate_loads(&setup, &[load], 1, 0)?;
+/// let profile = Profiler::of(&setup)?.profile(&readings[0])?;
+/// assert!((profile.total_n - 2.0).abs() < 0.2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Profiler<'a> {
     sensors: LoadSensors<'a>,
     cells: Cells,

@@ -15,6 +15,18 @@ use palpate_numerics::watch::{Cancelled, Watch};
 
 /// The k nearest neighbours, weighted by their inverse distance, in the space of the reading's [`Features`], each of which
 /// has variance 1. Whitening by their full covariance would blow directions of mere noise up to the size of the others.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, neighbours::Neighbours};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(20), 0)?;
+/// let estimate = Neighbours::default().fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
     /// Most neighbours to try, at least 1. Of k = 1, 2, … that which is nearest to the training rows in the root mean square

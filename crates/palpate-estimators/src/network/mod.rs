@@ -34,6 +34,20 @@ use palpate_numerics::watch::Cancelled;
 
 /// A feed-forward network and how it is trained. The default is the founding paper's: one hidden layer of ten
 /// logistic nodes, a logistic output, and back-propagation with learning rate 0.7 and momentum 0.9.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, network::Network};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10), 0)?;
+/// let mut network = Network::default();
+/// network.training.aggregate_error = 1e-2;
+/// let estimate = network.fit(&setup, &presses)?.locate(&presses.rows[4].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(180.0)).abs() < mm(40.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
     /// Nodes of each hidden layer, input side first.

@@ -12,6 +12,19 @@ use palpate_mechanics::units::Unit;
 /// column is written where every row has a force, a nuisance coordinate never. `extent` says whether positions have one coordinate or
 /// two. `comment` says where the recording comes from, in a first line that begins with `#`.
 ///
+/// ```
+/// use palpate_estimators::{arrangement::Training, recording, setup::Setup};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10), 0)?;
+/// let mut file = Vec::new();
+/// recording::write(&presses, setup.surface.extent(), "simulated", &mut file)?;
+/// assert_eq!(setup.read_recording("simulated.csv", &file[..])?.rows, presses.rows);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Whatever `out` reports.
 pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {

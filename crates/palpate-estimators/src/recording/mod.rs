@@ -111,6 +111,17 @@ impl Recording {
     /// Splits the rows into `count` folds by position: of the distinct positions, sorted by x and then y, fold k
     /// holds out those whose index leaves k when divided by `count`, with all their rows.
     ///
+    /// ```
+    /// use palpate_estimators::{arrangement::Training, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let folds = setup.simulate(&Training::even(10).repeated(2), 0)?.folds(5)?;
+    /// assert_eq!((folds.len(), folds[0].training.len(), folds[0].held_out.len()), (5, 16, 4));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`TooFewPositions`] when there are fewer distinct positions than folds, or fewer than 2, since every fold
     /// needs rows to fit; a `count` below 2 counts as 2.

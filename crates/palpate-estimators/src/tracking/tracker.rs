@@ -19,6 +19,24 @@ const MOST_CONTACTS: usize = 2;
 const UNSEEN: f64 = 9.0;
 
 /// Follows contacts through readings in time: up to two on a line, one on a plane.
+///
+/// ```
+/// use palpate_estimators::estimator::{Tracker, TrackerConfig};
+/// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(10).repeated(5), 0)?;
+/// let locator = Influence::default().fit(&setup, &presses)?.into_locator();
+/// let config = TrackerConfig::default();
+/// let tracking = locator.tracking(&config)?;
+/// let mut tracker = Tracker::new(tracking.likelihood(), config);
+/// tracker.follow(0.0, &presses.rows[20].reading)?;
+/// let track = tracker.follow(0.01, &presses.rows[21].reading)?;
+/// assert!((track.contacts[0].x_m - mm(180.0)).abs() < mm(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Tracker<'a> {
     likelihood: &'a dyn Likelihood,
     config: TrackerConfig,

@@ -24,6 +24,18 @@ use training::{Trained, Training, jacobians};
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
 /// Outputs are the position and, where the bench does not know the force but every row of the recording does, the force.
+///
+/// ```
+/// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, network::LevenbergMarquardt};
+/// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+/// let presses = setup.simulate(&Training::even(20), 0)?;
+/// let estimate = LevenbergMarquardt { ensemble: 1, ..LevenbergMarquardt::default() }.fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(2.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LevenbergMarquardt {
     /// Nodes of each hidden layer, input side first; at least 1 each.
