@@ -51,21 +51,12 @@ struct Heading {
     format_version: u32,
 }
 
-#[derive(serde::Serialize)]
-struct Written<'a> {
-    format: &'static str,
-    format_version: u32,
-    locator: &'a Locator,
-}
-
-#[derive(serde::Deserialize)]
+#[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Read {
-    #[serde(rename = "format")]
-    _format: String,
-    #[serde(rename = "format_version")]
-    _format_version: u32,
-    locator: Locator,
+struct File<L> {
+    format: String,
+    format_version: u32,
+    locator: L,
 }
 
 impl Locator {
@@ -86,8 +77,8 @@ impl Locator {
     /// # Errors
     /// [`LocatorFileError::Json`] when a number has no JSON, which no fitted locator has.
     pub fn to_json(&self) -> Result<String, LocatorFileError> {
-        let written = Written { format: FORMAT, format_version: FORMAT_VERSION, locator: self };
-        Ok(serde_json::to_string_pretty(&written)? + "\n")
+        let file = File { format: FORMAT.to_owned(), format_version: FORMAT_VERSION, locator: self };
+        Ok(serde_json::to_string_pretty(&file)? + "\n")
     }
 
     /// Reads the text of a locator file.
@@ -102,7 +93,7 @@ impl Locator {
         if heading.format_version != FORMAT_VERSION {
             return Err(LocatorFileError::Version { found: heading.format_version });
         }
-        let Read { locator, .. } = serde_json::from_str(text)?;
+        let File::<Self> { locator, .. } = serde_json::from_str(text)?;
         locator.check()?;
         Ok(locator)
     }

@@ -6,7 +6,7 @@
 
 use super::TrackerConfig;
 use super::gaussian::{Change, Gaussian};
-use crate::likelihood::{ContactFit, LineLikelihood};
+use crate::likelihood::{ContactFit, Geometry, LineLikelihood};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::Oscillator;
 use palpate_numerics::small::Matrix;
@@ -224,7 +224,7 @@ const OF_MOTION: usize = 3;
 pub(super) const OF_CONTACT: usize = 4;
 
 /// Motions of a contact.
-pub(super) const MOTIONS: usize = 3;
+const MOTIONS: usize = 3;
 
 /// Where the numbers of contact `k` begin.
 pub(super) const fn contact(k: usize) -> usize {
@@ -254,7 +254,7 @@ pub(super) fn seen_on_line<const K: usize>(length_m: f64) -> SeenNumbers<K> {
 }
 
 /// The motion of contact `k` in member `member` of a bank, whose number has a digit to the base 3 for each contact.
-pub(super) const fn motion_of(member: usize, k: usize) -> usize {
+const fn motion_of(member: usize, k: usize) -> usize {
     member / MOTIONS.pow(k as u32) % MOTIONS
 }
 
@@ -320,8 +320,18 @@ impl Step {
 /// A step of contacts on a line.
 #[derive(Clone, Copy)]
 pub(super) struct OnLine<'a> {
-    pub step: &'a Step,
-    pub likelihood: &'a dyn LineLikelihood,
+    step: &'a Step,
+    likelihood: &'a dyn LineLikelihood,
+}
+
+impl<'a> OnLine<'a> {
+    /// A step on a line; nothing on a plane.
+    pub fn of(step: &'a Step, geometry: Geometry<'a>) -> Option<Self> {
+        match geometry {
+            Geometry::Line(likelihood) => Some(Self { step, likelihood }),
+            Geometry::Plane(_) => None,
+        }
+    }
 }
 
 impl<const N: usize, const M: usize> Dynamics<N, M> for OnLine<'_> {

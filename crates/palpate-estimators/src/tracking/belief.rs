@@ -57,27 +57,20 @@ impl Belief {
     pub fn contacts(&self) -> usize {
         match self {
             Self::Nothing(_) => 0,
-            Self::One(_) => 1,
+            Self::One(_) | Self::OnPlane(_) => 1,
             Self::Two(_) => 2,
-            Self::OnPlane(_) => 1,
         }
     }
 
     /// After a step and before its reading.
     pub fn predicted(&self, step: &Step, geometry: Geometry) -> Self {
-        match (self, geometry) {
-            (Self::Nothing(bank), Geometry::Line(likelihood)) => {
-                Self::Nothing(bank.predicted(&OnLine { step, likelihood }))
-            }
-            (Self::One(bank), Geometry::Line(likelihood)) => {
-                Self::One(bank.predicted(&OnLine { step, likelihood }))
-            }
-            (Self::Two(bank), Geometry::Line(likelihood)) => {
-                Self::Two(Box::new(bank.predicted(&OnLine { step, likelihood })))
-            }
+        match (self, OnLine::of(step, geometry)) {
+            (Self::Nothing(bank), Some(line)) => Self::Nothing(bank.predicted(&line)),
+            (Self::One(bank), Some(line)) => Self::One(bank.predicted(&line)),
+            (Self::Two(bank), Some(line)) => Self::Two(Box::new(bank.predicted(&line))),
             (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&OnPlane(step)))),
             // A plane in balance that nothing touches stays as it is.
-            (belief, Geometry::Plane(_)) => belief.clone(),
+            (belief, None) => belief.clone(),
         }
     }
 
@@ -85,32 +78,28 @@ impl Belief {
     pub fn updated(&self, seen: Seen) -> Option<(Self, f64)> {
         let extent = seen.likelihood.extent();
         let length_m = extent.length_m();
-        Some(match (self, seen.likelihood.geometry()) {
+        match (self, seen.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
-                let expand = |about: &[f64; 1]| seen.fit_nothing(about);
-                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
-                (Self::Nothing(bank), evidence)
+                let expand = |about: &[f64; 1]| seen.likelihood.fit_nothing(seen.whitened, about[0]);
+                let updated = bank.updated(&seen_on_line(length_m), expand, None);
+                updated.map(|(bank, evidence)| (Self::Nothing(bank), evidence))
             }
             (Self::One(bank), Geometry::Line(line)) => {
-                let expand = |about: &[f64; 3]| seen.fit_one(line, about);
-                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
-                (Self::One(bank), evidence)
+                let updated = bank.updated(&seen_on_line(length_m), |about| seen.fit_one(line, about), None);
+                updated.map(|(bank, evidence)| (Self::One(bank), evidence))
             }
             (Self::Two(bank), Geometry::Line(line)) => {
-                let expand = |about: &[f64; 5]| seen.fit_two(line, about);
-                let (bank, evidence) = bank.updated(&seen_on_line(length_m), expand, None)?;
-                (Self::Two(Box::new(bank)), evidence)
+                let updated = bank.updated(&seen_on_line(length_m), |about| seen.fit_two(line, about), None);
+                updated.map(|(bank, evidence)| (Self::Two(Box::new(bank)), evidence))
             }
             (Self::OnPlane(bank), Geometry::Plane(plane)) => {
                 let expand = |about: &[f64; 3]| seen.fit_on_plane(plane, about);
-                let (bank, evidence) = bank.updated(&seen_on_plane(extent), expand, None)?;
-                (Self::OnPlane(Box::new(bank)), evidence)
+                let updated = bank.updated(&seen_on_plane(extent), expand, None);
+                updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
             // Contacts of a line are not believed in on a plane, nor the other way round.
-            (Self::One(_) | Self::Two(_), Geometry::Plane(_)) | (Self::OnPlane(_), Geometry::Line(_)) => {
-                return None;
-            }
-        })
+            (Self::One(_) | Self::Two(_), Geometry::Plane(_)) | (Self::OnPlane(_), Geometry::Line(_)) => None,
+        }
     }
 
     /// What is left when contact `k` lets go; the surface swings on.
@@ -135,15 +124,13 @@ impl Belief {
 
     /// What it was before a step, given what it was `later` after it, if that has as many contacts.
     pub fn smoothed(&self, step: &Step, geometry: Geometry, later: &Self) -> Option<Self> {
-        match (self, later, geometry) {
-            (Self::Nothing(bank), Self::Nothing(later), Geometry::Line(likelihood)) => {
-                Some(Self::Nothing(bank.smoothed(&OnLine { step, likelihood }, later)))
+        match (self, later, OnLine::of(step, geometry)) {
+            (Self::Nothing(bank), Self::Nothing(later), Some(line)) => {
+                Some(Self::Nothing(bank.smoothed(&line, later)))
             }
-            (Self::One(bank), Self::One(later), Geometry::Line(likelihood)) => {
-                Some(Self::One(bank.smoothed(&OnLine { step, likelihood }, later)))
-            }
-            (Self::Two(bank), Self::Two(later), Geometry::Line(likelihood)) => {
-                Some(Self::Two(Box::new(bank.smoothed(&OnLine { step, likelihood }, later))))
+            (Self::One(bank), Self::One(later), Some(line)) => Some(Self::One(bank.smoothed(&line, later))),
+            (Self::Two(bank), Self::Two(later), Some(line)) => {
+                Some(Self::Two(Box::new(bank.smoothed(&line, later))))
             }
             (Self::OnPlane(bank), Self::OnPlane(later), _) => {
                 Some(Self::OnPlane(Box::new(bank.smoothed(&OnPlane(step), later))))
@@ -171,10 +158,6 @@ impl Moments {
 }
 
 impl Seen<'_> {
-    fn fit_nothing(&self, about: &[f64; 1]) -> ContactFit<1> {
-        self.likelihood.fit_nothing(self.whitened, about[0])
-    }
-
     pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {
         let [mode_n, x_m, force_n] = *about;
         line.fit_one(self.whitened, at(x_m, force_n), self.swings.then_some(mode_n))
@@ -198,11 +181,11 @@ fn at(x_m: f64, force_n: f64) -> Contact {
 
 fn line_moments<const N: usize>(belief: &Gaussian<N>) -> Vec<Moments> {
     let of = |k: usize| {
-        let [x, v, w] = [X, V, W].map(|i| contact(k) + i);
+        let entry = |moment: usize| [X, V, W].get(moment).map(|i| contact(k) + i);
         let variance = |i: usize| belief.covariance[i][i].max(0.0);
         Moments {
-            mean: [belief.mean[x], belief.mean[v], belief.mean[w], 0.0, 0.0],
-            variance: [variance(x), variance(v), variance(w), 0.0, 0.0],
+            mean: std::array::from_fn(|moment| entry(moment).map_or(0.0, |i| belief.mean[i])),
+            variance: std::array::from_fn(|moment| entry(moment).map_or(0.0, variance)),
             covariance_m2: 0.0,
         }
     };

@@ -40,7 +40,8 @@ pub(super) struct Births<'a, L: ?Sized> {
 #[derive(Clone, Copy)]
 struct Newcomer {
     contact: Contact,
-    variance_m2: f64,
+    /// Covariance of the place in m²: xx, xy, yy; on a line xx alone.
+    covariance_m2: [f64; 3],
     variance_n2: f64,
     /// The share of all places that it stands for.
     room: f64,
@@ -48,10 +49,31 @@ struct Newcomer {
 
 impl<L: ?Sized> Births<'_, L> {
     /// The single contacts that the reading by itself shows, one in each valley of its misfit.
-    pub fn valleys(&self) -> impl Iterator<Item = &ContactEstimate> {
+    fn valleys(&self) -> impl Iterator<Item = &ContactEstimate> {
         let modes = self.alone.modes.as_slice().iter().map(|mode| &mode.contact);
         let touched = self.alone.status != Status::NoContact;
         std::iter::once(&self.alone.contact).chain(modes).filter(move |_| touched)
+    }
+
+    /// A contact with this force, or the known one; `None` where that does not press.
+    fn newcomer(
+        &self,
+        position: Position,
+        force_n: f64,
+        covariance_m2: [f64; 3],
+        room: f64,
+    ) -> Option<Newcomer> {
+        let known_n = self.seen.likelihood.known_force_n();
+        let force_n = known_n.unwrap_or(force_n);
+        let variance_n2 = if known_n.is_some() { 0.0 } else { (FORCES * force_n).powi(2) / 12.0 };
+        let contact = Contact { position, force_n };
+        (force_n > 0.0).then_some(Newcomer { contact, covariance_m2, variance_n2, room })
+    }
+
+    /// A contact that may turn out to be anywhere on the surface.
+    fn anywhere(&self, contact: &ContactEstimate) -> Option<Newcomer> {
+        let [xx, yy] = sides_m(self.seen.likelihood.extent()).map(|side_m| side_m.powi(2) / 12.0);
+        self.newcomer(contact.position, contact.force_n?, [xx, 0.0, yy], 1.0)
     }
 }
 
@@ -124,7 +146,8 @@ impl Births<'_, dyn LineLikelihood + '_> {
         belief: &Gaussian<N>,
         newcomer: Newcomer,
     ) -> Gaussian<N2> {
-        let Newcomer { contact: Contact { position, force_n }, variance_m2, variance_n2, .. } = newcomer;
+        let Newcomer { contact: Contact { position, force_n }, covariance_m2, variance_n2, .. } = newcomer;
+        let variance_m2 = covariance_m2[0];
         let mut joined = Gaussian::<N2>::default();
         joined.mean[..N].copy_from_slice(&belief.mean);
         for (row, old) in joined.covariance.iter_mut().zip(&belief.covariance) {
@@ -168,13 +191,8 @@ impl Births<'_, dyn LineLikelihood + '_> {
 
     /// The two contacts that the reading by itself shows, from left to right.
     fn pair(&self) -> Option<(Newcomer, Newcomer)> {
-        let length_m = self.length_m();
-        let anywhere = |contact: &ContactEstimate| {
-            self.newcomer(contact.position.x_m, contact.force_n?, length_m.powi(2) / 12.0, 1.0)
-        };
-        let first = anywhere(&self.alone.contact);
-        let second = self.alone.further.as_slice().first().and_then(anywhere);
-        let (first, second) = first.zip(second)?;
+        let first = self.anywhere(&self.alone.contact)?;
+        let second = self.anywhere(self.alone.further.as_slice().first()?)?;
         let in_order = first.contact.position.x_m <= second.contact.position.x_m;
         Some(if in_order { (first, second) } else { (second, first) })
     }
@@ -188,46 +206,18 @@ impl Births<'_, dyn LineLikelihood + '_> {
         let (low, high) = uncertainty.x_95_m;
         let count = ((high - low) / (WIDEST * length_m)).ceil().clamp(1.0, MOST_PARTS);
         if count == 1.0 {
-            let all = self.newcomer(contact.position.x_m, force_n, length_m.powi(2) / 12.0, 1.0);
-            return all.into_iter().collect();
+            return self.anywhere(contact).into_iter().collect();
         }
         let width_m = (high - low) / count;
         let part = |i: usize| {
             let x_m = low + (i as f64 + 0.5) * width_m;
-            self.newcomer(x_m, self.best_force_n(x_m, force_n), width_m.powi(2) / 12.0, width_m / length_m)
+            let near = Contact { position: Position::along(x_m), force_n };
+            let fit = self.likelihood.fit_one(self.seen.whitened, near, None);
+            let variance_m2 = [width_m.powi(2) / 12.0, 0.0, 0.0];
+            self.newcomer(near.position, better_force_n(&fit, force_n), variance_m2, width_m / length_m)
         };
         (0..count as usize).filter_map(part).collect()
     }
-
-    /// The force that fits a place, from one that fits near it.
-    fn best_force_n(&self, x_m: f64, near_n: f64) -> f64 {
-        let contact = Contact { position: Position::along(x_m), force_n: near_n };
-        better_force_n(&self.likelihood.fit_one(self.seen.whitened, contact, None), near_n)
-    }
-
-    fn newcomer(&self, x_m: f64, force_n: f64, variance_m2: f64, room: f64) -> Option<Newcomer> {
-        let known_n = self.seen.likelihood.known_force_n();
-        let force_n = known_n.unwrap_or(force_n);
-        let position = Position::along(x_m);
-        let variance_n2 = if known_n.is_some() { 0.0 } else { (FORCES * force_n).powi(2) / 12.0 };
-        let possible = force_n > 0.0;
-        possible.then_some(Newcomer {
-            contact: Contact { position, force_n },
-            variance_m2,
-            variance_n2,
-            room,
-        })
-    }
-}
-
-/// A contact on a plane that has just come, before its reading.
-#[derive(Clone, Copy)]
-struct PlaneNewcomer {
-    contact: Contact,
-    /// Covariance of the place in m²: xx, xy, yy.
-    covariance_m2: [f64; 3],
-    /// The share of all places that it stands for.
-    room: f64,
 }
 
 /// A contact in each valley of the reading's misfit, held possible as on a line. A long valley is born in
@@ -237,16 +227,13 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
     pub fn where_nothing_touched(&self) -> Vec<(f64, Belief)> {
         self.valleys()
             .flat_map(|contact| self.parts(contact))
-            .filter_map(|newcomer| self.one(&newcomer))
+            .filter_map(|newcomer| self.one(newcomer))
             .collect()
     }
 
     /// A contact with the reading; what it does next is not known from that, so its motions are as one.
-    fn one(&self, newcomer: &PlaneNewcomer) -> Option<(f64, Belief)> {
+    fn one(&self, newcomer: Newcomer) -> Option<(f64, Belief)> {
         let Contact { position: Position { x_m, y_m }, force_n } = newcomer.contact;
-        if force_n <= 0.0 {
-            return None;
-        }
         let mut belief = Gaussian::<PLANE_NUMBERS>::default();
         let [xx, xy, yy] = newcomer.covariance_m2;
         for (at, place_m, variance_m2) in [(ALONG, x_m, xx), (ACROSS, y_m, yy)] {
@@ -257,9 +244,7 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
         }
         (belief.covariance[ALONG][ACROSS], belief.covariance[ACROSS][ALONG]) = (xy, xy);
         belief.mean[FORCE] = force_n;
-        if self.seen.likelihood.known_force_n().is_none() {
-            belief.covariance[FORCE][FORCE] = (FORCES * force_n).powi(2) / 12.0;
-        }
+        belief.covariance[FORCE][FORCE] = newcomer.variance_n2;
         let born: Bank<PLANE_NUMBERS, 1> = Bank::of(belief);
         let expand = |about: &[f64; 3]| self.seen.fit_on_plane(self.likelihood, about);
         let numbers = seen_on_plane(self.seen.likelihood.extent());
@@ -268,7 +253,7 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
     }
 
     /// The parts of one valley.
-    fn parts(&self, contact: &ContactEstimate) -> Vec<PlaneNewcomer> {
+    fn parts(&self, contact: &ContactEstimate) -> Vec<Newcomer> {
         let (Some(force_n), Some(uncertainty)) = (contact.force_n, contact.uncertainty) else {
             return Vec::new();
         };
@@ -279,15 +264,8 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
         let reach_m = NORMAL_95 * longest.sqrt();
         let [cos, sin] = principal_direction([xx, xy, yy]);
         let count = (2.0 * reach_m / (WIDEST * longest_m)).ceil().clamp(1.0, MOST_PARTS);
-        let anywhere = sides_m.map(|side_m| side_m.powi(2) / 12.0);
         if count == 1.0 {
-            let (position, known_n) = (contact.position, self.seen.likelihood.known_force_n());
-            let contact = Contact { position, force_n: known_n.unwrap_or(force_n) };
-            return vec![PlaneNewcomer {
-                contact,
-                covariance_m2: [anywhere[0], 0.0, anywhere[1]],
-                room: 1.0,
-            }];
+            return self.anywhere(contact).into_iter().collect();
         }
         let width_m = 2.0 * reach_m / count;
         let [along, across] = [width_m.powi(2) / 12.0, longest_m.powi(2) / 12.0];
@@ -302,18 +280,9 @@ impl Births<'_, dyn PlaneLikelihood + '_> {
                 x_m: (contact.position.x_m + off_m * cos).clamp(0.0, sides_m[0]),
                 y_m: (contact.position.y_m + off_m * sin).clamp(0.0, sides_m[1]),
             };
-            let contact = Contact { position, force_n: self.best_force_n(position, force_n) };
-            PlaneNewcomer { contact, covariance_m2, room: width_m / longest_m }
+            let fit = self.likelihood.fit_on_plane(self.seen.whitened, Contact { position, force_n });
+            self.newcomer(position, better_force_n(&fit, force_n), covariance_m2, width_m / longest_m)
         };
-        (0..count as usize).map(part).collect()
-    }
-
-    /// The force that fits a place, from one that fits near it; the known one where it is known.
-    fn best_force_n(&self, position: Position, near_n: f64) -> f64 {
-        if let Some(known_n) = self.seen.likelihood.known_force_n() {
-            return known_n;
-        }
-        let near = Contact { position, force_n: near_n };
-        better_force_n(&self.likelihood.fit_on_plane(self.seen.whitened, near), near_n)
+        (0..count as usize).filter_map(part).collect()
     }
 }

@@ -48,12 +48,12 @@ pub struct Tracker<'a> {
 
 /// What may be: a surface with some contacts that came at some time and have moved since.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Hypothesis {
+struct Hypothesis {
     /// Tells it from every other one.
-    pub id: u64,
+    id: u64,
     /// ln of its probability.
-    pub weight: f64,
-    pub belief: Belief,
+    weight: f64,
+    belief: Belief,
     /// Whether the readings hardly show the first contact, or the second.
     unseen: [bool; MOST_CONTACTS],
 }
@@ -96,13 +96,7 @@ impl<'a> Tracker<'a> {
         Ok(self.track(time_s, alone, moments))
     }
 
-    /// The hypotheses, the most probable first.
-    pub(super) fn hypotheses(&self) -> &[Hypothesis] {
-        &self.hypotheses
-    }
-
-    /// What a step of time does.
-    pub(super) fn step(&self, duration_s: f64) -> Step {
+    fn step(&self, duration_s: f64) -> Step {
         Step::new(&self.config, duration_s, self.likelihood.known_force_n().is_some())
     }
 
@@ -295,15 +289,8 @@ pub struct SmoothTracker<'a> {
     tracker: Tracker<'a>,
     likelihood: &'a dyn Likelihood,
     tracks: Vec<Track>,
-    /// What was held possible at each reading, of contacts.
-    past: Vec<Vec<Remembered>>,
-}
-
-/// A hypothesis as it was.
-#[derive(Clone, Debug)]
-struct Remembered {
-    id: u64,
-    belief: Belief,
+    /// The hypotheses with contacts at each reading, by their ids.
+    past: Vec<Vec<(u64, Belief)>>,
 }
 
 impl<'a> SmoothTracker<'a> {
@@ -319,28 +306,19 @@ impl<'a> SmoothTracker<'a> {
     /// [`TrackError`] when the time is not later than before.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<(), TrackError> {
         let track = self.tracker.follow(time_s, reading)?;
-        let lasts = |id: u64| self.tracker.hypotheses().iter().any(|hypothesis| hypothesis.id == id);
+        let lasts = |id: u64| self.tracker.hypotheses.iter().any(|hypothesis| hypothesis.id == id);
         if let Some(before) = self.past.last_mut() {
             // Nobody goes back to what neither lasted nor was shown.
-            let mut number = 0;
-            before.retain(|remembered| {
-                number += 1;
-                number == 1 || lasts(remembered.id)
-            });
+            let shown = before.first().map(|(id, _)| *id);
+            before.retain(|(id, _)| shown == Some(*id) || lasts(*id));
         }
+        let with_contacts =
+            self.tracker.hypotheses.iter().filter(|hypothesis| hypothesis.belief.contacts() > 0);
+        let mut remembered: Vec<_> =
+            with_contacts.map(|hypothesis| (hypothesis.id, hypothesis.belief.clone())).collect();
         // The one that is shown comes first.
-        let shown = track.contacts.len();
-        let (shown, others): (Vec<_>, Vec<_>) = self
-            .tracker
-            .hypotheses()
-            .iter()
-            .filter(|hypothesis| hypothesis.belief.contacts() > 0)
-            .partition(|hypothesis| hypothesis.belief.contacts() == shown);
-        let remembered = shown
-            .into_iter()
-            .chain(others)
-            .map(|hypothesis| Remembered { id: hypothesis.id, belief: hypothesis.belief.clone() });
-        self.past.push(remembered.collect());
+        remembered.sort_by_key(|(_, belief)| belief.contacts() != track.contacts.len());
+        self.past.push(remembered);
         self.tracks.push(track);
         Ok(())
     }
@@ -360,7 +338,7 @@ impl<'a> SmoothTracker<'a> {
             let number = self.tracks[k].contacts.len();
             let lasting = later.and_then(|(id, belief)| self.gone_back(k, id, &belief));
             let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
-            let last = || self.past[k].first().map(|one| (one.id, one.belief.clone()));
+            let last = || self.past[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
             smoothed[k].contacts =
@@ -371,8 +349,8 @@ impl<'a> SmoothTracker<'a> {
 
     /// What hypothesis `id` was at reading `k`, given what it was at the next.
     fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
-        let remembered = self.past[k].iter().find(|remembered| remembered.id == id)?;
+        let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
-        remembered.belief.smoothed(&step, self.likelihood.geometry(), later).map(|belief| (id, belief))
+        belief.smoothed(&step, self.likelihood.geometry(), later).map(|belief| (id, belief))
     }
 }
