@@ -126,8 +126,7 @@ impl Evaluation {
     /// The errors within a portion, or everywhere; `None` where nothing was located.
     pub fn summary(&self, portion: Option<Portion>) -> Option<ErrorSummary> {
         let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
-        let mut errors: Vec<f64> = self.located.iter().filter(inside).map(Located::error_m).collect();
-        errors.sort_by(f64::total_cmp);
+        let errors = sorted_errors_m(self.located.iter().filter(inside));
         Some(ErrorSummary {
             count: errors.len(),
             average_m: mean(errors.iter().copied()),
@@ -154,33 +153,33 @@ impl Evaluation {
 
     /// The median error of the contacts in each cell, in metres; NaN where there is none.
     pub fn median_by_cell_m(&self, cells: &Cells) -> Vec<f64> {
-        let mut errors: Vec<Vec<f64>> = vec![Vec::new(); cells.len()];
-        for located in &self.located {
-            errors[cells.cell_of(located.truth)].push(located.error_m());
-        }
-        errors.into_iter().map(|errors| median(errors).unwrap_or(f64::NAN)).collect()
+        let median = |cell: Vec<&Located>| percentile(&sorted_errors_m(cell), 50.0).unwrap_or(f64::NAN);
+        self.by_cell(cells).into_iter().map(median).collect()
     }
 
     /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
     /// for a stretch without contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
         let extent = Extent::Line { length_m: self.length_m };
-        let cells = Cells { extent, columns: count, rows: 1 };
-        let mut stretches: Vec<Vec<&Located>> = vec![Vec::new(); count];
-        for located in &self.located {
-            stretches[cells.cell_of(located.truth)].push(located);
-        }
-        let point = |stretch: &Vec<&Located>| {
+        let point = |stretch: Vec<&Located>| {
             let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
-            Some((mean_m, median(stretch.iter().map(|located| located.error_m()).collect())?))
+            Some((mean_m, percentile(&sorted_errors_m(stretch), 50.0)?))
         };
-        stretches.iter().filter_map(point).collect()
+        let stretches = self.by_cell(&Cells { extent, columns: count, rows: 1 });
+        stretches.into_iter().filter_map(point).collect()
+    }
+
+    fn by_cell(&self, cells: &Cells) -> Vec<Vec<&Located>> {
+        let mut parts = vec![Vec::new(); cells.len()];
+        for located in &self.located {
+            parts[cells.cell_of(located.truth)].push(located);
+        }
+        parts
     }
 
     /// The 1st to the 100th percentile of the errors, in metres; nothing where nothing was located.
     pub fn percentiles_m(&self) -> Vec<(u32, f64)> {
-        let mut errors: Vec<f64> = self.located.iter().map(Located::error_m).collect();
-        errors.sort_by(f64::total_cmp);
+        let errors = sorted_errors_m(&self.located);
         (1..=100).filter_map(|percent| Some((percent, percentile(&errors, f64::from(percent))?))).collect()
     }
 
@@ -195,6 +194,12 @@ impl Evaluation {
         });
         summaries.collect()
     }
+}
+
+fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f64> {
+    let mut errors: Vec<f64> = located.into_iter().map(Located::error_m).collect();
+    errors.sort_by(f64::total_cmp);
+    errors
 }
 
 /// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.

@@ -1,7 +1,7 @@
 //! The fields of one line, found and read with errors that know their place.
 
 use super::columns::{Column, Header};
-use super::csv_error::{CsvError, CsvProblem, Place};
+use super::csv_error::{CsvError, CsvProblem};
 use palpate_mechanics::units::Unit;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -19,10 +19,7 @@ impl<'a> Cells<'a> {
     pub fn parse(source: &'a str, line: usize, text: &'a str) -> Result<Self, CsvError> {
         match split(text) {
             Ok(fields) => Ok(Self { source, line, text, fields }),
-            Err(open) => {
-                let place = Place { line, column: None, text: text.to_owned(), span: open.span };
-                Err(CsvProblem::OpenQuote.at(source, place))
-            }
+            Err(open) => Err(CsvProblem::OpenQuote.at(source, line, text.to_owned(), open)),
         }
     }
 
@@ -33,48 +30,35 @@ impl<'a> Cells<'a> {
 
     /// Refuses a row that has more or fewer fields than `expected`.
     pub fn check_width(&self, expected: usize) -> Result<(), CsvError> {
-        let found = self.width();
-        if found == expected {
-            Ok(())
-        } else {
-            Err(self.line_error(CsvProblem::RowLength { found, expected }))
+        match self.width() {
+            found if found == expected => Ok(()),
+            found => Err(self.line_error(CsvProblem::RowLength { found, expected })),
         }
     }
 
     /// Which field of every line `column` is, as this first line of the file tells.
     pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
-        match (column, header) {
-            (Column::Number(number), _) => self.find_number(*number),
-            (Column::Name(name), Header::Present) => self.find_name(name),
-            (Column::Name(name), Header::Absent) => {
-                let (wanted, count) = (name.clone(), self.width());
-                Err(self.line_error(CsvProblem::NameWithoutHeader { wanted, count }))
-            }
-        }
-    }
-
-    fn find_number(&self, wanted: usize) -> Result<usize, CsvError> {
         let count = self.width();
-        match wanted.checked_sub(1) {
-            Some(index) if index < count => Ok(index),
-            _ => Err(self.line_error(CsvProblem::NoSuchColumn { wanted, count })),
+        let name = match column {
+            Column::Number(number) if (1..=count).contains(number) => return Ok(number - 1),
+            Column::Number(wanted) => {
+                return Err(self.line_error(CsvProblem::NoSuchColumn { wanted: *wanted, count }));
+            }
+            Column::Name(name) => name.clone(),
+        };
+        if header == Header::Absent {
+            return Err(self.line_error(CsvProblem::NameWithoutHeader { wanted: name, count }));
         }
-    }
-
-    fn find_name(&self, name: &str) -> Result<usize, CsvError> {
-        let mut same = (0..self.width()).filter(|i| self.fields[*i].value == name);
+        let mut same = (0..count).filter(|i| self.fields[*i].value == name.as_str());
         match (same.next(), same.next()) {
             (Some(index), None) => Ok(index),
             (Some(first), Some(second)) => {
-                let name = name.to_owned();
-                Err(self.error(
-                    second,
-                    CsvProblem::DuplicateColumn { name, first: first + 1, second: second + 1 },
-                ))
+                let problem = CsvProblem::DuplicateColumn { name, first: first + 1, second: second + 1 };
+                Err(self.error(second, problem))
             }
             (None, _) => {
                 let present = self.fields.iter().map(|field| field.value.clone().into_owned()).collect();
-                Err(self.line_error(CsvProblem::MissingColumn { wanted: name.to_owned(), present }))
+                Err(self.line_error(CsvProblem::MissingColumn { wanted: name, present }))
             }
         }
     }
@@ -102,15 +86,17 @@ impl<'a> Cells<'a> {
 
     /// A problem with field `index`.
     pub fn error(&self, index: usize, problem: CsvProblem) -> CsvError {
-        let span = self.fields.get(index).map_or(0..self.text.len(), |field| field.span.clone());
-        let place = Place { line: self.line, column: Some(index + 1), text: self.text.to_owned(), span };
-        problem.at(self.source, place)
+        let mut error = self.line_error(problem);
+        if let Some(place) = &mut error.place {
+            place.column = Some(index + 1);
+            place.span = self.fields.get(index).map_or(place.span.clone(), |field| field.span.clone());
+        }
+        error
     }
 
     /// A problem with the whole line.
     fn line_error(&self, problem: CsvProblem) -> CsvError {
-        let span = 0..self.text.len();
-        problem.at(self.source, Place { line: self.line, column: None, text: self.text.to_owned(), span })
+        problem.at(self.source, self.line, self.text.to_owned(), 0..self.text.len())
     }
 }
 
@@ -123,24 +109,16 @@ pub(super) struct Field<'a> {
     pub span: Range<usize>,
 }
 
-/// A quote that the line does not close.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct OpenQuote {
-    /// From the quote to the end of the line.
-    pub span: Range<usize>,
-}
-
 /// Cuts `line` at its commas, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but
-/// a field ends with its line, so that every row has one line number).
-pub(super) fn split(line: &str) -> Result<Vec<Field<'_>>, OpenQuote> {
+/// a field ends with its line, so that every row has one line number). The error is what follows a quote that stays open.
+pub(super) fn split(line: &str) -> Result<Vec<Field<'_>>, Range<usize>> {
     let bytes = line.as_bytes();
     let mut fields = Vec::new();
     let mut start = 0;
     loop {
         let opening = start + bytes[start..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
         let end = if bytes.get(opening) == Some(&b'"') {
-            let closing = closing_quote(bytes, opening).ok_or(OpenQuote { span: opening..bytes.len() })?;
-            comma(bytes, closing)
+            comma(bytes, closing_quote(bytes, opening).ok_or(opening..bytes.len())?)
         } else {
             comma(bytes, opening)
         };
@@ -172,18 +150,10 @@ fn field(line: &str, range: Range<usize>) -> Field<'_> {
     let text = &line[range.clone()];
     let trimmed = text.trim();
     let start = range.start + (text.len() - text.trim_start().len());
-    let quoted = trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
-    let value = match quoted {
-        Some(inside) if inside.contains("\"\"") => Cow::Owned(inside.replace("\"\"", "\"")),
-        Some(inside) => Cow::Borrowed(inside),
+    let value = match trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')) {
+        Some(inside) if inside.contains("\"\"") => Cow::Owned(inside.replace("\"\"", "\"").trim().to_owned()),
+        Some(inside) => Cow::Borrowed(inside.trim()),
         None => Cow::Borrowed(trimmed),
     };
-    Field { value: trim(value), span: start..start + trimmed.len() }
-}
-
-fn trim(value: Cow<'_, str>) -> Cow<'_, str> {
-    match value {
-        Cow::Borrowed(text) => Cow::Borrowed(text.trim()),
-        Cow::Owned(text) => Cow::Owned(text.trim().to_owned()),
-    }
+    Field { value, span: start..start + trimmed.len() }
 }

@@ -136,9 +136,10 @@ pub enum CsvProblem {
 }
 
 impl CsvProblem {
-    /// This problem, at a place of the file `source`.
-    pub(super) fn at(self, source: &str, place: Place) -> CsvError {
-        CsvError { source_name: source.to_owned(), place: Some(Box::new(place)), problem: self }
+    /// This problem with the bytes `span` of `text`, a line of the file `source`.
+    pub(super) fn at(self, source: &str, line: usize, text: String, span: Range<usize>) -> CsvError {
+        let place = Some(Box::new(Place { line, column: None, text, span }));
+        CsvError { source_name: source.to_owned(), place, problem: self }
     }
 
     /// This problem, which concerns the whole file `source`.

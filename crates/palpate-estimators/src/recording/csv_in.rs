@@ -4,7 +4,7 @@ use std::io::Read;
 
 use super::cells::Cells;
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns};
-use super::csv_error::{CsvError, CsvProblem, Place};
+use super::csv_error::{CsvError, CsvProblem};
 use super::{Provenance, Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -36,8 +36,8 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         Ok((ContactFields::find(head, schema.columns)?, ChannelFields::find(head, schema.columns)?))
     };
     let rows = file.rows(schema.columns.header, find, |cells, (contact, channels)| {
-        let Touch { position, force_n, nuisance } = contact.touch(cells, schema)?;
-        Ok(Row { position, force_n, nuisance, reading: channels.reading(cells)? })
+        let row = contact.row(cells, schema)?;
+        Ok(Row { reading: channels.reading(cells)?, ..row })
     })?;
     Ok(schema.recording(source.to_owned(), rows, vec![file.digest]))
 }
@@ -66,15 +66,14 @@ pub fn read_pair(
     let contact_rows = contacts.rows(
         header,
         |head| ContactFields::find(head, columns),
-        |cells, contact| contact.touch(cells, schema),
+        |cells, contact| contact.row(cells, schema),
     )?;
     if reading_rows.len() != contact_rows.len() {
         let problem = CsvProblem::RowsDiffer { readings: reading_rows.len(), contacts: contact_rows.len() };
         return Err(problem.of_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let row = |(reading, Touch { position, force_n, nuisance })| Row { position, force_n, nuisance, reading };
-    let rows = rows.map(row).collect();
+    let rows = rows.map(|(reading, contact)| Row { reading, ..contact }).collect();
     Ok(schema.recording(source, rows, vec![readings.digest, contacts.digest]))
 }
 
@@ -117,23 +116,17 @@ impl<'s> File<'s> {
         find: impl Fn(&Cells) -> Result<C, CsvError>,
         row: impl Fn(&Cells, &C) -> Result<T, CsvError>,
     ) -> Result<Vec<T>, CsvError> {
-        let lines = without_mark(&self.text).lines().enumerate();
-        let mut lines = lines
-            .filter(|(_, text)| !is_passed_over(text))
-            .map(|(i, text)| Cells::parse(self.source, i + 1, text));
-        let head = lines.next().ok_or_else(|| CsvProblem::Empty.of_file(self.source))??;
-        let columns = find(&head)?;
-        let first = match header {
-            Header::Present => None,
-            Header::Absent => Some(row(&head, &columns)?),
-        };
-        let mut rows: Vec<T> = first.into_iter().collect();
-        for cells in lines {
-            let cells = cells?;
-            cells.check_width(head.width())?;
-            rows.push(row(&cells, &columns)?);
+        let (mut lines, mut rows) = (Lines::new(self.source), Vec::new());
+        for line in self.text.lines() {
+            if let Some((cells, columns)) = lines.next(line.as_bytes(), header, &find)? {
+                rows.push(row(&cells, columns)?);
+            }
         }
-        if rows.is_empty() { Err(CsvProblem::NoRows.of_file(self.source)) } else { Ok(rows) }
+        match lines.fields {
+            None => Err(CsvProblem::Empty.of_file(self.source)),
+            Some(_) if rows.is_empty() => Err(CsvProblem::NoRows.of_file(self.source)),
+            Some(_) => Ok(rows),
+        }
     }
 }
 
@@ -145,14 +138,7 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
     let after =
         String::from_utf8_lossy(rest.split(|byte| *byte == b'\n').next().unwrap_or(rest)).into_owned();
     let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-    CsvProblem::NotUtf8.at(source, Place { line, column: None, text: before + &after, span: mark })
-}
-
-/// What a row says of its contact.
-struct Touch {
-    pub position: Position,
-    pub force_n: Option<f64>,
-    nuisance: Option<f64>,
+    CsvProblem::NotUtf8.at(source, line, before + &after, mark)
 }
 
 /// Which fields of a row say where and how hard the contact was.
@@ -167,7 +153,7 @@ struct ContactFields {
 }
 
 impl ContactFields {
-    pub fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
         let find = |column| head.find(column, columns.header);
         let (x, y) = match &columns.position {
             PositionColumns::Along(x) => (find(x)?, None),
@@ -184,7 +170,8 @@ impl ContactFields {
         Ok(Self { x, y, position_unit, frame, force, nuisance: nuisance.transpose()? })
     }
 
-    pub fn touch(&self, cells: &Cells, schema: &Schema) -> Result<Touch, CsvError> {
+    /// The row of a contact, its reading still empty.
+    fn row(&self, cells: &Cells, schema: &Schema) -> Result<Row, CsvError> {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
         let position = self.frame.position(x_m, y_m);
@@ -195,7 +182,8 @@ impl ContactFields {
         }
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
-        Ok(Touch { position, force_n: force_n.or(schema.known_force_n), nuisance })
+        let force_n = force_n.or(schema.known_force_n);
+        Ok(Row { position, force_n, nuisance, reading: Vec::new() })
     }
 }
 
@@ -224,8 +212,9 @@ impl<F> Lines<F> {
     ) -> Result<Option<(Cells<'a>, &'a F)>, CsvError> {
         self.count += 1;
         let text = utf8(&self.source, self.count, line)?;
-        let text = if self.count == 1 { without_mark(text) } else { text };
-        if is_passed_over(text) {
+        // Some spreadsheets begin a file with a byte-order mark.
+        let text = if self.count == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
+        if text.trim().is_empty() || text.starts_with('#') {
             return Ok(None);
         }
         let cells = Cells::parse(&self.source, self.count, text)?;
@@ -281,13 +270,13 @@ impl ReadingParser {
 struct ChannelFields(Vec<(usize, Unit)>);
 
 impl ChannelFields {
-    pub fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
         let find =
             |channel: &super::ValueColumn| Ok((head.find(&channel.column, columns.header)?, channel.unit));
         columns.channels.iter().map(find).collect::<Result<_, _>>().map(Self)
     }
 
-    pub fn reading(&self, cells: &Cells) -> Result<Vec<f64>, CsvError> {
+    fn reading(&self, cells: &Cells) -> Result<Vec<f64>, CsvError> {
         self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
     }
 }
@@ -345,7 +334,7 @@ pub struct TimedParser<'a> {
 struct TimedFields {
     time: Option<usize>,
     contact: Option<ContactFields>,
-    second: Option<[usize; 2]>,
+    second: Option<(usize, usize)>,
     channels: ChannelFields,
 }
 
@@ -376,51 +365,37 @@ impl<'a> TimedParser<'a> {
         let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
         let Some((cells, fields)) = next else { return Ok(None) };
         let time_s = fields.time.map(|field| cells.number(field, Unit::NONE)).transpose()?;
-        let touch = fields.contact.as_ref().map(|contact| contact.touch(&cells, schema)).transpose()?;
+        let row = fields.contact.as_ref().map(|contact| contact.row(&cells, schema)).transpose()?;
         // A force that nobody knows is not 0: something touched.
-        let truth = touch.map(|touch| Contact {
-            position: touch.position,
-            force_n: touch.force_n.unwrap_or(f64::INFINITY),
+        let truth = row.map(|Row { position, force_n, .. }| Contact {
+            position,
+            force_n: force_n.unwrap_or(f64::INFINITY),
         });
-        let second = fields.second.map(|fields| second_contact(&cells, fields)).transpose()?;
+        let second = |(x, force)| -> Result<Contact, CsvError> {
+            let position = Position::along(cells.number(x, SensorKind::Deflection.unit())?);
+            Ok(Contact { position, force_n: cells.number(force, SensorKind::Reaction.unit())? })
+        };
+        let second = fields.second.map(second).transpose()?;
         let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
         Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&cells)? }))
     }
-}
-
-/// The second contact of a line, from the fields of its place and its force.
-fn second_contact(cells: &Cells, [x, force]: [usize; 2]) -> Result<Contact, CsvError> {
-    let position = Position::along(cells.number(x, SensorKind::Deflection.unit())?);
-    Ok(Contact { position, force_n: cells.number(force, SensorKind::Reaction.unit())? })
 }
 
 impl TimedFields {
     fn find(head: &Cells, schema: &Schema) -> Result<Self, CsvError> {
         let columns = schema.columns;
         let named = columns.header == Header::Present;
-        let time = Column::Name(TIME.to_owned());
-        let time = if named && head.has(&time) { Some(head.find(&time, columns.header)?) } else { None };
-        let contact = if named { ContactFields::find(head, columns).ok() } else { None };
-        let second = SECOND.map(|name| Column::Name(name.to_owned()));
-        let second = if named && second.iter().all(|column| head.has(column)) {
-            let [x, force] = &second;
-            Some([head.find(x, columns.header)?, head.find(force, columns.header)?])
-        } else {
-            None
+        let field = |name: &str| {
+            let column = Column::Name(name.to_owned());
+            (named && head.has(&column)).then(|| head.find(&column, columns.header)).transpose()
         };
-        let channels = ChannelFields::find(head, columns)?;
-        Ok(Self { time, contact, second, channels })
+        Ok(Self {
+            time: field(TIME)?,
+            contact: if named { ContactFields::find(head, columns).ok() } else { None },
+            second: field(SECOND[0])?.zip(field(SECOND[1])?),
+            channels: ChannelFields::find(head, columns)?,
+        })
     }
-}
-
-/// Whether a line holds nothing, not even a comma, or is a comment.
-fn is_passed_over(line: &str) -> bool {
-    line.trim().is_empty() || line.starts_with('#')
-}
-
-/// `text` without the byte-order mark that some spreadsheets put first.
-fn without_mark(text: &str) -> &str {
-    text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
 /// `bytes` as text, without the line's end.
@@ -430,7 +405,7 @@ fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvEr
         Err(_) => {
             let text = String::from_utf8_lossy(bytes).trim_end_matches(['\r', '\n']).to_owned();
             let span = 0..text.len();
-            Err(CsvProblem::NotUtf8.at(source, Place { line, column: None, text, span }))
+            Err(CsvProblem::NotUtf8.at(source, line, text, span))
         }
     }
 }
