@@ -13,18 +13,18 @@ use palpate_numerics::root_mean_square;
 /// ⌈0.95·(n + 1)⌉, which covers a further contact like those held out with probability at least 0.95.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeldOutSpread {
+pub struct HeldOutErrors {
     /// Root mean square error along x and y, in metres.
     pub rms_m: [f64; 2],
     /// Half-width of the 95 % interval along x and y, in metres.
     pub half_95_m: [f64; 2],
 }
 
-impl HeldOutSpread {
+impl HeldOutErrors {
     /// Fewest errors of which number ⌈0.95·(n + 1)⌉ exists.
     pub const FEWEST: usize = 19;
 
-    /// The spread of errors (x, y) in metres; `None` of fewer than [`HeldOutSpread::FEWEST`], which bound no 95 % interval.
+    /// The spread of errors (x, y) in metres; `None` of fewer than [`HeldOutErrors::FEWEST`], which bound no 95 % interval.
     pub fn of(errors_m: &[[f64; 2]]) -> Option<Self> {
         if errors_m.len() < Self::FEWEST {
             return None;
@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn the_interval_covers_nineteen_in_twenty() {
         let errors: Vec<[f64; 2]> = (1..=99).map(|i| [f64::from(i) * -1e-3, 0.0]).collect();
-        let spread = HeldOutSpread::of(&errors).unwrap();
+        let spread = HeldOutErrors::of(&errors).unwrap();
         assert_eq!(spread.half_95_m, [95e-3, 0.0]);
         // Σ i² = n·(n + 1)·(2n + 1)/6
         assert!((spread.rms_m[0] - 1e-3 * (100.0 * 199.0 / 6.0_f64).sqrt()).abs() < 1e-12);
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn too_few_errors_bound_nothing() {
-        assert_eq!(HeldOutSpread::of(&[[1.0, 0.0]; 18]), None);
-        assert_eq!(HeldOutSpread::of(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
+        assert_eq!(HeldOutErrors::of(&[[1.0, 0.0]; 18]), None);
+        assert_eq!(HeldOutErrors::of(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
     }
 }

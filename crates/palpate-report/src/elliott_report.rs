@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::numbers::{NOTHING, mm, number, spread, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
 use super::{Axis, Chart, ErrorPoint, Marker, Series};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, INNER};
 
 /// Reports the study: `report.html`, one self-contained page, and its figures as SVG files.
@@ -107,9 +107,9 @@ impl ElliottReport<'_> {
         Chart::new(title, x, Axis::log10("mean error, mm"), series).with_height(520)
     }
 
-    fn bars(&self, label: &str, colour: usize, error: fn(&ChainRow) -> Option<Spread>) -> Series {
+    fn bars(&self, label: &str, colour: usize, error: fn(&ChainRow) -> Option<Quantiles>) -> Series {
         let point = |(x, row): (f64, &ChainRow)| {
-            let Spread { median, p05, p95 } = error(row)?.scaled(1e3);
+            let Quantiles { median, p05, p95 } = error(row)?.scaled(1e3);
             Some(ErrorPoint { x, y: median, low: p05, high: p95 })
         };
         let points = self.by_components().filter_map(point).collect();
@@ -117,7 +117,7 @@ impl ElliottReport<'_> {
     }
 
     /// The chains that do not depend on a number of components: a line across each.
-    fn across(&self, error: fn(&ChainRow) -> Option<Spread>) -> impl Iterator<Item = Series> {
+    fn across(&self, error: fn(&ChainRow) -> Option<Quantiles>) -> impl Iterator<Item = Series> {
         let chains = [
             (Chain::Readings, "network on all readings", 1),
             (Chain::Influence, "influence locator", 2),
@@ -134,7 +134,7 @@ impl ElliottReport<'_> {
 
     fn table(&self) -> Table {
         let row = |row: &ChainRow| {
-            let shown = |figure: Option<Spread>| {
+            let shown = |figure: Option<Quantiles>| {
                 text(figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number)))
             };
             let over = row.error_m.zip(row.limit_m).map(|(error, limit_m)| error.median / limit_m);

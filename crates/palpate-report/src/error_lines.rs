@@ -2,7 +2,7 @@
 
 use super::numbers::mm;
 use super::{BandPoint, Chart, Mark, Series};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve, LimitError};
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
@@ -14,7 +14,7 @@ const ASSUMED_NOISE_M: f64 = 5e-6;
 const LABEL: &str = "limit";
 
 /// A line along the medians of some spreads and, where `with_band`, a band from the 5th to the 95th percentile under it.
-pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Spread)], with_band: bool) -> Vec<Series> {
+pub(super) fn banded(label: &str, colour: usize, along: &[(f64, Quantiles)], with_band: bool) -> Vec<Series> {
     let line = Series::line(label, colour, along.iter().map(|&(x, spread)| (x, spread.median)).collect());
     let band = along.iter().map(|&(x, spread)| BandPoint { x, low: spread.p05, high: spread.p95 });
     let band = with_band.then(|| Series::band("", colour, band.collect()));

@@ -8,7 +8,9 @@ use super::numbers::{counted, listed, mm, number, stretch, whole};
 use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, words};
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::estimator::Locator;
-use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Located, Portion, Spread, percentage_error};
+use palpate_estimators::evaluation::{
+    ErrorSummary, Evaluation, Located, Portion, Quantiles, percentage_error,
+};
 use palpate_estimators::recording::Provenance;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
@@ -192,8 +194,8 @@ impl EvaluationReport<'_> {
         if pairs.len() <= MOST_MARKERS {
             return vec![Series::markers(label, colour, pairs, Marker::Circle)];
         }
-        let spread = |place: &[(f64, f64)]| Spread::of(place.iter().map(|pair| pair.1).collect());
-        let places: Vec<(f64, Spread)> = pairs
+        let spread = |place: &[(f64, f64)]| Quantiles::of(place.iter().map(|pair| pair.1).collect());
+        let places: Vec<(f64, Quantiles)> = pairs
             .chunk_by(|a, b| a.0 == b.0)
             .filter_map(|place| Some((place[0].0, spread(place)?)))
             .collect();

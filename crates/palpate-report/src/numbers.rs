@@ -1,6 +1,6 @@
 //! Numbers as people read them.
 
-use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
@@ -75,7 +75,7 @@ pub(crate) fn stated(value: f64) -> String {
 
 /// Median with the range from the 5th to the 95th percentile: "2.38 (2.26–2.73)"; the median alone where they all read
 /// the same.
-pub(crate) fn spread(spread: Spread, shown: fn(f64) -> String) -> String {
+pub(crate) fn spread(spread: Quantiles, shown: fn(f64) -> String) -> String {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     if low == median && high == median { median } else { format!("{median} ({low}–{high})") }
 }
@@ -123,8 +123,8 @@ mod tests {
 
     #[test]
     fn a_spread_of_one_value_is_that_value() {
-        assert_eq!(spread(Spread { median: 2.0, p05: 2.0, p95: 2.0 }, number), "2.00");
-        assert_eq!(spread(Spread { median: 2.0, p05: 1.0, p95: 30.0 }, number), "2.00 (1.00–30.0)");
+        assert_eq!(spread(Quantiles { median: 2.0, p05: 2.0, p95: 2.0 }, number), "2.00");
+        assert_eq!(spread(Quantiles { median: 2.0, p05: 1.0, p95: 30.0 }, number), "2.00 (1.00–30.0)");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::error_lines::{banded, limit_line_or_assumed, tolerance_mark};
 use super::numbers::{NOTHING, counted, mm, number, stretch, whole};
 use super::page::{Table, numeric, short, text, value, words};
 use super::{Axis, Chart, Series, StudyReport};
-use palpate_estimators::evaluation::{Located, Portion, Spread};
+use palpate_estimators::evaluation::{Located, Portion, Quantiles};
 use palpate_studies::{Arm, ArmOutcome, ArmResults};
 
 /// An arm among the lines of a figure.
@@ -77,7 +77,7 @@ impl<'a> StudyReport<'a> {
 }
 
 /// The spread over an arm's seeds of a figure of each contact: by position in mm.
-pub(crate) fn along(outcome: &ArmOutcome, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Spread)> {
+pub(crate) fn along(outcome: &ArmOutcome, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
@@ -137,7 +137,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
         heading: heading.to_owned(),
         cells: report.results.arms.iter().map(cell).collect(),
     };
-    let spread = |heading: &str, of: &dyn Fn(&ArmResults) -> Option<Spread>| {
+    let spread = |heading: &str, of: &dyn Fn(&ArmResults) -> Option<Quantiles>| {
         column(heading, &|arm| Some(stacked(of(arm)?, number)))
     };
     let judging = report.study.judging();
@@ -189,7 +189,7 @@ fn arm_columns(report: &StudyReport) -> Vec<ArmColumn> {
 }
 
 /// The median, and beneath it the range where there is one.
-fn stacked(spread: Spread, shown: fn(f64) -> String) -> Markup {
+fn stacked(spread: Quantiles, shown: fn(f64) -> String) -> Markup {
     let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
     html! { (median) @if low != median || high != median { span.range { (low) "–" (high) } } }
 }

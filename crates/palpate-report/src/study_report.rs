@@ -10,7 +10,7 @@ use super::study_parts::{
     ArmLine, arms_table, chart_of_errors, error_chart, errors, glossary, run_table, source,
 };
 use super::{Axis, Chart, Marker, Series};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
@@ -131,7 +131,7 @@ fn overview(report: &StudyReport) -> Option<Figure> {
 /// A figure that arms are compared by.
 struct Compared {
     label: String,
-    error: fn(&ArmResults) -> Option<Spread>,
+    error: fn(&ArmResults) -> Option<Quantiles>,
     limit: fn(&ArmResults) -> Option<f64>,
 }
 
@@ -139,7 +139,7 @@ struct Compared {
 /// beyond them.
 fn compared(report: &StudyReport) -> Vec<Compared> {
     if report.study.judging().training_span {
-        let span = |label: &str, error: fn(&ArmResults) -> Option<Spread>| Compared {
+        let span = |label: &str, error: fn(&ArmResults) -> Option<Quantiles>| Compared {
             label: label.to_owned(),
             error,
             limit: |_| None,

@@ -24,7 +24,7 @@ pub use study::{Arm, AskedLayout, Judging, Study};
 use palpate_design::sensors::SensorDesign;
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
-use palpate_estimators::evaluation::{Calibration, Trial};
+use palpate_estimators::evaluation::{Calibration, Split};
 use palpate_estimators::recording::{Recording, TimedRecording};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
@@ -74,7 +74,7 @@ impl Rig {
     ///
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
-    pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Trial>, RigSimulationError> {
+    pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, RigSimulationError> {
         let calibration = self.calibration()?;
         (0..count).map(|k| Ok(calibration.simulate(seed + k)?)).collect()
     }

@@ -8,7 +8,7 @@ use super::seed_by_seed::SeedBySeed;
 use super::{Arm, Judging, Study};
 use palpate_design::sensors::DesignError;
 use palpate_estimators::estimator::{Estimator, FitError, Locator, Method};
-use palpate_estimators::evaluation::{Evaluation, EvaluationError, Trial};
+use palpate_estimators::evaluation::{Evaluation, EvaluationError, Split};
 use palpate_estimators::fit::FitTask;
 use palpate_estimators::network::{Network, TrainingOutcome};
 use palpate_estimators::setup::Setup;
@@ -73,7 +73,7 @@ pub(super) struct InLanes {
     /// What is fitted: networks.
     pub estimator: Estimator,
     pub setup: Setup,
-    pub trial: Trial,
+    pub trial: Split,
 }
 
 impl InLanes {

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::limits::expected_errors_m;
 use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
 use palpate_estimators::evaluation::{
-    ErrorSummary, Evaluation, Portion, Spread, limit_ratio, percentage_error,
+    ErrorSummary, Evaluation, Portion, Quantiles, limit_ratio, percentage_error,
 };
 use palpate_estimators::network::{Precision, TrainingStatus};
 use palpate_mechanics::contact::Position;
@@ -59,13 +59,13 @@ pub struct ArmResults {
     pub converged: Option<usize>,
     /// Epochs of training, likewise.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub epochs: Option<Spread>,
+    pub epochs: Option<Quantiles>,
     /// Average percentage error over all positions.
-    pub error_percent: Spread,
+    pub error_percent: Quantiles,
     /// Largest percentage error over all positions.
-    pub max_error_percent: Spread,
+    pub max_error_percent: Quantiles,
     /// Share of the positions located within the tolerance, in %.
-    pub effective_length_percent: Spread,
+    pub effective_length_percent: Quantiles,
     /// The same errors by portion; in JSON as `error_percent_20_380` and so on.
     #[serde(flatten, serialize_with = "portions_as_keys")]
     pub portions: Vec<PortionResults>,
@@ -77,7 +77,7 @@ pub struct ArmResults {
     pub limit: Option<LimitResults>,
     /// Share of the estimator's 95 % intervals that hold their contact, in %, where it has them.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub coverage_percent: Option<Spread>,
+    pub coverage_percent: Option<Quantiles>,
 }
 
 /// What an arm fits.
@@ -108,9 +108,9 @@ pub struct PortionResults {
     /// The portion.
     pub portion: Portion,
     /// Average percentage error.
-    pub error_percent: Spread,
+    pub error_percent: Quantiles,
     /// Largest percentage error.
-    pub max_error_percent: Spread,
+    pub max_error_percent: Quantiles,
     /// Average percentage error of an estimator at the limit, where there is a limit.
     pub limit_error_percent: Option<f64>,
 }
@@ -121,9 +121,9 @@ pub struct TrainingSpanResults {
     /// Where the outermost training positions are.
     pub training_span: Portion,
     /// Average percentage error between them; `None` where nothing is judged there.
-    pub error_percent_within_training: Option<Spread>,
+    pub error_percent_within_training: Option<Quantiles>,
     /// Average percentage error beyond them, likewise.
-    pub error_percent_beyond_training: Option<Spread>,
+    pub error_percent_beyond_training: Option<Quantiles>,
 }
 
 /// What physics allows an arm.
@@ -134,7 +134,7 @@ pub struct LimitResults {
     pub limit_error_percent: f64,
     /// Average error over the limit's, at contacts at least 1/80 of the length from the ends whose limit is at most 1/200 of it;
     /// `None` where there are none.
-    pub error_over_limit: Option<Spread>,
+    pub error_over_limit: Option<Quantiles>,
 }
 
 fn portions_as_keys<S: serde::Serializer>(
@@ -195,7 +195,7 @@ impl SetUp {
 impl ArmResults {
     fn of(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
         let spread = |figure: &dyn Fn(&TrainedSeed) -> Option<f64>| {
-            Spread::of(outcome.fits.iter().filter_map(figure).collect())
+            Quantiles::of(outcome.fits.iter().filter_map(figure).collect())
         };
         let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
             spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
@@ -225,7 +225,7 @@ impl ArmResults {
             set_up,
             seeds: outcome.fits.len(),
             converged: outcomes().next().map(|_| converged),
-            epochs: Spread::of(outcomes().map(|outcome| f64::from(outcome.epochs)).collect()),
+            epochs: Quantiles::of(outcomes().map(|outcome| f64::from(outcome.epochs)).collect()),
             error_percent: error(None, |s| s.average_m)?,
             max_error_percent: error(None, |s| s.largest_m)?,
             effective_length_percent: spread(&|fit| {
@@ -267,7 +267,7 @@ fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults>
             let part = Evaluation { length_m: *length_m, located: located.copied().collect() };
             percent(&part, None, |s| s.average_m)
         };
-        Spread::of(outcome.fits.iter().filter_map(part).collect())
+        Quantiles::of(outcome.fits.iter().filter_map(part).collect())
     };
     Some(TrainingSpanResults {
         training_span: span,

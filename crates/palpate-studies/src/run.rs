@@ -7,7 +7,7 @@ use super::prepare::{InLanes, PreparedArm};
 use super::seed_by_seed::SeedBySeed;
 use super::{PreparedStudy, StudyRunError};
 use palpate_estimators::estimator::{FitError, Locator, Method};
-use palpate_estimators::evaluation::{Calibrated, EvaluationError, Located, Spread};
+use palpate_estimators::evaluation::{Calibrated, EvaluationError, Located, Quantiles};
 use palpate_estimators::fit::{Fit, SeedQueue};
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -34,7 +34,7 @@ pub struct ArmOutcome {
 
 impl ArmOutcome {
     /// The spread over the seeds of a figure of each contact, the mean of all readings of a seed at a position: by x in metres.
-    pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Spread)> {
+    pub fn by_position(&self, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
         let means = |fit: &TrainedSeed| -> Vec<(f64, f64)> {
             let positions = fit.evaluation.located.chunk_by(|a, b| a.truth == b.truth);
             let mean =
@@ -42,7 +42,7 @@ impl ArmOutcome {
             positions.map(|readings| (readings[0].truth.x_m, mean(readings))).collect()
         };
         let seeds: Vec<Vec<(f64, f64)>> = self.fits.iter().map(means).collect();
-        let at = |i: usize| Spread::of(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
+        let at = |i: usize| Quantiles::of(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
         let first = seeds.first().into_iter().flatten();
         first.enumerate().filter_map(|(i, (x_m, _))| Some((*x_m, at(i)?))).collect()
     }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use palpate_design::sensors::DesignError;
-use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -111,7 +111,7 @@ fn a_figure_spreads_over_the_seeds_position_by_position() {
         first.iter().map(|located| located.error_m()).sum::<f64>() / readings as f64
     };
     let at_first = outcome.fits.iter().map(mean_at_first).collect();
-    assert_eq!(along[0].1, Spread::of(at_first).unwrap());
+    assert_eq!(along[0].1, Quantiles::of(at_first).unwrap());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::recording_files::RecordingFiles;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
 use palpate_estimators::estimator::{Comparison, contenders};
-use palpate_estimators::evaluation::{Trial, limit_ratio, percentage_error, try_estimator};
+use palpate_estimators::evaluation::{Split, evaluate_splits, limit_ratio, percentage_error};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
@@ -140,7 +140,7 @@ fn write_report(
 struct Trials {
     data: String,
     how: String,
-    trials: Vec<Trial>,
+    trials: Vec<Split>,
 }
 
 fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
@@ -155,7 +155,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each");
         return Ok(Trials { data: "simulation".to_owned(), how, trials });
     };
-    let trials = Trial::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
+    let trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
     let data = recording.provenance.source;
     let how = format!("{data}, cross-validated in {} folds by position", arguments.folds);
     Ok(Trials { data, how, trials })
@@ -164,7 +164,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
 fn compare(
     arguments: &Arguments,
     rig: &Rig,
-    trials: &[Trial],
+    trials: &[Split],
 ) -> Result<(Vec<Comparison>, Vec<LeftOut>), Failure> {
     let rows = trials.first().map_or(0, |trial| trial.training.rows.len());
     let mut contenders = contenders(&rig.setup, &rig.estimator, rows);
@@ -183,7 +183,7 @@ fn compare(
         bar.set_prefix(contender.kind());
         let clock = || start.elapsed().as_secs_f64();
         let go_on = |_| !interrupt::asked();
-        match try_estimator(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
+        match evaluate_splits(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
             Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
             Err(error) => left_out.push(LeftOut { name: contender.kind(), why: error.to_string() }),

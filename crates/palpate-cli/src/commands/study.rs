@@ -4,7 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::progress::Observer;
 use crate::table::table;
 use crate::{input, interrupt, output, progress};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::units::format_count;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -251,8 +251,9 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     fn column(heading: &str, of: impl Fn(&ArmResults) -> Option<String> + 'static) -> ArmColumn {
         (heading.to_owned(), Box::new(of))
     }
-    let spread =
-        |s: &Spread, digits: usize| format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95);
+    let spread = |s: &Quantiles, digits: usize| {
+        format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95)
+    };
     let mut columns = vec![
         column("arm", |arm| Some(arm.name.clone())),
         column("converged", |arm| Some(format!("{}/{}", arm.converged?, arm.seeds))),

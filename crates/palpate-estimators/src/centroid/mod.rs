@@ -4,7 +4,7 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
-use crate::held_out::HeldOutSpread;
+use crate::held_out::HeldOutErrors;
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::on_surface;
@@ -76,7 +76,7 @@ impl Fit for Centroid {
         let mut locator = uncalibrated(setup, recording)?;
         recording.check_distinct_positions(locator.terms())?;
         locator.map = calibrate(&locator, &recording.rows)?;
-        locator.spread = HeldOutSpread::of(&held_out_errors(&locator, recording, watch)?);
+        locator.spread = HeldOutErrors::of(&held_out_errors(&locator, recording, watch)?);
         Ok(locator)
     }
 }
@@ -187,7 +187,7 @@ pub struct CentroidLocator {
     /// The contact's force in newtons, where the bench knows it.
     pub force_n: Option<f64>,
     /// How far maps were off at positions that they were not calibrated on.
-    pub spread: Option<HeldOutSpread>,
+    pub spread: Option<HeldOutErrors>,
 }
 
 /// What the channels' magnitudes weigh.

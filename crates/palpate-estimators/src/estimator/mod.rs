@@ -18,7 +18,7 @@ use std::sync::Arc;
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
-use crate::evaluation::{EvaluationError, Trial, Tried, try_estimator};
+use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
@@ -301,13 +301,13 @@ impl Locator {
     }
 }
 
-/// How one estimator did over some trials.
+/// Evaluation of one estimator over some splits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The estimator.
     pub estimator: Estimator,
-    /// Its answers to all trials together, and their times.
-    pub tried: Tried,
+    /// The evaluation, with its times.
+    pub tried: TimedEvaluation,
 }
 
 /// The estimators that `auto` chooses from, and that a comparison shows: every contender, with the settings of `own`
@@ -349,12 +349,12 @@ pub fn choose(task: FitTask) -> Result<Choice, FitError> {
     let FitTask { setup, recording, seed, watch } = task;
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
-    let trials =
-        Trial::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
+    let splits =
+        Split::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
     let mut tried = Vec::new();
     let mut last = None;
     for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
-        match try_estimator(setup, &estimator, &trials, seed, &|| 0.0, watch) {
+        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, watch) {
             Ok(one) => {
                 if let Some(summary) = one.evaluation.summary(None) {
                     tried.push((estimator, summary.average_m));

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Evaluation, EvaluationError, Trial};
+use super::{Evaluation, EvaluationError, Split};
 use crate::arrangement::{ArrangementError, Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, SeedQueue};
 use crate::setup::Setup;
@@ -110,7 +110,7 @@ impl Calibration {
     ///
     /// # Errors
     /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
-    pub fn simulate(&self, seed: u64) -> Result<Trial, SimulateError> {
+    pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
         let all = [self.presses.as_slice(), &self.contacts].concat();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
@@ -120,7 +120,7 @@ impl Calibration {
         } else {
             simulate_at(&self.pressed, &self.presses, 1, seed)?
         };
-        Ok(Trial { training, judged: recording.subset(touched) })
+        Ok(Split { training, judged: recording.subset(touched) })
     }
 
     /// Simulates, fits and judges.
@@ -133,7 +133,7 @@ impl Calibration {
         seed: u64,
         watch: Watch,
     ) -> Result<Calibrated<E::Method>, EvaluationError<E::Error>> {
-        let Trial { training, judged } = self.simulate(seed)?;
+        let Split { training, judged } = self.simulate(seed)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
         let evaluation = Evaluation::of(&locator, &judged)?;
@@ -155,7 +155,7 @@ impl Calibration {
         let (Some(&seed), true) = (seeds.front(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
-        let Trial { training, judged } = self.simulate(seed)?;
+        let Split { training, judged } = self.simulate(seed)?;
         let mut queue = Queue { seeds, fitted: Vec::new() };
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;

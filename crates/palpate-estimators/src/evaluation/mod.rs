@@ -240,9 +240,9 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     (bound_m > 0.0).then(|| error_m / bound_m)
 }
 
-/// Where a figure lies over many seeds.
+/// Median, 5th and 95th percentile of a figure over many seeds.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Spread {
+pub struct Quantiles {
     /// Half of the seeds lie below.
     pub median: f64,
     /// One in twenty lies below.
@@ -251,13 +251,13 @@ pub struct Spread {
     pub p95: f64,
 }
 
-impl Spread {
-    /// The same spread in another unit, of which one of this makes `factor`.
+impl Quantiles {
+    /// The same in another unit, of which one of this makes `factor`.
     pub fn scaled(self, factor: f64) -> Self {
         Self { median: self.median * factor, p05: self.p05 * factor, p95: self.p95 * factor }
     }
 
-    /// The spread of some values, in any order; `None` of nothing.
+    /// The quantiles of some values, in any order; `None` of nothing.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         Some(Self {
@@ -270,16 +270,16 @@ impl Spread {
 
 /// A recording to fit, and one to judge by, whose contacts the fit has not seen.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub struct Split {
     /// What is fitted.
     pub training: Recording,
     /// What is judged by.
     pub judged: Recording,
 }
 
-/// An estimator's answers to some trials together, and the time they took.
+/// An evaluation over some splits together, and the time it took.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tried {
+pub struct TimedEvaluation {
     /// The answers.
     pub evaluation: Evaluation,
     /// Mean time of a fit, by the caller's clock.
@@ -288,48 +288,48 @@ pub struct Tried {
     pub locate_ns: f64,
 }
 
-impl Trial {
-    /// A trial a fold of a recording, by position.
+impl Split {
+    /// A split for each fold of a recording, by position.
     ///
     /// # Errors
     /// [`TooFewPositions`] as for [`Recording::folds`].
     pub fn by_folds(recording: &Recording, folds: usize) -> Result<Vec<Self>, TooFewPositions> {
         let folds = recording.folds(folds)?;
-        let trial = |fold: &Fold| Self {
+        let split = |fold: &Fold| Self {
             training: recording.subset(&fold.training),
             judged: recording.subset(&fold.held_out),
         };
-        Ok(folds.iter().map(trial).collect())
+        Ok(folds.iter().map(split).collect())
     }
 }
 
-/// Fits an estimator to each trial and locates what the trial judges by. `clock` tells seconds since any fixed moment.
+/// Fits an estimator to the training part of each split and locates what it judges by. `clock` tells seconds since any fixed moment.
 ///
 /// # Errors
 /// [`EvaluationError`] when the estimator does not suit the setup or a recording, or the watch stopped it.
-pub fn try_estimator<E: Fit>(
+pub fn evaluate_splits<E: Fit>(
     setup: &Setup,
     estimator: &E,
-    trials: &[Trial],
+    splits: &[Split],
     seed: u64,
     clock: &dyn Fn() -> f64,
     watch: Watch,
-) -> Result<Tried, EvaluationError<E::Error>> {
+) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
     let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m(), located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
-    for trial in trials {
+    for split in splits {
         let start = clock();
-        let task = FitTask { setup, recording: &trial.training, seed, watch };
+        let task = FitTask { setup, recording: &split.training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
-        let part = Evaluation::of(&locator, &trial.judged)?;
+        let part = Evaluation::of(&locator, &split.judged)?;
         (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
         evaluation.located.extend(part.located);
     }
     let readings = evaluation.located.len().max(1) as f64;
-    Ok(Tried {
+    Ok(TimedEvaluation {
         evaluation,
-        fit_seconds: fitting_s / trials.len().max(1) as f64,
+        fit_seconds: fitting_s / splits.len().max(1) as f64,
         locate_ns: locating_s / readings * 1e9,
     })
 }
@@ -380,8 +380,8 @@ pub fn cross_validate<E: Fit>(
     task: FitTask,
     folds: usize,
 ) -> Result<Evaluation, EvaluationError<E::Error>> {
-    let trials = Trial::by_folds(task.recording, folds)?;
-    Ok(try_estimator(task.setup, estimator, &trials, task.seed, &|| 0.0, task.watch)?.evaluation)
+    let splits = Split::by_folds(task.recording, folds)?;
+    Ok(evaluate_splits(task.setup, estimator, &splits, task.seed, &|| 0.0, task.watch)?.evaluation)
 }
 
 #[cfg(test)]

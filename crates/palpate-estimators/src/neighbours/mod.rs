@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
-use crate::held_out::HeldOutSpread;
+use crate::held_out::HeldOutErrors;
 use crate::recording::{Row, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::on_surface;
@@ -78,7 +78,7 @@ impl Fit for Neighbours {
             count: best + 1,
             rows,
             force_n: task.setup.force_n,
-            spread: errors.get(best).and_then(|errors| HeldOutSpread::of(errors)),
+            spread: errors.get(best).and_then(|errors| HeldOutErrors::of(errors)),
         })
     }
 }
@@ -115,7 +115,7 @@ pub struct NeighboursLocator {
     /// The contact's force in newtons, where the bench knows it.
     pub force_n: Option<f64>,
     /// How far the neighbours at other positions were off.
-    pub spread: Option<HeldOutSpread>,
+    pub spread: Option<HeldOutErrors>,
 }
 
 /// A training row.

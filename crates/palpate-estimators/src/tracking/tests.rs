@@ -124,7 +124,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
 }
 
 #[test]
-fn the_pulls_of_a_fit_are_the_slopes_of_its_misfit() {
+fn the_scores_of_a_fit_are_the_slopes_of_its_misfit() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     let whitened: Vec<f64> = (0..8).map(|i| f64::from(i % 3) * 4.0).collect();

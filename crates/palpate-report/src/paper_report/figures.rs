@@ -7,7 +7,7 @@ use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
 use crate::study_parts::{ArmLine, along, error_chart};
 use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;
 use palpate_studies::paper::COUNTS;
 
@@ -35,7 +35,7 @@ const MIDDLE_4: Family =
 struct Measure {
     title: &'static str,
     axis: Axis,
-    of: fn(&ArmResults) -> Option<Spread>,
+    of: fn(&ArmResults) -> Option<Quantiles>,
     /// Key of the published figures.
     key: &'static str,
 }
@@ -168,7 +168,7 @@ impl Paper<'_> {
             .iter()
             .filter_map(|&count| {
                 let arm = self.report.results.arm(&format!("{}-{count}", family.name))?;
-                let Spread { median, p05, p95 } = (measure.of)(arm)?;
+                let Quantiles { median, p05, p95 } = (measure.of)(arm)?;
                 Some(ErrorPoint { x: f64::from(count) + shift, y: median, low: p05, high: p95 })
             })
             .collect();

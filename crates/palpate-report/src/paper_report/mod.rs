@@ -16,7 +16,7 @@ use super::numbers::{counted, listed};
 use super::page::{Page, ReportFile, Section};
 use super::study_parts::{arms_table, glossary, run_table, source};
 use super::study_report::{least_error, longest};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, claims, published_figures};
 
 const DOI: &str = "https://doi.org/10.5772/53567";
@@ -162,6 +162,6 @@ fn lead() -> Markup {
 }
 
 /// Where our seeds lie.
-fn ours(figure: &PublishedFigure) -> Spread {
-    Spread { median: figure.median, p05: figure.p05, p95: figure.p95 }
+fn ours(figure: &PublishedFigure) -> Quantiles {
+    Quantiles { median: figure.median, p05: figure.p05, p95: figure.p95 }
 }

@@ -6,7 +6,7 @@ use super::{Paper, ours};
 use crate::numbers::{NOTHING, listed, mm, number, spread, stretch};
 use crate::page::{Table, numeric, short, text, wide};
 use palpate_estimators::arrangement::{Arrangement, Training};
-use palpate_estimators::evaluation::{Portion, Spread};
+use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::contact::Position;
 use palpate_studies::PortionResults;
 
@@ -111,7 +111,7 @@ impl Paper<'_> {
         Table::new(columns, rows, caption)
     }
 
-    fn portion_row(&self, kind: &str, portion: Portion, key: &str, found: Spread) -> Vec<Markup> {
+    fn portion_row(&self, kind: &str, portion: Portion, key: &str, found: Quantiles) -> Vec<Markup> {
         let published = self.published("position-10", key);
         vec![
             text(stretch(portion)),

@@ -1,7 +1,7 @@
 //! The report of Elliott's chain has every chain in its table, and its figures.
 
 use crate::elliott_report;
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_rig::Rig;
 use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, RIG_TOML};
 
@@ -15,7 +15,7 @@ fn elliotts_chain_has_its_page() {
         tolerance_m: 5e-3,
         seed: 0,
     };
-    let spread = |median: f64| Spread { median, p05: 0.9 * median, p95: 1.2 * median };
+    let spread = |median: f64| Quantiles { median, p05: 0.9 * median, p95: 1.2 * median };
     let row = |chain, error_m: f64, is_single: bool| ChainRow {
         chain,
         error_m: is_single.then(|| spread(error_m)),

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use palpate_estimators::evaluation::Trial;
+use palpate_estimators::evaluation::Split;
 use palpate_estimators::recording::{Provenance, Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
@@ -84,7 +84,7 @@ impl ArraySensor {
     }
 
     /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
-    pub fn trials(&self, count: u64, seed: u64) -> Vec<Trial> {
+    pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
         let length_m = self.rig.setup.surface.extent().length_m();
         let pressed: Vec<Position> =
             self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
@@ -93,7 +93,7 @@ impl ArraySensor {
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&pressed, seed, &mut rng);
-            Trial { training, judged: self.recording(&judged, seed, &mut rng) }
+            Split { training, judged: self.recording(&judged, seed, &mut rng) }
         };
         (0..count).map(trial).collect()
     }

@@ -15,7 +15,7 @@ use serde::Serialize;
 use palpate_estimators::centroid::Centroid;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::estimator::contenders;
-use palpate_estimators::evaluation::{Trial, try_estimator};
+use palpate_estimators::evaluation::{Split, evaluate_splits};
 use palpate_mechanics::sensing::{Layout, Sensor};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
@@ -145,12 +145,12 @@ impl DeadAreas {
         sensing: &str,
         rig: &Rig,
         estimator: &Estimator,
-        trials: &[Trial],
+        trials: &[Split],
         findings: &mut DeadAreaFindings,
         watch: Watch,
     ) -> Result<(), Cancelled> {
         let sensors = rig.setup.layout.len();
-        match try_estimator(&rig.setup, estimator, trials, self.seed, &|| 0.0, watch) {
+        match evaluate_splits(&rig.setup, estimator, trials, self.seed, &|| 0.0, watch) {
             Ok(tried) => {
                 let evaluation = &tried.evaluation;
                 findings.rows.push(DeadAreaRow {

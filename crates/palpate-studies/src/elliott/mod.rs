@@ -13,7 +13,7 @@ use karhunen_loeve::{raw_layout, without_model};
 use serde::Serialize;
 
 use palpate_estimators::estimator::{Estimator, FitError, Locator, ReadingError, Track, TrackerConfig};
-use palpate_estimators::evaluation::{Evaluation, Spread, Trial};
+use palpate_estimators::evaluation::{Evaluation, Quantiles, Split};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{InputScale, Network};
 use palpate_estimators::recording::TimedRecording;
@@ -93,11 +93,11 @@ pub struct ChainRow {
     /// The chain.
     pub chain: Chain,
     /// Mean error of presses within the inner plate, in metres; nothing of a tracker, which wants readings in time.
-    pub error_m: Option<Spread>,
+    pub error_m: Option<Quantiles>,
     /// Share of these presses whose error is within the tolerance, in %.
-    pub effective_percent: Option<Spread>,
+    pub effective_percent: Option<Quantiles>,
     /// Mean error of readings of the moving load, in metres.
-    pub moving_error_m: Spread,
+    pub moving_error_m: Quantiles,
     /// Mean of the Cramér–Rao bound over the same presses, of what the chain sees, in metres; nothing where it does not tell
     /// the place everywhere.
     pub limit_m: Option<f64>,
@@ -220,7 +220,7 @@ impl Elliott {
         for &count in &self.components {
             let reduce = |recording| setup.reduction.reduced(recording, count);
             let trial =
-                Trial { training: reduce(&setup.trial.training), judged: reduce(&setup.trial.judged) };
+                Split { training: reduce(&setup.trial.training), judged: reduce(&setup.trial.judged) };
             let recording = reduce(&setup.moving.recording);
             let moving = TimedRecording { recording, ..setup.moving.clone() };
             let reduced = Setup {
@@ -266,7 +266,7 @@ impl Elliott {
     }
 
     /// The derivatives of all readings at each judged contact.
-    fn gradients(&self, trials: &[Trial]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
+    fn gradients(&self, trials: &[Split]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
         let Setup { surface, layout, force_n, .. } = &self.rig.setup;
         let model = surface.model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
         let force_n = force_n.ok_or(RigSimulationError::from(SimulateError::NoForce))?;
@@ -289,7 +289,7 @@ impl Elliott {
         contacts: &[Vec<ResponseGradient>],
     ) -> Option<ChainRow> {
         let pressed = |pick: fn((f64, f64)) -> f64| {
-            Spread::of(judged.iter().filter_map(|one| one.pressed.map(pick)).collect())
+            Quantiles::of(judged.iter().filter_map(|one| one.pressed.map(pick)).collect())
         };
         let seen = match chain {
             Chain::Components(count) => count,
@@ -305,7 +305,7 @@ impl Elliott {
             chain,
             error_m: pressed(|(error_m, _)| error_m),
             effective_percent: pressed(|(_, percent)| percent),
-            moving_error_m: Spread::of(judged.iter().map(|one| one.moving_error_m).collect())?,
+            moving_error_m: Quantiles::of(judged.iter().map(|one| one.moving_error_m).collect())?,
             limit_m: bounds.filter(|_| is_single).map(mean_m),
         })
     }
@@ -314,7 +314,7 @@ impl Elliott {
 /// What the chains of one calibration share.
 #[derive(Clone, Copy)]
 struct TrialSetup<'a> {
-    trial: &'a Trial,
+    trial: &'a Split,
     moving: &'a TimedRecording,
     reduction: &'a KarhunenLoeve,
     seed: u64,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::{ArmResults, StudyResults};
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 
 /// How near our median must come to a published figure to agree with it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -40,7 +40,7 @@ enum Figure {
 }
 
 impl Figure {
-    fn of(self, arm: &ArmResults) -> Option<Spread> {
+    fn of(self, arm: &ArmResults) -> Option<Quantiles> {
         Some(match self {
             Self::Epochs => arm.epochs?,
             Self::Error => arm.error_percent,
@@ -136,7 +136,7 @@ impl Agreement {
 /// Every published figure whose arm is among the results, beside ours.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
-        let Spread { median, p05, p95 } = figure.of(results.arm(arm)?)?;
+        let Quantiles { median, p05, p95 } = figure.of(results.arm(arm)?)?;
         let (key, what) = figure.name();
         let yardstick = figure.yardstick(published);
         let agrees = yardstick.accepts(published, median);

@@ -5,7 +5,7 @@ use super::built_in::BuiltIn;
 use crate::failure::Failure;
 use crate::input;
 use crate::table::table;
-use palpate_estimators::evaluation::Spread;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_numerics::watch::Watch;
 use palpate_report::{ReportFile, elliott_report};
 use palpate_studies::elliott::{COMPONENTS, Elliott, ElliottError, ElliottFindings, PRESENTATIONS, RIG_TOML};
@@ -51,7 +51,7 @@ impl BuiltIn for Elliott {
     fn tell(findings: &ElliottFindings) -> String {
         let heading = ["chain", "error, mm", "limit, mm", "effective area, %", "moving, mm"];
         let rows = findings.rows.iter().map(|row| {
-            let mm = |spread: Spread| format!("{:.3}", spread.median * 1e3);
+            let mm = |spread: Quantiles| format!("{:.3}", spread.median * 1e3);
             vec![
                 row.chain.to_string(),
                 row.error_m.map_or_else(String::new, mm),

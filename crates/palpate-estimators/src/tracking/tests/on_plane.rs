@@ -80,7 +80,7 @@ fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
 }
 
 #[test]
-fn the_pulls_of_a_fit_on_a_plane_are_the_slopes_of_its_misfit() {
+fn the_scores_of_a_fit_on_a_plane_are_the_slopes_of_its_misfit() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
     let whitened: Vec<f64> = (0..9).map(|i| f64::from(i % 4) * -5.0).collect();
