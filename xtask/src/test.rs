@@ -15,6 +15,9 @@ use crate::tidy;
 /// Tells a test that it must fail where it would skip.
 const STRICT: &str = "PALPATE_STRICT";
 
+/// All that is checked: every crate, with the features that are off by default.
+const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
+
 /// What a test that is skipped for want of a prerequisite counts as.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Skips {
@@ -39,11 +42,13 @@ pub fn run(root: &Path, skips: Skips) -> Result<bool> {
     let steps = [
         step("prerequisites", || prerequisites(root, skips, &mut missing))?,
         step("formatting", || shown(root, &["fmt", "--all", "--check"]))?,
-        step("clippy", || shown(root, &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?,
+        step("clippy", || {
+            shown(root, &[&["clippy", "--all-targets"], &EVERYTHING[..], &["--", "-D", "warnings"]].concat())
+        })?,
         step("tests", || tests(root, skips, &skipped))?,
-        step("doc tests", || watched(cargo(root, &["test", "--workspace", "--doc"])))?,
+        step("doc tests", || watched(cargo(root, &[&["test", "--doc"], &EVERYTHING[..]].concat())))?,
         step("docs", || {
-            let mut docs = cargo(root, &["doc", "--workspace", "--no-deps"]);
+            let mut docs = cargo(root, &[&["doc", "--no-deps"], &EVERYTHING[..]].concat());
             Ok((run::shown(docs.env("RUSTDOCFLAGS", "-D warnings"))?, None))
         })?,
         step("tidy", || Ok((tidy::run(root)?, None)))?,
@@ -78,9 +83,9 @@ fn prerequisites(root: &Path, skips: Skips, missing: &mut Vec<String>) -> Outcom
 
 fn tests(root: &Path, skips: Skips, skipped: &Skipped) -> Outcome {
     let mut command = if NEXTEST.is_there(root) {
-        cargo(root, &["nextest", "run", "--workspace", "--no-fail-fast"])
+        cargo(root, &[&["nextest", "run", "--no-fail-fast"], &EVERYTHING[..]].concat())
     } else {
-        cargo(root, &["test", "--workspace", "--lib", "--bins", "--tests", "--no-fail-fast"])
+        cargo(root, &[&["test", "--lib", "--bins", "--tests", "--no-fail-fast"], &EVERYTHING[..]].concat())
     };
     command.env(skipped::VARIABLE, &skipped.file);
     match skips {

@@ -1,6 +1,6 @@
 //! The influence estimator on the paper's beam: a fit of 10 × 10 presses, and an estimate with its uncertainty; one
-//! core, CPU time, medians. What bounds the estimate is said in `influence/search.rs`,
-//! and what bounds a batch in `influence/batch.rs`.
+//! core, CPU time, medians. What bounds the estimate is said in `influence/beam/search.rs`,
+//! and what bounds a batch in `influence/beam/locator.rs`.
 
 use cpu_time::ThreadTime;
 use palpate_core::{Estimate, Status};
