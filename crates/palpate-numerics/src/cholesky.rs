@@ -21,6 +21,7 @@ const GRAM: usize = 48;
 /// The factor L of A = L·Lᵀ, lower triangular.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cholesky {
+    /// Row by row in memory.
     lower: Array2<f64>,
 }
 
@@ -47,6 +48,9 @@ impl Cholesky {
     pub fn factor(mut matrix: Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let size = matrix.nrows();
         assert_eq!(size, matrix.ncols(), "a matrix to be factored is square");
+        if !matrix.is_standard_layout() {
+            matrix = matrix.as_standard_layout().into_owned();
+        }
         factor_panel(matrix.view_mut()).map_err(|error| NotPositiveDefinite { size, ..error })?;
         for (row, mut values) in matrix.outer_iter_mut().enumerate() {
             values.slice_mut(s![row + 1..]).fill(0.0);
@@ -81,8 +85,9 @@ impl Cholesky {
     /// # Panics
     /// When b is shorter than the matrix.
     pub fn solve_lower_in_place(&self, b: &mut [f64]) {
-        for (i, row) in self.lower.outer_iter().enumerate() {
-            let sum = row.slice(s![..i]).dot(&ArrayView1::from(&b[..i]));
+        let lower = self.lower.as_slice().expect("it lies row by row");
+        for (i, row) in lower.chunks_exact(self.size().max(1)).enumerate() {
+            let sum = ArrayView1::from(&row[..i]).dot(&ArrayView1::from(&b[..i]));
             b[i] = (b[i] - sum) / row[i];
         }
     }

@@ -73,13 +73,16 @@ macro_rules! vector {
         impl Vector<$lanes> for $vector {
             #[inline(always)]
             fn load(values: &[$real; $lanes]) -> Self {
-                // SAFETY: both are 64 bytes of numbers, and any bits are a number.
-                Self(unsafe { transmute::<[$real; $lanes], [$register; $registers]>(*values) })
+                // SAFETY: both are 64 bytes of numbers, and any bits are a number. A copy of the array would be stored in halves before it
+                // is loaded as a whole, for which the machine waits.
+                Self(unsafe { values.as_ptr().cast::<[$register; $registers]>().read_unaligned() })
             }
             #[inline(always)]
             fn to_array(self) -> [$real; $lanes] {
+                let mut lanes = [0.0; $lanes];
                 // SAFETY: both are 64 bytes of numbers, and any bits are a number.
-                unsafe { transmute::<[$register; $registers], [$real; $lanes]>(self.0) }
+                unsafe { lanes.as_mut_ptr().cast::<[$register; $registers]>().write_unaligned(self.0) };
+                lanes
             }
             #[inline(always)]
             fn mul_add(self, factor: Self, term: Self) -> Self {
@@ -211,6 +214,14 @@ impl Eight for Avx512F64 {
         unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0[0], other.0[0]) }
     }
     #[inline(always)]
+    fn sum(self) -> f64 {
+        // SAFETY: see the head of this file.
+        unsafe {
+            let [whole] = self.0;
+            sum_of_four(_mm256_add_pd(_mm512_castpd512_pd256(whole), _mm512_extractf64x4_pd::<1>(whole)))
+        }
+    }
+    #[inline(always)]
     fn sums(eight: &[Self; 8]) -> Self {
         let [Self([a]), Self([b]), Self([c]), Self([d]), Self([e]), Self([f]), Self([g]), Self([h])] = *eight;
         // SAFETY: see the head of this file.
@@ -227,6 +238,19 @@ impl Eight for Avx512F64 {
             let odd = quarters(halves(b, d), halves(f, h));
             Self([_mm512_add_pd(_mm512_unpacklo_pd(even, odd), _mm512_unpackhi_pd(even, odd))])
         }
+    }
+}
+
+/// (0 + 2) + (1 + 3), by lane.
+///
+/// # Safety
+/// See the head of this file.
+#[inline(always)]
+unsafe fn sum_of_four(four: __m256d) -> f64 {
+    // SAFETY: as the function's own.
+    unsafe {
+        let two = _mm_add_pd(_mm256_castpd256_pd128(four), _mm256_extractf128_pd::<1>(four));
+        _mm_cvtsd_f64(_mm_add_sd(two, _mm_unpackhi_pd(two, two)))
     }
 }
 
@@ -264,6 +288,12 @@ impl Eight for Avx2F64 {
     #[inline(always)]
     fn below(self, other: Self) -> u8 {
         each_register!(self, r => _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], other.0[r])).signs()
+    }
+    #[inline(always)]
+    fn sum(self) -> f64 {
+        let [low, high] = self.0;
+        // SAFETY: see the head of this file.
+        unsafe { sum_of_four(_mm256_add_pd(low, high)) }
     }
     #[inline(always)]
     fn sums(eight: &[Self; 8]) -> Self {
