@@ -1,7 +1,7 @@
 //! Where to look: the misfit at every STRIDE-th node, its valleys, and where in a valley to start.
 //!
 //! Symbols as in [`super::search`]. At a known force a chord joins the influences of two neighbouring coarse nodes, times the force.
-//! How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve stmixtures from its chord is known
+//! How close d comes to a chord is a quadratic in the misfits at its ends; how far the curve strays from its chord is known
 //! beforehand, so a valley's lowest misfit is bounded from below without going there. With the force free, a place is told by the
 //! direction of d alone: between the directions of f at two neighbouring coarse nodes, the least-squares mixture α·f + β·g of both lies at
 //! t = β/(α + β) of the way from one to the other, and the best force is that of the mixture.
@@ -246,7 +246,7 @@ impl Chord {
         let (from, to) = (table.at_node(STRIDE * (node - 1)), table.at_node(STRIDE * node));
         let ends = || from.iter().zip(to);
         let square = scale * scale * ends().map(|(a, b)| (b - a) * (b - a)).sum::<f64>();
-        let stmixtures = (1..PARTS).map(|part| {
+        let strays = (1..PARTS).map(|part| {
             let t = part as f64 / PARTS as f64;
             let x_m = ((node - 1) as f64 + t) * STRIDE as f64 * table.spacing_m();
             let mut sum = 0.0;
@@ -257,7 +257,7 @@ impl Chord {
             cross: ends().map(|(a, b)| a * b).sum(),
             square,
             half_inverse: if square > 0.0 { 0.5 / square } else { 0.0 },
-            sag: MARGIN * stmixtures.fold(0.0, f64::max),
+            sag: MARGIN * strays.fold(0.0, f64::max),
             least_weight: weights.as_flattened().iter().copied().fold(1.0, f64::min),
         }
     }
