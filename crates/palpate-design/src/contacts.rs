@@ -1,8 +1,9 @@
 //! The contacts that a design is for.
 
-use crate::range::OutOfRange;
+use crate::range::{check_count, check_positions};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::OutOfRange;
 
 /// Contact positions along a line, and along the longer side of a plane, where a design does not say.
 const ALONG_A_LINE: f64 = 400.0;
@@ -67,12 +68,12 @@ impl WeightedContacts {
     pub fn of(prior: &ContactPrior, extent: Extent) -> Result<Self, OutOfRange> {
         let ContactPrior { from, to, every_m, weights } = prior;
         OutOfRange::check_positive([("the distance of contacts in m", *every_m)])?;
-        OutOfRange::check_positions("an end of the contacts, in m,", [*from, *to], extent)?;
+        check_positions("an end of the contacts, in m,", [*from, *to], extent)?;
         let sizes =
             [to.x_m - from.x_m, to.y_m - from.y_m].map(|size_m| ("the range of contacts in m", size_m));
         OutOfRange::check("at least 0", sizes, |value| value >= 0.0)?;
         let count: f64 = sizes.iter().map(|(_, size_m)| size_m / every_m + 1.0).product();
-        OutOfRange::check_count("the number of contacts", count)?;
+        check_count("the number of contacts", count)?;
         let shares = weights.iter().map(|weight| ("a weight of contacts", *weight));
         OutOfRange::check("at least 0", shares, |value| value.is_finite() && value >= 0.0)?;
         let along = |from_m: f64, to_m: f64| {

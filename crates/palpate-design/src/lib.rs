@@ -43,5 +43,4 @@ pub mod sensors;
 mod verification;
 
 pub use contacts::{ContactPrior, WeightedContacts};
-pub use range::OutOfRange;
 pub use verification::Verification;

@@ -66,13 +66,7 @@ pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
 
 /// A finger with five strain gauges whose force is not known, pressed with `force_n` at 24 places, twice each.
 pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
-    let digit = Digit {
-        length_m: mm(120.0),
-        width_m: mm(10.0),
-        thickness_m: mm(0.5),
-        youngs_modulus_pa: gpa(200.0),
-        direction,
-    };
+    let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap().with_direction(direction);
     let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
     let setup = Setup::new(digit).sensors(gauges).unwrap();
     Example { setup, training: Training::even(24).repeated(2).with_force(force_n) }
@@ -80,7 +74,7 @@ pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
 
 /// To and fro four times between two places, at 0.5 m/s.
 pub(crate) fn to_and_fro(from: Position, to: Position) -> Motion {
-    Motion { from, to, speed_m_per_s: 0.5, turn_m: mm(100.0), passes: 4, lifted_s: 0.0, touch_s: 0.1 }
+    Motion::new(from, to, 0.5, mm(100.0)).and_then(|motion| motion.with_passes(4)).unwrap()
 }
 
 /// The motion of a load along the paper's beam.
@@ -96,7 +90,7 @@ pub(crate) fn over_the_plate() -> Motion {
 
 /// The paper's beam of steel, which swings.
 pub(crate) fn swinging_beam() -> ModalBeam {
-    ModalBeam { beam: beam(), density_kg_per_m3: 7850.0, damping_ratio: 0.01 }
+    ModalBeam::new(beam(), 7850.0, 0.01).unwrap()
 }
 
 /// The paper's beam as it is calibrated to follow a moving load.
@@ -110,16 +104,12 @@ pub(crate) fn two_moving_loads() -> (Example, [Motion; 2]) {
         .sensors(Deflection.evenly(8).noise(um(20.0)))
         .and_then(|setup| setup.sensors(Strain.evenly(8).noise(microstrain(5.0))));
     let training = Training::even(10).repeated(50).with_force(newtons(3.0));
-    let motion = |from_mm: f64, to_mm: f64, speed_m_per_s: f64, passes: usize| Motion {
-        from: Position::along(mm(from_mm)),
-        to: Position::along(mm(to_mm)),
-        speed_m_per_s,
-        turn_m: 0.2 * mm(to_mm - from_mm),
-        passes,
-        lifted_s: 0.0,
-        touch_s: 0.1,
+    let motion = |from_mm: f64, to_mm: f64, speed_m_per_s: f64, passes: usize| {
+        let [from, to] = [from_mm, to_mm].map(|x_mm| Position::along(mm(x_mm)));
+        let motion = Motion::new(from, to, speed_m_per_s, 0.2 * mm(to_mm - from_mm));
+        motion.and_then(|motion| motion.with_passes(passes)).unwrap()
     };
-    let second = Motion { lifted_s: 0.5, touch_s: 0.05, ..motion(250.0, 340.0, 0.1, 3) };
+    let second = motion(250.0, 340.0, 0.1, 3).with_lifts(0.5, 0.05).unwrap();
     (Example { setup: setup.unwrap(), training }, [motion(60.0, 150.0, 0.2, 6), second])
 }
 

@@ -8,8 +8,11 @@ use crate::arrangement::inner_grid;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{CramerRaoBound, LimitError};
-use palpate_mechanics::sensing::{Layout, Placement, Sensor, SensorGroup, SensorKind, even_positions};
+use palpate_mechanics::sensing::{
+    Layout, LayoutError, Placement, Sensor, SensorGroup, SensorKind, even_positions,
+};
 use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
+use palpate_numerics::OutOfRange;
 
 /// A surface with its sensors, all checked. A rig describes it, and a locator keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,16 +93,12 @@ pub enum SetupError {
     /// No sensor.
     #[error("a group of 0 sensors; at least 1 is needed")]
     NoSensors,
+    /// A sensor that cannot be.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// A number that is not in its range.
-    #[error("{what} is {value}; it must be {bound}")]
-    OutOfRange {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its bound.
-        bound: &'static str,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
 }
 
 /// Checks that a sensor of this `kind` at `position` goes with a surface; `number` is its number in messages, from 1.
@@ -180,18 +179,15 @@ impl Setup {
     }
 
     fn of_extent(extent: Extent, channels: &[&str]) -> Result<Self, SetupError> {
-        let sizes = [
+        OutOfRange::check_positive([
             ("the length in metres", extent.length_m()),
             ("the width in metres", extent.width_m().unwrap_or(1.0)),
-        ];
-        for (what, value) in sizes {
-            check(what, value, |size| size > 0.0, "greater than 0 and finite")?;
-        }
+        ])?;
         let positions = vec![Position::default(); channels.len()];
         let mut setup = Self::new(extent).sensors(SensorKind::Raw.at_positions(positions))?;
-        for (sensor, name) in setup.layout.sensors.iter_mut().zip(channels) {
-            (*name).clone_into(&mut sensor.name);
-        }
+        setup.layout.edit(|sensors| {
+            sensors.iter_mut().zip(channels).for_each(|(sensor, name)| (*name).clone_into(&mut sensor.name));
+        })?;
         Ok(setup)
     }
 
@@ -201,28 +197,16 @@ impl Setup {
     /// [`SetupError`] for a sensor that does not go with the surface, or numbers of its channel out of their range.
     pub fn sensors(mut self, group: SensorGroup) -> Result<Self, SetupError> {
         let SensorGroup { kind, placement, channel } = group;
-        let positive = "at least 0 and finite";
-        for (what, value) in [
-            ("the noise", channel.noise_sd),
-            ("the resolution", channel.resolution),
-            ("the offset error", channel.offset_error),
-            ("the position error in metres", channel.position_error_m),
-        ] {
-            check(what, value, |size| size >= 0.0, positive)?;
-        }
-        check(
-            "the gain error",
-            channel.gain_error,
-            |gain| (0.0..1.0).contains(&gain),
-            "at least 0 and below 1",
-        )?;
+        channel.check()?;
         let positions = positions_of(placement, self.surface.extent())?;
-        let before = self.layout.sensors.iter().filter(|sensor| sensor.kind == kind).count();
+        let before = self.layout.kinds().into_iter().filter(|of| *of == kind).count();
+        let mut sensors = self.layout.into_sensors();
         for (i, position) in positions.into_iter().enumerate() {
             check_sensor(&self.surface, kind, i + 1, position)?;
             let name = format!("{kind}_{}", before + i + 1);
-            self.layout.sensors.push(Sensor { kind, position, name, channel });
+            sensors.push(Sensor { kind, position, name, channel });
         }
+        self.layout = Layout::new(sensors)?;
         Ok(self)
     }
 
@@ -231,7 +215,7 @@ impl Setup {
     /// # Errors
     /// [`SetupError::OutOfRange`] for a force that is not greater than 0 and finite.
     pub fn known_force(self, force_n: f64) -> Result<Self, SetupError> {
-        check("the force in newtons", force_n, |force| force > 0.0, "greater than 0 and finite")?;
+        OutOfRange::check_positive([("the force in newtons", force_n)])?;
         Ok(Self { force_n: Some(force_n), ..self })
     }
 
@@ -282,15 +266,6 @@ impl Setup {
         let extent = self.surface.extent();
         Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }
     }
-}
-
-fn check(
-    what: &'static str,
-    value: f64,
-    good: impl Fn(f64) -> bool,
-    bound: &'static str,
-) -> Result<(), SetupError> {
-    if value.is_finite() && good(value) { Ok(()) } else { Err(SetupError::OutOfRange { what, value, bound }) }
 }
 
 fn positions_of(placement: Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {

@@ -11,8 +11,9 @@ use crate::arrangement::{ArrangementError, Training};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
+use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
 use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
+use palpate_numerics::OutOfRange;
 
 pub use moving::{MovingContact, MovingContacts, simulate_moving};
 
@@ -28,6 +29,12 @@ pub enum SimulateError {
     /// The training positions cannot be laid out.
     #[error(transparent)]
     Arrangement(#[from] ArrangementError),
+    /// A number of a sensor is not in its range.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// A speed of a moving contact is not in its range.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// A position does not lie on the surface.
     #[error(
         "position {number} is at {}, off the surface; it must be within {}",
@@ -53,7 +60,7 @@ impl<'a> CleanSensors<'a> {
     /// The response functions of all sensors of `layout`.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
         let function = |sensor: &Sensor| surface.response_function(sensor.kind, sensor.position);
-        Self { functions: layout.sensors.iter().map(function).collect() }
+        Self { functions: layout.sensors().iter().map(function).collect() }
     }
 
     /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
@@ -150,26 +157,26 @@ pub fn simulate_loads(
 fn clean_reading_of_loads(surface: &dyn Surface, layout: &Layout, loads: &[UniformLoad]) -> Vec<f64> {
     let reading = |sensor: &Sensor| {
         let function = surface.influence_function(sensor.kind, sensor.position);
-        loads.iter().map(|load| load.force_n * load.mean(&*function)).sum()
+        loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum()
     };
-    layout.sensors.iter().map(reading).collect()
+    layout.sensors().iter().map(reading).collect()
 }
 
 /// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
 /// surface's edge. A perfectly placed sensor stays where it is.
 pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
-    let mut placed = layout.clone();
-    for sensor in &mut placed.sensors {
+    layout.clone().with_positions(|sensor| {
         let error_m = sensor.channel.position_error_m;
         let mut beside =
             |at_m: f64, size_m: f64| (at_m + error_m * rng.random_range(-1.0..=1.0)).clamp(0.0, size_m);
         if error_m > 0.0 {
             let Position { x_m, y_m } = sensor.position;
             let y_m = extent.width_m().map_or(y_m, |width_m| beside(y_m, width_m));
-            sensor.position = Position { x_m: beside(x_m, extent.length_m()), y_m };
+            Position { x_m: beside(x_m, extent.length_m()), y_m }
+        } else {
+            sensor.position
         }
-    }
-    placed
+    })
 }
 
 #[cfg(test)]

@@ -224,7 +224,8 @@ pub fn sweep_speeds(
     let mut sweep = Vec::new();
     for ratio in SPEED_RATIOS {
         let speed_m_per_s = ratio * beam.critical_speed_m_per_s();
-        let recording = simulate_moving(setup, &moving.at_speed(speed_m_per_s), seed)?;
+        let recording =
+            simulate_moving(setup, &moving.at_speed(speed_m_per_s).map_err(SimulateError::from)?, seed)?;
         let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
         let errors =

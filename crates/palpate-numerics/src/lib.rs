@@ -8,6 +8,7 @@ mod cholesky;
 mod distributions;
 mod eigen;
 mod elliptic;
+mod out_of_range;
 mod random_order;
 pub mod regression;
 pub mod simd;
@@ -23,6 +24,7 @@ pub use distributions::{
 };
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};
+pub use out_of_range::OutOfRange;
 pub use random_order::random_order;
 pub use sparse_cholesky::{SparseCholesky, SparseCholeskyError, SparseSymmetric};
 pub use statistics::{mean, mean_and_variance, median, percentile, root_mean_square, standard_error};

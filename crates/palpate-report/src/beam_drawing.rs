@@ -46,8 +46,8 @@ const REMARK_LINE: f64 = 26.0;
 
 /// The beam bent by `force_n` newtons, its supports and sensors, as SVG; and where the force is drawn.
 pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (String, Position) {
-    let supports = [0.0, beam.length_m].map(|at_m| (at_m * 1e3, BeamSupportKind::Simple)).to_vec();
-    let load = Position::along(DRAWN_LOAD * beam.length_m);
+    let supports = [0.0, beam.length_m()].map(|at_m| (at_m * 1e3, BeamSupportKind::Simple)).to_vec();
+    let load = Position::along(DRAWN_LOAD * beam.length_m());
     (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }.svg(), load)
 }
 
@@ -101,7 +101,7 @@ impl BeamDrawing {
             length_mm: beam.length_m() * 1e3,
             supports: Vec::new(),
             steps: Vec::new(),
-            sensors_mm: layout.sensors.iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
+            sensors_mm: layout.sensors().iter().map(|sensor| sensor.position.x_m * 1e3).collect(),
             load_mm: load.x_m * 1e3,
             load_label: format!("{} N", stated(force_n)),
             deflection_mm: (0..=SHAPE_STEPS).map(point).collect(),

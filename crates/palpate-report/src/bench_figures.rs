@@ -39,7 +39,7 @@ pub(super) fn bench_figure(
 pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: Vec<Mark>) -> Chart {
     let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
         let of_row = |(row, (_, layout)): (usize, &(String, &Layout))| -> Vec<(f64, f64)> {
-            let sensors = layout.sensors.iter().filter(|sensor| sensor.kind == kind);
+            let sensors = layout.sensors().iter().filter(|sensor| sensor.kind == kind);
             sensors.map(|sensor| (sensor.position.x_m * 1e3, row_height(layouts.len(), row))).collect()
         };
         let points: Vec<(f64, f64)> = layouts.iter().enumerate().flat_map(of_row).collect();

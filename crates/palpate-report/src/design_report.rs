@@ -202,7 +202,7 @@ impl<'a> SensorDesignReport<'a> {
             (0.0, 1.1 * greatest, [0.1 * greatest, 0.04 * greatest])
         };
         let sites = |designed: &Designed, colour, y, marker| {
-            let points = designed.layout.sensors.iter().map(|sensor| (sensor.position.x_m * 1e3, y));
+            let points = designed.layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3, y));
             let label = format!("sensors, {} layout", designed.method.name());
             Series::markers(label, colour, points.collect(), marker)
         };

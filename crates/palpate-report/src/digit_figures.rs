@@ -26,7 +26,7 @@ const MARGIN: f64 = 0.06;
 
 /// `what` ("The bench"), the finger as it is and bent by `force_n` newtons at three places; x and y have the same scale.
 pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n: f64) -> Figure {
-    let l = digit.length_m;
+    let l = digit.length_m();
     let points = |contact: Contact| {
         let shape = digit.shape(contact);
         let point = |i| shape.point(f64::from(i) / f64::from(SHAPE_STEPS) * l);
@@ -40,7 +40,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
         let [x_m, y_m] = digit.shape(at(share)).point(share * l);
         series.push(Series::markers("", colour, in_milli(vec![(x_m, y_m)]), Marker::Circle));
     }
-    let gauges = layout.sensors.iter().map(|sensor| (sensor.position.x_m * 1e3, 0.0)).collect();
+    let gauges = layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3, 0.0)).collect();
     series.push(Series::markers("strain gauges", 6, gauges, Marker::Square));
     // The plot is about as high as it is wide, and both axes span the finger and its margins.
     let (low, high) = (-MARGIN * l * 1e3, (1.0 + MARGIN) * l * 1e3);
@@ -50,7 +50,7 @@ pub(super) fn shapes_figure(what: &str, digit: &Digit, layout: &Layout, force_n:
         Chart { width_px: 640, ..Chart::new("The finger, exactly bent", x, y, series).with_height(720) };
     let caption = html! {
         (what) ": a finger clamped at 0 with " (counted(layout.len(), "strain gauge", "strain gauges")) ", bent by "
-        (stated(force_n)) " N that " (match digit.direction {
+        (stated(force_n)) " N that " (match digit.direction() {
             ForceDirection::Normal => "push across the bent finger",
             ForceDirection::Vertical => "hang straight down",
         }) ", at three places (discs). Beyond the contact the finger is straight."
@@ -87,13 +87,13 @@ pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit
     let curve = |share: f64, value: &dyn Fn(Contact) -> f64| {
         let contact = |i| {
             let force_n = most_n * 10f64.powf(2.0 * f64::from(i) / f64::from(FORCES) - 2.0);
-            Contact { position: Position::along(share * digit.length_m), force_n }
+            Contact { position: Position::along(share * digit.length_m()), force_n }
         };
         (1..=FORCES).map(contact).map(|contact| (contact.force_n, value(contact))).collect()
     };
     let figure = |title: &str, axis: &str, name: &str, shown: &dyn Fn([f64; 2], Contact) -> f64| {
         let lines = JUDGED_CONTACTS.into_iter().enumerate().flat_map(|(colour, share)| {
-            let place = mm(share * digit.length_m);
+            let place = mm(share * digit.length_m());
             let errors = curve(share, &|contact| shown(theory.errors(contact), contact));
             let limits = curve(share, &|contact| shown(at_limit(contact), contact));
             [

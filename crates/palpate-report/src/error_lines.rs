@@ -36,9 +36,10 @@ pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
     match curve(setup, &setup.layout) {
-        Err(LimitError::Noise(NoiseError::Singular { .. })) if setup.layout.sensors.iter().all(clean) => {
+        Err(LimitError::Noise(NoiseError::Singular { .. })) if setup.layout.sensors().iter().all(clean) => {
             let mut layout = setup.layout.clone();
-            layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M);
+            let assume = |sensor: &mut Sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M;
+            layout.edit(|sensors| sensors.iter_mut().for_each(assume)).ok()?;
             Some(line(&curve(setup, &layout).ok()?, 6, assumed_label()))
         }
         _ => limit_line(setup),

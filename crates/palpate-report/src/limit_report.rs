@@ -255,7 +255,7 @@ impl LimitReport<'_> {
     }
 
     fn sensor_table(&self) -> Table {
-        let rows = self.setup.layout.sensors.iter().enumerate().map(|(i, sensor)| {
+        let rows = self.setup.layout.sensors().iter().enumerate().map(|(i, sensor)| {
             vec![
                 text((i + 1).to_string()),
                 text(sensor.kind.name()),

@@ -87,7 +87,7 @@ pub(super) fn limits_mm(
 
 /// Where the sensors are, in mm; raw channels are nowhere.
 pub(super) fn sensors_mm(layout: &Layout) -> Vec<(f64, f64)> {
-    let placed = layout.sensors.iter().filter(|sensor| sensor.kind != SensorKind::Raw);
+    let placed = layout.sensors().iter().filter(|sensor| sensor.kind != SensorKind::Raw);
     placed.map(|sensor| in_mm(sensor.position)).collect()
 }
 

@@ -127,10 +127,10 @@ impl ProfileReport<'_> {
     /// The simulated loads in N/mm as a line that steps up and down.
     fn truth_steps(&self) -> Vec<(f64, f64)> {
         let mut loads = self.truth.to_vec();
-        loads.sort_by(|a, b| a.from.x_m.total_cmp(&b.from.x_m));
+        loads.sort_by(|a, b| a.from().x_m.total_cmp(&b.from().x_m));
         let steps = loads.iter().flat_map(|load| {
-            let (from, to) = (load.from.x_m * 1e3, load.to.x_m * 1e3);
-            let density = load.force_n / (to - from);
+            let (from, to) = (load.from().x_m * 1e3, load.to().x_m * 1e3);
+            let density = load.force_n() / (to - from);
             [(from, 0.0), (from, density), (to, density), (to, 0.0)]
         });
         let end = (self.profile.cells.extent.length_m() * 1e3, 0.0);
@@ -140,7 +140,7 @@ impl ProfileReport<'_> {
     fn width_figure(&self, resolution: &Resolution) -> Figure {
         let points = self.along(|cell| resolution.widths_m[cell] * 1e3);
         let most = points.iter().fold(0.0, |most: f64, point| most.max(point.1));
-        let sensors = self.layout.sensors.iter();
+        let sensors = self.layout.sensors().iter();
         let sensors = sensors.map(|sensor| (sensor.position.x_m * 1e3, 0.02 * most)).collect();
         let series =
             vec![Series::line("width", 0, points), Series::markers("sensors", 2, sensors, Marker::Triangle)];
@@ -226,7 +226,7 @@ impl ProfileReport<'_> {
         let mut kinds = self.layout.kinds();
         kinds.dedup();
         let of_kind = |(colour, kind): (usize, &SensorKind)| {
-            let sensors = self.layout.sensors.iter().enumerate().filter(|(_, sensor)| sensor.kind == *kind);
+            let sensors = self.layout.sensors().iter().enumerate().filter(|(_, sensor)| sensor.kind == *kind);
             let points = sensors.filter_map(|(i, sensor)| {
                 let at = match self.extent() {
                     Extent::Line { .. } => sensor.position.x_m * 1e3,
@@ -295,7 +295,7 @@ impl ProfileReport<'_> {
     }
 
     fn reading_table(&self) -> Table {
-        let rows = self.layout.sensors.iter().enumerate().map(|(i, sensor)| {
+        let rows = self.layout.sensors().iter().enumerate().map(|(i, sensor)| {
             let unit = sensor.kind.unit();
             let shown = |value: Option<f64>| {
                 text(value.map_or_else(|| "–".to_owned(), |value| format!("{:.4}", value / unit.factor())))

@@ -168,7 +168,7 @@ fn compared(report: &StudyReport) -> Vec<Compared> {
 fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
     let mut layouts: Vec<(Vec<&str>, &Layout)> = Vec::new();
     let places = |layout: &Layout| -> Vec<_> {
-        layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
+        layout.sensors().iter().map(|sensor| (sensor.kind, sensor.position)).collect()
     };
     for arm in &report.study.study.arms {
         let layout = &arm.rig.setup.layout;

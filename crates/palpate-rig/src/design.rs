@@ -179,7 +179,7 @@ impl At<OfferKeys> {
     /// A kind with its noise and cost; the faults that are not named here are those of the rig's own sensors of the kind.
     fn build(&self, setup: &Setup) -> Result<SensorOffer, RigError> {
         let kind = kind_on(&setup.surface, &self.measure)?;
-        let own = setup.layout.sensors.iter().find(|sensor| sensor.kind == kind);
+        let own = setup.layout.sensors().iter().find(|sensor| sensor.kind == kind);
         let own = own.map_or_else(ChannelModel::default, |sensor| sensor.channel);
         let size = |key: &Option<At<Written>>, own| {
             key.as_ref().map_or(Ok(own), |written| written.si::<AtLeastZero>(kind.dimension()))

@@ -5,11 +5,12 @@ use std::ops::Range;
 
 use palpate_estimators::arrangement::ArrangementError;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::sensing::{LayoutError, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeamError;
 use palpate_mechanics::surface::{
     BeamError, DigitError, Extent, InsensitiveSensor, PlateError, SupportedBeamError,
 };
+use palpate_numerics::OutOfRange;
 use serde::de::{Expected, Unexpected};
 
 use crate::document::Place;
@@ -105,6 +106,12 @@ pub enum RigProblem {
     /// A beam whose motion cannot be computed.
     #[error(transparent)]
     ModalBeam(ModalBeamError),
+    /// A moving contact with a number out of its range.
+    #[error(transparent)]
+    Motion(OutOfRange),
+    /// A sensor with a number out of its range.
+    #[error(transparent)]
+    Layout(LayoutError),
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),

@@ -91,9 +91,8 @@ impl At<MotionKeys> {
         let missing = || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
         let density = density.ok_or_else(|| missing().at(&self.place))?;
         let damping_ratio = self.damping.as_ref().map_or(ModalBeam::USUAL_DAMPING_RATIO, |ratio| ratio.si);
-        let beam = ModalBeam { beam, density_kg_per_m3: density.si, damping_ratio };
-        beam.validate().map_err(|error| RigProblem::ModalBeam(error).at(&density.place))?;
-        Ok(beam)
+        ModalBeam::new(beam, density.si, damping_ratio)
+            .map_err(|error| RigProblem::ModalBeam(error).at(&density.place))
     }
 
     /// A contact beside another one, which says what both share.
@@ -129,32 +128,30 @@ impl At<MotionKeys> {
         if let (Some(touch), true) = (&self.touch, lifted_s == 0.0) {
             return Err(touch.place.unused("a contact that is never `lifted`"));
         }
-        Ok(Motion {
-            from,
-            to,
-            speed_m_per_s: self.speed.si,
-            turn_m,
-            passes: self.passes.map_or(1, Count::get),
-            lifted_s,
-            touch_s: self.touch.as_ref().map_or(TOUCH_S, |touch| touch.si),
-        })
+        let touch_s = self.touch.as_ref().map_or(TOUCH_S, |touch| touch.si);
+        Motion::new(from, to, self.speed.si, turn_m)
+            .and_then(|motion| motion.with_passes(self.passes.map_or(1, Count::get)))
+            .and_then(|motion| motion.with_lifts(lifted_s, touch_s))
+            .map_err(|problem| RigProblem::Motion(problem).at(&self.place))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::Rig;
+    use palpate_mechanics::contact::Position;
 
     const RIG: &str = include_str!("../../../examples/moving-load.toml");
 
     #[test]
     fn a_motion_is_read_with_its_beam() {
         let moving = Rig::from_toml(RIG).unwrap().motion.unwrap();
-        assert_eq!(
-            (moving.first.motion.passes, moving.rate_hz, moving.beam.unwrap().damping_ratio),
-            (4, 1000.0, 0.01)
-        );
-        assert!((moving.first.motion.speed_m_per_s, moving.beam.unwrap().density_kg_per_m3) == (0.5, 7850.0));
+        let motion = Motion::new(Position::along(0.05), Position::along(0.35), 0.5, 0.1).unwrap();
+        let motion = motion.with_passes(4).and_then(|motion| motion.with_lifts(0.0, TOUCH_S)).unwrap();
+        assert_eq!((moving.first.motion, moving.rate_hz), (motion, 1000.0));
+        let beam = Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap();
+        assert_eq!(moving.beam.unwrap(), ModalBeam::new(beam, 7850.0, 0.01).unwrap());
     }
 
     const PLATE: &str = include_str!("../../../examples/moving-plate.toml");
@@ -163,9 +160,9 @@ mod tests {
     fn a_motion_on_a_plate_is_between_two_points_of_it() {
         let moving = Rig::from_toml(PLATE).unwrap().motion.unwrap();
         assert_eq!((moving.beam, moving.second), (None, None));
-        let motion = moving.first.motion;
-        assert_eq!((motion.from.x_m, motion.from.y_m), (0.05, 0.08));
-        assert_eq!((motion.to.x_m, motion.to.y_m), (0.25, 0.21));
+        let (start, end) = (moving.contacts_at(0.0, 3.0), moving.contacts_at(1e9, 3.0));
+        assert_eq!((start[0].position.x_m, start[0].position.y_m), (0.05, 0.08));
+        assert!((end[0].position.x_m - 0.05).abs() < 1e-12, "{end:?}");
     }
 
     #[test]

@@ -81,7 +81,7 @@ pub(crate) fn build(
             sensor.name.clone_from(name);
         }
     }
-    Ok(Layout { sensors })
+    Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at(&sections.place))
 }
 
 /// What a sensor of `surface` measures.

@@ -192,15 +192,10 @@ impl At<SurfaceKeys> {
             SurfaceKeys::Beam(keys) => keys.build(&self.place),
             SurfaceKeys::Plate(keys) => keys.build(&self.place).map(SurfaceSpec::Plate),
             SurfaceKeys::Digit(keys) => {
-                let digit = Digit {
-                    length_m: keys.length.si,
-                    width_m: keys.width.si,
-                    thickness_m: keys.thickness.si,
-                    youngs_modulus_pa: keys.youngs_modulus.si,
-                    direction: keys.direction,
-                };
-                digit.validate().map_err(|error| RigProblem::Digit(error).at(&self.place))?;
-                Ok(SurfaceSpec::Digit(digit))
+                let (length_m, width_m) = (keys.length.si, keys.width.si);
+                let digit = Digit::new(length_m, width_m, keys.thickness.si, keys.youngs_modulus.si);
+                let digit = digit.map_err(|error| RigProblem::Digit(error).at(&self.place))?;
+                Ok(SurfaceSpec::Digit(digit.with_direction(keys.direction)))
             }
             SurfaceKeys::Measured(keys) => {
                 Ok(Extent::new(keys.length.si, keys.width.map(|width| width.si)).into())
@@ -249,9 +244,8 @@ impl BeamKeys {
         if let (None, None, [BeamSection { width_m, thickness_m, .. }]) =
             (supports, &self.sections, sections.as_slice())
         {
-            let beam = Beam { length_m, width_m: *width_m, thickness_m: *thickness_m, youngs_modulus_pa };
-            beam.validate().map_err(|error| RigProblem::Beam(error).at(place))?;
-            return Ok(SurfaceSpec::Beam(beam));
+            let beam = Beam::new(length_m, *width_m, *thickness_m, youngs_modulus_pa);
+            return beam.map(SurfaceSpec::Beam).map_err(|error| RigProblem::Beam(error).at(place));
         }
         let supports = match supports {
             Some(listed) => listed.iter().map(|support| support.build().1).collect(),

@@ -20,10 +20,10 @@ const FSI_WATER: &str = include_str!("../../../examples/fsi-water.toml");
 #[test]
 fn the_papers_bench_is_what_the_paper_says() {
     let rig = Rig::from_toml(PAPER).unwrap();
-    let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+    let beam = Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap();
     assert_eq!(rig.setup.surface, SurfaceSpec::Beam(beam));
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
-    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6);
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6)).unwrap();
     assert_eq!(rig.setup.layout, layout);
     assert_eq!(rig.setup.force_n, Some(3.0));
     assert_eq!(

@@ -48,7 +48,10 @@ mod tests {
         let unknown = expected_errors_m(&setup, 3.0, &positions).unwrap();
         let most_m = 0.4 / 12.0_f64.sqrt() * FRAC_2_PI.sqrt();
         assert!(unknown[0] < most_m && unknown[0] > 0.99 * most_m, "{unknown:?}");
-        setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 0.0);
+        setup
+            .layout
+            .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 0.0))
+            .unwrap();
         assert_eq!(expected_errors_m(&setup, 3.0, &positions), None);
     }
 }

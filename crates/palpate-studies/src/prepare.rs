@@ -141,7 +141,7 @@ impl PreparedArm {
         let judging = &study.judging;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
         let setup = &arm.rig.setup;
-        let perfect = setup.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default());
+        let perfect = setup.layout.sensors().iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
             Estimator::Network(network) if perfect => {
                 let calibration = arm.rig.calibration().map_err(simulated)?.judged_at(&judging.positions, 1);

@@ -187,7 +187,7 @@ impl SetUp {
             estimator: arm.rig.estimator.kind(),
             force: if setup.force_n.is_some() { Force::Known } else { Force::Unknown },
             layout: arm.layout.as_ref().map(|asked| asked.method.name()),
-            sensors: setup.layout.sensors.iter().map(place).collect(),
+            sensors: setup.layout.sensors().iter().map(place).collect(),
         }
     }
 }

@@ -18,7 +18,7 @@ pub(super) struct SeedBySeed {
 impl SeedBySeed {
     /// The calibration of a rig; where its sensors have noise, with as many readings at each position as the study judges by.
     pub fn of(rig: &Rig, judging: &Judging) -> Result<Self, RigSimulationError> {
-        let noisy = rig.setup.layout.sensors.iter().any(|sensor| sensor.channel.noise_sd > 0.0);
+        let noisy = rig.setup.layout.sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
         let readings = if noisy { judging.readings } else { 1 };
         let calibration = rig.calibration()?.judged_at(&judging.positions, readings);
         let is_network = matches!(rig.estimator, Estimator::Network(_));

@@ -87,7 +87,7 @@ fn sines() -> Vec<Vec<f64>> {
 fn deflections(beam: &Beam) -> Vec<Vec<f64>> {
     let mut modes: Vec<Vec<f64>> = Vec::new();
     for k in 1..=SENSORS {
-        let at = |x: f64| palpate_mechanics::contact::Position::along(x * beam.length_m);
+        let at = |x: f64| palpate_mechanics::contact::Position::along(x * beam.length_m());
         let shape = beam.influence_function(SensorKind::Deflection, at(k as f64 / 9.0));
         let mut mode: Vec<f64> = (0..SITES).map(|i| shape.at(at(site(i)))).collect();
         for _ in 0..2 {

@@ -25,7 +25,7 @@ fn main() {
             println!("{name}, force {}", if force_n.is_some() { "known" } else { "unknown" });
             let locator = fit(&rig, force_n);
             for speed_m_per_s in [0.1, 0.2, 0.5, 1.0] {
-                let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s)), ..rig.clone() };
+                let rig = Rig { motion: Some(moving.at_speed(speed_m_per_s).unwrap()), ..rig.clone() };
                 println!("  {speed_m_per_s} m/s");
                 measure(&locator, &rig);
             }
@@ -45,7 +45,7 @@ fn measure(locator: &Locator, rig: &Rig) {
         seeds.map(|seed| rig.simulate_moving(seed).expect("the example can be moved")).collect();
     let beam = rig.motion.and_then(|moving| moving.beam);
     let own =
-        beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
+        beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio() });
     let ways = [Some(("in balance", None)), own.map(|own| ("with inertia", Some(own)))];
     for (name, swing) in ways.into_iter().flatten() {
         let config = TrackerConfig { swing, ..TrackerConfig::default() };

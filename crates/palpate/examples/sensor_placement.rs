@@ -15,7 +15,7 @@ pub fn gain() -> Result<f64, Box<dyn std::error::Error>> {
     let design = SensorDesign::of(&setup)?.sites(Sites::Every(mm(5.0))).contacts(contacts).unknown_force();
     let problem = SensorProblem::new(&setup, &design, Watch::NONE)?;
     let (even, best) = (problem.even()?, problem.greedy_exchange(0, Watch::NONE)?);
-    for sensor in &best.layout.sensors {
+    for sensor in best.layout.sensors() {
         println!("{}: {:.0} mm", sensor.name, 1e3 * sensor.position.x_m);
     }
     let limit = |designed: &Designed| designed.assessment.mean_limit_m.ok_or("some contact is not told");

@@ -58,11 +58,11 @@ fn setup(setup: &Setup) -> Vec<String> {
     let surface = match &setup.surface {
         SurfaceSpec::Beam(beam) => format!(
             "simply supported beam, {} × {} × {}, Young's modulus {}",
-            format_length_mm(beam.length_m),
-            format_length_mm(beam.width_m),
-            format_length_mm(beam.thickness_m),
+            format_length_mm(beam.length_m()),
+            format_length_mm(beam.width_m()),
+            format_length_mm(beam.thickness_m()),
             Quantity {
-                value: beam.youngs_modulus_pa,
+                value: beam.youngs_modulus_pa(),
                 dimension: palpate_mechanics::units::Dimension::Modulus
             }
         ),
@@ -89,14 +89,14 @@ fn setup(setup: &Setup) -> Vec<String> {
         ),
         SurfaceSpec::Digit(digit) => format!(
             "flexible digit, {} × {} × {}, Young's modulus {}, contact forces {}; E·I/l² is {:.3} N",
-            format_length_mm(digit.length_m),
-            format_length_mm(digit.width_m),
-            format_length_mm(digit.thickness_m),
+            format_length_mm(digit.length_m()),
+            format_length_mm(digit.width_m()),
+            format_length_mm(digit.thickness_m()),
             Quantity {
-                value: digit.youngs_modulus_pa,
+                value: digit.youngs_modulus_pa(),
                 dimension: palpate_mechanics::units::Dimension::Modulus
             },
-            digit.direction.name(),
+            digit.direction().name(),
             digit.characteristic_force_n()
         ),
         SurfaceSpec::Measured(_) => match extent.width_m() {
@@ -116,7 +116,7 @@ fn setup(setup: &Setup) -> Vec<String> {
 
 fn layout(layout: &Layout, extent: Extent) -> String {
     let names: Vec<String> = layout
-        .sensors
+        .sensors()
         .iter()
         .map(|sensor| match sensor.kind {
             palpate_mechanics::sensing::SensorKind::Raw => sensor.name.clone(),

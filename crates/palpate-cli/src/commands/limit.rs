@@ -8,7 +8,7 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
     Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
 };
-use palpate_mechanics::sensing::NoiseError;
+use palpate_mechanics::sensing::{NoiseError, Sensor};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
 use palpate_report::{LimitReport, limit_report};
@@ -120,18 +120,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn setup(arguments: &Arguments) -> Result<Setup, Failure> {
     let mut setup = input::read_rig(&arguments.rig)?.setup;
     for noise in &arguments.noise {
-        let mut meant = setup
-            .layout
-            .sensors
-            .iter_mut()
-            .filter(|sensor| sensor.kind.dimension() == noise.dimension)
-            .peekable();
-        if meant.peek().is_none() {
+        let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
+        if !setup.layout.sensors().iter().any(meant) {
             let complaint =
                 Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
             return Err(complaint.help("give the noise in the unit of the readings, as in \"5 um\"").into());
         }
-        meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
+        let edited = setup.layout.edit(|sensors| {
+            let meant = sensors.iter_mut().filter(|sensor| meant(sensor));
+            meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
+        });
+        edited.map_err(|error| Complaint::new(format!("--noise {noise}: {error}")))?;
     }
     Ok(setup)
 }

@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map(|frequency_hz| Swing { frequency_hz, damping_ratio: ModalBeam::USUAL_DAMPING_RATIO });
     let beam = rig.as_ref().and_then(|rig| rig.motion).and_then(|moving| moving.beam);
     let own =
-        beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio });
+        beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio() });
     let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
     let tracking = locator
         .tracking(&config)

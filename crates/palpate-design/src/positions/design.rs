@@ -1,13 +1,13 @@
 //! What training positions are designed for, and how they come about.
 
 use crate::contacts::{ContactPrior, WeightedContacts};
-use crate::range::OutOfRange;
 use crate::sensors::{SensorDesign, TOLERANCE_M};
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::influence::Influence;
 use palpate_mechanics::limit::Force;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::OutOfRange;
 
 /// How much may be pressed, for which estimator and contacts, and how long is searched.
 /// [`PositionProblem::new`](super::PositionProblem::new) checks it.

@@ -6,7 +6,7 @@ use palpate_estimators::evaluation::EvaluationError;
 use palpate_numerics::regression::RegressionError;
 use palpate_numerics::watch::Cancelled;
 
-use crate::range::OutOfRange;
+use palpate_numerics::OutOfRange;
 
 /// A setup, a design or a recording that no training positions can be found for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

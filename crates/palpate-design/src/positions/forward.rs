@@ -54,7 +54,7 @@ impl ForwardModel {
         let clean: Vec<Vec<f64>> =
             positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
         let full_scale = |s: usize| clean.iter().map(|reading| reading[s].abs()).fold(0.0, f64::max);
-        let sd = |s: usize| match setup.layout.sensors[s].channel.reading_sd() {
+        let sd = |s: usize| match setup.layout.sensors()[s].channel.reading_sd() {
             sd if sd > 0.0 => sd,
             _ => (NOMINAL_NOISE * full_scale(s)).max(f64::MIN_POSITIVE),
         };
@@ -88,7 +88,7 @@ impl ForwardModel {
         let alive = living(layout);
         let scaled = at_one_force(recording);
         let sds = alive.iter().map(|&s| {
-            let stated = layout.sensors[s].channel.reading_sd();
+            let stated = layout.sensors()[s].channel.reading_sd();
             let sd = scatter(recording, &scaled, s).unwrap_or(stated);
             if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
@@ -163,7 +163,7 @@ impl ForwardModel {
 }
 
 fn living(layout: &Layout) -> Vec<usize> {
-    (0..layout.len()).filter(|s| !layout.sensors[*s].channel.dead).collect()
+    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead).collect()
 }
 
 fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {

@@ -265,7 +265,7 @@ impl PositionProblem {
         (first, count): (u64, usize),
         watch: Watch,
     ) -> Result<Vec<Evaluation>, PositionError> {
-        let channels = self.pressed.layout.sensors.iter().map(|sensor| sensor.channel);
+        let channels = self.pressed.layout.sensors().iter().map(|sensor| sensor.channel);
         let faultless = channels.into_iter().all(|channel| channel == ChannelModel::default());
         let readings = if faultless { 1 } else { readings.div_ceil(self.contacts.len()) };
         let calibration = self.calibration.clone().pressed_at(positions, self.design.repeats);

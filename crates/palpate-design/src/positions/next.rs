@@ -4,11 +4,11 @@ use super::design::PositionDesign;
 use super::error::PositionError;
 use super::forward::ForwardModel;
 use super::variance::{ExpectedError, Posterior};
-use crate::range::OutOfRange;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Force;
+use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
 /// Presses that are looked ahead, at most.

@@ -151,8 +151,8 @@ pub(super) fn reads_mirrored(surface: &dyn Surface, layout: &Layout, force_n: f6
         let scale = here.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         here.iter().zip(there.iter().rev()).all(|(a, b)| (a.abs() - b.abs()).abs() <= 1e-9 * scale)
     }) && layout
-        .sensors
+        .sensors()
         .iter()
-        .zip(layout.sensors.iter().rev())
+        .zip(layout.sensors().iter().rev())
         .all(|(a, b)| a.channel == b.channel && a.kind == b.kind)
 }

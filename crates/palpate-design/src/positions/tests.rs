@@ -3,7 +3,7 @@ use super::variance::{ExpectedError, Posterior};
 use super::*;
 use crate::contacts::ContactPrior;
 use palpate_estimators::simulate::simulate_at;
-use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::plate::PlateSpec;
 use palpate_numerics::watch::{Cancelled, Progress};
 
@@ -68,7 +68,7 @@ fn a_bench_is_mirrored_or_not() {
     let surface = setup.surface.model().unwrap();
     assert!(reads_mirrored(surface, &setup.layout, 3.0));
     let mut moved = setup.layout.clone();
-    moved.sensors[0].position.x_m += 1e-3;
+    moved.edit(|sensors| sensors[0].position.x_m += 1e-3).unwrap();
     assert!(!reads_mirrored(surface, &moved, 3.0));
 }
 
@@ -222,11 +222,10 @@ fn a_recording_that_tells_too_little_is_refused() {
     };
     assert!(refused(&setup, &recording).contains("3 distinct positions; at least 4"));
     let (mut setup, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
-    for sensor in &mut setup.layout.sensors {
-        sensor.channel = ChannelModel::default();
-    }
+    let perfect = |sensor: &mut Sensor| sensor.channel = ChannelModel::default();
+    setup.layout.edit(|sensors| sensors.iter_mut().for_each(perfect)).unwrap();
     assert!(refused(&setup, &recording).contains("how noisy channel 1 is"));
-    setup.layout.sensors.pop();
+    setup.layout.edit(|sensors| drop(sensors.pop())).unwrap();
     assert!(refused(&setup, &recording).contains("8 channels; the setup has 7"));
     assert_eq!(setup.layout.kinds()[0], SensorKind::Deflection);
 }

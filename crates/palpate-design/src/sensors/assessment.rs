@@ -86,7 +86,7 @@ impl SensorProblem<'_> {
 
     /// The criterion's value, and the worst when one sensor is dead.
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
-        let live = || layout.sensors.iter().filter(|sensor| !sensor.channel.dead);
+        let live = || layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
         let rows: Vec<Vec<Block>> = live()
             .map(|sensor| self.sensitivity.row(sensor.kind, sensor.position, &sensor.channel))
             .collect();
@@ -106,7 +106,7 @@ impl SensorProblem<'_> {
     /// By the costs of the kinds that are offered; other kinds cost nothing.
     fn cost(&self, layout: &Layout) -> f64 {
         layout
-            .sensors
+            .sensors()
             .iter()
             .filter_map(|sensor| self.offered(sensor))
             .map(|offer| self.pool.design.offers[offer].cost)
@@ -122,7 +122,7 @@ impl SensorProblem<'_> {
     fn keeps_constraints(&self, layout: &Layout) -> bool {
         let (design, extent) = (&self.pool.design, self.pool.extent);
         let placed: Option<Vec<PlacedSensor>> = layout
-            .sensors
+            .sensors()
             .iter()
             .map(|sensor| Some(PlacedSensor { offer: self.offered(sensor)?, position: sensor.position }))
             .collect();

@@ -8,7 +8,8 @@ use palpate_mechanics::surface::Extent;
 
 use super::error::DesignError;
 use crate::contacts::{ContactPrior, spacing};
-use crate::range::OutOfRange;
+use crate::range::{check_count, check_positions};
+use palpate_numerics::OutOfRange;
 
 /// Candidate sites that a line has where a design does not say: every millimetre of the paper's beam.
 const SITES_ALONG_A_LINE: f64 = 400.0;
@@ -150,7 +151,7 @@ impl SensorDesign {
     /// [`LimitError::NoModel`] where no model explains the sensors.
     pub fn of(setup: &Setup) -> Result<Self, DesignError> {
         let mut offers: Vec<SensorOffer> = Vec::new();
-        for sensor in &setup.layout.sensors {
+        for sensor in setup.layout.sensors() {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {
                 let channel = ChannelModel { dead: false, ..sensor.channel };
                 offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0 });
@@ -223,15 +224,15 @@ impl SensorDesign {
             offer < self.offers.len() as f64
         })?;
         let must_have = self.must_have.iter().map(|wanted| wanted.position);
-        OutOfRange::check_positions("the position of a `must_have` sensor, in m,", must_have, extent)?;
+        check_positions("the position of a `must_have` sensor, in m,", must_have, extent)?;
         match &self.sites {
             Sites::Every(every_m) => {
                 OutOfRange::check_positive([("the distance of sites in m", *every_m)])?;
                 let count = extent.sides_m().map(|size_m| size_m / every_m + 1.0).product();
-                OutOfRange::check_count("the number of sites", count)
+                check_count("the number of sites", count)
             }
-            Sites::At(sites) => OutOfRange::check_positions("a site, in m,", sites.iter().copied(), extent),
-            Sites::Count(count) => OutOfRange::check_count("the number of sites", *count as f64),
+            Sites::At(sites) => check_positions("a site, in m,", sites.iter().copied(), extent),
+            Sites::Count(count) => check_count("the number of sites", *count as f64),
         }
     }
 }

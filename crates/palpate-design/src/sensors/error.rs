@@ -2,12 +2,11 @@
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::LimitError;
-use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::sensing::{LayoutError, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
+use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Cancelled;
-
-use crate::range::OutOfRange;
 
 /// A constraint that cannot be met, or a setup that nothing can be designed for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,6 +20,9 @@ pub enum DesignError {
     /// A number that is not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// A number of an offered sensor that is not in its range.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// A kind without noise.
     #[error(
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"

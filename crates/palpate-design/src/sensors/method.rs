@@ -88,7 +88,7 @@ impl SensorProblem<'_> {
         let even = self.even_if_any()?;
         let is_even = |existing: &Designed| {
             let places = |layout: &Layout| -> Vec<_> {
-                layout.sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect()
+                layout.sensors().iter().map(|sensor| (sensor.kind, sensor.position)).collect()
             };
             even.as_ref().is_some_and(|even| places(&even.layout) == places(&existing.layout))
         };
@@ -219,13 +219,13 @@ impl SensorProblem<'_> {
     }
 
     fn judged(&self, method: Method, sensors: Vec<PlacedSensor>) -> Result<Designed, DesignError> {
-        let layout = self.layout(sensors);
+        let layout = self.layout(sensors)?;
         let assessment = self.assess(&layout)?;
         Ok(Designed { method, layout, assessment })
     }
 
     /// Kind by kind, from left to right.
-    fn layout(&self, mut placed: Vec<PlacedSensor>) -> Layout {
+    fn layout(&self, mut placed: Vec<PlacedSensor>) -> Result<Layout, DesignError> {
         placed.sort_by(|a, b| {
             let by_offer = a.offer.cmp(&b.offer);
             let by_row = a.position.y_m.total_cmp(&b.position.y_m);
@@ -239,7 +239,7 @@ impl SensorProblem<'_> {
             let name = format!("{}_{number}", offer.kind);
             sensors.push(Sensor { kind: offer.kind, position, name, channel });
         }
-        Layout { sensors }
+        Ok(Layout::new(sensors)?)
     }
 }
 

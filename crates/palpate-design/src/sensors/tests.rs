@@ -38,7 +38,7 @@ fn four_kinds() -> Vec<SensorOffer> {
 }
 
 fn places(designed: &Designed) -> Vec<f64> {
-    designed.layout.sensors.iter().map(|sensor| (sensor.position.x_m * 1e3).round()).collect()
+    designed.layout.sensors().iter().map(|sensor| (sensor.position.x_m * 1e3).round()).collect()
 }
 
 /// Eight deflection sensors, contacts from 20 to 380 mm every 5 mm, force unknown.

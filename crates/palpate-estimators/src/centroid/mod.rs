@@ -83,7 +83,7 @@ impl Fit for Centroid {
 
 /// A locator whose map is still empty.
 fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
-    let sensors = &setup.layout.sensors;
+    let sensors = setup.layout.sensors();
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
     if live < 2 {
         return Err(CentroidFitError::TooFewSensors { found: live });

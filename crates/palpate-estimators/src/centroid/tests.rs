@@ -27,22 +27,21 @@ fn fit(setup: &Setup, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitErro
 /// A pad of raw channels; `width_m` where it is two-dimensional.
 fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     let mut layout = Layout::even(SensorKind::Raw, channels, 0.1);
-    for (i, sensor) in layout.sensors.iter_mut().enumerate() {
-        sensor.name = format!("c{i}");
-    }
+    let name = |(i, sensor): (usize, &mut Sensor)| sensor.name = format!("c{i}");
+    layout.edit(|sensors| sensors.iter_mut().enumerate().for_each(name)).unwrap();
     Setup { surface: SurfaceSpec::Measured(Extent::new(0.1, width_m)), layout, force_n: None, columns: None }
 }
 
 /// Two supports share a force by the lever: their centroid is the contact itself.
 fn scales() -> Setup {
-    let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
+    let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap();
     let support = |name: &str, x_m| Sensor {
         kind: SensorKind::Reaction,
         position: Position::along(x_m),
         name: name.to_owned(),
         channel: Default::default(),
     };
-    let layout = Layout { sensors: vec![support("left", 0.0), support("right", 0.4)] };
+    let layout = Layout::new(vec![support("left", 0.0), support("right", 0.4)]).unwrap();
     Setup { surface: SurfaceSpec::Beam(beam), layout, force_n: None, columns: None }
 }
 
@@ -115,7 +114,7 @@ fn what_does_not_calibrate_is_named() {
         message(&setup, silent),
         "every reaction reading of the recording is 0; a centroid weighs sensors by what they read"
     );
-    setup.layout.sensors[0].channel.dead = true;
+    setup.layout.set_dead(0, true);
     assert_eq!(
         message(&setup, rows),
         "a centroid needs at least 2 sensors that are not dead; the layout has 1"

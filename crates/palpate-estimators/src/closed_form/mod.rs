@@ -118,16 +118,16 @@ impl ClosedFormLocator {
     /// Channels that are not dead and that see a contact somewhere.
     fn seeing(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
-            let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m));
+            let quarters = [0.25, 0.5, 0.75].map(|share| Position::along(share * self.beam.length_m()));
             let influence = |contact: Position| self.beam.influence(sensor.kind, sensor.position, contact);
             !sensor.channel.dead && quarters.into_iter().any(|contact| influence(contact) != 0.0)
         };
-        (0..self.layout.len()).filter(|i| sees(&self.layout.sensors[*i])).collect()
+        (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
     }
 
     /// What each channel's readings are multiplied by: 1/σ where every noise is known, else 1/full scale.
     fn weights(&self, channels: &[usize]) -> (Vec<f64>, Noise) {
-        let sensors = || channels.iter().map(|i| &self.layout.sensors[*i]);
+        let sensors = || channels.iter().map(|i| &self.layout.sensors()[*i]);
         let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
         if known.iter().all(|weight| weight.is_finite()) {
             return (known, Noise::Known);
@@ -137,13 +137,13 @@ impl ClosedFormLocator {
 
     /// The stretches between neighbouring sensors, supports included.
     fn segments(&self, channels: &[usize], weights: &[f64]) -> Vec<Segment> {
-        let length_m = self.beam.length_m;
-        let mut ends: Vec<f64> = channels.iter().map(|i| self.layout.sensors[*i].position.x_m).collect();
+        let length_m = self.beam.length_m();
+        let mut ends: Vec<f64> = channels.iter().map(|i| self.layout.sensors()[*i].position.x_m).collect();
         ends.extend([0.0, length_m]);
         ends.sort_by(f64::total_cmp);
         ends.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * length_m);
         let influence = |channel: usize, contact_m: f64| {
-            let sensor = &self.layout.sensors[channels[channel]];
+            let sensor = &self.layout.sensors()[channels[channel]];
             weights[channel] * self.beam.influence(sensor.kind, sensor.position, Position::along(contact_m))
         };
         ends.windows(2).map(|pair| Segment::new(pair[0], pair[1], channels.len(), influence)).collect()
@@ -152,10 +152,10 @@ impl ClosedFormLocator {
     /// The channels under the left and the right support, where the layout sees a contact by these two alone.
     fn scales(&self, channels: &[usize]) -> Option<(usize, usize)> {
         let &[first, second] = channels else { return None };
-        let sensor = |i: usize| &self.layout.sensors[i];
+        let sensor = |i: usize| &self.layout.sensors()[i];
         let reactions = [first, second].iter().all(|i| sensor(*i).kind == SensorKind::Reaction);
         let (a, b) = (sensor(first).position.x_m, sensor(second).position.x_m);
-        let apart = (a - b).abs() > 0.5 * self.beam.length_m;
+        let apart = (a - b).abs() > 0.5 * self.beam.length_m();
         (reactions && apart).then_some(if a < b { (first, second) } else { (second, first) })
     }
 
@@ -164,10 +164,10 @@ impl ClosedFormLocator {
     /// For an unknown force W a = l·R_right/W and W = R_left + R_right, and to first order ∂a/∂R_left = −a/W, ∂a/∂R_right = (l − a)/W,
     /// ∂W/∂R = 1; for a known one a is from weighted least squares of R_left = W·(1 − a/l) and R_right = W·a/l.
     fn balance(&self, (left, right): (usize, usize), reading: &[f64], noise: Noise) -> Estimate {
-        let length_m = self.beam.length_m;
+        let length_m = self.beam.length_m();
         let (left_n, right_n) = (reading[left], reading[right]);
         let [var_left, var_right] =
-            [left, right].map(|i| self.layout.sensors[i].channel.reading_sd().powi(2));
+            [left, right].map(|i| self.layout.sensors()[i].channel.reading_sd().powi(2));
         let (position_m, force_n, [xx, xf, ff]) = match self.force_n {
             None => {
                 let force_n = left_n + right_n;
@@ -245,10 +245,7 @@ impl Locate for ClosedFormLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         LocatorFault::check_count("sensors", setup.layout.len(), self.layout.len())?;
-        let beam =
-            [self.beam.length_m, self.beam.width_m, self.beam.thickness_m, self.beam.youngs_modulus_pa];
-        LocatorFault::check_numbers("beam", beam, |x| x > 0.0, "a number greater than 0")?;
-        let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
+        let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;

@@ -1,5 +1,7 @@
 //! Clean readings over the whole beam, noise against its propagation, and what the closed form must not claim.
 
+use std::sync::LazyLock;
+
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::recording::{Provenance, Recording, Row};
@@ -11,7 +13,7 @@ use palpate_mechanics::surface::{Beam, Extent, Surface, SurfaceSpec};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
+static BEAM: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap());
 
 fn setup(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> Setup {
     let sensors = sensors.iter().enumerate().map(|(i, (kind, x_m))| Sensor {
@@ -20,8 +22,8 @@ fn setup(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> 
         name: format!("c{i}"),
         channel: ChannelModel { noise_sd, ..ChannelModel::default() },
     });
-    let layout = Layout { sensors: sensors.collect() };
-    Setup { surface: SurfaceSpec::Beam(BEAM), layout, force_n, columns: None }
+    let layout = Layout::new(sensors.collect()).unwrap();
+    Setup { surface: SurfaceSpec::Beam(*BEAM), layout, force_n, columns: None }
 }
 
 fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
@@ -48,7 +50,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
 
 fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     let contact = Position::along(x_m);
-    let sensors = setup.layout.sensors.iter();
+    let sensors = setup.layout.sensors().iter();
     sensors.map(|s| force_n * BEAM.influence(s.kind, s.position, contact)).collect()
 }
 
@@ -186,7 +188,7 @@ fn what_no_contact_explains_is_not_located() {
 #[test]
 fn a_dead_channel_is_left_out() {
     let mut deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
-    deflections.layout.sensors[3].channel.dead = true;
+    deflections.layout.set_dead(3, true);
     let mut reading = clean(&deflections, 0.17, 3.0);
     reading[3] = 0.0;
     let estimate = fit(&deflections).unwrap().locate(&reading);

@@ -1,7 +1,7 @@
 //! The linear theory of bending, judged on the clean readings of a digit that is bent exactly.
 
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::surface::{Digit, Surface};
+use palpate_mechanics::surface::Digit;
 
 use super::{DigitEstimator, DigitLocator, DigitTheory};
 use crate::fit::{Fit, Fitted};

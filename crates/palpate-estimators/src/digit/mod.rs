@@ -35,11 +35,10 @@ use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interv
 /// ```
 /// use palpate_estimators::{arrangement::Training, digit::DigitEstimator, fit::Fit, setup::Setup};
 /// use palpate_mechanics::sensing::SensorKind::Strain;
-/// use palpate_mechanics::surface::{Digit, ForceDirection::Normal};
+/// use palpate_mechanics::surface::Digit;
 /// use palpate_mechanics::units::{gpa, microstrain, mm, newtons};
 ///
-/// let [length_m, width_m, thickness_m] = [120.0, 10.0, 0.5].map(mm);
-/// let digit = Digit { length_m, width_m, thickness_m, youngs_modulus_pa: gpa(200.0), direction: Normal };
+/// let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0))?;
 /// let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
 /// let setup = Setup::new(digit).sensors(gauges)?;
 /// let presses = setup.simulate(&Training::even(12).with_force(newtons(4.0)), 0)?;
@@ -130,7 +129,7 @@ impl Fit for DigitEstimator {
             let sd = sensor.channel.reading_sd();
             !sensor.channel.dead && !(sd > 0.0 && sd.is_finite())
         };
-        if let Some(i) = locator.layout.sensors.iter().position(noiseless) {
+        if let Some(i) = locator.layout.sensors().iter().position(noiseless) {
             return Err(DigitFitError::NoNoise { gauge: i + 1 });
         }
         let (needed, found) = (locator.unknowns(), locator.living().count());
@@ -171,11 +170,12 @@ impl DigitLocator {
     /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
     pub fn leave_out(&mut self, gauge: usize) -> bool {
         let needed = self.unknowns();
-        let Some(sensor) = self.layout.sensors.get_mut(gauge) else { return false };
-        let was_dead = std::mem::replace(&mut sensor.channel.dead, true);
+        let Some(sensor) = self.layout.sensors().get(gauge) else { return false };
+        let was_dead = sensor.channel.dead;
+        self.layout.set_dead(gauge, true);
         let enough = self.living().count() >= needed;
         if !enough {
-            self.layout.sensors[gauge].channel.dead = was_dead;
+            self.layout.set_dead(gauge, was_dead);
         }
         enough
     }
@@ -187,7 +187,7 @@ impl DigitLocator {
 
     /// Gauges that are not dead.
     fn living(&self) -> impl Iterator<Item = &Sensor> {
-        self.layout.sensors.iter().filter(|sensor| !sensor.channel.dead)
+        self.layout.sensors().iter().filter(|sensor| !sensor.channel.dead)
     }
 
     fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
@@ -196,7 +196,7 @@ impl DigitLocator {
         let Some(best) = posterior.pieces.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
-        let length_m = self.digit.length_m;
+        let length_m = self.digit.length_m();
         let quantile_m = |share: f64| posterior.quantile_m(share, length_m);
         let ends = (quantile_m(0.025), quantile_m(0.975));
         let mut estimate = Estimate::of_contact(contact(best, ends), Status::Located);
@@ -253,10 +253,7 @@ impl Locate for DigitLocator {
         LocatorFault::check_count("gauges", setup.layout.len(), self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
         LocatorFault::check_count("sensors that are no gauges", 0, others)?;
-        let Digit { length_m, width_m, thickness_m, youngs_modulus_pa, .. } = self.digit;
-        let sizes = [length_m, width_m, thickness_m, youngs_modulus_pa, self.digit.characteristic_force_n()];
-        LocatorFault::check_numbers("digit", sizes, |x| x > 0.0, "a number greater than 0")?;
-        let places = self.layout.sensors.iter().map(|sensor| sensor.position.x_m);
+        let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_digit = |x: f64| self.digit.contains(Position::along(x));
         LocatorFault::check_numbers("gauge position", places, on_digit, "on the digit")?;
         let noise = self.living().map(|sensor| sensor.channel.reading_sd());
@@ -314,7 +311,7 @@ impl Posterior {
         let mut pieces: Vec<Piece> = Vec::new();
         let mut least = f64::INFINITY;
         // From the tip on, as gauges that must read nothing rule out stretches nearer to the clamp.
-        for stretch in stretches(likelihood.gauges, likelihood.digit.length_m).into_iter().rev() {
+        for stretch in stretches(likelihood.gauges, likelihood.digit.length_m()).into_iter().rev() {
             if likelihood.least_chi_squared(stretch) > least + MOST_EXCESS {
                 continue;
             }
@@ -521,7 +518,7 @@ fn gauges(layout: &Layout, reading: &[f64]) -> Vec<Gauge> {
         strain,
     };
     let mut gauges: Vec<Gauge> =
-        layout.sensors.iter().zip(reading.iter().copied()).filter(inside).map(gauge).collect();
+        layout.sensors().iter().zip(reading.iter().copied()).filter(inside).map(gauge).collect();
     gauges.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
     gauges
 }

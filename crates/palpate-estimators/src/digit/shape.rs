@@ -32,7 +32,7 @@ impl DigitShape {
     pub(super) fn new(digit: &Digit, contact: &ContactEstimate, steps: usize) -> Self {
         let force_n = contact.force_n.unwrap_or(0.0);
         let at = |off_m: f64, off_n: f64| {
-            let position_m = (contact.position.x_m + off_m).max(0.0).min(digit.length_m);
+            let position_m = (contact.position.x_m + off_m).max(0.0).min(digit.length_m());
             digit
                 .shape(Contact { position: Position::along(position_m), force_n: (force_n + off_n).max(0.0) })
         };
@@ -40,7 +40,7 @@ impl DigitShape {
         let beside: Vec<[Elastica; 2]> = deviations(contact).map(|[x, f]| [at(x, f), at(-x, -f)]).to_vec();
         let steps = steps.max(1);
         let point = |i: usize| {
-            let at_m = digit.length_m * i as f64 / steps as f64;
+            let at_m = digit.length_m() * i as f64 / steps as f64;
             let [x_m, y_m] = shape.point(at_m);
             let off = |[a, b]: &[Elastica; 2]| {
                 let ([ax, ay], [bx, by]) = (a.point(at_m), b.point(at_m));

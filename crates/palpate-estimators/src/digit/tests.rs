@@ -8,6 +8,7 @@ use crate::setup::Setup;
 use crate::simulate::{clean_reading, simulate_at};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
+use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Digit, ForceDirection, SurfaceSpec};
 
 fn example() -> Setup {
@@ -53,7 +54,7 @@ struct Tally {
 
 /// Presses with simulated noise, evenly from `from_m` to the tip.
 fn tally(setup: &Setup, force_n: f64, from_m: f64, count: usize, seed: u64) -> Tally {
-    let l = digit(setup).length_m;
+    let l = digit(setup).length_m();
     let share = |i: usize| (i as f64 + 0.5) / count as f64;
     let positions: Vec<Position> =
         (0..count).map(|i| Position::along(from_m + share(i) * (l - from_m))).collect();
@@ -161,7 +162,12 @@ fn readings_that_no_push_explains_say_so() {
 #[test]
 fn dead_and_saturated_gauges_are_left_out() {
     let mut setup = example();
-    setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
+    setup
+        .layout
+        .edit(|sensors| {
+            sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)))
+        })
+        .unwrap();
     let mut locator = locator(&setup, DigitTheory::Exact);
     let mut reading = clean(&setup, 0.09, 2.0);
     assert!(reading[0] < -1500e-6 && reading[2] > -1500e-6);
@@ -231,13 +237,17 @@ fn a_locator_survives_its_file_and_bad_numbers_do_not() {
         bad.check().unwrap_err().to_string()
     };
     let shown = [
-        refused(|digit| digit.digit.thickness_m = 0.0),
-        refused(|digit| digit.layout.sensors[1].position.x_m = 0.2),
-        refused(|digit| digit.layout.sensors[0].channel.noise_sd = 0.0),
+        refused(|digit| digit.layout.edit(|sensors| sensors[1].position.x_m = 0.2).unwrap()),
+        refused(|digit| digit.layout.edit(|sensors| sensors[0].channel.noise_sd = 0.0).unwrap()),
         refused(|digit| digit.force_n = Some(-1.0)),
-        refused(|digit| drop(digit.layout.sensors.pop())),
-        refused(|digit| digit.layout.sensors[2].kind = palpate_mechanics::sensing::SensorKind::Slope),
-        refused(|digit| digit.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)),
+        refused(|digit| digit.layout.edit(|sensors| drop(sensors.pop())).unwrap()),
+        refused(|digit| digit.layout.edit(|sensors| sensors[2].kind = SensorKind::Slope).unwrap()),
+        refused(|digit| {
+            digit
+                .layout
+                .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true))
+                .unwrap()
+        }),
     ];
     insta::assert_snapshot!(shown.join("\n"));
 }
@@ -259,9 +269,9 @@ fn benches_that_do_not_suit_are_refused_in_words() {
     };
     let shown = [
         refused(&paper),
-        with(&|setup| setup.layout.sensors[3].kind = palpate_mechanics::sensing::SensorKind::Deflection),
-        with(&|setup| setup.layout.sensors[3].channel.noise_sd = 0.0),
-        with(&|setup| setup.layout.sensors.truncate(1)),
+        with(&|setup| setup.layout.edit(|sensors| sensors[3].kind = SensorKind::Deflection).unwrap()),
+        with(&|setup| setup.layout.edit(|sensors| sensors[3].channel.noise_sd = 0.0).unwrap()),
+        with(&|setup| setup.layout.edit(|sensors| sensors.truncate(1)).unwrap()),
         with(&|setup| setup.force_n = Some(20.0)),
     ];
     insta::assert_snapshot!(shown.join("\n"));

@@ -275,7 +275,7 @@ impl Locator {
             }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
-        self.setup.layout.sensors[channel].channel.dead = true;
+        self.setup.layout.set_dead(channel, true);
         Ok(())
     }
 

@@ -169,7 +169,7 @@ impl Calibration {
 
     /// Whether every channel reports what its sensor reads.
     fn is_faultless(&self) -> bool {
-        self.pressed.layout.sensors.iter().all(|sensor| sensor.channel == ChannelModel::default())
+        self.pressed.layout.sensors().iter().all(|sensor| sensor.channel == ChannelModel::default())
     }
 }
 

@@ -62,13 +62,13 @@ pub(super) fn learn(
     let mut channels = Channels {
         offsets: vec![0.0; layout.len()],
         noise_sd: vec![1.0; layout.len()],
-        dead: layout.sensors.iter().map(|sensor| sensor.channel.dead).collect(),
+        dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
     };
     let learning = Learning { from, surface, layout, presses: &presses, places };
     for kind in SensorKind::ALL {
         let is_meant = |s: &usize| {
-            let sensor = &layout.sensors[*s];
+            let sensor = &layout.sensors()[*s];
             sensor.kind == kind && !sensor.channel.dead
         };
         let living: Vec<usize> = (0..layout.len()).filter(is_meant).collect();
@@ -82,10 +82,10 @@ pub(super) fn learn(
 }
 
 fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
-    if let Some(raw) = layout.sensors.iter().position(|sensor| sensor.kind == SensorKind::Raw) {
+    if let Some(raw) = layout.sensors().iter().position(|sensor| sensor.kind == SensorKind::Raw) {
         return Err(InfluenceFitError::RawSensor { sensor: raw + 1 });
     }
-    if layout.sensors.iter().all(|sensor| sensor.channel.dead) {
+    if layout.sensors().iter().all(|sensor| sensor.channel.dead) {
         return Err(InfluenceFitError::AllDead { sensors: layout.len() });
     }
     Ok(())
@@ -114,7 +114,7 @@ impl<'a> Learning<'a> {
         let pressed: Vec<Position> = presses.presses.iter().map(|press| press.position).collect();
         let remainders = Remainders::new(surface, kind, &pressed, places);
         let priors: Vec<Prior<'a>> =
-            living.iter().map(|s| Prior::new(surface, &layout.sensors[*s], mean)).collect();
+            living.iter().map(|s| Prior::new(surface, &layout.sensors()[*s], mean)).collect();
         let with = |(prior, &s): (&Prior<'a>, &usize), kept: &[usize]| {
             let noise = presses.noise_variance(layout, s);
             SensorPresses::new(prior.clone(), presses, s, noise, kept, &remainders.presses)
@@ -207,7 +207,7 @@ impl Presses {
     /// The variance of a sensor's noise from its repeats and the noise that its rig states, or `None` where neither
     /// says anything. Quantisation to steps q adds q²/12 where there are no repeats that show it.
     pub fn noise_variance(&self, layout: &Layout, sensor: usize) -> Option<f64> {
-        let channel = &layout.sensors[sensor].channel;
+        let channel = &layout.sensors()[sensor].channel;
         let stated = channel.noise_sd.powi(2) + channel.resolution.powi(2) / 12.0;
         let belief = if stated > 0.0 { STATED_FREEDOM } else { 0.0 };
         let freedom = self.freedom + belief;
@@ -462,7 +462,7 @@ mod tests {
         assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
         let mut layout = Layout::even(SensorKind::Deflection, 1, 0.4);
         assert_eq!(presses.noise_variance(&layout, 0), Some(2.0));
-        layout.sensors[0].channel.noise_sd = 1.0;
+        layout.edit(|sensors| sensors[0].channel.noise_sd = 1.0).unwrap();
         let blended = presses.noise_variance(&layout, 0).unwrap();
         assert!((blended - 22.0 / 21.0).abs() < 1e-15);
     }

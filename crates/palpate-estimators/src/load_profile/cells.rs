@@ -89,9 +89,9 @@ impl Cells {
         let density = |cell| {
             let (from, to) = self.corners(cell);
             let force_n = |load: &UniformLoad| {
-                load.force_n
-                    * shared(load.from.x_m, load.to.x_m, from.x_m, to.x_m)
-                    * shared(load.from.y_m, load.to.y_m, from.y_m, to.y_m)
+                load.force_n()
+                    * shared(load.from().x_m, load.to().x_m, from.x_m, to.x_m)
+                    * shared(load.from().y_m, load.to().y_m, from.y_m, to.y_m)
             };
             loads.iter().map(force_n).sum::<f64>() / self.measure()
         };
@@ -211,8 +211,8 @@ mod tests {
     #[test]
     fn the_density_of_a_load_sums_up_to_its_force() {
         let at = |x_m, y_m| Position { x_m, y_m };
-        let on_line = UniformLoad { from: at(0.05, 0.0), to: at(0.17, 0.0), force_n: 3.0 };
-        let on_plane = UniformLoad { from: at(0.05, 0.02), to: at(0.17, 0.09), force_n: 3.0 };
+        let on_line = UniformLoad::between(at(0.05, 0.0), at(0.17, 0.0), 3.0);
+        let on_plane = UniformLoad::between(at(0.05, 0.02), at(0.17, 0.09), 3.0);
         let plane = Cells::over(Extent::Plane { length_m: 0.3, width_m: 0.15 });
         for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
             let density = cells.mean_density(&[load, load]);

@@ -78,7 +78,7 @@ impl<'a> LoadSensors<'a> {
             let influence = surface.influence_function(sensor.kind, sensor.position);
             Some(LoadChannel { influence, offset: 0.0, noise_sd })
         };
-        let channels = layout.sensors.iter().zip(layout.reading_sds()?).map(channel).collect();
+        let channels = layout.sensors().iter().zip(layout.reading_sds()?).map(channel).collect();
         Ok(Self { extent: surface.extent(), channels })
     }
 
@@ -100,12 +100,12 @@ impl<'a> LoadSensors<'a> {
 ///
 /// ```
 /// use palpate_estimators::{load_profile::Profiler, setup::Setup, simulate::simulate_loads};
-/// use palpate_mechanics::{contact::Position, surface::UniformLoad};
+/// use palpate_mechanics::surface::UniformLoad;
 /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
 ///
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
-/// let load = UniformLoad { from: Position::along(mm(120.0)), to: Position::along(mm(160.0)), force_n: 2.0 };
+/// let load = UniformLoad::along(mm(120.0), mm(160.0), 2.0);
 /// let readings = simulate_loads(&setup, &[load], 1, 0)?;
 /// let profile = Profiler::of(&setup)?.profile(&readings[0])?;
 /// assert!((profile.total_n - 2.0).abs() < 0.2);
@@ -363,7 +363,7 @@ impl Patch {
         let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m());
         let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m().unwrap_or(0.0));
         let corner = |x_m, y_m| Position { x_m, y_m };
-        UniformLoad { from: corner(left, low), to: corner(right, high), force_n: self.force_n }
+        UniformLoad::between(corner(left, low), corner(right, high), self.force_n)
     }
 }
 
@@ -496,7 +496,7 @@ pub fn patch_limits(sensors: &LoadSensors, loads: &[UniformLoad]) -> Option<Vec<
             let first = each * number;
             row[first] = load.mean(&*channel.influence) / channel.noise_sd;
             for (i, slope) in load.mean_gradient(&*channel.influence).into_iter().take(each - 1).enumerate() {
-                row[first + 1 + i] = load.force_n * slope / channel.noise_sd;
+                row[first + 1 + i] = load.force_n() * slope / channel.noise_sd;
             }
         }
     }

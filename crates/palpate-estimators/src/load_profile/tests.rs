@@ -13,29 +13,29 @@ use palpate_mechanics::sensing::{ChannelModel, Layout, NoiseError, Sensor, Senso
 use palpate_mechanics::surface::{Beam, Extent, InfluenceFunction, Surface, UniformLoad};
 
 fn beam() -> Beam {
-    Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 }
+    Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
 }
 
 /// Eight deflection sensors with 2 µm noise, and as many strain sensors with 0.5 µε where they are wanted.
 fn layout(strain: bool) -> Layout {
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
-    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 2e-6);
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 2e-6)).unwrap();
     if strain {
         let mut more = Layout::even(SensorKind::Strain, 8, 0.4);
-        more.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 0.5e-6);
-        layout.sensors.extend(more.sensors);
+        more.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 0.5e-6)).unwrap();
+        layout.edit(|sensors| sensors.extend(more.into_sensors())).unwrap();
     }
     layout
 }
 
 fn patch(centre_m: f64, force_n: f64) -> UniformLoad {
     let (from, to) = (Position::along(centre_m - 0.01), Position::along(centre_m + 0.01));
-    UniformLoad { from, to, force_n }
+    UniformLoad::between(from, to, force_n)
 }
 
 fn clean(sensors: &LoadSensors, loads: &[UniformLoad]) -> Vec<f64> {
     let read = |channel: &LoadChannel| {
-        loads.iter().map(|load| load.force_n * load.mean(&*channel.influence)).sum::<f64>()
+        loads.iter().map(|load| load.force_n() * load.mean(&*channel.influence)).sum::<f64>()
     };
     sensors.channels.iter().map(|channel| channel.as_ref().map_or(0.0, read)).collect()
 }
@@ -86,7 +86,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
             near &= off.abs() <= 3.0;
             tally.centre_squares += off * off;
             tally.centres_covered += holds(patch.centre.x_95_m(), load.centre().x_m);
-            tally.forces_covered += holds(patch.force_95_n(), load.force_n);
+            tally.forces_covered += holds(patch.force_95_n(), load.force_n());
         }
         tally.within_3_limits += usize::from(near);
     }
@@ -148,7 +148,7 @@ fn the_same_reading_gives_the_same_profile_and_twice_the_load_twice_the_profile(
 fn an_even_load_is_smooth_and_one_patch() {
     let beam = beam();
     let sensors = LoadSensors::new(&beam, &layout(true)).unwrap();
-    let load = UniformLoad { from: Position::along(0.02), to: Position::along(0.38), force_n: 4.0 };
+    let load = UniformLoad::along(0.02, 0.38, 4.0);
     let reading = noisy(&sensors, &clean(&sensors, &[load]), &mut Xoshiro256PlusPlus::seed_from_u64(3));
     let profile = Profiler::new(sensors).profile(&reading).unwrap();
     assert_eq!((profile.status, profile.patches.len()), (Status::Located, 1));
@@ -162,7 +162,7 @@ fn an_even_load_is_smooth_and_one_patch() {
 fn silence_and_impossible_readings_have_their_status() {
     let beam = beam();
     let mut layout = layout(true);
-    layout.sensors[3].channel.dead = true;
+    layout.set_dead(3, true);
     let sensors = LoadSensors::new(&beam, &layout).unwrap();
     let profiler = Profiler::new(sensors.clone());
     let silent = profiler.profile(&[0.0; 16]).unwrap();
@@ -185,10 +185,10 @@ fn silence_and_impossible_readings_have_their_status() {
 fn sensors_without_noise_or_life_are_refused() {
     let beam = beam();
     let mut layout = layout(false);
-    layout.sensors[1].channel.noise_sd = 0.0;
+    layout.edit(|sensors| sensors[1].channel.noise_sd = 0.0).unwrap();
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("clean sensors were taken") };
     assert!(matches!(error, LoadSensorsError::Noise(NoiseError::Singular { number: 2, .. })), "{error}");
-    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)).unwrap();
     let Err(error) = LoadSensors::new(&beam, &layout) else { panic!("dead sensors were taken") };
     assert_eq!(error, LoadSensorsError::Noise(NoiseError::AllDead { count: 8 }));
 }
@@ -259,12 +259,11 @@ fn on_a_plane_two_squares_are_told_apart() {
         name: format!("deflection_{}", i + 1),
         channel: ChannelModel { noise_sd: 1e-6, ..ChannelModel::default() },
     };
-    let layout = Layout { sensors: (0..32).map(sensor).collect() };
+    let layout = Layout::new((0..32).map(sensor).collect()).unwrap();
     let sensors = LoadSensors::new(&Foam, &layout).unwrap();
-    let square = |x_m: f64, y_m: f64, force_n: f64| UniformLoad {
-        from: Position { x_m: x_m - 0.01, y_m: y_m - 0.01 },
-        to: Position { x_m: x_m + 0.01, y_m: y_m + 0.01 },
-        force_n,
+    let square = |x_m: f64, y_m: f64, force_n: f64| {
+        let corner = |off_m: f64| Position { x_m: x_m + off_m, y_m: y_m + off_m };
+        UniformLoad::between(corner(-0.01), corner(0.01), force_n)
     };
     let loads = [square(0.05, 0.03, 2.0), square(0.14, 0.07, 1.0)];
     let limits = patch_limits(&sensors, &loads).unwrap();
@@ -278,7 +277,7 @@ fn on_a_plane_two_squares_are_told_apart() {
         assert!((profile.total_n / 3.0 - 1.0).abs() < 0.02, "{}", profile.total_n);
         for (patch, load) in profile.patches.iter().zip(&loads) {
             assert!(patch.centre.position.distance_m(load.centre()) < 2e-3, "{patch:?}");
-            assert!((patch.force_n / load.force_n - 1.0).abs() < 0.05, "{patch:?}");
+            assert!((patch.force_n / load.force_n() - 1.0).abs() < 0.05, "{patch:?}");
         }
     }
 }

@@ -10,6 +10,7 @@ use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
 use palpate_mechanics::surface::Motion;
 use palpate_mechanics::surface::modal::{ModalBeam, ModalResponse};
+use palpate_numerics::OutOfRange;
 
 /// Modes of the beam that swing; the others follow the contact at once. The tenth is a hundred times as fast as the first.
 const MODES: usize = 10;
@@ -50,10 +51,12 @@ impl MovingContacts {
     }
 
     /// The same contacts, the first at another speed between its turns.
-    #[must_use]
-    pub fn at_speed(self, speed_m_per_s: f64) -> Self {
-        let motion = Motion { speed_m_per_s, ..self.first.motion };
-        Self { first: MovingContact { motion, ..self.first }, ..self }
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a speed that is not greater than 0 and finite.
+    pub fn at_speed(self, speed_m_per_s: f64) -> Result<Self, OutOfRange> {
+        let motion = self.first.motion.with_speed(speed_m_per_s)?;
+        Ok(Self { first: MovingContact { motion, ..self.first }, ..self })
     }
 
     fn moving(&self) -> impl Iterator<Item = MovingContact> {
@@ -117,7 +120,7 @@ impl Under<'_> {
                     response.advance(contacts, since_s);
                 }
                 let clean = |sensor: &Sensor| response.reading(sensor.kind, sensor.position);
-                layout.sensors.iter().map(clean).collect()
+                layout.sensors().iter().map(clean).collect()
             }
             Self::Balances(sensors) => {
                 let readings = contacts.iter().map(|contact| sensors.reading(*contact));

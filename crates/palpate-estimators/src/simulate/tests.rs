@@ -18,7 +18,7 @@ fn a_clean_simulation_is_force_times_influence() {
     let surface = rig.setup.surface.model().unwrap();
     for (i, row) in recording.rows.iter().enumerate() {
         assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
-        for (sensor, value) in rig.setup.layout.sensors.iter().zip(&row.reading) {
+        for (sensor, value) in rig.setup.layout.sensors().iter().zip(&row.reading) {
             let influence = surface.influence(SensorKind::Deflection, sensor.position, row.position);
             assert_eq!(*value, 3.0 * influence);
         }
@@ -67,16 +67,20 @@ fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
     let mut here = Layout::even(SensorKind::Deflection, 8, 0.4);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     assert_eq!(displaced(&here, line, &mut rng), here);
-    here.sensors[0].position.x_m = 0.0;
-    here.sensors.iter_mut().for_each(|sensor| sensor.channel.position_error_m = 5e-4);
+    here.edit(|sensors| sensors[0].position.x_m = 0.0).unwrap();
+    here.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.position_error_m = 5e-4))
+        .unwrap();
     let mut moved = Vec::new();
     for _ in 0..200 {
         let placed = displaced(&here, line, &mut rng);
-        assert!(placed.sensors[0].position.x_m >= 0.0);
+        assert!(placed.sensors()[0].position.x_m >= 0.0);
         moved.extend(
-            placed.sensors[1..].iter().zip(&here.sensors[1..]).map(|(p, h)| p.position.x_m - h.position.x_m),
+            placed.sensors()[1..]
+                .iter()
+                .zip(&here.sensors()[1..])
+                .map(|(p, h)| p.position.x_m - h.position.x_m),
         );
-        assert!(placed.sensors.iter().all(|sensor| sensor.position.y_m == 0.0));
+        assert!(placed.sensors().iter().all(|sensor| sensor.position.y_m == 0.0));
     }
     let largest = moved.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
     let mean = moved.iter().sum::<f64>() / moved.len() as f64;

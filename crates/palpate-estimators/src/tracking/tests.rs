@@ -86,7 +86,7 @@ fn errors(likelihood: &BeamLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2
 #[test]
 fn a_track_is_several_times_closer_than_its_readings() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 0.2, passes: 2, ..along_the_beam() };
+    let motion = along_the_beam().with_speed(0.2).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(3.0), 3.0, 5.0), (None, 4.0, 6.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
@@ -99,7 +99,8 @@ fn a_track_is_several_times_closer_than_its_readings() {
 #[test]
 fn a_contact_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..along_the_beam() };
+    let motion = along_the_beam().with_speed(1.0).unwrap().with_passes(2).unwrap();
+    let motion = motion.with_lifts(0.2, 0.02).unwrap();
     let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");
@@ -113,7 +114,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
     // Bent as by a load in the middle, which has just jumped elsewhere.
     let mut response = swinging_beam().at_rest(1, &[load(0.2)]);
     response.change_loads(&[load(0.1)]);
-    let sensors = &rig.setup.layout.sensors;
+    let sensors = &rig.setup.layout.sensors();
     let reading: Vec<f64> =
         sensors.iter().map(|sensor| response.reading(sensor.kind, sensor.position)).collect();
     let mut whitened = Vec::new();

@@ -79,7 +79,7 @@ impl<'a> CramerRaoBound<'a> {
             let response = surface.response_function(sensor.kind, sensor.position);
             Some(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
         };
-        let channels = layout.sensors.iter().zip(layout.reading_sds()?).filter_map(channel).collect();
+        let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
         Ok(Self { surface, channels })
     }
 

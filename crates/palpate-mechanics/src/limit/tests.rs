@@ -1,5 +1,7 @@
 //! The limit against the paper's figures, closed forms, simulation, and its own symmetries.
 
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -11,15 +13,15 @@ use crate::surface::{Beam, Extent, InfluenceFunction};
 use palpate_numerics::small::dot;
 
 /// The founding paper's beam.
-const BEAM: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+static BEAM: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap());
 
 fn with_noise(mut layout: Layout, noise_sd: f64) -> Layout {
-    layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd)).unwrap();
     layout
 }
 
 fn deflections(count: usize) -> Layout {
-    with_noise(Layout::even(SensorKind::Deflection, count, BEAM.length_m), 5e-6)
+    with_noise(Layout::even(SensorKind::Deflection, count, BEAM.length_m()), 5e-6)
 }
 
 fn sd_mm(limit: &CramerRaoBound, a_mm: f64, force: Force) -> f64 {
@@ -28,7 +30,7 @@ fn sd_mm(limit: &CramerRaoBound, a_mm: f64, force: Force) -> f64 {
 }
 
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
-    limit_warnings(&CramerRaoBound::new(&BEAM, layout).unwrap(), 3.0, force).unwrap()
+    limit_warnings(&CramerRaoBound::new(&*BEAM, layout).unwrap(), 3.0, force).unwrap()
 }
 
 /// The words of some warnings.
@@ -39,7 +41,7 @@ fn words(warnings: &[LimitWarning]) -> String {
 #[test]
 fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
     let layout = deflections(8);
-    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     // What physics allows at 5 µm and 3 N, from a calculation of its own.
     let known = [(1.0, 0.087), (50.0, 0.095), (100.0, 0.12), (200.0, 0.69)];
     let unknown = [(1.0, 8300.0), (20.0, 21.0), (50.0, 3.3), (200.0, 0.69)];
@@ -63,10 +65,10 @@ fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
 fn two_reactions_give_the_closed_form() {
     // R₁ = W·(l − a)/l and R₂ = W·a/l with noise σ: known force, σ·l/(W·√2); unknown force, position a = l·R₂/(R₁ + R₂)
     // and force R₁ + R₂ with σ·√((l − a)² + a²)/W and σ·√2.
-    let mut layout = with_noise(Layout::even(SensorKind::Reaction, 2, BEAM.length_m), 0.01);
-    layout.sensors[0].position = Position::along(0.0);
-    layout.sensors[1].position = Position::along(0.4);
-    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+    let mut layout = with_noise(Layout::even(SensorKind::Reaction, 2, BEAM.length_m()), 0.01);
+    layout.edit(|sensors| sensors[0].position = Position::along(0.0)).unwrap();
+    layout.edit(|sensors| sensors[1].position = Position::along(0.4)).unwrap();
+    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     for a_m in [0.0, 0.05, 0.2, 0.4] {
         let contact = Contact { position: Position::along(a_m), force_n: 3.0 };
         let known = limit.at(contact, Force::Known).unwrap();
@@ -117,9 +119,12 @@ impl Surface for Pad {
 
 fn pad_layout(positions: &[(f64, f64)]) -> Layout {
     let mut layout = with_noise(Layout::even(SensorKind::Deflection, positions.len(), 0.06), 1e-6);
-    for (sensor, &(x_m, y_m)) in layout.sensors.iter_mut().zip(positions) {
-        sensor.position = Position { x_m, y_m };
-    }
+    let at = |sensors: &mut Vec<Sensor>| {
+        for (sensor, &(x_m, y_m)) in sensors.iter_mut().zip(positions) {
+            sensor.position = Position { x_m, y_m };
+        }
+    };
+    layout.edit(at).unwrap();
     layout
 }
 
@@ -187,7 +192,7 @@ fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64
 fn maximum_likelihood_spreads_as_the_limit_says() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(20);
     let layout = deflections(8);
-    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     const DRAWS: usize = 4000;
     for (a_mm, force) in [
         (5.0, Force::Known),
@@ -220,7 +225,7 @@ proptest! {
     fn less_noise_more_force_and_more_sensors_lower_the_limit(a in 0.002..0.398_f64, factor in 1.5..10.0_f64) {
         let at = |layout: &Layout, force_n, force| {
             let contact = Contact { position: Position::along(a), force_n };
-            CramerRaoBound::new(&BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
+            CramerRaoBound::new(&*BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
         };
         let layout = deflections(8);
         for force in [Force::Known, Force::Unknown] {
@@ -228,9 +233,9 @@ proptest! {
             prop_assert!((at(&with_noise(layout.clone(), factor * 5e-6), 3.0, force) / limit / factor - 1.0).abs() < 1e-6);
             prop_assert!((at(&layout, factor * 3.0, force) * factor / limit - 1.0).abs() < 1e-6);
             let mut more = layout.clone();
-            more.sensors.extend(deflections(3).sensors);
+            more.edit(|sensors| sensors.extend(deflections(3).into_sensors())).unwrap();
             prop_assert!(at(&more, 3.0, force) < limit);
-            let mirrored = CramerRaoBound::new(&BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
+            let mirrored = CramerRaoBound::new(&*BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
             prop_assert!((mirrored.unwrap().sd_x_m / limit - 1.0).abs() < 1e-4);
         }
         prop_assert!(at(&layout, 3.0, Force::Known) <= at(&layout, 3.0, Force::Unknown) * (1.0 + 1e-9));
@@ -240,44 +245,46 @@ proptest! {
 #[test]
 fn a_dead_channel_counts_as_if_it_were_not_there() {
     let mut dead = deflections(8);
-    dead.sensors[2].channel.dead = true;
+    dead.set_dead(2, true);
     // A dead channel needs no noise.
-    dead.sensors[2].channel.noise_sd = 0.0;
+    dead.edit(|sensors| sensors[2].channel.noise_sd = 0.0).unwrap();
     let mut without = deflections(8);
-    without.sensors.remove(2);
+    without.edit(|sensors| drop(sensors.remove(2))).unwrap();
     let (dead, without) =
-        (CramerRaoBound::new(&BEAM, &dead).unwrap(), CramerRaoBound::new(&BEAM, &without).unwrap());
+        (CramerRaoBound::new(&*BEAM, &dead).unwrap(), CramerRaoBound::new(&*BEAM, &without).unwrap());
     assert_eq!(dead.alive(), 7);
     for force in [Force::Known, Force::Unknown] {
         assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));
     }
     let whole = deflections(8);
-    let whole = CramerRaoBound::new(&BEAM, &whole).unwrap();
+    let whole = CramerRaoBound::new(&*BEAM, &whole).unwrap();
     assert!(sd_mm(&dead, 130.0, Force::Known) > sd_mm(&whole, 130.0, Force::Known));
 }
 
 #[test]
 fn quantisation_is_noise_of_a_twelfth_of_its_square() {
     let mut coarse = with_noise(deflections(8), 3e-6);
-    coarse.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 4e-6 * 12f64.sqrt());
-    let (coarse, plain) = (CramerRaoBound::new(&BEAM, &coarse).unwrap(), deflections(8));
-    let plain = CramerRaoBound::new(&BEAM, &plain).unwrap();
+    coarse
+        .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 4e-6 * 12f64.sqrt()))
+        .unwrap();
+    let (coarse, plain) = (CramerRaoBound::new(&*BEAM, &coarse).unwrap(), deflections(8));
+    let plain = CramerRaoBound::new(&*BEAM, &plain).unwrap();
     let ratio = sd_mm(&coarse, 70.0, Force::Known) / sd_mm(&plain, 70.0, Force::Known);
     assert!((ratio - 1.0).abs() < 1e-12);
     let mut silent = with_noise(deflections(8), 0.0);
-    silent.sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 1e-6);
-    assert!(CramerRaoBound::new(&BEAM, &silent).is_ok());
+    silent.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 1e-6)).unwrap();
+    assert!(CramerRaoBound::new(&*BEAM, &silent).is_ok());
 }
 
 #[test]
 fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
     let mut saturating = deflections(8);
-    saturating.sensors[3].channel.range = Some((-1e-3, 1e-3));
+    saturating.edit(|sensors| sensors[3].channel.range = Some((-1e-3, 1e-3))).unwrap();
     let mut without = deflections(8);
-    without.sensors.remove(3);
+    without.edit(|sensors| drop(sensors.remove(3))).unwrap();
     let whole = deflections(8);
     let [saturating, without, whole] = [saturating, without, whole].map(|layout| {
-        let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+        let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
         [10.0, 200.0].map(|a_mm| sd_mm(&limit, a_mm, Force::Known))
     });
     assert_eq!(saturating[1], without[1], "3 N at mid-span lower sensor 4 by more than 1 mm");
@@ -289,13 +296,13 @@ fn what_has_no_limit_says_why() {
     let clean = deflections(8);
     let clean = with_noise(clean, 0.0);
     let mut one_clean = deflections(8);
-    one_clean.sensors[4].channel.noise_sd = 0.0;
+    one_clean.edit(|sensors| sensors[4].channel.noise_sd = 0.0).unwrap();
     let mut dead = deflections(2);
-    dead.sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
-    let said = |layout: &Layout| CramerRaoBound::new(&BEAM, layout).err().unwrap().to_string();
+    dead.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)).unwrap();
+    let said = |layout: &Layout| CramerRaoBound::new(&*BEAM, layout).err().unwrap().to_string();
     let no_model = LimitError::NoModel.to_string();
     let layout = deflections(8);
-    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     let force = |force_n| LimitCurve::over(&limit, force_n, Force::Known).unwrap_err().to_string();
     let every = |every_m| LimitCurve::every(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
     insta::assert_snapshot!(
@@ -316,7 +323,7 @@ fn what_has_no_limit_says_why() {
 #[test]
 fn no_information_is_none_and_never_infinite() {
     let layout = deflections(8);
-    let limit = CramerRaoBound::new(&BEAM, &layout).unwrap();
+    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     let at = |x_m, force_n, force| limit.at(Contact { position: Position::along(x_m), force_n }, force);
     assert_eq!(at(0.0, 3.0, Force::Unknown), None);
     assert_eq!(at(0.4, 3.0, Force::Unknown), None);
@@ -325,7 +332,7 @@ fn no_information_is_none_and_never_infinite() {
     assert!(at(0.0, 3.0, Force::Known).is_some(), "the beam tilts when a known force leaves its support");
     // One sensor cannot tell two numbers; nor can it see a small move of a force right above it.
     let one = deflections(1);
-    let one = CramerRaoBound::new(&BEAM, &one).unwrap();
+    let one = CramerRaoBound::new(&*BEAM, &one).unwrap();
     let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
     assert_eq!(one.at(contact(0.1), Force::Unknown), None);
     assert_eq!(one.at(contact(0.2), Force::Known), None);
@@ -357,9 +364,9 @@ fn loud_sensors_miss_contacts_next_to_the_supports() {
 fn reactions_see_what_deflections_do_not() {
     let mut layout = deflections(8);
     let mut supports = with_noise(Layout::even(SensorKind::Reaction, 2, 0.4), 0.01);
-    supports.sensors[0].position = Position::along(0.0);
-    supports.sensors[1].position = Position::along(0.4);
-    layout.sensors.extend(supports.sensors);
+    supports.edit(|sensors| sensors[0].position = Position::along(0.0)).unwrap();
+    supports.edit(|sensors| sensors[1].position = Position::along(0.4)).unwrap();
+    layout.edit(|sensors| sensors.extend(supports.into_sensors())).unwrap();
     assert_eq!(warnings(&layout, Force::Unknown), vec![]);
     assert_eq!(warnings(&layout, Force::Known), vec![]);
 }

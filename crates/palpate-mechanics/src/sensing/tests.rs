@@ -35,7 +35,7 @@ fn reported(channels: &[ChannelModel], clean: &[f64], seed: u64) -> Vec<f64> {
 fn even_sensors_sit_at_multiples_of_a_ninth() {
     let layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     let expected: Vec<Position> = (1..=8).map(|i| Position::along(f64::from(i) * 0.4 / 9.0)).collect();
-    let found: Vec<Position> = layout.sensors.iter().map(|sensor| sensor.position).collect();
+    let found: Vec<Position> = layout.sensors().iter().map(|sensor| sensor.position).collect();
     assert_eq!(found, expected);
     assert_eq!(layout.names()[7], "deflection_8");
 }

@@ -4,22 +4,14 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface, first_not_positive};
+use super::{Extent, InfluenceFunction, InsensitiveSensor, Strip, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
 /// A straight beam of rectangular section on two simple supports, at x = 0 and x = l.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Beam {
-    /// Length l between the supports, in metres.
-    pub length_m: f64,
-    /// Width of the section, in metres.
-    pub width_m: f64,
-    /// Thickness t of the section, in metres.
-    pub thickness_m: f64,
-    /// Young's modulus E, in pascals.
-    pub youngs_modulus_pa: f64,
-}
+#[serde(try_from = "Strip", into = "Strip")]
+pub struct Beam(Strip);
 
 /// Why a beam cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -62,36 +54,32 @@ impl Beam {
         thickness_m: f64,
         youngs_modulus_pa: f64,
     ) -> Result<Self, BeamError> {
-        let beam = Self { length_m, width_m, thickness_m, youngs_modulus_pa };
-        beam.validate()?;
-        Ok(beam)
+        Self::try_from(Strip { length_m, width_m, thickness_m, youngs_modulus_pa })
     }
 
-    /// Checks that every dimension is positive and finite, and that the deflections are so too.
-    ///
-    /// # Errors
-    /// [`BeamError`], with the name and value of the first dimension that is not.
-    pub fn validate(&self) -> Result<(), BeamError> {
-        let dimensions = [
-            ("length", self.length_m),
-            ("width", self.width_m),
-            ("thickness", self.thickness_m),
-            ("youngs_modulus", self.youngs_modulus_pa),
-        ];
-        if let Some((name, value)) = first_not_positive(&dimensions) {
-            return Err(BeamError::NotPositive { name, value });
-        }
-        let compliance_m_per_n = self.full_scale(SensorKind::Deflection);
-        if compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite() {
-            Ok(())
-        } else {
-            Err(BeamError::Compliance { compliance_m_per_n })
-        }
+    /// Length l between the supports, in metres.
+    pub fn length_m(&self) -> f64 {
+        self.0.length_m
+    }
+
+    /// Width of the section, in metres.
+    pub fn width_m(&self) -> f64 {
+        self.0.width_m
+    }
+
+    /// Thickness t of the section, in metres.
+    pub fn thickness_m(&self) -> f64 {
+        self.0.thickness_m
+    }
+
+    /// Young's modulus E, in pascals.
+    pub fn youngs_modulus_pa(&self) -> f64 {
+        self.0.youngs_modulus_pa
     }
 
     /// Bending stiffness E·I in N·m², with I = width·t³/12.
     pub fn bending_stiffness(&self) -> f64 {
-        self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
+        self.0.bending_stiffness()
     }
 
     /// Deflection y(x) per newton at a, in m/N, positive upward: −b·x·(l² − b² − x²)/(6·E·I·l) for x ≤ a, and mirrored
@@ -112,13 +100,13 @@ impl Beam {
     /// mirrored beyond. A downward force stretches the lower face, so it is never negative.
     fn strain(&self, span: Span) -> f64 {
         let Span { l, b, x, .. } = span;
-        0.5 * self.thickness_m * b * x / (self.bending_stiffness() * l)
+        0.5 * self.0.thickness_m * b * x / (self.bending_stiffness() * l)
     }
 
     /// Force of the support at `sensor` on the beam per newton at a, positive upward: b/l on the left, a/l on the
     /// right; 0 where there is no support.
     fn reaction(&self, sensor_m: f64, contact_m: f64) -> f64 {
-        let l = self.length_m;
+        let l = self.0.length_m;
         let near = |support_m: f64| (sensor_m - support_m).abs() <= 1e-9 * l;
         if near(0.0) {
             (l - contact_m) / l
@@ -127,6 +115,27 @@ impl Beam {
         } else {
             0.0
         }
+    }
+}
+
+impl TryFrom<Strip> for Beam {
+    type Error = BeamError;
+
+    fn try_from(strip: Strip) -> Result<Self, BeamError> {
+        strip.check().map_err(|(name, value)| BeamError::NotPositive { name, value })?;
+        let beam = Self(strip);
+        let compliance_m_per_n = beam.full_scale(SensorKind::Deflection);
+        if compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite() {
+            Ok(beam)
+        } else {
+            Err(BeamError::Compliance { compliance_m_per_n })
+        }
+    }
+}
+
+impl From<Beam> for Strip {
+    fn from(beam: Beam) -> Self {
+        beam.0
     }
 }
 
@@ -163,7 +172,7 @@ struct BeamInfluence<'a> {
 impl InfluenceFunction for BeamInfluence<'_> {
     fn at(&self, contact: Position) -> f64 {
         let Self { beam, kind, sensor_m } = *self;
-        let span = Span::new(beam.length_m, sensor_m, contact.x_m);
+        let span = Span::new(beam.0.length_m, sensor_m, contact.x_m);
         match kind {
             SensorKind::Deflection => beam.deflection(span),
             SensorKind::Slope => beam.slope(span),
@@ -178,12 +187,12 @@ impl InfluenceFunction for BeamInfluence<'_> {
     /// and mirrored with the sign changed, with its kink over the sensor; of the reactions, −1/l and 1/l.
     fn gradient(&self, contact: Position) -> [f64; 2] {
         let Self { beam, kind, sensor_m } = *self;
-        let (l, stiffness) = (beam.length_m, beam.bending_stiffness());
+        let (l, stiffness) = (beam.0.length_m, beam.bending_stiffness());
         let Span { b, x, direction, .. } = Span::new(l, sensor_m, contact.x_m);
         let along = match kind {
             SensorKind::Deflection => beam.slope(Span::new(l, contact.x_m, sensor_m)),
             SensorKind::Slope => (l * l - 3.0 * b * b - 3.0 * x * x) / (6.0 * stiffness * l),
-            SensorKind::Strain => -direction * 0.5 * beam.thickness_m * x / (stiffness * l),
+            SensorKind::Strain => -direction * 0.5 * beam.0.thickness_m * x / (stiffness * l),
             // A reaction is linear in the contact's position.
             SensorKind::Reaction => (beam.reaction(sensor_m, l) - beam.reaction(sensor_m, 0.0)) / l,
             SensorKind::Raw => 0.0,
@@ -202,12 +211,12 @@ impl Surface for Beam {
     }
 
     fn is_supported_at(&self, position: Position) -> bool {
-        let l = self.length_m;
+        let l = self.0.length_m;
         [0.0, l].iter().any(|support_m| (position.x_m - support_m).abs() <= 1e-9 * l)
     }
 
     fn force_supports(&self) -> Vec<Position> {
-        [0.0, self.length_m].map(Position::along).to_vec()
+        [0.0, self.0.length_m].map(Position::along).to_vec()
     }
 
     /// Supports hold the deflection, and leave nothing to bend.
@@ -220,17 +229,17 @@ impl Surface for Beam {
     /// Deflection l³/(48·E·I) at mid-span; slope l²/(9·√3·E·I) over a support, for a force l/√3 from the other one;
     /// strain t·l/(8·E·I) at mid-span; reaction 1 under the force.
     fn full_scale(&self, kind: SensorKind) -> f64 {
-        let (l, stiffness) = (self.length_m, self.bending_stiffness());
+        let (l, stiffness) = (self.0.length_m, self.bending_stiffness());
         match kind {
             SensorKind::Deflection => l.powi(3) / (48.0 * stiffness),
             SensorKind::Slope => l * l / (9.0 * 3f64.sqrt() * stiffness),
-            SensorKind::Strain => self.thickness_m * l / (8.0 * stiffness),
+            SensorKind::Strain => self.0.thickness_m * l / (8.0 * stiffness),
             SensorKind::Reaction => 1.0,
             SensorKind::Raw => 0.0,
         }
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.length_m }
+        Extent::Line { length_m: self.length_m() }
     }
 }

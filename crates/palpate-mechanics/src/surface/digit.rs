@@ -5,8 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Elastica, Extent, ForceDirection, InfluenceFunction, ResponseFunction, ResponseGradient, Surface,
-    first_not_positive,
+    Elastica, Extent, ForceDirection, InfluenceFunction, ResponseFunction, ResponseGradient, Strip, Surface,
 };
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
@@ -17,17 +16,15 @@ use crate::sensing::SensorKind;
 /// force they are those of its [`Elastica`]. Positions are counted along the finger, so a contact keeps its position when
 /// the finger bends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Digit {
-    /// Length l from the clamp to the tip, in metres.
-    pub length_m: f64,
-    /// Width of the section, in metres.
-    pub width_m: f64,
-    /// Thickness t of the section, in metres.
-    pub thickness_m: f64,
-    /// Young's modulus E, in pascals.
-    pub youngs_modulus_pa: f64,
-    /// Where the contact's force points.
-    pub direction: ForceDirection,
+#[serde(try_from = "Finger", into = "Finger")]
+pub struct Digit(Finger);
+
+/// A digit that is yet to be checked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Finger {
+    #[serde(flatten)]
+    strip: Strip,
+    direction: ForceDirection,
 }
 
 /// Why a digit cannot be computed.
@@ -73,59 +70,80 @@ impl Digit {
         thickness_m: f64,
         youngs_modulus_pa: f64,
     ) -> Result<Self, DigitError> {
-        let direction = ForceDirection::Normal;
-        let digit = Self { length_m, width_m, thickness_m, youngs_modulus_pa, direction };
-        digit.validate()?;
-        Ok(digit)
+        let strip = Strip { length_m, width_m, thickness_m, youngs_modulus_pa };
+        Self::try_from(Finger { strip, direction: ForceDirection::Normal })
     }
 
     /// The same, touched by forces of this direction.
     #[must_use]
     pub fn with_direction(self, direction: ForceDirection) -> Self {
-        Self { direction, ..self }
+        Self(Finger { direction, ..self.0 })
     }
 
-    /// Checks that every dimension is positive and finite, and that the stiffness is so too.
-    ///
-    /// # Errors
-    /// [`DigitError`], with the name and value of the first dimension that is not.
-    pub fn validate(&self) -> Result<(), DigitError> {
-        let dimensions = [
-            ("length", self.length_m),
-            ("width", self.width_m),
-            ("thickness", self.thickness_m),
-            ("youngs_modulus", self.youngs_modulus_pa),
-        ];
-        if let Some((name, value)) = first_not_positive(&dimensions) {
-            return Err(DigitError::NotPositive { name, value });
-        }
-        let force_n = self.characteristic_force_n();
-        let compliance = 1.0 / force_n;
-        if force_n > 0.0 && force_n.is_finite() && compliance.is_finite() {
-            Ok(())
-        } else {
-            Err(DigitError::Stiffness { force_n })
-        }
+    /// Where the contact's force points.
+    pub fn direction(&self) -> ForceDirection {
+        self.0.direction
+    }
+
+    /// Length l from the clamp to the tip, in metres.
+    pub fn length_m(&self) -> f64 {
+        self.0.strip.length_m
+    }
+
+    /// Width of the section, in metres.
+    pub fn width_m(&self) -> f64 {
+        self.0.strip.width_m
+    }
+
+    /// Thickness t of the section, in metres.
+    pub fn thickness_m(&self) -> f64 {
+        self.0.strip.thickness_m
+    }
+
+    /// Young's modulus E, in pascals.
+    pub fn youngs_modulus_pa(&self) -> f64 {
+        self.0.strip.youngs_modulus_pa
     }
 
     /// Bending stiffness E·I in N·m², with I = width·t³/12.
     pub fn bending_stiffness(&self) -> f64 {
-        self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
+        self.0.strip.bending_stiffness()
     }
 
     /// The force at the tip whose load F·l²/(E·I) is 1, in newtons: up to a tenth of it the finger is linear within 1 %.
     pub fn characteristic_force_n(&self) -> f64 {
-        self.bending_stiffness() / (self.length_m * self.length_m)
+        self.bending_stiffness() / (self.length_m() * self.length_m())
     }
 
     /// The finger's exact shape when it is touched at `contact`.
     pub fn shape(&self, contact: Contact) -> Elastica {
-        Elastica::new(self.direction, self.bending_stiffness(), contact.position.x_m, contact.force_n)
+        Elastica::new(self.direction(), self.bending_stiffness(), contact.position.x_m, contact.force_n)
     }
 
     /// Strain on the lower face per downward curvature, in metres: −t/2. A downward force stretches the upper face.
     pub fn strain_per_curvature_m(&self) -> f64 {
-        -0.5 * self.thickness_m
+        -0.5 * self.thickness_m()
+    }
+}
+
+impl TryFrom<Finger> for Digit {
+    type Error = DigitError;
+
+    fn try_from(finger: Finger) -> Result<Self, DigitError> {
+        finger.strip.check().map_err(|(name, value)| DigitError::NotPositive { name, value })?;
+        let digit = Self(finger);
+        let force_n = digit.characteristic_force_n();
+        if force_n > 0.0 && force_n.is_finite() && (1.0 / force_n).is_finite() {
+            Ok(digit)
+        } else {
+            Err(DigitError::Stiffness { force_n })
+        }
+    }
+}
+
+impl From<Digit> for Finger {
+    fn from(digit: Digit) -> Self {
+        digit.0
     }
 }
 
@@ -188,13 +206,13 @@ impl Surface for Digit {
     /// Strain t·l/(2·E·I), at the clamp for a force at the tip.
     fn full_scale(&self, kind: SensorKind) -> f64 {
         match kind {
-            SensorKind::Strain => 0.5 * self.thickness_m * self.length_m / self.bending_stiffness(),
+            SensorKind::Strain => 0.5 * self.thickness_m() * self.length_m() / self.bending_stiffness(),
             _ => 0.0,
         }
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.length_m }
+        Extent::Line { length_m: self.length_m() }
     }
 }
 

@@ -1,7 +1,5 @@
 //! A force that is spread over part of a surface.
 
-use serde::{Deserialize, Serialize};
-
 use super::InfluenceFunction;
 use crate::contact::Position;
 
@@ -12,20 +10,48 @@ const POINTS_ALONG: usize = 100;
 const POINTS_ACROSS: usize = 20;
 
 /// A force spread evenly over a stretch of a line, or over a rectangle of a plane.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformLoad {
-    /// Its left end, or lower left corner.
-    pub from: Position,
-    /// Its right end, or upper right corner; not left of or below `from`.
-    pub to: Position,
-    /// The whole force in newtons, positive downward.
-    pub force_n: f64,
+    from: Position,
+    to: Position,
+    force_n: f64,
 }
 
 impl UniformLoad {
-    /// A force in newtons over a stretch of a line, from its left end to its right one, in metres.
+    /// A force in newtons over a stretch of a line, from one end of it to the other, in metres.
+    ///
+    /// ```
+    /// use palpate_mechanics::surface::UniformLoad;
+    ///
+    /// let load = UniformLoad::along(0.15, 0.23, 3.0);
+    /// assert!((load.centre().x_m - 0.19).abs() < 1e-12);
+    /// ```
     pub const fn along(from_m: f64, to_m: f64, force_n: f64) -> Self {
-        Self { from: Position::along(from_m), to: Position::along(to_m), force_n }
+        Self::between(Position::along(from_m), Position::along(to_m), force_n)
+    }
+
+    /// A force in newtons over the stretch, or the rectangle, between two opposite ends or corners.
+    pub const fn between(one: Position, other: Position, force_n: f64) -> Self {
+        Self {
+            from: Position { x_m: one.x_m.min(other.x_m), y_m: one.y_m.min(other.y_m) },
+            to: Position { x_m: one.x_m.max(other.x_m), y_m: one.y_m.max(other.y_m) },
+            force_n,
+        }
+    }
+
+    /// Its left end, or lower left corner.
+    pub const fn from(&self) -> Position {
+        self.from
+    }
+
+    /// Its right end, or upper right corner.
+    pub const fn to(&self) -> Position {
+        self.to
+    }
+
+    /// The whole force in newtons, positive downward.
+    pub const fn force_n(&self) -> f64 {
+        self.force_n
     }
 
     /// The middle of it, where its force acts as a whole.
@@ -71,14 +97,14 @@ mod tests {
     use crate::surface::{Beam, Surface};
 
     fn beam() -> Beam {
-        Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 }
+        Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap()
     }
 
     /// 5·q·l⁴/(384·E·I) at mid-span, t·q·l²/(16·E·I) there, and half of the load at either support.
     #[test]
     fn a_load_all_over_a_beam_bends_it_as_tables_say() {
         let (beam, l) = (beam(), 0.4);
-        let load = UniformLoad { from: Position::along(0.0), to: Position::along(l), force_n: 1.0 };
+        let load = UniformLoad::along(0.0, l, 1.0);
         let read = |kind, at| load.mean(&*beam.influence_function(kind, Position::along(at)));
         let stiffness = beam.bending_stiffness();
         let deflection = -5.0 * l.powi(3) / (384.0 * stiffness);
@@ -91,11 +117,7 @@ mod tests {
     #[test]
     fn moving_a_load_changes_what_is_read_as_its_gradient_says() {
         let beam = beam();
-        let load = |x_m: f64| UniformLoad {
-            from: Position::along(x_m - 0.01),
-            to: Position::along(x_m + 0.01),
-            force_n: 1.0,
-        };
+        let load = |x_m: f64| UniformLoad::along(x_m - 0.01, x_m + 0.01, 1.0);
         let influence = beam.influence_function(SensorKind::Deflection, Position::along(0.13));
         let step = 1e-4;
         let slope = (load(0.2 + step).mean(&*influence) - load(0.2 - step).mean(&*influence)) / (2.0 * step);

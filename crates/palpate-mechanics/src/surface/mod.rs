@@ -30,6 +30,8 @@ pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 
@@ -99,6 +101,33 @@ pub trait InfluenceFunction: Send + Sync {
     /// How fast it changes as the contact moves along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
+}
+
+/// A straight strip of rectangular section.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Strip {
+    length_m: f64,
+    width_m: f64,
+    thickness_m: f64,
+    youngs_modulus_pa: f64,
+}
+
+impl Strip {
+    /// The first dimension, by name and value, that is not positive and finite, as an error.
+    fn check(&self) -> Result<(), (&'static str, f64)> {
+        let dimensions = [
+            ("length", self.length_m),
+            ("width", self.width_m),
+            ("thickness", self.thickness_m),
+            ("youngs_modulus", self.youngs_modulus_pa),
+        ];
+        first_not_positive(&dimensions).map_or(Ok(()), Err)
+    }
+
+    /// E·I in N·m², with I = width·t³/12.
+    fn bending_stiffness(&self) -> f64 {
+        self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
+    }
 }
 
 /// The first of some dimensions, by name and value, that is not a positive, finite number.

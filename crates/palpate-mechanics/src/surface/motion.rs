@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::{Contact, Position};
+use palpate_numerics::OutOfRange;
 
 /// A contact that moves between two places and back, straight, as often as is said.
 ///
@@ -11,23 +12,72 @@ use crate::contact::{Contact, Position};
 /// πv²/(4s) at most. Between passes the contact is lifted for `lifted_s`, and lets go and comes down over `touch_s` each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Where the first pass starts.
-    pub from: Position,
-    /// Where it ends; not where it starts.
-    pub to: Position,
-    /// The constant speed between the turns, in m/s; greater than 0.
-    pub speed_m_per_s: f64,
-    /// Length of the turn at either end, in metres; greater than 0, at most half the way.
-    pub turn_m: f64,
-    /// How often the way is gone, there or back; at least 1.
-    pub passes: usize,
-    /// How long nothing touches between two passes, in seconds; 0 to keep touching.
-    pub lifted_s: f64,
-    /// How long the force takes to fall or build up beside that, in seconds; means nothing where `lifted_s` is 0.
-    pub touch_s: f64,
+    from: Position,
+    to: Position,
+    speed_m_per_s: f64,
+    turn_m: f64,
+    passes: usize,
+    lifted_s: f64,
+    touch_s: f64,
 }
 
 impl Motion {
+    /// One pass from a place to another one, with turns of `turn_m` metres at both ends and a constant speed between them.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] unless the way and the speed are greater than 0, and a turn is so too and at most half the way.
+    ///
+    /// ```
+    /// use palpate_mechanics::contact::Position;
+    /// use palpate_mechanics::surface::Motion;
+    ///
+    /// let motion = Motion::new(Position::along(0.05), Position::along(0.35), 0.5, 0.05)?;
+    /// assert!((motion.duration_s() - 0.8).abs() < 1e-12); // turns of 0.2 s, 0.4 s between them
+    /// # Ok::<(), palpate_numerics::OutOfRange>(())
+    /// ```
+    pub fn new(from: Position, to: Position, speed_m_per_s: f64, turn_m: f64) -> Result<Self, OutOfRange> {
+        Self { from, to, speed_m_per_s, turn_m, passes: 1, lifted_s: 0.0, touch_s: 0.0 }.checked()
+    }
+
+    /// The same at another constant speed, in m/s.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] unless it is greater than 0 and finite.
+    pub fn with_speed(self, speed_m_per_s: f64) -> Result<Self, OutOfRange> {
+        Self { speed_m_per_s, ..self }.checked()
+    }
+
+    /// The same way gone `passes` times, there and back in turn.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for none.
+    pub fn with_passes(self, passes: usize) -> Result<Self, OutOfRange> {
+        Self { passes, ..self }.checked()
+    }
+
+    /// The same, with nothing touching for `lifted_s` seconds between two passes (0 to keep touching), and a force that takes
+    /// `touch_s` seconds to fall before that and to build up after it.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a time that is negative or not finite.
+    pub fn with_lifts(self, lifted_s: f64, touch_s: f64) -> Result<Self, OutOfRange> {
+        Self { lifted_s, touch_s, ..self }.checked()
+    }
+
+    fn checked(self) -> Result<Self, OutOfRange> {
+        let way_m = self.length_m();
+        OutOfRange::check_positive([("the way in metres", way_m), ("the speed in m/s", self.speed_m_per_s)])?;
+        let turn = [("the turn in metres", self.turn_m)];
+        OutOfRange::check("greater than 0 and at most half the way", turn, |m| m > 0.0 && m <= 0.5 * way_m)?;
+        OutOfRange::check("at least 1", [("the number of passes", self.passes as f64)], |n| n >= 1.0)?;
+        let times = [
+            ("the time lifted in seconds", self.lifted_s),
+            ("the time of touching in seconds", self.touch_s),
+        ];
+        OutOfRange::check_not_negative(times)?;
+        Ok(self)
+    }
+
     /// How long it takes, in seconds.
     pub fn duration_s(&self) -> f64 {
         self.passes as f64 * self.pass_s() + (self.passes - 1) as f64 * self.rest_s()
@@ -95,22 +145,18 @@ impl Motion {
 mod tests {
     use super::*;
 
-    const MOTION: Motion = Motion {
-        from: Position::along(0.35),
-        to: Position::along(0.05),
-        speed_m_per_s: 0.5,
-        turn_m: 0.05,
-        passes: 3,
-        lifted_s: 0.3,
-        touch_s: 0.1,
-    };
+    fn motion() -> Motion {
+        Motion::new(Position::along(0.35), Position::along(0.05), 0.5, 0.05)
+            .and_then(|motion| motion.with_passes(3)?.with_lifts(0.3, 0.1))
+            .unwrap()
+    }
 
     #[test]
     fn it_goes_there_and_back_and_is_lifted_between() {
         // A pass takes 0.2 s of turns twice and 0.4 s between them, a rest 0.5 s.
-        assert!((MOTION.duration_s() - (3.0 * 0.8 + 2.0 * 0.5)).abs() < 1e-12);
+        assert!((motion().duration_s() - (3.0 * 0.8 + 2.0 * 0.5)).abs() < 1e-12);
         let at = |time_s: f64| {
-            let Contact { position, force_n } = MOTION.contact_at(time_s, 3.0);
+            let Contact { position, force_n } = motion().contact_at(time_s, 3.0);
             format!("{:.1} mm {force_n:.2} N", position.x_m * 1e3)
         };
         let told = [-1.0, 0.2, 0.4, 0.8, 0.85, 1.05, 1.3, 1.5, 2.1, 9.0].map(at);
@@ -121,9 +167,9 @@ mod tests {
     fn on_a_plane_it_goes_straight_at_the_same_speed() {
         // 300 mm long, as along the line.
         let (from, to) = (Position { x_m: 0.3, y_m: 0.25 }, Position { x_m: 0.06, y_m: 0.07 });
-        let plane = Motion { from, to, ..MOTION };
+        let plane = Motion { from, to, ..motion() };
         for time_s in [0.1, 0.2, 0.35, 0.7, 1.45] {
-            let (along, on_plane) = (MOTION.contact_at(time_s, 3.0), plane.contact_at(time_s, 3.0));
+            let (along, on_plane) = (motion().contact_at(time_s, 3.0), plane.contact_at(time_s, 3.0));
             let way_m = on_plane.position.distance_m(from);
             assert!((way_m - (0.35 - along.position.x_m)).abs() < 1e-12);
             let Position { x_m, y_m } = on_plane.position;
@@ -133,7 +179,7 @@ mod tests {
 
     #[test]
     fn its_speed_and_acceleration_stay_within_their_bounds() {
-        let touching = Motion { lifted_s: 0.0, ..MOTION };
+        let touching = motion().with_lifts(0.0, 0.1).unwrap();
         let (h, most) = (1e-4, PI * 0.25 / (4.0 * 0.05));
         let x = |time_s: f64| touching.contact_at(time_s, 1.0).position.x_m;
         for i in 1..(touching.duration_s() / h) as i32 {
@@ -145,5 +191,26 @@ mod tests {
                 "{t}: {speed} {acceleration}"
             );
         }
+    }
+
+    #[test]
+    fn numbers_out_of_bounds_are_refused_with_their_value() {
+        let (from, to) = (Position::along(0.1), Position::along(0.2));
+        let told = [
+            Motion::new(from, from, 0.5, 0.05),
+            Motion::new(from, to, f64::INFINITY, 0.05),
+            Motion::new(from, to, 0.5, 0.06),
+            motion().with_passes(0),
+            motion().with_speed(-1.0),
+            motion().with_lifts(-0.1, 0.0),
+        ];
+        insta::assert_snapshot!(told.map(|motion| motion.unwrap_err().to_string()).join("\n"), @r"
+        the way in metres is 0; it must be greater than 0 and finite
+        the speed in m/s is inf; it must be greater than 0 and finite
+        the turn in metres is 0.06; it must be greater than 0 and at most half the way
+        the number of passes is 0; it must be at least 1
+        the speed in m/s is -1; it must be greater than 0 and finite
+        the time lifted in seconds is -0.1; it must be at least 0 and finite
+        ");
     }
 }

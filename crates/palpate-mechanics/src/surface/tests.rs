@@ -1,9 +1,11 @@
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
 
 use super::*;
 
 /// The founding paper's beam.
-const PAPER: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+static PAPER: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap());
 
 fn at(kind: SensorKind, x_m: f64, a_m: f64) -> f64 {
     PAPER.influence(kind, Position::along(x_m), Position::along(a_m))
@@ -52,16 +54,16 @@ proptest! {
         let difference = (at(SensorKind::Slope, x + h, a) - at(SensorKind::Slope, x - h, a)) / (2.0 * h);
         let strain = at(SensorKind::Strain, x, a);
         let kink = if (x - a).abs() < h { 1e-2 } else { 1e-5 };
-        prop_assert!((0.5 * PAPER.thickness_m * difference - strain).abs() < kink * PAPER.full_scale(SensorKind::Strain));
+        prop_assert!((0.5 * PAPER.thickness_m() * difference - strain).abs() < kink * PAPER.full_scale(SensorKind::Strain));
     }
 
     /// ∫ E·I·y''·φ'' dx = −φ(a) for every φ that vanishes with its second derivative on the supports: here sin(kπx/l).
     #[test]
     fn stiffness_times_the_fourth_derivative_is_the_load_weakly(k in 1..8u32, a in 0.01..0.39) {
-        let wave = f64::from(k) * std::f64::consts::PI / PAPER.length_m;
-        let curvature = |x| at(SensorKind::Strain, x, a) / (0.5 * PAPER.thickness_m);
+        let wave = f64::from(k) * std::f64::consts::PI / PAPER.length_m();
+        let curvature = |x| at(SensorKind::Strain, x, a) / (0.5 * PAPER.thickness_m());
         let integrand = |x: f64| PAPER.bending_stiffness() * curvature(x) * -(wave * wave) * (wave * x).sin();
-        let virtual_work = simpson(integrand, 0.0, a) + simpson(integrand, a, PAPER.length_m);
+        let virtual_work = simpson(integrand, 0.0, a) + simpson(integrand, a, PAPER.length_m());
         prop_assert!((virtual_work + (wave * a).sin()).abs() < 1e-6);
     }
 
@@ -83,7 +85,7 @@ proptest! {
             let (sensor, contact) = (Position::along(x), Position::along(a));
             let [closed, across] = PAPER.influence_function(kind, sensor).gradient(contact);
             let differenced = (at(kind, x, a + STEP_M) - at(kind, x, a - STEP_M)) / (2.0 * STEP_M);
-            let scale = PAPER.full_scale(kind) / PAPER.length_m;
+            let scale = PAPER.full_scale(kind) / PAPER.length_m();
             prop_assert!((closed - differenced).abs() <= 1e-8 * scale, "{kind}: {closed} against {differenced}");
             prop_assert_eq!(across, 0.0);
         }
@@ -127,15 +129,26 @@ fn full_scale_is_the_largest_influence_of_a_dense_grid() {
 #[test]
 fn a_beam_without_size_is_refused_with_value_and_bound() {
     let refused = [
-        Beam { length_m: 0.0, ..PAPER },
-        Beam { width_m: -0.04, ..PAPER },
-        Beam { thickness_m: f64::NAN, ..PAPER },
-        Beam { youngs_modulus_pa: f64::INFINITY, ..PAPER },
-        Beam { thickness_m: 1e-200, ..PAPER },
+        Beam::new(0.0, 0.04, 1.2e-3, 200e9),
+        Beam::new(0.4, -0.04, 1.2e-3, 200e9),
+        Beam::new(0.4, 0.04, f64::NAN, 200e9),
+        Beam::new(0.4, 0.04, 1.2e-3, f64::INFINITY),
+        Beam::new(0.4, 0.04, 1e-200, 200e9),
     ];
-    let messages = refused.map(|beam| beam.validate().unwrap_err().to_string());
+    let messages = refused.map(|beam| beam.unwrap_err().to_string());
     insta::assert_snapshot!(messages.join("\n"));
-    assert_eq!(PAPER.validate(), Ok(()));
+}
+
+#[test]
+fn a_beam_is_checked_when_it_is_read() {
+    let written = serde_json::to_string(&*PAPER).unwrap();
+    assert_eq!(
+        written,
+        r#"{"length_m":0.4,"width_m":0.04,"thickness_m":0.0012,"youngs_modulus_pa":200000000000.0}"#
+    );
+    assert_eq!(serde_json::from_str::<Beam>(&written).unwrap(), *PAPER);
+    let negative = serde_json::from_str::<Beam>(&written.replace("0.0012", "-0.0012")).unwrap_err();
+    assert_eq!(negative.to_string(), "a beam's thickness is -0.0012; it must be greater than 0 and finite");
 }
 
 #[test]

@@ -58,19 +58,20 @@ impl Paper<'_> {
     /// What the beam would do with the modulus as printed, unless the study uses it.
     fn why_not_the_printed_modulus(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
-        if (beam.youngs_modulus_pa / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
+        if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
             return Markup::default();
         }
         let sag_m = |youngs_modulus_pa: f64| {
-            force_n * Beam { youngs_modulus_pa, ..beam }.full_scale(SensorKind::Deflection)
+            // The deflection is inversely proportional to the modulus.
+            force_n * beam.full_scale(SensorKind::Deflection) * beam.youngs_modulus_pa() / youngs_modulus_pa
         };
         html! {
             p {
                 "One value is not followed: the paper prints a Young's modulus of 200 MPa. With it, the load in the middle would \
-                 bend this " (stated(beam.length_m * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
+                 bend this " (stated(beam.length_m() * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
                 " m, far outside the small deflections that the beam equation is made for. Steel has 200 GPa, so the print is \
-                 taken for a slip. With " (stated(beam.youngs_modulus_pa / 1e9)) " GPa, as here, it bends by "
-                (number(sag_m(beam.youngs_modulus_pa) * 1e3)) " mm."
+                 taken for a slip. With " (stated(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
+                (number(sag_m(beam.youngs_modulus_pa()) * 1e3)) " mm."
             }
         }
     }
@@ -103,12 +104,12 @@ fn cells(name: &str, paper: &str, study: &str) -> Vec<Markup> {
 }
 
 fn modulus_row(beam: Beam) -> Vec<Markup> {
-    let value = format!("{} GPa", stated(beam.youngs_modulus_pa / 1e9));
+    let value = format!("{} GPa", stated(beam.youngs_modulus_pa() / 1e9));
     cells("Young's modulus", "200 MPa, taken for a slip", &value)
 }
 
 fn noise_row(rig: &Rig) -> Vec<Markup> {
-    let noisy = rig.setup.layout.sensors.iter().any(|sensor| sensor.channel != Default::default());
+    let noisy = rig.setup.layout.sensors().iter().any(|sensor| sensor.channel != Default::default());
     let study = if noisy {
         "the sensors have faults, as the study's file states"
     } else {

@@ -19,7 +19,8 @@ impl Paper<'_> {
     /// Distance of neighbouring sensors in mm, where it is the same for all.
     pub(super) fn sensor_pitch_mm(&self) -> Option<String> {
         let (rig, ..) = self.setup()?;
-        let positions: Vec<f64> = rig.setup.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+        let positions: Vec<f64> =
+            rig.setup.layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
         let pitches: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let first = *pitches.first()?;
         pitches.iter().all(|pitch| (pitch - first).abs() < 1e-6).then(|| number(first * 1e3))
@@ -85,8 +86,8 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
     let sag_mm = force_n * beam.full_scale(SensorKind::Deflection) * 1e3;
     html! {
         p {
-            "The surface here is a beam, " (mm(beam.length_m)) " mm long, " (mm(beam.width_m)) " mm wide and "
-            (mm(beam.thickness_m)) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa / 1e9))
+            "The surface here is a beam, " (mm(beam.length_m())) " mm long, " (mm(beam.width_m())) " mm wide and "
+            (mm(beam.thickness_m())) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa() / 1e9))
             " GPa, on two wedges at its ends. "
             (counted(rig.setup.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
             (stated(force_n)) " N, whose force is known, stands on it. With the load in the middle the beam sags by "
@@ -97,7 +98,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
 
 /// "deflection", or more where the sensors differ.
 fn kinds(rig: &Rig) -> String {
-    let mut names: Vec<&str> = rig.setup.layout.sensors.iter().map(|sensor| sensor.kind.name()).collect();
+    let mut names: Vec<&str> = rig.setup.layout.sensors().iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();
     names.join(", ")
 }

@@ -320,7 +320,10 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
     assert!(page(&study_report(&run.report())).contains(&assumed), "the paper's readings are clean");
     for (noise_sd, drawn) in [(um(5.0), true), (0.0, false)] {
         let mut rig = quick_rig(5);
-        rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd);
+        rig.setup
+            .layout
+            .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd))
+            .unwrap();
         let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {
             title: "Errors",

@@ -28,7 +28,7 @@ fn millimetres(positions: impl IntoIterator<Item = Position>) -> Vec<[f64; 2]> {
 #[test]
 fn grids_and_pairs_lie_where_they_say() {
     let rig = Rig::from_toml(PLANE).unwrap();
-    let sensors = millimetres(rig.setup.layout.sensors.iter().map(|sensor| sensor.position));
+    let sensors = millimetres(rig.setup.layout.sensors().iter().map(|sensor| sensor.position));
     assert_eq!(sensors[..4], [[75.0, 50.0], [150.0, 50.0], [225.0, 50.0], [75.0, 100.0]]);
     let training = rig.training.unwrap();
     assert_eq!((&training.arrangement, training.count), (&Arrangement::Grid { columns: 6, rows: 4 }, 24));
@@ -39,7 +39,7 @@ fn grids_and_pairs_lie_where_they_say() {
         .replace("grid = [3, 3]", "positions = [[\"75 mm\", \"50 mm\"], [\"10 cm\", \"0 mm\"]]")
         .replace("grid = [6, 4]", "positions = [[\"1 mm\", \"2 mm\"]]");
     let rig = Rig::from_toml(&pairs).unwrap();
-    let sensors = millimetres(rig.setup.layout.sensors.iter().map(|sensor| sensor.position));
+    let sensors = millimetres(rig.setup.layout.sensors().iter().map(|sensor| sensor.position));
     assert_eq!(sensors, [[75.0, 50.0], [100.0, 0.0]]);
     let pressed = rig.training.unwrap().positions(rig.setup.surface.extent()).unwrap();
     assert_eq!(millimetres(pressed), [[1.0, 2.0]]);
@@ -98,8 +98,8 @@ fn a_load_on_a_plane_is_a_rectangle() {
     let load = "[[load]]\nfrom = [\"70 mm\", \"80 mm\"]\nto = [\"110 mm\", \"120 mm\"]\nforce = \"4 N\"\n";
     let loaded = format!("{PLANE}{load}");
     let loads = Rig::from_toml(&loaded).unwrap().loads;
-    assert_eq!(millimetres([loads[0].from, loads[0].to]), [[70.0, 80.0], [110.0, 120.0]]);
-    assert_eq!((loads.len(), loads[0].force_n), (1, 4.0));
+    assert_eq!(millimetres([loads[0].from(), loads[0].to()]), [[70.0, 80.0], [110.0, 120.0]]);
+    assert_eq!((loads.len(), loads[0].force_n()), (1, 4.0));
     insta::assert_snapshot!(refused(
         &loaded,
         &[

@@ -46,7 +46,7 @@ impl ArraySensor {
         let training = rig.training()?;
         let length_m = model.length_m();
         let share = |sensor: &Sensor| sensor.channel.noise_sd / (force_n * model.full_scale(sensor.kind));
-        let noise_sd = rig.setup.layout.sensors.first().map_or(0.0, share);
+        let noise_sd = rig.setup.layout.sensors().first().map_or(0.0, share);
         let pitch_m = length_m / count as f64;
         let sensor = |i: usize| Sensor {
             kind: SensorKind::Raw,
@@ -56,7 +56,7 @@ impl ArraySensor {
         };
         let setup = Setup {
             surface: SurfaceSpec::Measured(Extent::Line { length_m }),
-            layout: Layout { sensors: (0..count).map(sensor).collect() },
+            layout: Layout::new((0..count).map(sensor).collect()).map_err(SimulateError::from)?,
             force_n: Some(force_n),
             columns: None,
         };
@@ -101,7 +101,7 @@ impl ArraySensor {
     fn recording(&self, positions: &[Position], seed: u64, rng: &mut Xoshiro256PlusPlus) -> Recording {
         let layout = &self.rig.setup.layout;
         let row = |position: &Position| {
-            let reading = layout.sensors.iter().map(|sensor| {
+            let reading = layout.sensors().iter().map(|sensor| {
                 let off = position.distance_m(sensor.position) / self.spread_m;
                 (-0.5 * off * off).exp() + self.noise_sd * rng.sample::<f64, _>(StandardNormal)
             });

@@ -35,7 +35,7 @@ pub struct Fold {
 impl FoldedErrors {
     /// Folds the errors of an evaluation over the gaps of a layout along a line.
     pub fn of(evaluation: &Evaluation, layout: &Layout, tolerance_m: f64) -> Self {
-        let mut places: Vec<f64> = layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+        let mut places: Vec<f64> = layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
         places.sort_by(f64::total_cmp);
         let folded: Vec<(f64, f64)> = evaluation
             .located

@@ -119,9 +119,12 @@ impl DeadAreas {
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
         let length_m = rig.setup.surface.extent().length_m();
-        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors.first().cloned() {
-            rig.setup.layout = Layout::even(kind, count, length_m);
-            rig.setup.layout.sensors.iter_mut().for_each(|sensor| sensor.channel = channel);
+        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors().first().cloned() {
+            let mut layout = Layout::even(kind, count, length_m);
+            // A channel of the rig, which was checked.
+            if layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel = channel)).is_ok() {
+                rig.setup.layout = layout;
+            }
         }
         rig
     }

@@ -3,9 +3,8 @@
 use ndarray::{Array1, Array2};
 
 use palpate_estimators::recording::{Recording, Row};
-use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::Bound;
-use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{ResponseGradient, SurfaceSpec};
 use palpate_numerics::symmetric_eigen;
 
@@ -77,13 +76,7 @@ impl KarhunenLoeve {
 
 /// Channels without a model, a component each.
 pub(super) fn raw_layout(count: usize) -> Layout {
-    let sensor = |i: usize| Sensor {
-        kind: SensorKind::Raw,
-        position: Position::along(0.0),
-        name: format!("component_{}", i + 1),
-        channel: ChannelModel::default(),
-    };
-    Layout { sensors: (0..count).map(sensor).collect() }
+    Layout::even(SensorKind::Raw, count, 0.0)
 }
 
 /// A surface as one knows it who sees components of readings only: where it ends.

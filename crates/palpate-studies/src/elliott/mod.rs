@@ -271,7 +271,7 @@ impl Elliott {
         let model = surface.model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
         let force_n = force_n.ok_or(RigSimulationError::from(SimulateError::NoForce))?;
         let functions: Vec<_> = layout
-            .sensors
+            .sensors()
             .iter()
             .map(|sensor| model.response_function(sensor.kind, sensor.position))
             .collect();

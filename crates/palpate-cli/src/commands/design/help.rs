@@ -14,7 +14,7 @@ pub fn for_sensors(error: &DesignError) -> &'static str {
         DesignError::Limit(LimitError::Noise(error)) => error.help(),
         DesignError::Cancelled(_) => "start it again",
         DesignError::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
-        DesignError::OutOfRange(_) => "check it in [design]",
+        DesignError::OutOfRange(_) | DesignError::Layout(_) => "check it in [design]",
         DesignError::SingularNoise { .. } => {
             "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
         }

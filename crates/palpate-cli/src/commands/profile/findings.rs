@@ -139,14 +139,14 @@ impl PatchFound {
 impl TrueLoad {
     fn of(load: &UniformLoad, limit: Option<PatchLimit>, extent: Extent) -> Self {
         Self {
-            stretch_mm: [load.from.x_m * 1e3, load.to.x_m * 1e3],
+            stretch_mm: [load.from().x_m * 1e3, load.to().x_m * 1e3],
             centre_x_mm: load.centre().x_m * 1e3,
             across: extent.across(Across {
-                stretch_y_mm: [load.from.y_m * 1e3, load.to.y_m * 1e3],
+                stretch_y_mm: [load.from().y_m * 1e3, load.to().y_m * 1e3],
                 centre_y_mm: load.centre().y_m * 1e3,
                 limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
             }),
-            force_n: load.force_n,
+            force_n: load.force_n(),
             limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
             limit_force_n: limit.map(|limit| limit.sd_force_n),
         }

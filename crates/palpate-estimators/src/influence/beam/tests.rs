@@ -45,7 +45,7 @@ fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
     let (right, left) = (clean(setup, &[(x_m + h, force_n)]), clean(setup, &[(x_m - h, force_n)]));
     let here = clean(setup, &[(x_m, force_n)]);
     let (mut aa, mut af, mut ff) = (0.0, 0.0, 0.0);
-    for (s, sensor) in setup.layout.sensors.iter().enumerate() {
+    for (s, sensor) in setup.layout.sensors().iter().enumerate() {
         let (noise, dead) = (sensor.channel.noise_sd, sensor.channel.dead);
         let (g, f) = ((right[s] - left[s]) / (2.0 * h * noise), here[s] / (force_n * noise));
         if !dead {
@@ -105,7 +105,7 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
         let mut locator = fit(Influence { from, ..Influence::default() }, &setup, &recording);
         if let Some(channel) = faults.dead {
             assert!(locator.leave_out(channel));
-            rig.setup.layout.sensors[channel].channel.dead = true;
+            rig.setup.layout.set_dead(channel, true);
         }
         for mm in (5..=395).step_by(3) {
             let x_m = f64::from(mm) / 1e3;
@@ -230,7 +230,7 @@ fn two_contacts_are_told_apart() {
 
 /// Whether both positions are within 3 × their limits, those of two places and two unknown forces at once.
 fn both_near(setup: &Setup, truth: [(f64, f64); 2], found: [ContactEstimate; 2]) -> bool {
-    let noise = setup.layout.sensors[0].channel.noise_sd;
+    let noise = setup.layout.sensors()[0].channel.noise_sd;
     let columns: Vec<Vec<f64>> = (0..4)
         .map(|unknown| {
             let at = |side: f64| {

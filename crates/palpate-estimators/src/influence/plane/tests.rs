@@ -11,7 +11,7 @@ use crate::simulate::CleanSensors;
 use palpate_core::Status;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Sensor, measure};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::plate::PlateSpec;
 use rand::{RngExt, SeedableRng};
@@ -198,10 +198,9 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 #[test]
 fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
     let mut rig = rig();
-    rig.setup.layout.sensors.truncate(2);
-    for (sensor, y_m) in rig.setup.layout.sensors.iter_mut().zip([0.15, 0.075]) {
-        sensor.position = Position { x_m: 0.15, y_m };
-    }
+    rig.setup.layout.edit(|sensors| sensors.truncate(2)).unwrap();
+    let mut places = [0.15, 0.075].map(|y_m| Position { x_m: 0.15, y_m }).into_iter();
+    rig.setup.layout = rig.setup.layout.with_positions(|_| places.next().unwrap());
     let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
@@ -261,10 +260,12 @@ fn faults_that_a_calibration_shows_are_corrected() {
         plate(PlateSpec::DEFAULT_ELEMENTS, ChannelModel { gain_error: 0.05, offset_error: 20e-6, ..NOISE });
     let told = rig.setup.clone();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(17);
-    for sensor in &mut rig.setup.layout.sensors {
-        sensor.position.x_m += 1e-3 * rng.random_range(-1.0..=1.0);
-        sensor.position.y_m += 1e-3 * rng.random_range(-1.0..=1.0);
-    }
+    let mut off_m = || 1e-3 * rng.random_range(-1.0..=1.0);
+    let beside = |sensor: &Sensor| {
+        let Position { x_m, y_m } = sensor.position;
+        Position { x_m: x_m + off_m(), y_m: y_m + off_m() }
+    };
+    rig.setup.layout = rig.setup.layout.with_positions(beside);
     let limit = told.cramer_rao_bound().unwrap();
     let errors = ChannelErrors::draw(&rig.setup.layout, &mut rng);
     let clean = sensors(&rig.setup);

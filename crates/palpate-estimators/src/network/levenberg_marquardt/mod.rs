@@ -216,7 +216,7 @@ impl NetworkInputs {
     /// the mean norm: that of r/|r| is σ/|r|, that of ln |r| at most as large.
     fn feature_noise(&self, layout: &Layout, recording: &Recording) -> Option<Array1<f64>> {
         let Features { channels, features, .. } = &self.features;
-        let sd = |scale: &ChannelScale| layout.sensors[scale.channel].channel.reading_sd() / scale.divisor;
+        let sd = |scale: &ChannelScale| layout.sensors()[scale.channel].channel.reading_sd() / scale.divisor;
         let scaled: Vec<f64> = channels.iter().map(sd).collect();
         if scaled.contains(&0.0) {
             return None;

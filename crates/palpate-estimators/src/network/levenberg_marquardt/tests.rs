@@ -10,7 +10,7 @@ use crate::network::{Activation, Topology};
 use crate::recording::{Provenance, Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, SensorKind, measure};
+use palpate_mechanics::sensing::{ChannelErrors, Layout, SensorKind, measure};
 use palpate_mechanics::surface::{Beam, SurfaceSpec};
 use palpate_numerics::Cholesky;
 use palpate_testing::data;
@@ -66,11 +66,9 @@ fn effective_parameters_are_the_weights_that_the_data_determine() {
 
 /// The paper's bench.
 fn setup(noise_sd: f64, force_n: Option<f64>) -> Setup {
-    let beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3, youngs_modulus_pa: 200e9 };
+    let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap();
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
-    for sensor in &mut layout.sensors {
-        sensor.channel = ChannelModel { noise_sd, ..ChannelModel::default() };
-    }
+    layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd)).unwrap();
     Setup { surface: SurfaceSpec::Beam(beam), layout, force_n, columns: None }
 }
 
@@ -78,7 +76,7 @@ fn reading(setup: &Setup, x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) 
     let model = setup.surface.model().unwrap();
     let influence =
         |s: &palpate_mechanics::sensing::Sensor| model.influence(s.kind, s.position, Position::along(x_m));
-    let clean: Vec<f64> = setup.layout.sensors.iter().map(|s| force_n * influence(s)).collect();
+    let clean: Vec<f64> = setup.layout.sensors().iter().map(|s| force_n * influence(s)).collect();
     measure(&setup.layout, &clean, &ChannelErrors::none(&setup.layout), rng)
 }
 

@@ -60,7 +60,7 @@ fn errors(likelihood: &PlateLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 
 #[test]
 fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 0.3, passes: 2, ..over_the_plate() };
+    let motion = over_the_plate().with_speed(0.3).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
     for (force_n, filter, smoother) in [(Some(5.0), 2.5, 4.0), (None, 2.5, 4.0)] {
         let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
@@ -73,7 +73,8 @@ fn a_track_on_a_plane_is_several_times_closer_than_its_readings() {
 #[test]
 fn a_contact_on_a_plane_that_lets_go_is_lost_and_found_again() {
     let rig = rig();
-    let motion = Motion { speed_m_per_s: 1.0, passes: 2, lifted_s: 0.2, touch_s: 0.02, ..over_the_plate() };
+    let motion = over_the_plate().with_speed(1.0).unwrap().with_passes(2).unwrap();
+    let motion = motion.with_lifts(0.2, 0.02).unwrap();
     let wrong = wrongly_touching(&likelihood(&rig, None), &readings(&rig, motion, 3));
     // Only while the force is too small to be told from noise.
     assert!(wrong <= 15, "{wrong}");

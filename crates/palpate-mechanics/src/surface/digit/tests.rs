@@ -2,7 +2,7 @@ use super::*;
 
 /// Spring steel, 120 × 10 × 0.5 mm: E·I/l² is 1.447 N.
 fn digit(direction: ForceDirection) -> Digit {
-    Digit { length_m: 0.12, width_m: 0.01, thickness_m: 0.0005, youngs_modulus_pa: 200e9, direction }
+    Digit::new(0.12, 0.01, 0.0005, 200e9).unwrap().with_direction(direction)
 }
 
 fn strain(digit: &Digit, gauge_m: f64, x_m: f64, force_n: f64) -> f64 {
@@ -40,15 +40,24 @@ fn a_gauge_beyond_the_contact_reads_nothing() {
 
 #[test]
 fn a_digit_without_size_is_refused_with_value_and_bound() {
-    let good = digit(ForceDirection::Normal);
     for bad in [
-        Digit { thickness_m: 0.0, ..good },
-        Digit { length_m: f64::NAN, ..good },
-        Digit { width_m: -0.01, ..good },
-        Digit { youngs_modulus_pa: f64::INFINITY, ..good },
+        Digit::new(0.12, 0.01, 0.0, 200e9),
+        Digit::new(f64::NAN, 0.01, 0.0005, 200e9),
+        Digit::new(0.12, -0.01, 0.0005, 200e9),
+        Digit::new(0.12, 0.01, 0.0005, f64::INFINITY),
     ] {
-        assert!(matches!(bad.validate(), Err(DigitError::NotPositive { .. })), "{bad:?}");
+        assert!(matches!(bad, Err(DigitError::NotPositive { .. })), "{bad:?}");
     }
-    let thin = Digit { thickness_m: 1e-150, ..good };
-    assert!(matches!(thin.validate(), Err(DigitError::Stiffness { .. })));
+    assert!(matches!(Digit::new(0.12, 0.01, 1e-150, 200e9), Err(DigitError::Stiffness { .. })));
+}
+
+#[test]
+fn a_digit_is_checked_when_it_is_read() {
+    let written = serde_json::to_string(&digit(ForceDirection::Vertical)).unwrap();
+    assert_eq!(
+        written,
+        r#"{"length_m":0.12,"width_m":0.01,"thickness_m":0.0005,"youngs_modulus_pa":200000000000.0,"direction":"vertical"}"#
+    );
+    assert_eq!(serde_json::from_str::<Digit>(&written).unwrap(), digit(ForceDirection::Vertical));
+    assert!(serde_json::from_str::<Digit>(&written.replace("0.0005", "-1")).is_err());
 }

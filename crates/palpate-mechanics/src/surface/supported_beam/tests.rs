@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use super::*;
 use crate::surface::Beam;
 use BeamSupportKind::{Clamped, Free, Guided, Simple};
@@ -7,7 +9,7 @@ mod closed_forms;
 mod properties;
 mod refusals;
 
-const PAPER: Beam = Beam { length_m: 0.4, width_m: 0.04, thickness_m: 0.0012, youngs_modulus_pa: 200e9 };
+static PAPER: LazyLock<Beam> = LazyLock::new(|| Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap());
 
 /// A spring.
 fn spring(stiffness_n_per_m: f64, rotational_stiffness_nm_per_rad: Option<f64>) -> BeamSupportKind {
@@ -17,8 +19,8 @@ fn spring(stiffness_n_per_m: f64, rotational_stiffness_nm_per_rad: Option<f64>) 
 /// The paper's beam on other supports, in metres from its left end.
 fn paper_on(supports: &[(f64, BeamSupportKind)]) -> SupportedBeamSpec {
     SupportedBeamSpec {
-        length_m: PAPER.length_m,
-        youngs_modulus_pa: PAPER.youngs_modulus_pa,
+        length_m: PAPER.length_m(),
+        youngs_modulus_pa: PAPER.youngs_modulus_pa(),
         sections: vec![BeamSection { to_m: 0.4, width_m: 0.04, thickness_m: 0.0012 }],
         supports: supports.iter().map(|&(at_m, kind)| BeamSupport { at_m, kind }).collect(),
     }

@@ -87,7 +87,7 @@ pub fn findings(outcome: &Outcome) -> Findings {
 fn one(designed: &Designed, outcome: &Outcome, scale: f64) -> Design {
     Design {
         method: designed.method,
-        positions: designed.layout.sensors.iter().map(place).collect(),
+        positions: designed.layout.sensors().iter().map(place).collect(),
         worth: worth(&designed.assessment, scale),
         simulated: outcome.verification(designed.method).map(simulated),
     }

@@ -27,7 +27,7 @@ fn with_layout(text: &str, layout: &Layout) -> Result<String, toml_edit::TomlErr
     let own = sections(document.get("sensors"));
     let mut new = ArrayOfTables::new();
     for kind in SensorKind::ALL {
-        let sensors: Vec<&Sensor> = layout.sensors.iter().filter(|sensor| sensor.kind == kind).collect();
+        let sensors: Vec<&Sensor> = layout.sensors().iter().filter(|sensor| sensor.kind == kind).collect();
         if let Some(first) = sensors.first() {
             let mut section = section(kind, &own, &first.channel);
             section.insert("positions", value(positions(&sensors)));

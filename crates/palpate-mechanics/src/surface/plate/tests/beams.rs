@@ -26,7 +26,7 @@ const CONTACTS_M: [f64; 4] = [0.04, 0.11, 0.2, 0.37];
 #[test]
 fn a_strip_on_simple_ends_is_the_beam() {
     let strip = strip(Edge::Simple, Edge::Simple);
-    let beam = Beam { length_m: LENGTH_M, width_m: WIDTH_M, thickness_m: 0.8e-3, youngs_modulus_pa: 200e9 };
+    let beam = Beam::new(LENGTH_M, WIDTH_M, 0.8e-3, 200e9).unwrap();
     for kind in [SensorKind::Deflection, SensorKind::Slope, SensorKind::Strain] {
         let scale = beam.full_scale(kind);
         for sensor_m in SENSORS_M {

@@ -28,18 +28,17 @@ fn sensor(kind: SensorKind, x_m: f64, noise_sd: f64) -> Sensor {
 
 #[test]
 fn only_the_sensors_change() {
-    let layout = Layout {
-        sensors: vec![
-            sensor(SensorKind::Deflection, 0.035, 5e-6),
-            sensor(SensorKind::Deflection, 0.26, 5e-6),
-            sensor(SensorKind::Strain, 0.1234567, 1e-6),
-            sensor(SensorKind::Reaction, 0.4, 0.005),
-        ],
-    };
+    let layout = Layout::new(vec![
+        sensor(SensorKind::Deflection, 0.035, 5e-6),
+        sensor(SensorKind::Deflection, 0.26, 5e-6),
+        sensor(SensorKind::Strain, 0.1234567, 1e-6),
+        sensor(SensorKind::Reaction, 0.4, 0.005),
+    ])
+    .unwrap();
     let written = with_layout(RIG, &layout).unwrap();
     insta::assert_snapshot!(written);
     let rig = Rig::from_toml(&written).unwrap();
-    let places: Vec<f64> = rig.setup.layout.sensors.iter().map(|sensor| sensor.position.x_m).collect();
+    let places: Vec<f64> = rig.setup.layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
     assert_eq!(places, [0.035, 0.26, 0.123457, 0.4]);
     let again = with_layout(&written, &layout).unwrap();
     assert_eq!(again, written);

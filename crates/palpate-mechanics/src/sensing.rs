@@ -1,0 +1,481 @@
+//! What is measured where, and how well: sensor kinds, the layout, and the faults of real channels.
+
+use std::fmt;
+
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::Position;
+use crate::surface::Extent;
+use crate::units::{Dimension, Unit};
+use palpate_numerics::OutOfRange;
+
+/// What a sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensorKind {
+    /// Displacement of the surface across itself, in metres, positive upward.
+    Deflection,
+    /// The deflection's derivative along the length, in radians.
+    Slope,
+    /// Strain along the length on the lower face, positive in tension.
+    Strain,
+    /// Force of a support on the surface, in newtons, positive upward.
+    Reaction,
+    /// A channel in units of its own, which no model explains.
+    Raw,
+}
+
+impl SensorKind {
+    /// Every kind, in the order that messages list them.
+    pub const ALL: [Self; 5] = [Self::Deflection, Self::Slope, Self::Strain, Self::Reaction, Self::Raw];
+
+    /// Its name in a rig.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Deflection => "deflection",
+            Self::Slope => "slope",
+            Self::Strain => "strain",
+            Self::Reaction => "reaction",
+            Self::Raw => "raw",
+        }
+    }
+
+    /// The kind that a rig calls `name`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// What its readings measure.
+    pub const fn dimension(self) -> Dimension {
+        match self {
+            Self::Deflection => Dimension::Length,
+            Self::Slope => Dimension::Angle,
+            Self::Strain => Dimension::Strain,
+            Self::Reaction => Dimension::Force,
+            Self::Raw => Dimension::None,
+        }
+    }
+
+    /// The unit in which recordings are written: mm, mrad, ue (microstrain), N, or none.
+    pub fn unit(self) -> Unit {
+        let symbol = match self {
+            Self::Deflection => "mm",
+            Self::Slope => "mrad",
+            Self::Strain => "ue",
+            Self::Reaction => "N",
+            Self::Raw => "",
+        };
+        Unit::from_symbol(symbol).unwrap_or(Unit::NONE)
+    }
+}
+
+impl fmt::Display for SensorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// One sensor: what it measures, where, and how well.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensor {
+    /// What it measures.
+    pub kind: SensorKind,
+    /// Where it sits. A raw channel's position means nothing.
+    pub position: Position,
+    /// Its name, unique in the layout: "deflection_1", or what the recording calls its channel.
+    pub name: String,
+    /// The faults of its channel.
+    pub channel: ChannelModel,
+}
+
+/// All the sensors under one surface; a reading has one value for each, in this order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked")]
+pub struct Layout {
+    sensors: Vec<Sensor>,
+}
+
+/// A layout as a file has it.
+#[derive(Deserialize)]
+struct Unchecked {
+    sensors: Vec<Sensor>,
+}
+
+/// A sensor of a layout with a number out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("sensor {number}: {fault}")]
+pub struct LayoutError {
+    /// Which sensor, from 1.
+    pub number: usize,
+    /// Which number, with its bound.
+    pub fault: OutOfRange,
+}
+
+impl TryFrom<Unchecked> for Layout {
+    type Error = LayoutError;
+
+    fn try_from(unchecked: Unchecked) -> Result<Self, LayoutError> {
+        Self::new(unchecked.sensors)
+    }
+}
+
+impl Layout {
+    /// A layout of these sensors.
+    ///
+    /// # Errors
+    /// [`LayoutError`], for the first sensor with a number out of its range.
+    ///
+    /// ```
+    /// use palpate_mechanics::sensing::{Layout, SensorKind};
+    ///
+    /// let mut sensors = Layout::even(SensorKind::Deflection, 8, 0.4).into_sensors();
+    /// sensors[2].channel.noise_sd = -5e-6;
+    /// let refused = Layout::new(sensors).unwrap_err();
+    /// assert_eq!(refused.to_string(), "sensor 3: the noise is -0.000005; it must be at least 0 and finite");
+    /// ```
+    pub fn new(sensors: Vec<Sensor>) -> Result<Self, LayoutError> {
+        for (number, sensor) in (1..).zip(&sensors) {
+            let Position { x_m, y_m } = sensor.position;
+            let place = [("the position along x in metres", x_m), ("the position along y in metres", y_m)];
+            let checked =
+                sensor.channel.check().and_then(|()| OutOfRange::check("finite", place, f64::is_finite));
+            checked.map_err(|fault| LayoutError { number, fault })?;
+        }
+        Ok(Self { sensors })
+    }
+
+    /// `count` sensors of one kind, evenly placed at x_i = i·l/(count + 1) for i = 1…count, with perfect channels.
+    ///
+    /// `length_m` is the surface's length l in metres. The names are "deflection_1", "deflection_2" and so on.
+    pub fn even(kind: SensorKind, count: usize, length_m: f64) -> Self {
+        let sensors = even_positions(count, length_m)
+            .enumerate()
+            .map(|(i, position)| Sensor {
+                kind,
+                position,
+                name: format!("{kind}_{}", i + 1),
+                channel: ChannelModel::default(),
+            })
+            .collect();
+        Self { sensors }
+    }
+
+    /// The sensors.
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.sensors
+    }
+
+    /// The sensors, to make another layout of.
+    pub fn into_sensors(self) -> Vec<Sensor> {
+        self.sensors
+    }
+
+    /// Changes the sensors; the layout stays as it was where they are then refused.
+    ///
+    /// # Errors
+    /// [`LayoutError`] as for [`Layout::new`].
+    pub fn edit(&mut self, edit: impl FnOnce(&mut Vec<Sensor>)) -> Result<(), LayoutError> {
+        let mut sensors = self.sensors.clone();
+        edit(&mut sensors);
+        *self = Self::new(sensors)?;
+        Ok(())
+    }
+
+    /// The same layout with every sensor where `position` says; one that this has no finite place for stays where it is.
+    #[must_use]
+    pub fn with_positions(mut self, mut position: impl FnMut(&Sensor) -> Position) -> Self {
+        for sensor in &mut self.sensors {
+            let at = position(sensor);
+            if at.x_m.is_finite() && at.y_m.is_finite() {
+                sensor.position = at;
+            }
+        }
+        self
+    }
+
+    /// Says whether the channel of a sensor, by its index from 0, is dead; nothing where there is no such sensor.
+    pub fn set_dead(&mut self, sensor: usize, dead: bool) {
+        if let Some(sensor) = self.sensors.get_mut(sensor) {
+            sensor.channel.dead = dead;
+        }
+    }
+
+    /// How many sensors there are.
+    pub fn len(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.sensors.is_empty()
+    }
+
+    /// Where the sensors of each kind sit, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
+    /// "reaction (10, 20), (10, 180) mm" on a plane.
+    pub fn places_in_words(&self, extent: Extent) -> String {
+        let of = |kind: SensorKind| {
+            let sensors = self.sensors.iter().filter(|sensor| sensor.kind == kind);
+            let positions: Vec<Position> = sensors.map(|sensor| sensor.position).collect();
+            (!positions.is_empty()).then(|| format!("{kind} {}", extent.places_in_words(&positions)))
+        };
+        SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
+    }
+
+    /// What each sensor measures.
+    pub fn kinds(&self) -> Vec<SensorKind> {
+        self.sensors.iter().map(|sensor| sensor.kind).collect()
+    }
+
+    /// Each sensor's name.
+    pub fn names(&self) -> Vec<String> {
+        self.sensors.iter().map(|sensor| sensor.name.clone()).collect()
+    }
+
+    /// [`ChannelModel::reading_sd`] of each sensor; `None` for those that are dead.
+    ///
+    /// # Errors
+    /// [`NoiseError`] for the first live sensor without noise, or when none is alive.
+    pub fn reading_sds(&self) -> Result<Vec<Option<f64>>, NoiseError> {
+        let sds = self.sensors.iter().enumerate().map(|(i, sensor)| {
+            let ChannelModel { noise_sd, resolution, dead, .. } = sensor.channel;
+            let sd = sensor.channel.reading_sd();
+            if dead {
+                Ok(None)
+            } else if sd > 0.0 && sd.is_finite() {
+                Ok(Some(sd))
+            } else {
+                Err(NoiseError::Singular { number: i + 1, kind: sensor.kind, noise_sd, resolution })
+            }
+        });
+        let sds = sds.collect::<Result<Vec<_>, _>>()?;
+        let lives = sds.iter().any(Option::is_some);
+        if lives { Ok(sds) } else { Err(NoiseError::AllDead { count: self.len() }) }
+    }
+}
+
+/// x_i = i·l/(count + 1) for i = 1…count.
+pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Position> {
+    (1..=count).map(move |i| Position::along(i as f64 * length_m / (count + 1) as f64))
+}
+
+/// Sensors of one kind with the same channel model, for a surface that is yet to be named.
+///
+/// ```
+/// use palpate_mechanics::sensing::SensorKind;
+/// use palpate_mechanics::units::{mm, um};
+///
+/// let gauges = SensorKind::Strain.at([mm(4.0), mm(20.0), mm(40.0)]);
+/// let deflections = SensorKind::Deflection.evenly(8).noise(um(5.0));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorGroup {
+    /// What they measure.
+    pub kind: SensorKind,
+    /// Where they sit.
+    pub placement: Placement,
+    /// The faults that each of them has.
+    pub channel: ChannelModel,
+}
+
+/// Where the sensors of a group sit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Placement {
+    /// So many along the length l, at i·l/(count + 1) for i = 1…count.
+    Evenly(usize),
+    /// At the inner crossings of a grid of columns × rows: x = i·length/(columns + 1), y = j·width/(rows + 1).
+    Grid(usize, usize),
+    /// At these positions.
+    At(Vec<Position>),
+}
+
+impl SensorKind {
+    /// `count` sensors of this kind along the length l of a surface, at i·l/(count + 1) for i = 1…count.
+    pub fn evenly(self, count: usize) -> SensorGroup {
+        self.placed(Placement::Evenly(count))
+    }
+
+    /// Sensors of this kind on a plane, at the inner crossings of a grid: `columns` along the length, `rows` across.
+    pub fn grid(self, columns: usize, rows: usize) -> SensorGroup {
+        self.placed(Placement::Grid(columns, rows))
+    }
+
+    /// Sensors of this kind at positions along the length, in metres from its left end.
+    pub fn at(self, x_m: impl IntoIterator<Item = f64>) -> SensorGroup {
+        self.placed(Placement::At(x_m.into_iter().map(Position::along).collect()))
+    }
+
+    /// Sensors of this kind at positions on a plane.
+    pub fn at_positions(self, positions: impl IntoIterator<Item = Position>) -> SensorGroup {
+        self.placed(Placement::At(positions.into_iter().collect()))
+    }
+
+    fn placed(self, placement: Placement) -> SensorGroup {
+        SensorGroup { kind: self, placement, channel: ChannelModel::default() }
+    }
+}
+
+impl SensorGroup {
+    /// The same with Gaussian noise of this standard deviation, in the SI unit of the kind; at least 0.
+    #[must_use]
+    pub fn noise(mut self, sd: f64) -> Self {
+        self.channel.noise_sd = sd;
+        self
+    }
+
+    /// The same with this channel model: noise, resolution, gain and offset errors, range.
+    #[must_use]
+    pub fn channel(mut self, channel: ChannelModel) -> Self {
+        self.channel = channel;
+        self
+    }
+}
+
+/// The faults of one channel, in the SI unit of its sensor (or raw). The default channel is perfect.
+///
+/// reading = saturate(quantise((1 + g)·value + o + noise)), and 0 always when the channel is dead.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ChannelModel {
+    /// Standard deviation of the Gaussian noise of a reading; at least 0.
+    pub noise_sd: f64,
+    /// Quantisation step; 0 where there is none.
+    pub resolution: f64,
+    /// Gain errors g lie uniformly within ± this; at least 0 and below 1.
+    pub gain_error: f64,
+    /// Offset errors o lie uniformly within ± this; at least 0.
+    pub offset_error: f64,
+    /// The sensor sits within ± this of its place, uniformly, along each side of the surface, in metres; at least 0.
+    pub position_error_m: f64,
+    /// Lowest and highest value that it can report, where it saturates.
+    pub range: Option<(f64, f64)>,
+    /// Whether it reports 0 whatever happens.
+    pub dead: bool,
+}
+
+/// The gains and offsets that one simulated bench happens to have, a value per sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelErrors {
+    /// g of each sensor.
+    pub gains: Vec<f64>,
+    /// o of each sensor, in the SI unit of the sensor (or raw).
+    pub offsets: Vec<f64>,
+}
+
+impl ChannelErrors {
+    /// Draws a gain and an offset for each sensor of `layout`, once per simulated recording.
+    pub fn draw(layout: &Layout, rng: &mut impl Rng) -> Self {
+        let mut errors = Self::none(layout);
+        for (i, sensor) in layout.sensors.iter().enumerate() {
+            errors.gains[i] = sensor.channel.gain_error * rng.random_range(-1.0..=1.0);
+            errors.offsets[i] = sensor.channel.offset_error * rng.random_range(-1.0..=1.0);
+        }
+        errors
+    }
+
+    /// No gain and no offset errors.
+    pub fn none(layout: &Layout) -> Self {
+        Self { gains: vec![0.0; layout.len()], offsets: vec![0.0; layout.len()] }
+    }
+}
+
+/// What the sensors of `layout` report when the true values are `clean_reading`: gains and offsets `errors`, fresh noise
+/// from `rng`, quantisation, saturation.
+///
+/// One normal number is drawn per sensor whatever its faults, so a fault of one channel leaves the noise of the others
+/// as it was. Values without a sensor are left out.
+pub fn measure(
+    layout: &Layout,
+    clean_reading: &[f64],
+    errors: &ChannelErrors,
+    rng: &mut impl Rng,
+) -> Vec<f64> {
+    let drawn = errors.gains.iter().zip(&errors.offsets);
+    let channels = layout.sensors.iter().map(|sensor| &sensor.channel);
+    channels
+        .zip(clean_reading)
+        .zip(drawn)
+        .map(|((channel, value), (gain, offset))| {
+            let noise: f64 = rng.sample(StandardNormal);
+            channel.report((1.0 + gain) * value + offset + channel.noise_sd * noise)
+        })
+        .collect()
+}
+
+impl ChannelModel {
+    /// Checks that every number is in its range.
+    ///
+    /// # Errors
+    /// [`OutOfRange`], for the first that is not.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        OutOfRange::check_not_negative([
+            ("the noise", self.noise_sd),
+            ("the resolution", self.resolution),
+            ("the offset error", self.offset_error),
+            ("the position error in metres", self.position_error_m),
+        ])?;
+        let gain = [("the gain error", self.gain_error)];
+        OutOfRange::check("at least 0 and below 1", gain, |error| (0.0..1.0).contains(&error))?;
+        let (low, high) = self.range.unwrap_or((0.0, 1.0));
+        OutOfRange::check("finite", [("the upper end of the range", high)], f64::is_finite)?;
+        let lower = [("the lower end of the range", low)];
+        OutOfRange::check("finite and below the upper one", lower, |low| low.is_finite() && low < high)
+    }
+
+    /// Standard deviation of a reading, √(σ² + q²/12) with σ the noise and q the resolution, in the sensor's SI unit.
+    pub fn reading_sd(&self) -> f64 {
+        self.noise_sd.hypot(self.resolution / 12f64.sqrt())
+    }
+
+    /// Quantises and saturates the analogue `value`; 0 when dead.
+    fn report(&self, value: f64) -> f64 {
+        if self.dead {
+            return 0.0;
+        }
+        let quantised =
+            if self.resolution > 0.0 { (value / self.resolution).round() * self.resolution } else { value };
+        match self.range {
+            Some((low, high)) => quantised.max(low).min(high),
+            None => quantised,
+        }
+    }
+}
+
+/// A layout whose noise does not say how closely its readings are to be followed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoiseError {
+    /// A live sensor has neither noise nor resolution: the noise is singular.
+    #[error(
+        "sensor {number} ({kind}) has noise {noise_sd} and resolution {resolution}; one of them must be greater than 0, or \
+         nothing limits what it tells"
+    )]
+    Singular {
+        /// Which sensor, from 1.
+        number: usize,
+        /// What it measures.
+        kind: SensorKind,
+        /// Standard deviation of its noise, in its SI unit.
+        noise_sd: f64,
+        /// Its quantisation step, in its SI unit.
+        resolution: f64,
+    },
+    /// Every channel is dead.
+    #[error("all {count} sensors are dead; at least 1 must be alive")]
+    AllDead {
+        /// How many sensors there are.
+        count: usize,
+    },
+}
+
+impl NoiseError {
+    /// What to do about it, in a rig.
+    pub const fn help(&self) -> &'static str {
+        match self {
+            Self::Singular { .. } => "add `noise = \"5 um\"` to [sensors], in the unit of the readings",
+            Self::AllDead { .. } => "take sensors out of `dead` in [sensors]",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,575 @@
+//! Units of measure: "400 mm" becomes 0.4 m, and back for people.
+//!
+//! Everything inside palpate is SI; a number meets its unit only here, in files and in messages.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::de::{Deserializer, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+
+/// Metres from millimetres.
+pub const fn mm(length: f64) -> f64 {
+    length * 1e-3
+}
+
+/// Metres from micrometres.
+pub const fn um(length: f64) -> f64 {
+    length * 1e-6
+}
+
+/// Newtons; says what the number is.
+pub const fn newtons(force: f64) -> f64 {
+    force
+}
+
+/// Pascals from gigapascals.
+pub const fn gpa(modulus: f64) -> f64 {
+    modulus * 1e9
+}
+
+/// Pascals from megapascals.
+pub const fn mpa(modulus: f64) -> f64 {
+    modulus * 1e6
+}
+
+/// Strain from microstrain.
+pub const fn microstrain(strain: f64) -> f64 {
+    strain * 1e-6
+}
+
+/// A finite value and what it measures.
+///
+/// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity {
+    /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
+    pub value: f64,
+    /// What it measures.
+    pub dimension: Dimension,
+}
+
+/// Why a text is not the quantity that was wanted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnitError {
+    /// There is no text.
+    #[error("empty; write a number and a unit, as in `400 mm`")]
+    Empty,
+    /// The text does not start with a decimal number.
+    #[error("`{text}` does not start with a number; write a number and a unit, as in `400 mm`")]
+    NotANumber {
+        /// The text.
+        text: String,
+    },
+    /// The number is NaN or infinite, or becomes infinite in SI units.
+    #[error("`{text}` is not finite; the largest number is 1.8e308")]
+    NotFinite {
+        /// The text.
+        text: String,
+    },
+    /// No unit has this symbol, whatever it was to measure.
+    #[error("unknown unit `{unit}`; known are {}", Symbols(None))]
+    UnknownUnit {
+        /// What stands where the unit should.
+        unit: String,
+    },
+    /// The unit is unknown, or measures something else than was wanted.
+    #[error("{} `{unit}`; {} is one of {}", complaint(unit), wanted.noun(), Symbols(Some(*wanted)))]
+    WrongUnit {
+        /// What stands where the unit should.
+        unit: String,
+        /// What was wanted.
+        wanted: Dimension,
+    },
+    /// A plain number stands where a unit is needed.
+    #[error("`{text}` has no unit; {} is one of {}", wanted.noun(), Symbols(Some(*wanted)))]
+    MissingUnit {
+        /// The text.
+        text: String,
+        /// What was wanted.
+        wanted: Dimension,
+    },
+    /// A unit stands where a plain number is wanted.
+    #[error("`{text}` has a unit where a plain number is wanted")]
+    UnwantedUnit {
+        /// The text.
+        text: String,
+    },
+}
+
+fn complaint(unit: &str) -> &'static str {
+    if Unit::from_symbol(unit).is_some() { "wrong unit" } else { "unknown unit" }
+}
+
+/// The symbols of one dimension, or of all, for messages.
+struct Symbols(Option<Dimension>);
+
+impl fmt::Display for Symbols {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
+        use Dimension::{Frequency, RotationalStiffness, Speed, Stiffness, Time};
+        let all = [
+            Length,
+            Force,
+            Modulus,
+            Angle,
+            Strain,
+            Ratio,
+            Density,
+            Stiffness,
+            RotationalStiffness,
+            Speed,
+            Time,
+            Frequency,
+        ];
+        let units =
+            all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
+        for (i, unit) in units.enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{unit}")?;
+        }
+        Ok(())
+    }
+}
+
+impl Quantity {
+    /// Reads `text` as a quantity of the dimension `wanted` and returns its SI value.
+    ///
+    /// A ratio may be a plain number (0.05) or a percentage ("5 %"); every other dimension needs its unit.
+    ///
+    /// # Errors
+    /// [`UnitError`], with the text or unit and the units that would do.
+    pub fn parse_as(text: &str, wanted: Dimension) -> Result<f64, UnitError> {
+        match text.parse::<Self>() {
+            Ok(quantity) if quantity.dimension == wanted => Ok(quantity.value),
+            Ok(Self { value, dimension: Dimension::None }) if wanted == Dimension::Ratio => Ok(value),
+            Ok(Self { dimension: Dimension::None, .. }) => {
+                Err(UnitError::MissingUnit { text: text.trim().to_owned(), wanted })
+            }
+            Ok(_) if wanted == Dimension::None => {
+                Err(UnitError::UnwantedUnit { text: text.trim().to_owned() })
+            }
+            Ok(_) => Err(UnitError::WrongUnit { unit: split(text.trim()).1.to_owned(), wanted }),
+            Err(UnitError::UnknownUnit { unit }) if wanted != Dimension::None => {
+                Err(UnitError::WrongUnit { unit, wanted })
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl FromStr for Quantity {
+    type Err = UnitError;
+
+    fn from_str(text: &str) -> Result<Self, UnitError> {
+        let text = text.trim();
+        if text.is_empty() {
+            return Err(UnitError::Empty);
+        }
+        let (number, symbol) = split(text);
+        if number.is_empty() {
+            let spelled = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+            let infinite = spelled.starts_with("inf") || spelled.starts_with("nan");
+            let text = text.to_owned();
+            return Err(if infinite {
+                UnitError::NotFinite { text }
+            } else {
+                UnitError::NotANumber { text }
+            });
+        }
+        let unit =
+            Unit::from_symbol(symbol).ok_or_else(|| UnitError::UnknownUnit { unit: symbol.to_owned() })?;
+        match unit.parse_si(number) {
+            Some(value) if value.is_finite() => Ok(Self { value, dimension: unit.dimension() }),
+            Some(_) => Err(UnitError::NotFinite { text: text.to_owned() }),
+            None => Err(UnitError::NotANumber { text: text.to_owned() }),
+        }
+    }
+}
+
+/// The longest decimal number at the head of `text`, and what follows it without the space between.
+fn split(text: &str) -> (&str, &str) {
+    let bytes = text.as_bytes();
+    let digits_from = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
+    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let whole = digits_from(sign);
+    let mut end = sign + whole;
+    let mut fraction = 0;
+    if bytes.get(end) == Some(&b'.') {
+        fraction = digits_from(end + 1);
+        end += 1 + fraction;
+    }
+    if whole + fraction == 0 {
+        return ("", text);
+    }
+    if let Some(b'e' | b'E') = bytes.get(end) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = bytes.get(end + 1 + sign).map_or(0, |_| digits_from(end + 1 + sign));
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+        }
+    }
+    let (number, rest) = text.split_at(end);
+    (number, rest.trim_start())
+}
+
+/// A count with separators of thousands: "26,850".
+pub fn format_count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A length in metres as people read it: millimetres with at most four decimals, "44.4444 mm".
+pub fn format_length_mm(length_m: f64) -> String {
+    format!("{} mm", rounded(length_m * 1e3, 4))
+}
+
+/// Decimal notation with at most `decimals` decimals and no trailing zeros.
+fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+impl fmt::Display for Quantity {
+    /// Six significant digits in the largest unit that keeps the number at 1 or above.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = readable_unit(*self);
+        let rounded: f64 = format!("{:.5e}", self.value).parse().unwrap_or(self.value);
+        let number = match unit {
+            Some(unit) => unit.format_si(rounded),
+            None => Unit::NONE.format_si(rounded),
+        };
+        match unit {
+            Some(unit) => write!(f, "{number} {unit}"),
+            None => f.write_str(&number),
+        }
+    }
+}
+
+/// The largest unit that keeps the number at 1 or above. Some units are read but never chosen, and lengths below 10 m
+/// stay in millimetres.
+fn readable_unit(quantity: Quantity) -> Option<Unit> {
+    let magnitude = quantity.value.abs() * (1.0 + 1e-9);
+    if magnitude == 0.0 {
+        return quantity.dimension.units().find(|unit| unit.factor() == 1.0);
+    }
+    let hidden: &[&str] = if magnitude < 10.0 {
+        &["m", "cm", "deg", "um/m", "mm/m", "g/cm3"]
+    } else {
+        &["cm", "deg", "um/m", "mm/m", "g/cm3"]
+    };
+    let mut best = None;
+    for unit in quantity.dimension.units().filter(|unit| !hidden.contains(&unit.symbol())) {
+        if best.is_none() || magnitude >= unit.factor() {
+            best = Some(unit);
+        }
+    }
+    best
+}
+
+impl<'de> Deserialize<'de> for Quantity {
+    /// From a text with a unit, or from a plain number.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct TextOrNumber;
+
+        impl Visitor<'_> for TextOrNumber {
+            type Value = Quantity;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a quantity such as \"400 mm\", or a number")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Quantity, E> {
+                text.parse().map_err(E::custom)
+            }
+
+            fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Quantity, E> {
+                if value.is_finite() {
+                    Ok(Quantity { value, dimension: Dimension::None })
+                } else {
+                    Err(E::custom(UnitError::NotFinite { text: value.to_string() }))
+                }
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Quantity, E> {
+                self.visit_f64(value as f64)
+            }
+
+            fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Quantity, E> {
+                self.visit_f64(value as f64)
+            }
+        }
+
+        deserializer.deserialize_any(TextOrNumber)
+    }
+}
+
+/// What a quantity measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dimension {
+    /// A plain number.
+    None,
+    /// Length, in metres.
+    Length,
+    /// Force, in newtons.
+    Force,
+    /// Elastic modulus or pressure, in pascals.
+    Modulus,
+    /// Angle, in radians.
+    Angle,
+    /// Strain, metres per metre.
+    Strain,
+    /// A share, as a number where 1 is the whole.
+    Ratio,
+    /// Mass per volume, in kg/m³.
+    Density,
+    /// Force per length that a spring gives way by, in N/m.
+    Stiffness,
+    /// Couple per angle that a spring turns by, in N·m/rad.
+    RotationalStiffness,
+    /// Length per time, in m/s.
+    Speed,
+    /// Time, in seconds.
+    Time,
+    /// How often a second, in hertz.
+    Frequency,
+}
+
+impl Dimension {
+    /// The word for it in messages, with its article.
+    pub const fn noun(self) -> &'static str {
+        match self {
+            Self::None => "a plain number",
+            Self::Length => "a length",
+            Self::Force => "a force",
+            Self::Modulus => "a modulus",
+            Self::Angle => "an angle",
+            Self::Strain => "a strain",
+            Self::Ratio => "a ratio",
+            Self::Density => "a density",
+            Self::Stiffness => "a stiffness",
+            Self::RotationalStiffness => "a rotational stiffness",
+            Self::Speed => "a speed",
+            Self::Time => "a time",
+            Self::Frequency => "a frequency",
+        }
+    }
+
+    /// The units it can be written in, ASCII spellings only, smallest first.
+    pub fn units(self) -> impl Iterator<Item = Unit> {
+        (0..UNITS.len()).map(Unit).filter(move |unit| {
+            let symbol = unit.symbol();
+            unit.dimension() == self && symbol.is_ascii() && !symbol.is_empty()
+        })
+    }
+}
+
+/// How many SI units one unit is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Scale {
+    /// 10 to this power; scaling moves the decimal point, so nothing is lost.
+    Power(i32),
+    /// Any other factor.
+    Factor(f64),
+}
+
+/// Symbol, dimension and scale. Where several spellings mean one unit, palpate writes the first.
+const UNITS: &[(&str, Dimension, Scale)] = &[
+    ("", Dimension::None, Scale::Power(0)),
+    ("nm", Dimension::Length, Scale::Power(-9)),
+    ("um", Dimension::Length, Scale::Power(-6)),
+    ("µm", Dimension::Length, Scale::Power(-6)),
+    ("μm", Dimension::Length, Scale::Power(-6)),
+    ("mm", Dimension::Length, Scale::Power(-3)),
+    ("cm", Dimension::Length, Scale::Power(-2)),
+    ("m", Dimension::Length, Scale::Power(0)),
+    ("uN", Dimension::Force, Scale::Power(-6)),
+    ("µN", Dimension::Force, Scale::Power(-6)),
+    ("μN", Dimension::Force, Scale::Power(-6)),
+    ("mN", Dimension::Force, Scale::Power(-3)),
+    ("N", Dimension::Force, Scale::Power(0)),
+    ("kN", Dimension::Force, Scale::Power(3)),
+    ("Pa", Dimension::Modulus, Scale::Power(0)),
+    ("kPa", Dimension::Modulus, Scale::Power(3)),
+    ("MPa", Dimension::Modulus, Scale::Power(6)),
+    ("GPa", Dimension::Modulus, Scale::Power(9)),
+    ("urad", Dimension::Angle, Scale::Power(-6)),
+    ("µrad", Dimension::Angle, Scale::Power(-6)),
+    ("μrad", Dimension::Angle, Scale::Power(-6)),
+    ("mrad", Dimension::Angle, Scale::Power(-3)),
+    ("deg", Dimension::Angle, Scale::Factor(std::f64::consts::PI / 180.0)),
+    ("°", Dimension::Angle, Scale::Factor(std::f64::consts::PI / 180.0)),
+    ("rad", Dimension::Angle, Scale::Power(0)),
+    ("ue", Dimension::Strain, Scale::Power(-6)),
+    ("µε", Dimension::Strain, Scale::Power(-6)),
+    ("με", Dimension::Strain, Scale::Power(-6)),
+    ("um/m", Dimension::Strain, Scale::Power(-6)),
+    ("µm/m", Dimension::Strain, Scale::Power(-6)),
+    ("μm/m", Dimension::Strain, Scale::Power(-6)),
+    ("mm/m", Dimension::Strain, Scale::Power(-3)),
+    ("m/m", Dimension::Strain, Scale::Power(0)),
+    ("%", Dimension::Ratio, Scale::Power(-2)),
+    ("g/cm3", Dimension::Density, Scale::Power(3)),
+    ("kg/m3", Dimension::Density, Scale::Power(0)),
+    ("kg/m³", Dimension::Density, Scale::Power(0)),
+    ("N/m", Dimension::Stiffness, Scale::Power(0)),
+    ("kN/m", Dimension::Stiffness, Scale::Power(3)),
+    ("N/mm", Dimension::Stiffness, Scale::Power(3)),
+    ("Nm/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("N·m/rad", Dimension::RotationalStiffness, Scale::Power(0)),
+    ("mm/s", Dimension::Speed, Scale::Power(-3)),
+    ("m/s", Dimension::Speed, Scale::Power(0)),
+    ("us", Dimension::Time, Scale::Power(-6)),
+    ("µs", Dimension::Time, Scale::Power(-6)),
+    ("μs", Dimension::Time, Scale::Power(-6)),
+    ("ms", Dimension::Time, Scale::Power(-3)),
+    ("s", Dimension::Time, Scale::Power(0)),
+    ("Hz", Dimension::Frequency, Scale::Power(0)),
+    ("kHz", Dimension::Frequency, Scale::Power(3)),
+];
+
+/// A unit of measure.
+///
+/// Serialised as its symbol.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Unit(usize);
+
+impl Unit {
+    /// The unit of a plain number.
+    pub const NONE: Self = Self(0);
+
+    /// The unit with this symbol ("mm", "µε"); the empty symbol is that of a plain number.
+    pub fn from_symbol(symbol: &str) -> Option<Self> {
+        UNITS.iter().position(|(known, ..)| *known == symbol).map(Self)
+    }
+
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        self.entry().0
+    }
+
+    /// What it measures.
+    pub fn dimension(self) -> Dimension {
+        self.entry().1
+    }
+
+    /// How many SI units one of it is.
+    pub fn factor(self) -> f64 {
+        match self.entry().2 {
+            Scale::Power(exponent) => 10f64.powi(exponent),
+            Scale::Factor(factor) => factor,
+        }
+    }
+
+    /// Reads a decimal number in this unit as SI: "1.2" in mm is exactly the number that 0.0012 is.
+    ///
+    /// `None` unless `number` is a decimal number; infinities and NaN, as the text has them or by overflow, are
+    /// passed on.
+    pub fn parse_si(self, number: &str) -> Option<f64> {
+        match self.entry().2 {
+            Scale::Power(0) => number.parse().ok(),
+            Scale::Power(power) => parse_shifted(number, power),
+            Scale::Factor(factor) => number.parse::<f64>().ok().map(|value| value * factor),
+        }
+    }
+
+    /// Writes an SI value as the shortest decimal number in this unit that `parse_si` reads back: exactly, where
+    /// the unit is a power of ten of the SI unit.
+    pub fn format_si(self, value_si: f64) -> String {
+        match self.entry().2 {
+            Scale::Power(0) => format_shifted(value_si, 0),
+            Scale::Power(power) => format_shifted(value_si, -power),
+            Scale::Factor(factor) => format_shifted(value_si / factor, 0),
+        }
+    }
+
+    fn entry(self) -> &'static (&'static str, Dimension, Scale) {
+        &UNITS[self.0]
+    }
+}
+
+impl fmt::Debug for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Unit({:?})", self.symbol())
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.symbol())
+    }
+}
+
+impl Serialize for Unit {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.symbol())
+    }
+}
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let symbol = String::deserialize(deserializer)?;
+        Self::from_symbol(&symbol)
+            .ok_or_else(|| serde::de::Error::custom(format_args!("unknown unit `{symbol}`")))
+    }
+}
+
+/// `number` · 10^`power`, rounded once.
+fn parse_shifted(number: &str, power: i32) -> Option<f64> {
+    let (mantissa, exponent) = match number.find(['e', 'E']) {
+        Some(at) => (number.get(..at)?, number.get(at + 1..)?.parse::<i32>().ok()?),
+        None => (number, 0),
+    };
+    let value = mantissa.parse::<f64>().ok()?;
+    if !value.is_finite() {
+        return Some(value);
+    }
+    format!("{mantissa}e{}", exponent.saturating_add(power)).parse().ok()
+}
+
+/// The shortest digits of `value`, the decimal point moved `power` places to the right.
+fn format_shifted(value: f64, power: i32) -> String {
+    let scientific = format!("{value:e}");
+    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific };
+    let Ok(exponent) = exponent.parse::<i32>() else { return scientific };
+    let (sign, mantissa) = mantissa.strip_prefix('-').map_or(("", mantissa), |rest| ("-", rest));
+    let digits: String = mantissa.chars().filter(|c| *c != '.').collect();
+    if digits == "0" {
+        return format!("{sign}0");
+    }
+    place_point(sign, &digits, exponent + power)
+}
+
+/// Plain decimal notation where that stays short, scientific elsewhere; `exponent` is that of the first digit.
+fn place_point(sign: &str, digits: &str, exponent: i32) -> String {
+    let count = digits.len();
+    match usize::try_from(exponent) {
+        Ok(exponent) if exponent <= 15 && exponent + 1 >= count => {
+            format!("{sign}{digits}{}", "0".repeat(exponent + 1 - count))
+        }
+        Ok(exponent) if exponent <= 15 => {
+            let (whole, fraction) = digits.split_at(exponent + 1);
+            format!("{sign}{whole}.{fraction}")
+        }
+        Err(_) if exponent >= -7 => {
+            let zeros = "0".repeat(exponent.unsigned_abs() as usize - 1);
+            format!("{sign}0.{zeros}{digits}")
+        }
+        _ => {
+            let (first, rest) = digits.split_at(1);
+            let point = if rest.is_empty() { "" } else { "." };
+            format!("{sign}{first}{point}{rest}e{exponent}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,51 @@
+//! Numbers checked against their bounds.
+
+/// A number that is not in its range.
+///
+/// ```
+/// use palpate_numerics::OutOfRange;
+///
+/// let refused = OutOfRange::check_positive([("the length", 0.4), ("the width", -0.04)]).unwrap_err();
+/// assert_eq!(refused.to_string(), "the width is -0.04; it must be greater than 0 and finite");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{what} is {value}; it must be {bound}")]
+pub struct OutOfRange {
+    /// Which number.
+    pub what: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its bound.
+    pub bound: &'static str,
+}
+
+impl OutOfRange {
+    /// Checks that numbers, each with its name, are greater than 0 and finite.
+    ///
+    /// # Errors
+    /// The first that is not.
+    pub fn check_positive<const N: usize>(numbers: [(&'static str, f64); N]) -> Result<(), Self> {
+        Self::check("greater than 0 and finite", numbers, |value| value > 0.0 && value.is_finite())
+    }
+
+    /// Checks that numbers, each with its name, are at least 0 and finite.
+    ///
+    /// # Errors
+    /// The first that is not.
+    pub fn check_not_negative<const N: usize>(numbers: [(&'static str, f64); N]) -> Result<(), Self> {
+        Self::check("at least 0 and finite", numbers, |value| value >= 0.0 && value.is_finite())
+    }
+
+    /// Checks that numbers, each with its name, are `good`, as `bound` says.
+    ///
+    /// # Errors
+    /// The first that is not.
+    pub fn check(
+        bound: &'static str,
+        numbers: impl IntoIterator<Item = (&'static str, f64)>,
+        good: impl Fn(f64) -> bool,
+    ) -> Result<(), Self> {
+        let wrong = numbers.into_iter().find(|(_, value)| !good(*value));
+        wrong.map_or(Ok(()), |(what, value)| Err(Self { what, value, bound }))
+    }
+}
