@@ -1,7 +1,7 @@
 //! The limit over a whole surface.
 
-use super::grid::Grid;
-use super::{Bound, CramerRaoBound, Force, LimitError};
+use super::zone::Grid;
+use super::{Bound, CramerRaoBound, Force, LimitError, check_force};
 use crate::contact::{Contact, Position};
 use crate::surface::Extent;
 use palpate_numerics::{mean, percentile};
@@ -117,9 +117,4 @@ impl LimitCurve {
             without: self.points.len() - bounds.len(),
         })
     }
-}
-
-/// Refuses a force for which there is no limit.
-pub(super) fn check_force(force_n: f64) -> Result<(), LimitError> {
-    if force_n > 0.0 && force_n.is_finite() { Ok(()) } else { Err(LimitError::Force { force_n }) }
 }

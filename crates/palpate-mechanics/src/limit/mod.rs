@@ -12,24 +12,20 @@
 
 mod bound;
 mod curve;
-mod error;
-mod grid;
-mod information;
-mod twins;
 mod warning;
 mod zone;
 
 pub use bound::Bound;
 pub use curve::{LimitCurve, LimitPoint, LimitSummary};
-pub use error::LimitError;
 pub use warning::{AMBIGUOUS_DISTANCE, BLIND_SHARE, FAINT_SIGNAL, LimitWarning, limit_warnings};
 pub use zone::Zone;
 
 use std::sync::Arc;
 
 use crate::contact::Contact;
-use crate::sensing::{Layout, Sensor, SensorKind};
+use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
 use crate::surface::{ResponseFunction, ResponseGradient, Surface};
+use bound::{inverse_information, norm};
 
 /// What is known of the contact force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -99,16 +95,16 @@ impl<'a> CramerRaoBound<'a> {
         let Columns { force: by_force, along, across } = self.derivatives(contact);
         match (force, across) {
             (Force::Known, None) => {
-                let [[xx]] = information::inverse_information([along])?;
+                let [[xx]] = inverse_information([along])?;
                 Some(Bound::new([[xx, 0.0], [0.0, 0.0]], None))
             }
             (Force::Known, Some(across)) => Bound::of_columns([along, across]),
             (Force::Unknown, None) => {
-                let [[ff, _], [_, xx]] = information::inverse_information([by_force, along])?;
+                let [[ff, _], [_, xx]] = inverse_information([by_force, along])?;
                 Some(Bound::new([[xx, 0.0], [0.0, 0.0]], Some(ff)))
             }
             (Force::Unknown, Some(across)) => {
-                let covariance = information::inverse_information([by_force, along, across])?;
+                let covariance = inverse_information([by_force, along, across])?;
                 let [[ff, ..], [_, xx, xy], [_, _, yy]] = covariance;
                 Some(Bound::new([[xx, xy], [xy, yy]], Some(ff)))
             }
@@ -122,7 +118,7 @@ impl<'a> CramerRaoBound<'a> {
 
     /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
     pub fn signal_to_noise(&self, contact: Contact) -> f64 {
-        information::norm(&self.whitened_reading(contact))
+        norm(&self.whitened_reading(contact))
     }
 
     /// What a sensor reads without noise, held at the ends of its range.
@@ -155,6 +151,39 @@ struct Columns {
     force: Vec<f64>,
     along: Vec<f64>,
     across: Option<Vec<f64>>,
+}
+
+/// Why a bench has no limit.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LimitError {
+    /// The surface has no model.
+    #[error("a measured surface has no model, and without influence functions there is no limit to compute")]
+    NoModel,
+    /// The noise is singular, and the limit would be 0; or no sensor is alive.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
+    /// The contact force is not a positive, finite number.
+    #[error("the contact force is {force_n} N; it must be greater than 0 and finite")]
+    Force {
+        /// The force, in newtons.
+        force_n: f64,
+    },
+    /// The force is nowhere given.
+    #[error("the limit depends on the contact force, and none is given")]
+    NoForce,
+    /// Too few or too many positions.
+    #[error("the limit is asked for at {count} positions; there must be at least 1 and at most {most}")]
+    Positions {
+        /// How many there would be.
+        count: f64,
+        /// The most.
+        most: usize,
+    },
+}
+
+/// Refuses a force for which there is no limit.
+fn check_force(force_n: f64) -> Result<(), LimitError> {
+    if force_n > 0.0 && force_n.is_finite() { Ok(()) } else { Err(LimitError::Force { force_n }) }
 }
 
 #[cfg(test)]

@@ -4,35 +4,29 @@ mod beam;
 mod digit;
 mod elastica;
 mod extent;
-mod insensitive_sensor;
 mod load;
 pub mod modal;
 mod motion;
 pub mod plate;
-mod response;
 mod supported_beam;
-mod surface_spec;
 
 pub use beam::{Beam, BeamError};
 pub use digit::{Digit, DigitError};
 pub use elastica::{Elastica, ForceDirection};
 pub use extent::Extent;
-pub use insensitive_sensor::InsensitiveSensor;
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
 pub use plate::{Plate, PlateError};
-pub use response::{Proportional, ResponseFunction, ResponseGradient};
 pub use supported_beam::{
     BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
     SupportedBeamSpec,
 };
-pub use surface_spec::SurfaceSpec;
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Position;
+use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 
 /// An elastic surface with a model.
@@ -101,6 +95,146 @@ pub trait InfluenceFunction: Send + Sync {
     /// How fast it changes as the contact moves along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
+}
+
+/// What one sensor reads, as a function of where and how hard the surface is touched.
+pub trait ResponseFunction: Send + Sync {
+    /// The reading at `contact`, in the sensor's SI unit; 0 for a raw channel. Off the surface the value has no meaning.
+    fn at(&self, contact: Contact) -> f64;
+
+    /// How the reading changes with the contact. Where it has a kink, some value between those of its two sides.
+    fn gradient(&self, contact: Contact) -> ResponseGradient;
+}
+
+/// The derivatives of a reading by its contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResponseGradient {
+    /// By the contact's position along x and along y, in the reading's unit per metre.
+    pub position: [f64; 2],
+    /// By its force, in the reading's unit per newton.
+    pub force: f64,
+}
+
+/// Readings that are proportional to the force: force × influence.
+#[derive(Clone)]
+pub struct Proportional<'a>(pub Arc<dyn InfluenceFunction + 'a>);
+
+impl ResponseFunction for Proportional<'_> {
+    fn at(&self, contact: Contact) -> f64 {
+        contact.force_n * self.0.at(contact.position)
+    }
+
+    fn gradient(&self, contact: Contact) -> ResponseGradient {
+        let position = self.0.gradient(contact.position).map(|slope| contact.force_n * slope);
+        ResponseGradient { position, force: self.0.at(contact.position) }
+    }
+}
+
+/// Why a sensor reads nothing, wherever the surface is touched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InsensitiveSensor {
+    /// A support of a beam holds what it measures.
+    #[error("{} there", held(*kind))]
+    Held {
+        /// What the sensor measures.
+        kind: SensorKind,
+    },
+    /// The edge of a plate cannot move so.
+    #[error("the {edge} edge, which is {held}, has no {kind} wherever the plate is touched")]
+    AtEdge {
+        /// Which edge.
+        edge: &'static str,
+        /// How it is held.
+        held: &'static str,
+        /// What the sensor measures.
+        kind: SensorKind,
+    },
+    /// The deflection of a plate over a support that does not give.
+    #[error("simple support {number} keeps the plate from deflecting there")]
+    AtSupport {
+        /// Which support, from 1.
+        number: usize,
+    },
+}
+
+/// What keeps a sensor of this kind still.
+fn held(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Deflection => "a support holds the surface",
+        SensorKind::Slope => "a support holds the slope",
+        SensorKind::Strain => "nothing bends the surface",
+        SensorKind::Reaction | SensorKind::Raw => "nothing acts",
+    }
+}
+
+/// The surface that is touched.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceSpec {
+    /// A simply supported beam.
+    Beam(Beam),
+    /// A beam on any supports, with any sections.
+    SupportedBeam(Box<SupportedBeam>),
+    /// A rectangular plate.
+    Plate(Plate),
+    /// A flexible cantilever finger.
+    Digit(Digit),
+    /// A surface without a model, known by recordings only.
+    Measured(Extent),
+}
+
+impl From<Beam> for SurfaceSpec {
+    fn from(beam: Beam) -> Self {
+        Self::Beam(beam)
+    }
+}
+
+impl From<SupportedBeam> for SurfaceSpec {
+    fn from(beam: SupportedBeam) -> Self {
+        Self::SupportedBeam(Box::new(beam))
+    }
+}
+
+impl From<Plate> for SurfaceSpec {
+    fn from(plate: Plate) -> Self {
+        Self::Plate(plate)
+    }
+}
+
+impl From<Digit> for SurfaceSpec {
+    fn from(digit: Digit) -> Self {
+        Self::Digit(digit)
+    }
+}
+
+impl From<Extent> for SurfaceSpec {
+    fn from(extent: Extent) -> Self {
+        Self::Measured(extent)
+    }
+}
+
+impl SurfaceSpec {
+    /// The area that can be touched.
+    pub fn extent(&self) -> Extent {
+        match self {
+            Self::Beam(beam) => beam.extent(),
+            Self::SupportedBeam(beam) => beam.extent(),
+            Self::Plate(plate) => plate.extent(),
+            Self::Digit(digit) => digit.extent(),
+            Self::Measured(extent) => *extent,
+        }
+    }
+
+    /// Its mechanics, where it has a model.
+    pub fn model(&self) -> Option<&dyn Surface> {
+        match self {
+            Self::Beam(beam) => Some(beam),
+            Self::SupportedBeam(beam) => Some(beam.as_ref()),
+            Self::Plate(plate) => Some(plate),
+            Self::Digit(digit) => Some(digit),
+            Self::Measured(_) => None,
+        }
+    }
 }
 
 /// A straight strip of rectangular section.

@@ -1,10 +1,8 @@
-//! The influence function of one sensor on a plate.
+//! The influence function of one sensor on a plate, and how large influences are.
 
-use super::assembly::Functional;
-use super::mesh::{Derivative, Mesh};
-use super::solved::Solved;
-use super::spec::{PlateSpec, PointSupportKind};
-use super::{check, spec};
+use super::mesh::{Derivative, Mesh, NODE_DEGREES};
+use super::solved::{Functional, Solved};
+use super::spec::{self, PlateSpec, PointSupport, PointSupportKind};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use crate::surface::InfluenceFunction;
@@ -41,7 +39,7 @@ impl PlateInfluence {
 
     /// The largest magnitude at the nodes.
     pub fn largest(&self) -> f64 {
-        let deflections = self.degrees.iter().step_by(super::mesh::NODE_DEGREES);
+        let deflections = self.degrees.iter().step_by(NODE_DEGREES);
         deflections.fold(0.0, |largest: f64, value| largest.max(value.abs()))
     }
 }
@@ -90,8 +88,8 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
 /// The force of the support at `at` on the plate, positive upward: of an elastic one −k·w.
 fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Vec<f64> {
     let none = || vec![0.0; solved.mesh.degrees()];
-    let Some(i) = check::support_at(spec, at) else { return none() };
-    let spec::PointSupport { position, kind } = spec.supports[i];
+    let Some(i) = spec::support_at(spec, at) else { return none() };
+    let PointSupport { position, kind } = spec.supports[i];
     match kind {
         PointSupportKind::Simple => solved.reaction(i).unwrap_or_else(none),
         PointSupportKind::Elastic { stiffness_n_per_m } => {
@@ -99,4 +97,51 @@ fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Vec<f64> {
             solved.solutions(&[(load, stiffness_n_per_m)]).pop().unwrap_or_else(none)
         }
     }
+}
+
+/// Elements along the longer side of the mesh on which scales are taken, at most.
+const ELEMENTS: usize = 24;
+
+/// Sensors along each side of the grid over which the largest is sought, the edges included.
+const SENSORS: usize = 9;
+
+/// The largest magnitude of each kind of influence, in the order of [`SensorKind::ALL`].
+pub(super) struct FullScales([f64; SensorKind::ALL.len()]);
+
+impl FullScales {
+    /// Those of a plate; NaN when its equations have no solution.
+    pub fn of(spec: &PlateSpec) -> Self {
+        let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
+        if spec::check(&coarse).is_err() {
+            // Supports that only the finer mesh can tell apart.
+            coarse.elements = spec.elements;
+        }
+        match Solved::new(&coarse) {
+            Ok(solved) => Self(SensorKind::ALL.map(|kind| largest(&coarse, &solved, kind))),
+            Err(_) => Self([f64::NAN; SensorKind::ALL.len()]),
+        }
+    }
+
+    /// The one of `kind`.
+    pub fn of_kind(&self, kind: SensorKind) -> f64 {
+        let index = SensorKind::ALL.iter().position(|other| *other == kind);
+        index.map_or(0.0, |i| self.0[i])
+    }
+}
+
+fn largest(spec: &PlateSpec, solved: &Solved, kind: SensorKind) -> f64 {
+    let sensors: Vec<Position> = match kind {
+        SensorKind::Raw => Vec::new(),
+        SensorKind::Reaction => spec.supports.iter().map(|support| support.position).collect(),
+        SensorKind::Deflection | SensorKind::Slope | SensorKind::Strain => grid(spec),
+    };
+    let functions = PlateInfluence::of_all(spec, solved, kind, &sensors);
+    functions.iter().map(PlateInfluence::largest).fold(0.0, f64::max)
+}
+
+fn grid(spec: &PlateSpec) -> Vec<Position> {
+    let at = |i: usize, size_m: f64| i as f64 / (SENSORS - 1) as f64 * size_m;
+    let columns =
+        |j| (0..SENSORS).map(move |i| Position { x_m: at(i, spec.length_m), y_m: at(j, spec.width_m) });
+    (0..SENSORS).flat_map(columns).collect()
 }

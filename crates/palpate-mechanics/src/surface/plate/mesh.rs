@@ -1,9 +1,12 @@
-//! The grid of elements on a plate, and where a position is in it.
+//! The grid of elements on a plate: where a position is in it, its shape functions, and the stiffness of one element.
 //!
 //! Every node has four degrees of freedom, in this order: w, h_x·∂w/∂x, h_y·∂w/∂y, h_x·h_y·∂²w/∂x∂y, with the
 //! deflection w and the sides h_x, h_y of an element. All are lengths, so they are of one size.
+//!
+//! Symbols of the shape functions: ξ place within an element, 0 to 1; N₀, N₁ the cubic Hermite functions of value and slope
+//! at ξ = 0, N₂, N₃ those at ξ = 1. The element's stiffness is that of Bogner, Fox and Schmit, *The generation of
+//! inter-element-compatible stiffness and mass matrices by the use of interpolation formulas* (1965).
 
-use super::hermite;
 use crate::contact::Position;
 use crate::surface::Extent;
 
@@ -115,14 +118,14 @@ impl Mesh {
 
     /// The factors of the shape functions along x and along y.
     #[inline]
-    fn factors(&self, place: Place, of: Derivative) -> (hermite::Four, hermite::Four) {
+    fn factors(&self, place: Place, of: Derivative) -> (Four, Four) {
         let Place { xi, eta, .. } = place;
-        let over = |functions: hermite::Four, side_m: f64| functions.map(|value| value / side_m);
+        let over = |functions: Four, side_m: f64| functions.map(|value| value / side_m);
         match of {
-            Derivative::None => (hermite::values(xi), hermite::values(eta)),
-            Derivative::X => (over(hermite::slopes(xi), self.side_x_m), hermite::values(eta)),
-            Derivative::Y => (hermite::values(xi), over(hermite::slopes(eta), self.side_y_m)),
-            Derivative::XX => (over(hermite::curvatures(xi), self.side_x_m.powi(2)), hermite::values(eta)),
+            Derivative::None => (values(xi), values(eta)),
+            Derivative::X => (over(slopes(xi), self.side_x_m), values(eta)),
+            Derivative::Y => (values(xi), over(slopes(eta), self.side_y_m)),
+            Derivative::XX => (over(curvatures(xi), self.side_x_m.powi(2)), values(eta)),
         }
     }
 }
@@ -133,4 +136,79 @@ fn along(steps: f64, count: usize) -> (usize, f64) {
     // A float becomes the nearest whole number that fits, so that no position is out of bounds.
     let element = (steps as usize).min(count - 1);
     (element, steps - element as f64)
+}
+
+/// The four functions, or a derivative of them, at one ξ.
+type Four = [f64; 4];
+
+/// Integrals over the element of products of two functions or of their derivatives.
+type Integrals = [[f64; 4]; 4];
+
+/// N₀ … N₃ at `xi`.
+fn values(xi: f64) -> Four {
+    let (square, cube) = (xi * xi, xi * xi * xi);
+    [1.0 - 3.0 * square + 2.0 * cube, xi - 2.0 * square + cube, 3.0 * square - 2.0 * cube, cube - square]
+}
+
+/// Their first derivatives with respect to ξ.
+fn slopes(xi: f64) -> Four {
+    let square = xi * xi;
+    [6.0 * square - 6.0 * xi, 1.0 - 4.0 * xi + 3.0 * square, 6.0 * xi - 6.0 * square, 3.0 * square - 2.0 * xi]
+}
+
+/// Their second derivatives with respect to ξ.
+fn curvatures(xi: f64) -> Four {
+    [12.0 * xi - 6.0, 6.0 * xi - 4.0, 6.0 - 12.0 * xi, 6.0 * xi - 2.0]
+}
+
+/// ∫ fᵢ·gⱼ dξ from 0 to 1, by the rule of Gauss and Legendre with four points, exact up to degree 7.
+fn integrals(f: fn(f64) -> Four, g: fn(f64) -> Four) -> Integrals {
+    let mut sums = Integrals::default();
+    for (xi, weight) in gauss_points() {
+        let (f, g) = (f(xi), g(xi));
+        for (row, f) in sums.iter_mut().zip(f) {
+            for (sum, g) in row.iter_mut().zip(g) {
+                *sum += weight * f * g;
+            }
+        }
+    }
+    sums
+}
+
+/// Places and weights of the rule with four points on the unit interval (Abramowitz and Stegun, 25.4.30):
+/// x² = (3 ∓ 2·√(6/5))/7, weights (18 ± √30)/36 on −1 … 1.
+fn gauss_points() -> [(f64, f64); 4] {
+    let (root, spread) = (30f64.sqrt(), 2.0 * (6.0f64 / 5.0).sqrt());
+    let near = (((3.0 - spread) / 7.0).sqrt(), (18.0 + root) / 36.0);
+    let far = (((3.0 + spread) / 7.0).sqrt(), (18.0 - root) / 36.0);
+    let at = |x: f64, weight: f64| (0.5 * (1.0 + x), 0.5 * weight);
+    [at(-far.0, far.1), at(-near.0, near.1), at(near.0, near.1), at(far.0, far.1)]
+}
+
+/// The second derivative of the bending energy of an element with respect to its 16 degrees of freedom.
+///
+/// Degree 4·y + x belongs to the product of the Hermite functions x along the length and y along the width, so x = 2·a + p
+/// is the end a and the order of derivative p.
+pub(super) type ElementStiffness = [[f64; 16]; 16];
+
+/// D·∬ (w_xx² + w_yy² + 2·ν·w_xx·w_yy + 2·(1 − ν)·w_xy²)/2 as a quadratic form (Timoshenko and Woinowsky-Krieger, *Theory
+/// of Plates and Shells*, 2nd ed., eq. 117).
+///
+/// `rigidity_nm`: flexural rigidity D in N·m; `poissons_ratio`: ν. In units of newtons per metre.
+pub(super) fn element_stiffness(mesh: &Mesh, rigidity_nm: f64, poissons_ratio: f64) -> ElementStiffness {
+    let (h_x, h_y, nu) = (mesh.side_x_m, mesh.side_y_m, poissons_ratio);
+    let bent = integrals(curvatures, curvatures);
+    let level = integrals(values, values);
+    let twisted = integrals(slopes, slopes);
+    let mixed = integrals(curvatures, values);
+    let element = |row: usize, column: usize| {
+        let (i, k) = (row % 4, row / 4);
+        let (j, l) = (column % 4, column / 4);
+        let along_x = bent[i][j] * level[k][l] * h_y / h_x.powi(3);
+        let along_y = level[i][j] * bent[k][l] * h_x / h_y.powi(3);
+        let both = nu * (mixed[i][j] * mixed[l][k] + mixed[j][i] * mixed[k][l]) / (h_x * h_y);
+        let twist = 2.0 * (1.0 - nu) * twisted[i][j] * twisted[k][l] / (h_x * h_y);
+        rigidity_nm * (along_x + along_y + both + twist)
+    };
+    std::array::from_fn(|row| std::array::from_fn(|column| element(row, column)))
 }

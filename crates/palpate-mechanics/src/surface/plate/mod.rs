@@ -2,21 +2,13 @@
 //!
 //! One factor a plate, one solution a sensor: by reciprocity that is its influence over the whole plate.
 
-mod assembly;
-mod check;
 mod dissection;
-mod error;
-mod full_scale;
-mod hermite;
 mod influence;
 mod mesh;
 mod solved;
 mod spec;
-mod stiffness;
-mod unknowns;
 
-pub use error::{PlateError, Unsolvable};
-pub use spec::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind};
+pub use spec::{Edge, Edges, PlateError, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -26,8 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use full_scale::FullScales;
-use influence::{NotANumber, PlateInfluence};
+use influence::{FullScales, NotANumber, PlateInfluence};
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -54,7 +45,7 @@ impl Plate {
     /// # Errors
     /// [`PlateError`] when it cannot: a number out of its bounds, a rigid motion that nothing holds, a mesh too large.
     pub fn new(spec: PlateSpec) -> Result<Self, PlateError> {
-        check::check(&spec)?;
+        spec::check(&spec)?;
         Ok(Self { spec, computed: Arc::default() })
     }
 
@@ -88,7 +79,7 @@ impl Plate {
 
     /// Bytes that solving it needs at most, by an estimate.
     pub fn estimated_bytes(&self) -> f64 {
-        check::estimated_bytes(&self.spec)
+        spec::estimated_bytes(&self.spec)
     }
 
     /// Factors its equations, unless that is done.
@@ -132,7 +123,7 @@ impl Surface for Plate {
     }
 
     fn is_supported_at(&self, position: Position) -> bool {
-        check::support_at(&self.spec, position).is_some()
+        spec::support_at(&self.spec, position).is_some()
     }
 
     fn force_supports(&self) -> Vec<Position> {
@@ -142,13 +133,13 @@ impl Surface for Plate {
     }
 
     fn insensitive_sensor(&self, kind: SensorKind, sensor: Position) -> Option<InsensitiveSensor> {
-        check::insensitive_sensor(&self.spec, kind, sensor)
+        spec::insensitive_sensor(&self.spec, kind, sensor)
     }
 
     /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force
     /// grows without bound as the contact nears the sensor: its scale is that of a force spread over such a mesh's element.
     fn full_scale(&self, kind: SensorKind) -> f64 {
-        self.computed.full_scales.get_or_init(|| FullScales::of(self)).of_kind(kind)
+        self.computed.full_scales.get_or_init(|| FullScales::of(&self.spec)).of_kind(kind)
     }
 
     fn extent(&self) -> Extent {

@@ -3,15 +3,14 @@
 //! Symbols: K stiffness matrix, with the elastic supports in it; b the deflection of a simple support as a functional, B all
 //! of them as columns; r the forces of the simple supports on the plate; f a load.
 
+use std::collections::HashMap;
+
 use ndarray::{Array1, Array2};
 
-use super::assembly::{Functional, Spring, stiffness_matrix};
-use super::error::Unsolvable;
-use super::mesh::{Derivative, Mesh};
-use super::spec::{PlateSpec, PointSupport, PointSupportKind};
-use super::stiffness::element_stiffness;
-use super::unknowns::Unknowns;
-use palpate_numerics::{Cholesky, SparseCholesky};
+use super::dissection::nested_dissection;
+use super::mesh::{Derivative, ElementStiffness, Mesh, NODE_DEGREES, element_stiffness};
+use super::spec::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
+use palpate_numerics::{Cholesky, SparseCholesky, SparseSymmetric};
 
 /// The factored equations of a plate.
 ///
@@ -165,4 +164,181 @@ fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
     for (sum, value) in sum.iter_mut().zip(values) {
         *sum += factor * value;
     }
+}
+
+/// The numbers of the degrees of freedom that no edge holds at zero, in the order of elimination.
+struct Unknowns {
+    /// Of each degree of freedom, where it stands in the equations.
+    places: Vec<Option<u32>>,
+    /// Degree of freedom of each unknown.
+    degrees: Vec<u32>,
+}
+
+impl Unknowns {
+    /// The unknowns of a mesh whose edges are held so.
+    pub fn new(mesh: &Mesh, edges: Edges) -> Self {
+        let (columns, rows) = mesh.nodes();
+        let mut places = vec![None; mesh.degrees()];
+        let mut degrees = Vec::with_capacity(mesh.degrees());
+        for (column, row) in nested_dissection(columns, rows) {
+            let first = mesh.first_degree(column, row);
+            let held = held_degrees(mesh, edges, column, row);
+            for degree in (0..NODE_DEGREES).filter(|degree| !held[*degree]).map(|degree| first + degree) {
+                places[degree] = Some(degrees.len() as u32);
+                degrees.push(degree as u32);
+            }
+        }
+        Self { places, degrees }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.degrees.len()
+    }
+
+    /// Where a degree of freedom stands in the equations; `None` when it is held at zero.
+    pub fn place(&self, degree: usize) -> Option<usize> {
+        self.places[degree].map(|place| place as usize)
+    }
+
+    /// The degree of freedom of an unknown.
+    pub fn degree(&self, unknown: usize) -> usize {
+        self.degrees[unknown] as usize
+    }
+
+    /// All degrees of freedom, the held ones 0, when the unknowns are `unknowns`, times `factor`.
+    pub fn spread(&self, unknowns: &[f64], factor: f64) -> Vec<f64> {
+        self.places.iter().map(|place| place.map_or(0.0, |place| factor * unknowns[place as usize])).collect()
+    }
+}
+
+/// Which degrees of freedom of a node its edges hold at zero.
+///
+/// Along an edge that is held w = 0, so its derivative along the edge is zero too; on a clamped one the slope across it is
+/// zero as well, and so is that slope's derivative along it.
+fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; NODE_DEGREES] {
+    let on = [
+        (column == 0, edges.left, [true, false, true, false]),
+        (column == mesh.across, edges.right, [true, false, true, false]),
+        (row == 0, edges.bottom, [true, true, false, false]),
+        (row == mesh.up, edges.top, [true, true, false, false]),
+    ];
+    let mut held = [false; NODE_DEGREES];
+    for (_, edge, simple) in on.into_iter().filter(|(on, ..)| *on) {
+        let holds = match edge {
+            Edge::Free => [false; NODE_DEGREES],
+            Edge::Simple => simple,
+            Edge::Clamped => [true; NODE_DEGREES],
+        };
+        for (held, holds) in held.iter_mut().zip(holds) {
+            *held |= holds;
+        }
+    }
+    held
+}
+
+/// The sum over some degrees of freedom, each multiplied by its factor: what a point of the plate does, or a sensor reads.
+pub(super) type Functional = Vec<(usize, f64)>;
+
+/// A spring under a point of the plate.
+struct Spring {
+    /// The deflection of the point.
+    pub deflection: Functional,
+    /// Its stiffness, in N/m.
+    pub stiffness_n_per_m: f64,
+}
+
+/// The stiffness matrix of equal elements and springs, of the unknowns only.
+fn stiffness_matrix(
+    mesh: &Mesh,
+    unknowns: &Unknowns,
+    element: &ElementStiffness,
+    springs: &[Spring],
+) -> SparseSymmetric {
+    let under = springs_by_degree(springs);
+    let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
+    for unknown in 0..unknowns.count() {
+        let degree = unknowns.degree(unknown);
+        let mut column = element_column(mesh, element, degree);
+        for (spring, factor) in under.get(&degree).into_iter().flatten() {
+            for (other, other_factor) in &spring.deflection {
+                column.add(mesh, *other, spring.stiffness_n_per_m * factor * other_factor);
+            }
+        }
+        let elements = column.entries(mesh);
+        matrix.push_column(elements.filter_map(|(degree, value)| Some((unknowns.place(degree)?, value))));
+    }
+    matrix
+}
+
+/// The springs whose points move with a degree of freedom, and by how much.
+fn springs_by_degree(springs: &[Spring]) -> HashMap<usize, Vec<(&Spring, f64)>> {
+    let mut under: HashMap<usize, Vec<(&Spring, f64)>> = HashMap::new();
+    for spring in springs {
+        for (degree, factor) in &spring.deflection {
+            under.entry(*degree).or_default().push((spring, *factor));
+        }
+    }
+    under
+}
+
+/// A node couples with itself and the eight around it.
+const NEIGHBOURS: usize = 9;
+
+/// One column of the matrix: the couplings of a node's degree of freedom with those of its neighbours.
+struct Column {
+    /// The node, its column and row in the grid.
+    node: (usize, usize),
+    /// Neighbours row by row from the one below to the left.
+    couplings: [[f64; NODE_DEGREES]; NEIGHBOURS],
+}
+
+impl Column {
+    /// Adds to the coupling with `degree`, which is one of a neighbour.
+    fn add(&mut self, mesh: &Mesh, degree: usize, value: f64) {
+        let (node, degree) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
+        let (column, row) = (node % (mesh.across + 1), node / (mesh.across + 1));
+        let neighbour = 3 * (row + 1 - self.node.1) + (column + 1 - self.node.0);
+        self.couplings[neighbour][degree] += value;
+    }
+
+    /// Degree of freedom and coupling of all neighbours that exist.
+    fn entries(&self, mesh: &Mesh) -> impl Iterator<Item = (usize, f64)> {
+        let (columns, rows) = mesh.nodes();
+        self.couplings.iter().enumerate().flat_map(move |(i, couplings)| {
+            // One more than the neighbour's own, which may be left of or below the grid.
+            let (column, row) = (self.node.0 + i % 3, self.node.1 + i / 3);
+            let exists = (1..=columns).contains(&column) && (1..=rows).contains(&row);
+            let first = if exists { mesh.first_degree(column - 1, row - 1) } else { 0 };
+            let degrees = if exists { NODE_DEGREES } else { 0 };
+            couplings[..degrees].iter().enumerate().map(move |(degree, value)| (first + degree, *value))
+        })
+    }
+}
+
+/// What the up to four elements around a node add to the column of its `degree`.
+fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Column {
+    let (node, own) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
+    let node = (node % (mesh.across + 1), node / (mesh.across + 1));
+    let mut column = Column { node, couplings: [[0.0; NODE_DEGREES]; NEIGHBOURS] };
+    for (end_y, end_x) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        // The element of which this node is the end: its first node is (node.0 − end_x, node.1 − end_y).
+        let fits = |at: usize, end: usize, count: usize| at >= end && at - end < count;
+        if !(fits(node.0, end_x, mesh.across) && fits(node.1, end_y, mesh.up)) {
+            continue;
+        }
+        let row = &element[local(end_x, end_y, own)];
+        for (other_y, other_x) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let neighbour = 3 * (1 + other_y - end_y) + (1 + other_x - end_x);
+            for (degree, coupling) in column.couplings[neighbour].iter_mut().enumerate() {
+                *coupling += row[local(other_x, other_y, degree)];
+            }
+        }
+    }
+    column
+}
+
+/// Where a node's degree of freedom stands in an element.
+fn local(end_x: usize, end_y: usize, degree: usize) -> usize {
+    4 * (2 * end_y + degree / 2) + 2 * end_x + degree % 2
 }

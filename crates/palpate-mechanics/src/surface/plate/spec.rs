@@ -1,9 +1,13 @@
-//! A plate as data.
+//! A plate as data, and what is checked of it before anything is computed.
 
 use serde::{Deserialize, Serialize};
 
+use super::dissection::coupled_pairs;
+use super::mesh::{Mesh, NODE_DEGREES};
 use crate::contact::Position;
-use crate::surface::Extent;
+use crate::sensing::SensorKind;
+use crate::surface::{Extent, InsensitiveSensor, first_not_positive};
+use crate::units::format_length_mm;
 
 /// A rectangular plate: x runs along its length from the left edge to the right one, y along its width from the bottom edge
 /// to the top one.
@@ -106,4 +110,372 @@ impl PointSupport {
     pub(super) fn is_rigid(&self) -> bool {
         matches!(self.kind, PointSupportKind::Simple)
     }
+}
+
+/// A plate that cannot be computed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlateError {
+    /// A dimension is not a positive, finite number.
+    #[error("a plate's {name} is {value}; it must be greater than 0 and finite")]
+    NotPositive {
+        /// Which: "length", "width", "thickness" or "youngs_modulus".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// No material has this Poisson's ratio.
+    #[error("a plate's poissons_ratio is {value}; it must be greater than -1 and at most 0.5")]
+    PoissonsRatio {
+        /// The ratio.
+        value: f64,
+    },
+    /// The compliance l²/D is not a positive, finite number.
+    #[error("a plate's compliance l²/D is {compliance_m_per_n} m/N; it must be greater than 0 and finite")]
+    Compliance {
+        /// Longer side, squared, over flexural rigidity, in m/N.
+        compliance_m_per_n: f64,
+    },
+    /// Too few or too many elements.
+    #[error("a plate has {elements} elements along its longer side; it must have {fewest} to {most}")]
+    Elements {
+        /// How many it is to have.
+        elements: usize,
+        /// The fewest it can have.
+        fewest: usize,
+        /// The most it can have.
+        most: usize,
+    },
+    /// The factor of the stiffness matrix would not fit.
+    #[error(
+        "a plate of {elements} elements along its longer side needs {} of memory; at most {} can be used: take fewer elements",
+        gibibytes(*bytes), gibibytes(*most)
+    )]
+    MeshTooLarge {
+        /// Elements along the longer side.
+        elements: usize,
+        /// Estimated bytes.
+        bytes: f64,
+        /// The most that can be used.
+        most: f64,
+    },
+    /// A support beside the plate.
+    #[error(
+        "support {number} is at {}, off the plate; it must be within (0, 0) and {}",
+        Point(*at), Point(*corner)
+    )]
+    SupportOffPlate {
+        /// Which support, from 1.
+        number: usize,
+        /// Where it is.
+        at: Position,
+        /// The corner across from (0, 0).
+        corner: Position,
+    },
+    /// An elastic support without stiffness.
+    #[error("support {number} has a stiffness of {value} N/m; it must be greater than 0 and finite")]
+    Stiffness {
+        /// Which support, from 1.
+        number: usize,
+        /// Its stiffness, in N/m.
+        value: f64,
+    },
+    /// A support where the edge is held already.
+    #[error("support {number} is on the {edge} edge, which is held already; leave it out")]
+    SupportOnHeldEdge {
+        /// Which support, from 1.
+        number: usize,
+        /// Which edge.
+        edge: &'static str,
+    },
+    /// Two supports at one place.
+    #[error("supports {first} and {second} are both at {}; leave one out", Point(*at))]
+    SupportsAtOnePlace {
+        /// The first one's number, from 1.
+        first: usize,
+        /// The second one's number, from 1.
+        second: usize,
+        /// Where they are.
+        at: Position,
+    },
+    /// Two simple supports that the mesh cannot tell apart.
+    #[error(
+        "simple supports {first} and {second} are {} apart, less than an element of {} × {}; take more elements, or one support",
+        format_length_mm(*distance_m), format_length_mm(*side_x_m), format_length_mm(*side_y_m)
+    )]
+    SupportsTooClose {
+        /// The first one's number, from 1.
+        first: usize,
+        /// The second one's number, from 1.
+        second: usize,
+        /// Their distance, in metres.
+        distance_m: f64,
+        /// An element's side along x, in metres.
+        side_x_m: f64,
+        /// An element's side along y, in metres.
+        side_y_m: f64,
+    },
+    /// Nothing holds the plate.
+    #[error(
+        "nothing holds the plate: it can move up and down and tilt every way; hold an edge, or three points"
+    )]
+    NotHeld,
+    /// One point holds it.
+    #[error("the plate is held at {} only: it can tilt about it every way; hold it at three points at least", Point(*at))]
+    HeldAtOnePoint {
+        /// The point.
+        at: Position,
+    },
+    /// All that holds it is on one line.
+    #[error(
+        "the plate can turn about the line through {} and {}, on which all its supports are; hold it beside that line",
+        Point(*from), Point(*to)
+    )]
+    HeldOnALine {
+        /// A point of the line.
+        from: Position,
+        /// Another point of the line.
+        to: Position,
+    },
+    /// The equations could not be solved.
+    #[error("the equations of the plate could not be solved: {reason}")]
+    Unsolvable {
+        /// Why.
+        reason: Unsolvable,
+    },
+}
+
+/// Why the equations of a plate could not be solved.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Unsolvable {
+    /// The stiffness matrix has no factor.
+    #[error(transparent)]
+    Stiffness(#[from] palpate_numerics::SparseCholeskyError),
+    /// The compliances of the simple supports have no factor.
+    #[error(transparent)]
+    Supports(#[from] palpate_numerics::NotPositiveDefinite),
+}
+
+/// A position for people.
+struct Point(Position);
+
+impl std::fmt::Display for Point {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "({}, {})", format_length_mm(self.0.x_m), format_length_mm(self.0.y_m))
+    }
+}
+
+fn gibibytes(bytes: f64) -> String {
+    format!("{:.1} GiB", bytes / 2f64.powi(30))
+}
+
+/// The fewest and the most elements along the longer side.
+const FEWEST_ELEMENTS: usize = 4;
+const MOST_ELEMENTS: usize = 10_000;
+
+/// The most bytes that a plate's equations may need: 4 GiB.
+const MOST_BYTES: f64 = 4.0 * (1u64 << 30) as f64;
+
+/// Positions this near, as a share of the longer side, are the same.
+const SAME_PLACE: f64 = 1e-9;
+
+/// Points this near to a line, as a share of the longer side, do not keep the plate from turning about it.
+const ON_A_LINE: f64 = 1e-6;
+
+/// Checks all that can be wrong with a plate, the cheap things first.
+///
+/// # Errors
+/// [`PlateError`], with the value and its bound.
+pub(super) fn check(spec: &PlateSpec) -> Result<(), PlateError> {
+    check_numbers(spec)?;
+    for (i, support) in spec.supports.iter().enumerate() {
+        check_support(spec, i + 1, support)?;
+    }
+    check_distances(spec)?;
+    check_held(spec)?;
+    check_memory(spec)
+}
+
+fn check_numbers(spec: &PlateSpec) -> Result<(), PlateError> {
+    let dimensions = [
+        ("length", spec.length_m),
+        ("width", spec.width_m),
+        ("thickness", spec.thickness_m),
+        ("youngs_modulus", spec.youngs_modulus_pa),
+    ];
+    if let Some((name, value)) = first_not_positive(&dimensions) {
+        return Err(PlateError::NotPositive { name, value });
+    }
+    let value = spec.poissons_ratio;
+    if !(value > -1.0 && value <= 0.5) {
+        return Err(PlateError::PoissonsRatio { value });
+    }
+    let compliance_m_per_n = longer_side_m(spec).powi(2) / spec.flexural_rigidity();
+    if !(compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite()) {
+        return Err(PlateError::Compliance { compliance_m_per_n });
+    }
+    let (elements, fewest, most) = (spec.elements, FEWEST_ELEMENTS, MOST_ELEMENTS);
+    if (fewest..=most).contains(&elements) {
+        Ok(())
+    } else {
+        Err(PlateError::Elements { elements, fewest, most })
+    }
+}
+
+fn check_support(spec: &PlateSpec, number: usize, support: &PointSupport) -> Result<(), PlateError> {
+    let at = support.position;
+    if !spec.extent().contains(at) {
+        let corner = Position { x_m: spec.length_m, y_m: spec.width_m };
+        return Err(PlateError::SupportOffPlate { number, at, corner });
+    }
+    if let PointSupportKind::Elastic { stiffness_n_per_m: value } = support.kind
+        && !(value > 0.0 && value.is_finite())
+    {
+        return Err(PlateError::Stiffness { number, value });
+    }
+    match edges_at(spec, at).find(|(_, edge)| *edge != Edge::Free) {
+        Some((edge, _)) => Err(PlateError::SupportOnHeldEdge { number, edge }),
+        None => Ok(()),
+    }
+}
+
+/// No two supports may be at one place, nor two simple ones in one element: the mesh would have no freedom left there.
+fn check_distances(spec: &PlateSpec) -> Result<(), PlateError> {
+    let Mesh { side_x_m, side_y_m, .. } = Mesh::new(spec.extent(), spec.elements);
+    for (i, one) in spec.supports.iter().enumerate() {
+        for (j, other) in spec.supports[..i].iter().enumerate() {
+            let (first, second) = (j + 1, i + 1);
+            let apart_x_m = (one.position.x_m - other.position.x_m).abs();
+            let apart_y_m = (one.position.y_m - other.position.y_m).abs();
+            if apart_x_m.max(apart_y_m) <= SAME_PLACE * longer_side_m(spec) {
+                return Err(PlateError::SupportsAtOnePlace { first, second, at: one.position });
+            }
+            let elements_apart = (apart_x_m / side_x_m).max(apart_y_m / side_y_m);
+            if one.is_rigid() && other.is_rigid() && elements_apart < 1.0 - 1e-9 {
+                let distance_m = apart_x_m.hypot(apart_y_m);
+                return Err(PlateError::SupportsTooClose { first, second, distance_m, side_x_m, side_y_m });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A plate that can move without bending has no equilibrium. Its rigid motions w = a + b·x + c·y must all be held: by a
+/// clamped edge, or by points that are not on one line, an edge that is held being its two ends.
+fn check_held(spec: &PlateSpec) -> Result<(), PlateError> {
+    let edges = edges(spec);
+    if edges.iter().any(|(.., edge)| *edge == Edge::Clamped) {
+        return Ok(());
+    }
+    let held = edges.iter().filter(|(.., edge)| *edge == Edge::Simple);
+    let mut points: Vec<Position> = held.flat_map(|(_, ends, _)| *ends).collect();
+    points.extend(spec.supports.iter().map(|support| support.position));
+    let Some(from) = points.first().copied() else { return Err(PlateError::NotHeld) };
+    let tolerance_m = ON_A_LINE * longer_side_m(spec);
+    let distance_m = |p: &Position| (p.x_m - from.x_m).hypot(p.y_m - from.y_m);
+    let farthest = points.iter().max_by(|p, q| distance_m(p).total_cmp(&distance_m(q)));
+    let Some(to) = farthest.copied().filter(|to| distance_m(to) > tolerance_m) else {
+        return Err(PlateError::HeldAtOnePoint { at: from });
+    };
+    let (along_x, along_y) = (to.x_m - from.x_m, to.y_m - from.y_m);
+    let beside_m = |p: &Position| {
+        (along_x * (p.y_m - from.y_m) - along_y * (p.x_m - from.x_m)).abs() / along_x.hypot(along_y)
+    };
+    if points.iter().any(|p| beside_m(p) > tolerance_m) {
+        Ok(())
+    } else {
+        Err(PlateError::HeldOnALine { from, to })
+    }
+}
+
+fn check_memory(spec: &PlateSpec) -> Result<(), PlateError> {
+    let bytes = estimated_bytes(spec);
+    if bytes <= MOST_BYTES {
+        Ok(())
+    } else {
+        Err(PlateError::MeshTooLarge { elements: spec.elements, bytes, most: MOST_BYTES })
+    }
+}
+
+/// Bytes that the equations of the plate need at most: the factor, which couples pairs of nodes; the stiffness matrix, where
+/// a node couples with itself and its eight neighbours; and the solutions that hold the simple supports.
+pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
+    const NUMBER_BYTES: f64 = 8.0;
+    /// Columns of nearly the same pattern are stored as one block, with zeros: the most numbers for one that couples.
+    const PADDING: f64 = 1.25;
+    /// A matrix element is a value and a row, and the library that factors it makes a copy.
+    const ELEMENT_BYTES: f64 = 2.0 * (8.0 + 8.0);
+    let mesh = Mesh::new(spec.extent(), spec.elements);
+    let (columns, rows) = mesh.nodes();
+    let pair = (NODE_DEGREES * NODE_DEGREES) as f64;
+    let nodes = columns as f64 * rows as f64;
+    let factor = PADDING * pair * coupled_pairs(columns, rows) * NUMBER_BYTES;
+    let matrix = nodes * pair * 5.0 * ELEMENT_BYTES;
+    let rigid = spec.supports.iter().filter(|support| support.is_rigid()).count();
+    let solutions = (rigid + 8) as f64 * nodes * NODE_DEGREES as f64 * NUMBER_BYTES;
+    factor + matrix + solutions
+}
+
+/// Why a sensor of this `kind` at `position` reads nothing, wherever the plate is touched; `None` when it reads something.
+///
+/// On an edge that is held w = 0, so its derivatives along the edge are zero too; on a clamped one the slope across it is
+/// zero, and on a simple one the bending moment across it, and with it the curvature.
+pub(super) fn insensitive_sensor(
+    spec: &PlateSpec,
+    kind: SensorKind,
+    position: Position,
+) -> Option<InsensitiveSensor> {
+    let still = |(name, edge): &(&'static str, Edge)| {
+        let across = matches!(*name, "left" | "right");
+        match (kind, edge) {
+            (_, Edge::Free) | (SensorKind::Reaction | SensorKind::Raw, _) => false,
+            (SensorKind::Deflection, _) => true,
+            (SensorKind::Slope, Edge::Simple) | (SensorKind::Strain, Edge::Clamped) => !across,
+            (SensorKind::Slope, Edge::Clamped) | (SensorKind::Strain, Edge::Simple) => true,
+        }
+    };
+    if let Some((edge, how)) = edges_at(spec, position).find(still) {
+        let held = if how == Edge::Clamped { "clamped" } else { "simply supported" };
+        return Some(InsensitiveSensor::AtEdge { edge, held, kind });
+    }
+    let support = support_at(spec, position).filter(|i| spec.supports[*i].is_rigid())?;
+    (kind == SensorKind::Deflection).then_some(InsensitiveSensor::AtSupport { number: support + 1 })
+}
+
+/// The support at `position`, by its index.
+pub(super) fn support_at(spec: &PlateSpec, position: Position) -> Option<usize> {
+    let slack_m = SAME_PLACE * longer_side_m(spec);
+    spec.supports.iter().position(|support| {
+        let (dx, dy) = (support.position.x_m - position.x_m, support.position.y_m - position.y_m);
+        dx.abs().max(dy.abs()) <= slack_m
+    })
+}
+
+/// The edges that `position` is on, and how they are held.
+fn edges_at(spec: &PlateSpec, position: Position) -> impl Iterator<Item = (&'static str, Edge)> {
+    let near = |value: f64, bound: f64| (value - bound).abs() <= SAME_PLACE * longer_side_m(spec);
+    let on = [
+        near(position.x_m, 0.0),
+        near(position.x_m, spec.length_m),
+        near(position.y_m, 0.0),
+        near(position.y_m, spec.width_m),
+    ];
+    edges(spec).into_iter().zip(on).filter(|(_, on)| *on).map(|((name, _, edge), _)| (name, edge))
+}
+
+/// Each edge's name, its ends, and how it is held.
+fn edges(spec: &PlateSpec) -> [(&'static str, [Position; 2], Edge); 4] {
+    let corner = |x_m, y_m| Position { x_m, y_m };
+    let (length_m, width_m) = (spec.length_m, spec.width_m);
+    let [near, right] = [corner(0.0, 0.0), corner(length_m, 0.0)];
+    let [top, far] = [corner(0.0, width_m), corner(length_m, width_m)];
+    [
+        ("left", [near, top], spec.edges.left),
+        ("right", [right, far], spec.edges.right),
+        ("bottom", [near, right], spec.edges.bottom),
+        ("top", [top, far], spec.edges.top),
+    ]
+}
+
+fn longer_side_m(spec: &PlateSpec) -> f64 {
+    spec.length_m.max(spec.width_m)
 }

@@ -11,21 +11,15 @@
 //! | strain (t/2)·y''(s) | a kink of −t/(2·E·I) |
 //! | reaction of a support at s | the ground under it rises by 1 |
 //!
-//! What the beam admits to the left and to the right of the sensor is known once for all sensors (see `sweep`); fitting the
+//! What the beam admits to the left and to the right of the sensor is known once for all sensors (see `structure`); fitting the
 //! two together is one system of six equations a sensor, and its answer is the whole influence function, with its gradient.
 
-mod check;
-mod error;
-mod peak;
-mod response;
-mod shape;
 mod spec;
-mod state;
-mod sweep;
-mod words;
+mod structure;
 
-pub use error::{BeamPart, RigidMotion, SupportedBeamError};
-pub use spec::{BeamSection, BeamSupport, BeamSupportKind, SupportedBeamSpec};
+pub use spec::{
+    BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeamError, SupportedBeamSpec,
+};
 
 use std::sync::Arc;
 
@@ -34,11 +28,8 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use check::SAME_PLACE;
-use response::{Disturbance, Site, Structure};
-use shape::Shape;
-use state::State;
-use sweep::{Element, Hold};
+use spec::SAME_PLACE;
+use structure::{Disturbance, Element, Hold, Shape, Site, State, Structure};
 
 /// Influences below this share of full scale are 0 but for rounding.
 const ROUNDING: f64 = 1e-12;
@@ -124,7 +115,7 @@ impl SupportedBeam {
             SensorKind::Raw => 0.0,
             // Reactions are felt at the nodes only.
             SensorKind::Reaction => peak(i, 0.0).max(peak(i, element.length)),
-            _ => peak::largest(element.length, |offset| peak(i, offset)),
+            _ => largest_within(element.length, |offset| peak(i, offset)),
         };
         // The total order keeps a NaN, which `new` refuses.
         elements.map(of_element).max_by(f64::total_cmp).unwrap_or(f64::NAN)
@@ -221,6 +212,44 @@ fn hold(kind: BeamSupportKind, l: f64, stiffness_nm2: f64) -> Hold {
         },
         _ => Hold { yielding: rigid(kind.takes_force()), turning: rigid(kind.takes_couple()) },
     }
+}
+
+/// Sensor positions looked at in an element.
+const PEAK_STEPS: u32 = 32;
+/// Steps of the golden section around the best of them.
+const HALVINGS: u32 = 60;
+
+/// The largest value of `at` from 0 to `length`: of evenly spaced places the best, and the best around it by golden section.
+///
+/// Exact to rounding where `at` has one maximum between neighbouring places, as the smooth functions of the sensor's position
+/// on one element have, which bend at most a few times on it.
+fn largest_within(length: f64, at: impl Fn(f64) -> f64) -> f64 {
+    let place = |step: u32| length * f64::from(step) / f64::from(PEAK_STEPS);
+    let (best, value) = (0..=PEAK_STEPS)
+        .map(|step| (step, at(place(step))))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((0, f64::NAN));
+    let around = (place(best.saturating_sub(1)), place((best + 1).min(PEAK_STEPS)));
+    value.max(golden_section(around, at))
+}
+
+/// The largest value that golden section meets (Kiefer, Proc. Am. Math. Soc. 4, 1953).
+fn golden_section((mut low, mut high): (f64, f64), at: impl Fn(f64) -> f64) -> f64 {
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut left, mut right) = (high - ratio * (high - low), low + ratio * (high - low));
+    let (mut left_value, mut right_value) = (at(left), at(right));
+    for _ in 0..HALVINGS {
+        if left_value > right_value {
+            (high, right, right_value) = (right, left, left_value);
+            left = high - ratio * (high - low);
+            left_value = at(left);
+        } else {
+            (low, left, left_value) = (left, right, right_value);
+            right = low + ratio * (high - low);
+            right_value = at(right);
+        }
+    }
+    left_value.max(right_value)
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
-//! A beam on any supports, as data.
+//! A beam on any supports as data: its description, what it must say, and the words for it.
 
 use serde::{Deserialize, Serialize};
+
+use crate::surface::first_not_positive;
+use crate::units::{Dimension, Quantity, format_length_mm};
 
 /// A straight beam of rectangular sections and what holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -89,5 +92,354 @@ impl BeamSupportKind {
             self,
             Self::Clamped | Self::Guided | Self::Elastic { rotational_stiffness_nm_per_rad: Some(_), .. }
         )
+    }
+}
+
+/// More sections, and more supports, than a bench has.
+const MOST: usize = 100;
+/// Places nearer than this share of the length are one.
+pub(super) const SAME_PLACE: f64 = 1e-9;
+
+impl SupportedBeamSpec {
+    /// Checks that the beam can be computed: numbers in their bounds, sections that cover it, supports on it and apart, and
+    /// enough of them.
+    ///
+    /// # Errors
+    /// [`SupportedBeamError`], for the first thing that is wrong.
+    pub fn check(&self) -> Result<(), SupportedBeamError> {
+        let dimensions = [("length", self.length_m), ("youngs_modulus", self.youngs_modulus_pa)];
+        if let Some((name, value)) = first_not_positive(&dimensions) {
+            return Err(SupportedBeamError::NotPositive { name, value });
+        }
+        self.check_sections()?;
+        self.check_supports()?;
+        self.check_held()
+    }
+
+    fn check_sections(&self) -> Result<(), SupportedBeamError> {
+        let found = self.sections.len();
+        if found > MOST {
+            return Err(SupportedBeamError::TooManySections { found, most: MOST });
+        }
+        let (length_m, slack_m) = (self.length_m, SAME_PLACE * self.length_m);
+        let mut from_m = 0.0;
+        for (i, &BeamSection { to_m, width_m, thickness_m }) in self.sections.iter().enumerate() {
+            let number = i + 1;
+            if let Some((name, value)) = first_not_positive(&[("width", width_m), ("thickness", thickness_m)])
+            {
+                return Err(SupportedBeamError::Section { number, name, value });
+            }
+            if to_m.is_nan() || to_m <= from_m + slack_m {
+                return Err(SupportedBeamError::SectionsOverlap { number, from_m, to_m });
+            }
+            if to_m > length_m + slack_m {
+                return Err(SupportedBeamError::SectionBeyond { number, to_m, length_m });
+            }
+            from_m = to_m;
+        }
+        if from_m < length_m - slack_m {
+            return Err(SupportedBeamError::SectionsEnd { to_m: from_m, length_m });
+        }
+        Ok(())
+    }
+
+    fn check_supports(&self) -> Result<(), SupportedBeamError> {
+        let found = self.supports.len();
+        if found > MOST {
+            return Err(SupportedBeamError::TooManySupports { found, most: MOST });
+        }
+        let (length_m, slack_m) = (self.length_m, SAME_PLACE * self.length_m);
+        for (i, &BeamSupport { at_m, kind }) in self.supports.iter().enumerate() {
+            let number = i + 1;
+            if !(-slack_m..=length_m + slack_m).contains(&at_m) {
+                return Err(SupportedBeamError::SupportOffBeam { number, at_m, length_m });
+            }
+            if kind == BeamSupportKind::Free && (slack_m..=length_m - slack_m).contains(&at_m) {
+                return Err(SupportedBeamError::FreeWithin { number, at_m, length_m });
+            }
+            if let BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } = kind {
+                let turning = rotational_stiffness_nm_per_rad.map(|value| ("rotational_stiffness", value));
+                let springs = [Some(("stiffness", stiffness_n_per_m)), turning];
+                if let Some((name, value)) = springs.into_iter().flatten().find(|(_, v)| !is_positive(*v)) {
+                    return Err(SupportedBeamError::Stiffness { number, name, value });
+                }
+            }
+            let together = |other: &BeamSupport| (other.at_m - at_m).abs() <= slack_m;
+            if let Some(first) = self.supports[..i].iter().position(together) {
+                return Err(SupportedBeamError::SupportsTogether { first: first + 1, second: number, at_m });
+            }
+        }
+        Ok(())
+    }
+
+    /// Moving up and down and turning must both be held.
+    fn check_held(&self) -> Result<(), SupportedBeamError> {
+        let mut forces = self.supports.iter().filter(|support| support.kind.takes_force());
+        let couples = self.supports.iter().any(|support| support.kind.takes_couple());
+        let motion = match (forces.next(), forces.next(), couples) {
+            (Some(_), Some(_), _) | (Some(_), None, true) => return Ok(()),
+            (Some(only), None, false) => RigidMotion::Turning { about_m: only.at_m },
+            (None, _, true) => RigidMotion::UpAndDown,
+            (None, _, false) => RigidMotion::Any,
+        };
+        Err(SupportedBeamError::Mechanism { motion })
+    }
+}
+
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
+impl SupportedBeamSpec {
+    /// "clamped at 0 mm, elastic (2 N/mm) at 300 mm", from left to right.
+    pub fn supports_in_words(&self) -> String {
+        let mut supports = self.supports.clone();
+        supports.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
+        let words = |BeamSupport { at_m, kind }: &BeamSupport| {
+            format!("{} at {}", kind_in_words(*kind), format_length_mm(*at_m))
+        };
+        supports.iter().map(words).collect::<Vec<_>>().join(", ")
+    }
+
+    /// "40 mm × 1.2 mm", or "40 mm × 2 mm up to 100 mm, 40 mm × 1.2 mm up to 300 mm": width × thickness.
+    pub fn sections_in_words(&self) -> String {
+        let size = |section: &BeamSection| {
+            format!("{} × {}", format_length_mm(section.width_m), format_length_mm(section.thickness_m))
+        };
+        match self.sections.as_slice() {
+            [only] => size(only),
+            sections => {
+                let words = |section: &BeamSection| {
+                    format!("{} up to {}", size(section), format_length_mm(section.to_m))
+                };
+                sections.iter().map(words).collect::<Vec<_>>().join(", ")
+            }
+        }
+    }
+}
+
+fn kind_in_words(kind: BeamSupportKind) -> String {
+    let BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } = kind else {
+        return kind.name().to_owned();
+    };
+    let spring = Quantity { value: stiffness_n_per_m, dimension: Dimension::Stiffness };
+    match rotational_stiffness_nm_per_rad {
+        Some(value) => {
+            let turning = Quantity { value, dimension: Dimension::RotationalStiffness };
+            format!("elastic ({spring} and {turning})")
+        }
+        None => format!("elastic ({spring})"),
+    }
+}
+
+/// Why a beam on supports cannot be computed, and what of it is at fault. Sections and supports are numbered from 1, in the
+/// order of the description.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SupportedBeamError {
+    /// The length or the modulus is not a positive, finite number.
+    #[error("a beam's {name} is {value}; it must be greater than 0 and finite")]
+    NotPositive {
+        /// Which: "length" or "youngs_modulus".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// A dimension of a section is not a positive, finite number.
+    #[error("section {number}: the {name} is {value}; it must be greater than 0 and finite")]
+    Section {
+        /// Which section.
+        number: usize,
+        /// Which: "width" or "thickness".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// A spring's stiffness is not a positive, finite number.
+    #[error("support {number}: the {name} is {value}; it must be greater than 0 and finite")]
+    Stiffness {
+        /// Which support.
+        number: usize,
+        /// Which: "stiffness" or "rotational_stiffness".
+        name: &'static str,
+        /// Its value in SI units.
+        value: f64,
+    },
+    /// More sections than are computed.
+    #[error("the beam has {found} sections; it can have at most {most}")]
+    TooManySections {
+        /// How many there are.
+        found: usize,
+        /// The most that there can be.
+        most: usize,
+    },
+    /// More supports than are computed.
+    #[error("the beam has {found} supports; it can have at most {most}")]
+    TooManySupports {
+        /// How many there are.
+        found: usize,
+        /// The most that there can be.
+        most: usize,
+    },
+    /// Sections overlap, or one is out of order.
+    #[error(
+        "section {number} ends at {}, but the one before it reaches to {}: sections follow each other from left to right and do \
+         not overlap",
+        format_length_mm(*to_m),
+        format_length_mm(*from_m)
+    )]
+    SectionsOverlap {
+        /// Which section.
+        number: usize,
+        /// Where the one before it ends, or 0, in metres.
+        from_m: f64,
+        /// Where it ends, in metres.
+        to_m: f64,
+    },
+    /// A section reaches beyond the beam.
+    #[error(
+        "section {number} ends at {}, beyond the beam's end at {}",
+        format_length_mm(*to_m),
+        format_length_mm(*length_m)
+    )]
+    SectionBeyond {
+        /// Which section.
+        number: usize,
+        /// Where it ends, in metres.
+        to_m: f64,
+        /// The beam's length, in metres.
+        length_m: f64,
+    },
+    /// The sections end before the beam does.
+    #[error(
+        "the sections cover the beam up to {} only; it is {} long",
+        format_length_mm(*to_m),
+        format_length_mm(*length_m)
+    )]
+    SectionsEnd {
+        /// Where the last one ends, in metres.
+        to_m: f64,
+        /// The beam's length, in metres.
+        length_m: f64,
+    },
+    /// A support beside the beam.
+    #[error(
+        "support {number} is at {}, off the beam; it must be within 0 and {}",
+        format_length_mm(*at_m),
+        format_length_mm(*length_m)
+    )]
+    SupportOffBeam {
+        /// Which support.
+        number: usize,
+        /// Where it is, in metres.
+        at_m: f64,
+        /// The beam's length, in metres.
+        length_m: f64,
+    },
+    /// Two supports at one place.
+    #[error("supports {first} and {second} are both at {}", format_length_mm(*at_m))]
+    SupportsTogether {
+        /// The one.
+        first: usize,
+        /// The other, which comes later.
+        second: usize,
+        /// Where they are, in metres.
+        at_m: f64,
+    },
+    /// A place within the beam that is said to be a free end.
+    #[error(
+        "support {number} is `free` at {}, within the beam; free is an end, at 0 or {}",
+        format_length_mm(*at_m),
+        format_length_mm(*length_m)
+    )]
+    FreeWithin {
+        /// Which support.
+        number: usize,
+        /// Where it is, in metres.
+        at_m: f64,
+        /// The beam's length, in metres.
+        length_m: f64,
+    },
+    /// The supports let the beam move as a whole.
+    #[error("the beam is a mechanism: {motion}")]
+    Mechanism {
+        /// How it can move.
+        motion: RigidMotion,
+    },
+    /// The deflections are not numbers that can be computed with.
+    #[error(
+        "a beam's largest deflection is {compliance_m_per_n} m/N; it must be greater than 0 and finite, and not be lost beside \
+         the largest stiffness"
+    )]
+    Compliance {
+        /// The largest deflection per newton, in m/N.
+        compliance_m_per_n: f64,
+    },
+}
+
+/// A motion of the whole beam that bends nothing and that no support takes up.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RigidMotion {
+    /// All of them.
+    #[error("no support takes up force or couple, so it can move up and down and turn freely")]
+    Any,
+    /// Up and down.
+    #[error("its supports hold the slope only, so it can move up and down freely")]
+    UpAndDown,
+    /// About the only support.
+    #[error("only the support at {} takes up force, so it can turn about that freely", format_length_mm(*about_m))]
+    Turning {
+        /// Where that support is, in metres.
+        about_m: f64,
+    },
+}
+
+/// What of a beam's description is at fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BeamPart {
+    /// All of it.
+    Whole,
+    /// The supports together.
+    Supports,
+    /// One support, from 0.
+    Support(usize),
+    /// The sections together.
+    Sections,
+    /// One section, from 0.
+    Section(usize),
+}
+
+impl SupportedBeamError {
+    /// What is at fault.
+    pub const fn part(&self) -> BeamPart {
+        match *self {
+            Self::NotPositive { .. } | Self::Compliance { .. } => BeamPart::Whole,
+            Self::Section { number, .. }
+            | Self::SectionsOverlap { number, .. }
+            | Self::SectionBeyond { number, .. } => BeamPart::Section(number - 1),
+            Self::SectionsEnd { .. } | Self::TooManySections { .. } => BeamPart::Sections,
+            Self::Stiffness { number, .. }
+            | Self::SupportOffBeam { number, .. }
+            | Self::FreeWithin { number, .. }
+            | Self::SupportsTogether { second: number, .. } => BeamPart::Support(number - 1),
+            Self::Mechanism { .. } | Self::TooManySupports { .. } => BeamPart::Supports,
+        }
+    }
+
+    /// What would help.
+    pub const fn help(&self) -> Option<&'static str> {
+        match self {
+            Self::SectionsEnd { .. } => {
+                Some("leave `to` out of the last section: it then reaches to the beam's end")
+            }
+            Self::SupportsTogether { .. } => Some("leave one of them out, or move it"),
+            Self::Mechanism { motion: RigidMotion::UpAndDown } => {
+                Some("add a support that takes up force: simple, clamped or elastic")
+            }
+            Self::Mechanism { .. } => {
+                Some("clamp one support, or have two that take up force: simple, clamped or elastic")
+            }
+            Self::FreeWithin { .. } => Some("leave it out: where no support is listed, the beam is free"),
+            _ => None,
+        }
     }
 }

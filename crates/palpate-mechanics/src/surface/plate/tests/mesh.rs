@@ -3,8 +3,7 @@
 use proptest::prelude::*;
 
 use super::super::dissection::{coupled_pairs, nested_dissection};
-use super::super::mesh::Mesh;
-use super::super::stiffness::element_stiffness;
+use super::super::mesh::{Mesh, element_stiffness};
 use super::*;
 use crate::surface::Extent;
 

@@ -52,7 +52,7 @@ fn near_a_node(beam: &SupportedBeam, share: f64) -> bool {
 fn jumps(beam: &SupportedBeam, contact_m: f64) -> Vec<(f64, f64, f64)> {
     let l = beam.spec.length_m;
     let mut bent = beam.shape(Deflection, Position::along(contact_m)).pieces;
-    let air = shape::Piece {
+    let air = structure::Piece {
         from: 0.0,
         to: 0.0,
         start: State::SLOPE * 0.0,
@@ -60,7 +60,7 @@ fn jumps(beam: &SupportedBeam, contact_m: f64) -> Vec<(f64, f64, f64)> {
         stiffness: 1.0,
     };
     bent.insert(0, air);
-    bent.push(shape::Piece { from: 1.0, to: 1.0, ..air });
+    bent.push(structure::Piece { from: 1.0, to: 1.0, ..air });
     let d = beam.stiffness_nm2;
     bent.windows(2)
         .map(|pair| {

@@ -1,0 +1,485 @@
+//! The beam between its nodes: which states it admits, and how it bends after a disturbance at one place.
+//!
+//! Lengths here are shares of the beam's length l and stiffnesses shares of its largest bending stiffness D, so that all
+//! four numbers of a state have one magnitude and one unit, that of the deflection.
+//!
+//! Whatever acts further along, the stretches passed so far leave two freedoms: the states of a section are the
+//! combinations of two. A sweep carries such a pair from the free air before the beam through its supports and stretches,
+//! and makes it orthonormal after every support, so that nothing is lost on the way (Godunov's orthogonal sweep, Uspekhi
+//! Mat. Nauk 16(3), 1961). Stiffness matrices are not formed: theirs have entries of 12·E·I/h³, of which a short element
+//! takes (l/h)³ digits away, and a rigid support is not a stiff spring's limit in them.
+
+use std::ops::{Add, Mul};
+
+use super::spec::SAME_PLACE;
+use crate::contact::Position;
+use crate::surface::InfluenceFunction;
+use palpate_numerics::small::solve_general;
+
+/// The beam between its nodes, with the states that it admits from both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Structure {
+    length_m: f64,
+    /// Where the nodes are, as shares of the length: ends, supports and section steps.
+    pub nodes: Vec<f64>,
+    pub holds: Vec<Hold>,
+    /// One fewer than nodes.
+    pub elements: Vec<Element>,
+    forth: Sweep,
+    back: Sweep,
+}
+
+/// A place in an element. At the element's ends it is on this element's side of their supports and steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Site {
+    pub element: usize,
+    /// From the element's beginning, as a share of the beam's length; from 0 to the element's length.
+    pub offset: f64,
+}
+
+/// What happens at a site.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Disturbance {
+    /// The state jumps by this much.
+    Jump(State),
+    /// The ground under the support at the site rises by 1.
+    Settlement,
+}
+
+/// What lies to both sides of a site.
+struct Surroundings {
+    /// Admitted by the beam to its left, in the factors of this element, if any.
+    left: Pair,
+    left_element: Option<usize>,
+    /// Admitted by the beam to its right, in the factors of this element of the sweep back, if any.
+    right: Pair,
+    right_element: Option<usize>,
+    hold: Hold,
+    /// Whether the hold is to the left of what happens.
+    held_left: bool,
+}
+
+impl Structure {
+    pub fn new(length_m: f64, nodes: Vec<f64>, holds: Vec<Hold>, elements: Vec<Element>) -> Self {
+        let forth = Sweep::through(holds.iter().copied().zip(elements.iter().copied()));
+        let mirrored = holds.iter().rev().copied().zip(elements.iter().rev().copied());
+        let back = Sweep::through(mirrored);
+        Self { length_m, nodes, holds, elements, forth, back }
+    }
+
+    /// The site of a sensor: in the element to the right of a node, but for the last one.
+    pub fn site(&self, place: f64) -> Site {
+        let last = self.elements.len() - 1;
+        let element =
+            self.nodes.partition_point(|node| node - SAME_PLACE <= place).saturating_sub(1).min(last);
+        let (length, offset) = (self.elements[element].length, place - self.nodes[element]);
+        let offset = if offset <= SAME_PLACE {
+            0.0
+        } else if offset >= length - SAME_PLACE {
+            length
+        } else {
+            offset
+        };
+        Site { element, offset }
+    }
+
+    /// What holds the beam at a site; `None` between nodes.
+    pub fn hold_at(&self, Site { element, offset }: Site) -> Option<Hold> {
+        if offset <= 0.0 {
+            Some(self.holds[element])
+        } else {
+            (offset >= self.elements[element].length).then(|| self.holds[element + 1])
+        }
+    }
+
+    /// The shape when nothing happens.
+    pub fn unbent(&self) -> Shape {
+        let nothing = State::DEFLECTION * 0.0;
+        let piece = Piece { from: 0.0, to: 1.0, start: nothing, end: nothing, stiffness: 1.0 };
+        Shape { length_m: self.length_m, pieces: vec![piece] }
+    }
+
+    /// The beam's shape after a disturbance: all it admits to the left and to the right of the site, fitted together.
+    pub fn shape(&self, site: Site, disturbance: Disturbance) -> Shape {
+        let around = self.surroundings(site);
+        let (left, right) = around.fitted(disturbance);
+        let mut pieces = self.pieces_left(site, &around, left);
+        pieces.extend(self.pieces_right(site, &around, right));
+        Shape { length_m: self.length_m, pieces }
+    }
+
+    fn surroundings(&self, Site { element, offset }: Site) -> Surroundings {
+        let last = self.elements.len() - 1;
+        let Element { length, stiffness, .. } = self.elements[element];
+        // Elements to the right of this one; the sweep back passes them before it.
+        let beyond = last - element;
+        let forward = |offset: f64| self.forth.start(element).map(|state| state.advanced(offset, stiffness));
+        let backward = |offset: f64| self.back.start(beyond).map(|state| state.advanced(offset, stiffness));
+        let (left, left_element) = if offset > 0.0 {
+            (forward(offset), Some(element))
+        } else {
+            (self.forth.end(element), element.checked_sub(1))
+        };
+        let (right, right_element) = if offset < length {
+            (backward(length - offset), Some(beyond))
+        } else {
+            (self.back.end(beyond), beyond.checked_sub(1))
+        };
+        let hold = self.hold_at(Site { element, offset }).unwrap_or_default();
+        let right = right.map(State::mirrored);
+        Surroundings { left, left_element, right, right_element, hold, held_left: offset <= 0.0 }
+    }
+
+    fn pieces_left(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
+        let Some(nearest) = around.left_element else { return Vec::new() };
+        let states = self.forth.back_from(nearest, factors);
+        let piece = |(element, (start, end)): (usize, (State, State))| {
+            let Element { stiffness, .. } = self.elements[element];
+            Piece { from: self.nodes[element], to: self.nodes[element + 1], start, end, stiffness }
+        };
+        let mut pieces: Vec<Piece> = (0..=nearest).rev().zip(states).map(piece).collect();
+        if let Some(cut) = pieces.first_mut().filter(|_| nearest == site.element) {
+            cut.to = cut.from + site.offset;
+            cut.end = combined(around.left, factors);
+        }
+        pieces.reverse();
+        pieces
+    }
+
+    fn pieces_right(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
+        let Some(nearest) = around.right_element else { return Vec::new() };
+        let first = self.elements.len() - 1 - nearest;
+        let states = self.back.back_from(nearest, factors);
+        let piece = |(element, (end, start)): (usize, (State, State))| {
+            let Element { stiffness, .. } = self.elements[element];
+            let [start, end] = [start, end].map(State::mirrored);
+            Piece { from: self.nodes[element], to: self.nodes[element + 1], start, end, stiffness }
+        };
+        let mut pieces: Vec<Piece> = (first..self.elements.len()).zip(states).map(piece).collect();
+        if let Some(cut) = pieces.first_mut().filter(|_| first == site.element) {
+            cut.from += site.offset;
+            cut.start = combined(around.right, factors);
+        }
+        pieces
+    }
+}
+
+impl Surroundings {
+    /// The factors of both sides: from left to right the state jumps by the disturbance, by the support's force and by its
+    /// couple; the support gives way to the one and turns under the other. Six equations.
+    fn fitted(&self, disturbance: Disturbance) -> (Factors, Factors) {
+        let (jump, settlement) = match disturbance {
+            Disturbance::Jump(jump) => (jump, 0.0),
+            Disturbance::Settlement => (State::DEFLECTION * 0.0, 1.0),
+        };
+        let [left, right] = [self.left, self.right].map(|pair| pair.map(State::numbers));
+        let (force, couple) = (State::SHEAR.numbers(), State::MOMENT.numbers());
+        let (mut system, mut right_side) = ([[0.0; 6]; 6], [0.0; 6]);
+        for i in 0..4 {
+            system[i] = [-left[0][i], -left[1][i], right[0][i], right[1][i], -force[i], -couple[i]];
+            right_side[i] = jump.numbers()[i];
+        }
+        let on_held_side = |number: usize| {
+            let side = if self.held_left { left } else { right };
+            let [a, b] = [side[0][number], side[1][number]];
+            if self.held_left { [a, b, 0.0, 0.0] } else { [0.0, 0.0, a, b] }
+        };
+        system[4] = match self.hold.yielding {
+            Some(c) => {
+                let [a, b, d, e] = on_held_side(0);
+                right_side[4] = settlement;
+                [a, b, d, e, c, 0.0]
+            }
+            None => [0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        };
+        system[5] = match self.hold.turning {
+            Some(c) => {
+                let [a, b, d, e] = on_held_side(1);
+                [a, b, d, e, 0.0, -c]
+            }
+            None => [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        };
+        let [a, b, c, d, ..] = solve_general(&system, &right_side);
+        ([a, b], [c, d])
+    }
+}
+
+/// What a sensor reads per newton, as the shape that a disturbance at the sensor bends the beam into (Betti and Maxwell;
+/// Müller-Breslau, *Die neueren Methoden der Festigkeitslehre*, 1886).
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shape {
+    /// In metres.
+    pub length_m: f64,
+    /// From one end of the beam to the other.
+    pub pieces: Vec<Piece>,
+}
+
+/// One cubic, known by its states at both ends. Places are shares of the beam's length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Piece {
+    pub from: f64,
+    pub to: f64,
+    pub start: State,
+    pub end: State,
+    pub stiffness: f64,
+}
+
+impl Piece {
+    /// The state at a place, from the nearer end: beside a support the deflection is then as small as it should be.
+    fn at(&self, place: f64) -> State {
+        let (behind, ahead) = (place - self.from, self.to - place);
+        if behind <= ahead {
+            self.start.advanced(behind, self.stiffness)
+        } else {
+            self.end.advanced(-ahead, self.stiffness)
+        }
+    }
+
+    /// The largest magnitude of the deflection: at an end, or where the slope, a quadratic, is 0.
+    fn peak(&self) -> f64 {
+        let State { slope, moment, shear, .. } = self.start;
+        let level = roots(shear / 2.0, moment, slope * self.stiffness);
+        let within = level.into_iter().filter(|by| (0.0..=self.to - self.from).contains(by));
+        within
+            .map(|by| self.at(self.from + by).deflection.abs())
+            .fold(self.start.deflection.abs().max(self.end.deflection.abs()), f64::max)
+    }
+}
+
+impl Shape {
+    /// The largest magnitude over all contact positions.
+    pub fn peak(&self) -> f64 {
+        self.pieces.iter().map(Piece::peak).fold(0.0, f64::max)
+    }
+
+    fn state(&self, contact: Position) -> State {
+        let place = contact.x_m / self.length_m;
+        let piece = self.pieces.partition_point(|piece| piece.to < place).min(self.pieces.len() - 1);
+        self.pieces[piece].at(place)
+    }
+}
+
+impl InfluenceFunction for Shape {
+    fn at(&self, contact: Position) -> f64 {
+        self.state(contact).deflection
+    }
+
+    fn gradient(&self, contact: Position) -> [f64; 2] {
+        [self.state(contact).slope / self.length_m, 0.0]
+    }
+}
+
+/// The real roots of a·t² + b·t + c; NaN for those that are not there.
+fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
+    let root = (b * b - 4.0 * a * c).sqrt();
+    let q = -0.5 * (b + if b < 0.0 { -root } else { root });
+    [q / a, c / q]
+}
+
+/// Two states whose combinations are all that can be; the factors of a combination.
+type Pair = [State; 2];
+type Factors = [f64; 2];
+
+/// What holds a node: how far it gives way to a unit force and turns under a unit couple, in the states' unit. 0 is
+/// rigid, `None` free.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Hold {
+    pub yielding: Option<f64>,
+    pub turning: Option<f64>,
+}
+
+/// A stretch between neighbouring nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Element {
+    /// As a share of the beam's length.
+    pub length: f64,
+    /// As a share of the beam's largest bending stiffness.
+    pub stiffness: f64,
+    pub thickness_m: f64,
+}
+
+/// The admitted states of every element, in the direction of the sweep.
+#[derive(Clone, Debug, PartialEq)]
+struct Sweep {
+    passages: Vec<Passage>,
+}
+
+/// One element's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Passage {
+    /// Just behind the support at its beginning.
+    start: Pair,
+    /// Just before the support at its end, with the same factors.
+    end: Pair,
+    /// From this element's factors to those of the one before.
+    before: [Factors; 2],
+}
+
+/// Nothing holds the air before the beam.
+const FREE: Pair = [State::DEFLECTION, State::SLOPE];
+
+impl Sweep {
+    /// Through `elements`, each with the hold of the node at its beginning.
+    pub fn through(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
+        let mut passages = Vec::new();
+        let mut pair = FREE;
+        for (hold, element) in elements {
+            let (start, before) = orthonormal(turned(yielded((pair, UNMIXED), hold.yielding), hold.turning));
+            let end = start.map(|state| state.advanced(element.length, element.stiffness));
+            passages.push(Passage { start, end, before });
+            pair = end;
+        }
+        Self { passages }
+    }
+
+    /// The pair just behind the support at the beginning of an element.
+    pub fn start(&self, element: usize) -> Pair {
+        self.passages[element].start
+    }
+
+    /// The pair just before the support at the end of the elements passed so far, counted from 0; that of the free air
+    /// where none was.
+    pub fn end(&self, passed: usize) -> Pair {
+        passed.checked_sub(1).map_or(FREE, |last| self.passages[last].end)
+    }
+
+    /// The states at the beginning and the end of `element` and of all before it, nearest first, when the combination in
+    /// `element` has these factors.
+    pub fn back_from(&self, element: usize, factors: Factors) -> impl Iterator<Item = (State, State)> + '_ {
+        self.passages[..=element].iter().rev().scan(factors, |factors, passage| {
+            let states = (combined(passage.start, *factors), combined(passage.end, *factors));
+            *factors = mixed(passage.before, *factors);
+            Some(states)
+        })
+    }
+}
+
+/// The combination of a pair.
+fn combined([first, second]: Pair, [a, b]: Factors) -> State {
+    first * a + second * b
+}
+
+/// A pair, and the matrix from its factors to those of the pair that it comes from, by columns.
+type Mixture = (Pair, [Factors; 2]);
+
+const UNMIXED: [Factors; 2] = [[1.0, 0.0], [0.0, 1.0]];
+
+fn mixed([first, second]: [Factors; 2], [a, b]: Factors) -> Factors {
+    [first[0] * a + second[0] * b, first[1] * a + second[1] * b]
+}
+
+/// Behind a support that gives way by c to a unit force: of the combinations, one has no deflection and passes as it is;
+/// the other one meets a force of −w/c, here times c so that a rigid support is nothing special.
+fn yielded(mixture: Mixture, yielding: Option<f64>) -> Mixture {
+    let Some(c) = yielding else { return mixture };
+    let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.deflection);
+    let met = moving * c + State::SHEAR * -moving.deflection;
+    ([State { deflection: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
+}
+
+/// Behind a support that turns by c under a unit couple, likewise.
+fn turned(mixture: Mixture, turning: Option<f64>) -> Mixture {
+    let Some(c) = turning else { return mixture };
+    let ((still, still_mix), (moving, moving_mix)) = parted(mixture, |state| state.slope);
+    let met = moving * c + State::MOMENT * moving.slope;
+    ([State { slope: 0.0, ..still }, met], [still_mix, moving_mix.map(|factor| factor * c)])
+}
+
+/// The combination of which `part` is 0, and the one at right angles to it.
+fn parted((pair, mix): Mixture, part: fn(State) -> f64) -> ((State, Factors), (State, Factors)) {
+    let [a, b] = pair.map(part);
+    let size = a.hypot(b);
+    let [a, b] = if size > 0.0 { [a / size, b / size] } else { [0.0, 1.0] };
+    let combination = |factors: Factors| (combined(pair, factors), mixed(mix, factors));
+    (combination([-b, a]), combination([a, b]))
+}
+
+/// Gram and Schmidt's, done twice, which is enough (Kahan, in Parlett, *The Symmetric Eigenvalue Problem*, 6.9).
+fn orthonormal(mixture: Mixture) -> Mixture {
+    let (mut pair, mut mix) = mixture;
+    scale(&mut pair, &mut mix, 0);
+    for _ in 0..2 {
+        scale(&mut pair, &mut mix, 1);
+        let along = pair[0].dot(pair[1]);
+        pair[1] = pair[1] + pair[0] * -along;
+        mix[1] = [mix[1][0] - along * mix[0][0], mix[1][1] - along * mix[0][1]];
+    }
+    scale(&mut pair, &mut mix, 1);
+    (pair, mix)
+}
+
+fn scale(pair: &mut Pair, mix: &mut [Factors; 2], which: usize) {
+    let largest = pair[which].numbers().into_iter().fold(0.0, |most: f64, number| most.max(number.abs()));
+    let shrunk = pair[which] * (1.0 / largest);
+    let factor = 1.0 / (largest * shrunk.dot(shrunk).sqrt());
+    pair[which] = pair[which] * factor;
+    mix[which] = mix[which].map(|value| value * factor);
+}
+
+/// The state of one section: deflection w, slope θ = dw/dξ, moment M = r·d²w/dξ² and its derivative V = dM/dξ, with
+/// ξ = x/l and r the stretch's stiffness over D. All but w are continuous wherever nothing acts, and so is w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct State {
+    pub deflection: f64,
+    pub slope: f64,
+    pub moment: f64,
+    /// Upward loads make it jump up: D·ΔV = q·l³ for a force q in newtons.
+    pub shear: f64,
+}
+
+impl State {
+    pub const DEFLECTION: Self = Self { deflection: 1.0, slope: 0.0, moment: 0.0, shear: 0.0 };
+    pub const SLOPE: Self = Self { deflection: 0.0, slope: 1.0, moment: 0.0, shear: 0.0 };
+    pub const MOMENT: Self = Self { deflection: 0.0, slope: 0.0, moment: 1.0, shear: 0.0 };
+    pub const SHEAR: Self = Self { deflection: 0.0, slope: 0.0, moment: 0.0, shear: 1.0 };
+
+    /// The state `by` further along a stretch of this stiffness that carries no load: w is a cubic.
+    pub fn advanced(self, by: f64, stiffness: f64) -> Self {
+        let Self { deflection, slope, moment, shear } = self;
+        Self {
+            deflection: deflection + by * (slope + by * (moment / 2.0 + by * shear / 6.0) / stiffness),
+            slope: slope + by * (moment + by * shear / 2.0) / stiffness,
+            moment: moment + by * shear,
+            shear,
+        }
+    }
+
+    /// The same state, seen by someone who walks the beam from its other end.
+    pub fn mirrored(self) -> Self {
+        Self { slope: -self.slope, shear: -self.shear, ..self }
+    }
+
+    pub fn dot(self, other: Self) -> f64 {
+        self.numbers().iter().zip(other.numbers()).map(|(a, b)| a * b).sum()
+    }
+
+    pub const fn numbers(self) -> [f64; 4] {
+        [self.deflection, self.slope, self.moment, self.shear]
+    }
+}
+
+impl Add for State {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            deflection: self.deflection + other.deflection,
+            slope: self.slope + other.slope,
+            moment: self.moment + other.moment,
+            shear: self.shear + other.shear,
+        }
+    }
+}
+
+impl Mul<f64> for State {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            deflection: self.deflection * factor,
+            slope: self.slope * factor,
+            moment: self.moment * factor,
+            shear: self.shear * factor,
+        }
+    }
+}
