@@ -1,6 +1,13 @@
 //! Where and how hard a surface is touched.
 
 /// A point on the surface, measured from its left support or lower left corner.
+///
+/// ```
+/// use palpate_core::Position;
+///
+/// let (contact, estimate) = (Position { x_m: 0.1, y_m: 0.2 }, Position { x_m: 0.103, y_m: 0.204 });
+/// assert!((contact.distance_m(estimate) - 0.005).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {

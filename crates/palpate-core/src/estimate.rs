@@ -94,6 +94,14 @@ const NO_CONTACT: ContactEstimate =
 const NO_MODE: Mode = Mode { contact: NO_CONTACT, probability: 0.0 };
 
 /// A list of at most N, without allocation.
+///
+/// ```
+/// use palpate_core::BoundedList;
+///
+/// let mut list = BoundedList::<u8, 2>::none(0);
+/// assert!(list.push(1) && list.push(2) && !list.push(3));
+/// assert_eq!(list.as_slice(), [1, 2]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct BoundedList<T, const N: usize> {
     items: [T; N],

@@ -1,5 +1,22 @@
 //! The part of palpate that also runs on a microcontroller: a reading goes in, an estimate comes out.
 //! No allocation, no standard library.
+//!
+//! ```
+//! use palpate_core::{Activation, Estimate, Network, Position, Status};
+//!
+//! // Two readings, one hidden node, and the position in metres out.
+//! let network = Network {
+//!     sizes: &[2, 1, 1],
+//!     biases: true,
+//!     hidden_activation: Activation::Tanh,
+//!     output_activation: Activation::Linear,
+//!     weights: &[1.0, -2.0, 0.5, 3.0, 0.25],
+//! };
+//! let (mut output, mut scratch) = ([0.0], [0.0; 4]);
+//! network.forward_into(&[0.3, 0.1], &mut output, &mut scratch).unwrap();
+//! let estimate = Estimate::of_position(Position::along(output[0]), Status::Located);
+//! assert!((estimate.contact.position.x_m - (3.0 * 0.6f64.tanh() + 0.25)).abs() < 1e-15);
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(

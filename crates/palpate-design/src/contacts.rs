@@ -52,6 +52,18 @@ pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> 
 }
 
 /// Contact positions, and how often the surface is touched there.
+///
+/// ```
+/// use palpate_design::{ContactPrior, WeightedContacts};
+/// use palpate_mechanics::surface::Extent;
+///
+/// // Every 100 mm from 0 to 400 mm, three times as often in the right half.
+/// let prior = ContactPrior { weights: vec![1.0, 3.0], ..ContactPrior::along(0.0, 0.4, 0.1) };
+/// let contacts = WeightedContacts::of(&prior, Extent::Line { length_m: 0.4 })?;
+/// assert_eq!(contacts.len(), 5);
+/// assert!((contacts.weights[4] - 3.0 / 11.0).abs() < 1e-15);
+/// # Ok::<(), palpate_numerics::OutOfRange>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedContacts {
     /// Where; on a line from left to right, on a plane row by row from the lower left.

@@ -335,6 +335,13 @@ impl SensorGroup {
 /// The faults of one channel, in the SI unit of its sensor (or raw). The default channel is perfect.
 ///
 /// reading = saturate(quantise((1 + g)·value + o + noise)), and 0 always when the channel is dead.
+///
+/// ```
+/// use palpate_mechanics::sensing::ChannelModel;
+///
+/// let channel = ChannelModel { noise_sd: 3e-6, resolution: 4e-6 * 12f64.sqrt(), ..ChannelModel::default() };
+/// assert!((channel.reading_sd() - 5e-6).abs() < 1e-18); // quantisation is noise of variance q²/12
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ChannelModel {
     /// Standard deviation of the Gaussian noise of a reading; at least 0.

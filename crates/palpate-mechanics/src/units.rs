@@ -41,6 +41,16 @@ pub const fn microstrain(strain: f64) -> f64 {
 /// A finite value and what it measures.
 ///
 /// Parsed from "400 mm", "200GPa", "5 µm", "5 %" or a plain number; shown with the prefix that keeps it readable.
+///
+/// ```
+/// use palpate_mechanics::units::{Dimension, Quantity};
+///
+/// assert_eq!(Quantity::parse_as("1.2 mm", Dimension::Length)?, 0.0012);
+/// assert_eq!(Quantity { value: 0.0012, dimension: Dimension::Length }.to_string(), "1.2 mm");
+/// let refused = Quantity::parse_as("3 N", Dimension::Length).unwrap_err();
+/// assert_eq!(refused.to_string(), "wrong unit `N`; a length is one of nm, um, mm, cm, m");
+/// # Ok::<(), palpate_mechanics::units::UnitError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
     /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
@@ -439,6 +449,14 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
 /// A unit of measure.
 ///
 /// Serialised as its symbol.
+///
+/// ```
+/// use palpate_mechanics::units::Unit;
+///
+/// let um = Unit::from_symbol("um").unwrap();
+/// assert_eq!(um.parse_si("5"), Some(5e-6));
+/// assert_eq!(um.format_si(5e-6), "5");
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Unit(usize);
 

@@ -19,6 +19,16 @@ const LANES: usize = 8;
 const GRAM: usize = 48;
 
 /// The factor L of A = L·Lᵀ, lower triangular.
+///
+/// ```
+/// use ndarray::array;
+/// use palpate_numerics::Cholesky;
+///
+/// let factor = Cholesky::factor(array![[4.0, 2.0], [2.0, 3.0]])?;
+/// assert_eq!(factor.solve(&array![8.0, 8.0]), array![1.0, 2.0]);
+/// assert!((factor.log_determinant() - 8f64.ln()).abs() < 1e-15);
+/// # Ok::<(), palpate_numerics::NotPositiveDefinite>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cholesky {
     /// Row by row in memory.

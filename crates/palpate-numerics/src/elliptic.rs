@@ -50,6 +50,13 @@ pub fn carlson_rd(mut x: f64, mut y: f64, mut z: f64) -> f64 {
 }
 
 /// Jacobi's elliptic functions at one argument, and the integral of dn².
+///
+/// ```
+/// use palpate_numerics::Jacobi;
+///
+/// let Jacobi { sn, cn, dn, .. } = Jacobi::new(0.5, 0.3); // u = 0.5, m = 0.7
+/// assert!((sn * sn + cn * cn - 1.0).abs() < 1e-15 && (dn * dn + 0.7 * sn * sn - 1.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jacobi {
     /// sn(u | m)

@@ -1,4 +1,17 @@
-//! Linear algebra, statistics and distribution functions that several modules need.
+//! Numerical methods that several crates need, each with its source.
+//!
+//! [`small`] holds the algebra of matrices whose size the compiler knows; [`Cholesky`] and [`SparseCholesky`] factor larger
+//! ones. [`regression`] learns smooth functions with their uncertainty. Statistics, distribution functions and elliptic
+//! functions are plain functions of this crate's root, and [`simd`] has the vectors that kernels are written in.
+//! [`watch`] carries the progress of long work out and its cancellation in, and [`OutOfRange`] a number and its bound.
+//!
+//! ```
+//! use palpate_numerics::{chi_squared_bound, median, normal_interval_95};
+//!
+//! assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), Some(2.5));
+//! assert!((normal_interval_95(0.2, 0.001).1 - 0.20196).abs() < 1e-6);
+//! assert!((chi_squared_bound(0.05, 8) - 15.507).abs() < 1e-3); // exceeded with a probability of 5 %
+//! ```
 #![cfg_attr(
     not(test),
     deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::print_stderr, clippy::print_stdout)

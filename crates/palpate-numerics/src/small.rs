@@ -16,6 +16,15 @@ pub const ROUNDING: f64 = 1e-14;
 /// D diagonal. Of A, only the lower triangle is read.
 ///
 /// An unknown that is held has no pivot. Its row and column count for nothing, and it is 0 in every solution and inverse.
+///
+/// ```
+/// use palpate_numerics::small::Ldl;
+///
+/// let factors = Ldl::new(&[[4.0, 0.0], [2.0, 3.0]]).unwrap(); // the lower triangle of [[4, 2], [2, 3]]
+/// assert_eq!(factors.determinant(), 8.0);
+/// assert_eq!(factors.solve([8.0, 8.0]), [1.0, 2.0]);
+/// assert!(Ldl::new(&[[1.0, 0.0], [2.0, 4.0]]).is_none()); // singular
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ldl<const N: usize> {
     /// L below its diagonal; zeros above it.

@@ -15,15 +15,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`prelude`] has what most programs use; the crates beneath have the rest:
+//! [`prelude`] has what most programs use; the modules of the crates beneath have the rest:
 //!
-//! | crate | what for |
-//! |---|---|
-//! | [`mechanics`] | surfaces, sensors, what they read, and the Cramér–Rao bound |
-//! | [`estimators`] | recordings, estimators, tracking, load profiles, evaluation |
-//! | [`design`] | where to put the sensors and where to press |
-//! | [`rig`] | the TOML file that says what is on the bench |
-//! | [`numerics`] | linear algebra, Gaussian-process regression, distributions |
+//! | crate | what for | modules |
+//! |---|---|---|
+//! | [`mechanics`] | surfaces, sensors, what they read, and the Cramér–Rao bound | [`contact`](mechanics::contact), [`limit`](mechanics::limit), [`sensing`](mechanics::sensing), [`surface`](mechanics::surface) with [`modal`](mechanics::surface::modal) and [`plate`](mechanics::surface::plate), [`units`](mechanics::units) |
+//! | [`estimators`] | recordings, estimators, tracking, load profiles, evaluation | [`arrangement`](estimators::arrangement), [`centroid`](estimators::centroid), [`closed_form`](estimators::closed_form), [`digit`](estimators::digit), [`estimator`](estimators::estimator), [`evaluation`](estimators::evaluation), [`features`](estimators::features), [`fit`](estimators::fit), [`gaussian_process`](estimators::gaussian_process), [`influence`](estimators::influence) with [`measured`](estimators::influence::measured), [`likelihood`](estimators::likelihood), [`load_profile`](estimators::load_profile), [`neighbours`](estimators::neighbours), [`network`](estimators::network), [`recording`](estimators::recording), [`setup`](estimators::setup), [`simulate`](estimators::simulate), [`status`](estimators::status), [`track_errors`](estimators::track_errors), [`tracking`](estimators::tracking) |
+//! | [`design`] | where to put the sensors and where to press | [`positions`](design::positions), [`sensors`](design::sensors) |
+//! | [`rig`] | the TOML file that says what is on the bench | |
+//! | [`numerics`] | linear algebra, Gaussian-process regression, distributions | [`regression`](numerics::regression), [`simd`](numerics::simd), [`small`](numerics::small), [`watch`](numerics::watch) |
 //!
 //! Lengths are in metres, forces in newtons, moduli in pascals; functions such as [`mm`](prelude::mm) say the unit where a
 //! number is written. The examples in the folder `examples` of this crate are complete programs.

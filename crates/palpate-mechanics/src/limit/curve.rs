@@ -16,6 +16,24 @@ pub struct LimitPoint {
 }
 
 /// The limit at many positions, for one force.
+///
+/// ```
+/// use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, limit_warnings};
+/// use palpate_mechanics::sensing::{Layout, SensorKind};
+/// use palpate_mechanics::surface::Beam;
+///
+/// let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9)?;
+/// let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
+/// layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6))?;
+/// let bound = CramerRaoBound::new(&beam, &layout)?;
+/// let curve = LimitCurve::over(&bound, 3.0, Force::Known)?;
+/// assert_eq!(curve.points.len(), 399);
+/// let summary = curve.summary().unwrap();
+/// assert!(summary.best.1 < summary.median_m && summary.median_m < summary.worst.1);
+/// let warnings = limit_warnings(&bound, 3.0, Force::Known)?;
+/// assert!(warnings[0].to_string().starts_with("ambiguous at 0–1.6 mm with known force"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitCurve {
     /// The surface.

@@ -52,6 +52,14 @@ const MOST_TURN: f64 = 300.0;
 const MOST_STEPS: usize = 60;
 
 /// A finger in its exact shape under one force.
+///
+/// ```
+/// use palpate_mechanics::surface::{Elastica, ForceDirection};
+///
+/// // Bisshopp and Drucker: a vertical load F·s²/(E·I) of 1 lowers the tip by 0.302 of the length.
+/// let shape = Elastica::new(ForceDirection::Vertical, 1.0, 1.0, 1.0);
+/// assert!((shape.point(1.0)[1] + 0.3017).abs() < 1e-4);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastica {
     direction: ForceDirection,

@@ -6,6 +6,15 @@ use crate::contact::Position;
 use crate::units::format_length_mm;
 
 /// The line or rectangle on which contacts lie.
+///
+/// ```
+/// use palpate_mechanics::contact::Position;
+/// use palpate_mechanics::surface::Extent;
+///
+/// let plate = Extent::Plane { length_m: 0.3, width_m: 0.2 };
+/// assert!(plate.contains(Position { x_m: 0.3, y_m: 0.1 }) && !plate.contains(Position { x_m: 0.1, y_m: 0.3 }));
+/// assert_eq!(plate.bounds_in_words(), "0 and 300 mm along, 0 and 200 mm across");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Sides", into = "Sides")]
 pub enum Extent {

@@ -19,6 +19,15 @@ use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 
 /// A [`Beam`] with inertia and damping.
+///
+/// ```
+/// use palpate_mechanics::surface::{Beam, modal::ModalBeam};
+///
+/// let steel = ModalBeam::new(Beam::new(0.4, 0.04, 1.2e-3, 200e9)?, 7850.0, 0.01)?;
+/// assert!((steel.frequency_hz(1) - 17.17).abs() < 0.01);
+/// assert!((steel.critical_speed_m_per_s() - 13.73).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModalBeam {
     beam: Beam,

@@ -7,6 +7,20 @@
 //! Rows at the same coordinates are collapsed to their weighted mean before anything is factored. That is exact: the
 //! posterior and the evidence are those of all rows, the scatter of the repeats included, so repeats teach the noise.
 //!
+//! ```
+//! use ndarray::Array2;
+//! use palpate_numerics::regression::{Regression, Samples};
+//! use palpate_numerics::watch::Watch;
+//!
+//! let x = Array2::from_shape_fn((12, 1), |(i, _)| 0.5 * i as f64);
+//! let y = x.mapv(f64::sin);
+//! let samples = Samples { coordinates: x.view(), outputs: y.view(), noise_variance: None };
+//! let process = Regression::default().fit(samples, Watch::NONE)?;
+//! let (mean, variance) = process.predict(&[1.25]);
+//! assert!((mean[0] - 1.25f64.sin()).abs() < 1e-3 && variance[0] < 1e-4);
+//! # Ok::<(), palpate_numerics::regression::RegressionError>(())
+//! ```
+//!
 //! Rasmussen and Williams, *Gaussian Processes for Machine Learning* (2006), chapters 2, 4 and 5.
 
 mod covariance;

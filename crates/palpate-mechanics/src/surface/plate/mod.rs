@@ -25,6 +25,28 @@ use solved::Solved;
 ///
 /// What was computed is no part of the plate: it is neither compared nor written to files. It stays in memory as long as a
 /// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements.
+///
+/// ```
+/// use palpate_mechanics::contact::Position;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
+/// use palpate_mechanics::surface::{Plate, Surface};
+///
+/// let spec = PlateSpec {
+///     length_m: 0.3,
+///     width_m: 0.3,
+///     thickness_m: 0.8e-3,
+///     youngs_modulus_pa: 200e9,
+///     poissons_ratio: 0.3,
+///     edges: Edges::all(Edge::Simple),
+///     supports: Vec::new(),
+///     elements: 8,
+/// };
+/// let per_newton = 0.011_60 * 0.3f64.powi(2) / spec.flexural_rigidity(); // Timoshenko and Woinowsky-Krieger, table 23
+/// let middle = Position { x_m: 0.15, y_m: 0.15 };
+/// assert!((Plate::new(spec)?.influence(Deflection, middle, middle) / -per_newton - 1.0).abs() < 5e-3);
+/// # Ok::<(), palpate_mechanics::surface::PlateError>(())
+/// ```
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(try_from = "PlateSpec", into = "PlateSpec")]
 pub struct Plate {

@@ -38,6 +38,24 @@ const ROUNDING: f64 = 1e-12;
 ///
 /// Signs are those of the simply supported [`Beam`](super::Beam). At a section step, and at a support that takes up a couple,
 /// the curvature jumps: a strain sensor there is on the right of it, at the beam's right end on the left.
+///
+/// ```
+/// use palpate_mechanics::contact::Position;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::{BeamSection, BeamSupport, BeamSupportKind, Surface};
+/// use palpate_mechanics::surface::{SupportedBeam, SupportedBeamSpec};
+///
+/// let cantilever = SupportedBeam::new(SupportedBeamSpec {
+///     length_m: 0.4,
+///     youngs_modulus_pa: 200e9,
+///     sections: vec![BeamSection { to_m: 0.4, width_m: 0.04, thickness_m: 1.2e-3 }],
+///     supports: vec![BeamSupport { at_m: 0.0, kind: BeamSupportKind::Clamped }],
+/// })?;
+/// let tip = Position::along(0.4);
+/// let closed_form = -0.4f64.powi(3) / (3.0 * 1.152); // −l³/(3·E·I)
+/// assert!((cantilever.influence(Deflection, tip, tip) / closed_form - 1.0).abs() < 1e-9);
+/// # Ok::<(), palpate_mechanics::surface::SupportedBeamError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "SupportedBeamSpec", into = "SupportedBeamSpec")]
 pub struct SupportedBeam {
