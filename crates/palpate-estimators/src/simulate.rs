@@ -107,12 +107,8 @@ pub fn simulate_at(
 ) -> Result<Recording, SimulateError> {
     let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
-    let mut places = rng.clone();
-    places.jump();
-    let sensors = CleanSensors::new(surface, &displaced(&setup.layout, surface.extent(), &mut places));
-    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
+    let (placed, errors, mut rng) = draw_faults(setup, seed);
+    let sensors = CleanSensors::new(surface, &placed);
     let mut rows = Vec::new();
     for (i, position) in positions.iter().copied().enumerate() {
         if !surface.contains(position) {
@@ -143,23 +139,25 @@ pub fn simulate_loads(
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
     let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut places = rng.clone();
-    places.jump();
-    let placed = displaced(&setup.layout, surface.extent(), &mut places);
-    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
-    let clean = clean_reading_of_loads(surface, &placed, loads);
-    Ok((0..repeats).map(|_| measure(&setup.layout, &clean, &errors, &mut rng)).collect())
-}
-
-/// What the sensors of `layout` would read without any fault under all of `loads` at once, by superposition, in the SI unit of
-/// each sensor.
-fn clean_reading_of_loads(surface: &dyn Surface, layout: &Layout, loads: &[UniformLoad]) -> Vec<f64> {
+    let (placed, errors, mut rng) = draw_faults(setup, seed);
+    // By superposition.
     let reading = |sensor: &Sensor| {
         let function = surface.influence_function(sensor.kind, sensor.position);
         loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum()
     };
-    layout.sensors().iter().map(reading).collect()
+    let clean: Vec<f64> = placed.sensors().iter().map(reading).collect();
+    Ok((0..repeats).map(|_| measure(&setup.layout, &clean, &errors, &mut rng)).collect())
+}
+
+/// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.
+fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256PlusPlus) {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
+    let mut places = rng.clone();
+    places.jump();
+    let placed = displaced(&setup.layout, setup.surface.extent(), &mut places);
+    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
+    (placed, errors, rng)
 }
 
 /// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the

@@ -10,7 +10,7 @@ use crate::setup::Setup;
 use crate::status::on_surface;
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
@@ -88,21 +88,17 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
     if live < 2 {
         return Err(CentroidFitError::TooFewSensors { found: live });
     }
-    let mut channel_scales = Vec::with_capacity(sensors.len());
-    for sensor in sensors {
+    let channel_scale = |sensor: &Sensor| {
         if sensor.channel.dead {
-            channel_scales.push(0.0);
-            continue;
+            return Ok(0.0);
         }
         let of_kind =
             (0..sensors.len()).filter(|i| sensors[*i].kind == sensor.kind && !sensors[*i].channel.dead);
         let readings = of_kind.flat_map(|i| recording.rows.iter().map(move |row| row.reading[i].abs()));
-        let largest = readings.fold(0.0, f64::max);
-        if !(largest > 0.0 && (1.0 / largest).is_finite()) {
-            return Err(CentroidFitError::Silent { kind: sensor.kind });
-        }
-        channel_scales.push(1.0 / largest);
-    }
+        let scale = 1.0 / readings.fold(0.0, f64::max);
+        if scale.is_finite() { Ok(scale) } else { Err(CentroidFitError::Silent { kind: sensor.kind }) }
+    };
+    let channel_scales = sensors.iter().map(channel_scale).collect::<Result<_, _>>()?;
     let raw = sensors.iter().any(|sensor| sensor.kind == SensorKind::Raw);
     let weighing = if raw {
         Weighing::Channels

@@ -136,8 +136,7 @@ impl Calibration {
         let Split { training, judged } = self.simulate(seed)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
-        let evaluation = Evaluation::of(&locator, &judged)?;
-        Ok(Calibrated { seed, locator, evaluation })
+        Ok(Calibrated { seed, evaluation: Evaluation::of(&locator, &judged)?, locator })
     }
 
     /// The same for some rising seeds. Without faults all seeds press alike, and the estimator fits them all at once, side by side where it
@@ -161,8 +160,7 @@ impl Calibration {
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
         queue.fitted.sort_by_key(|(seed, _)| *seed);
         let judge = |(seed, locator)| {
-            let evaluation = Evaluation::of(&locator, &judged)?;
-            Ok(Calibrated { seed, locator, evaluation })
+            Ok(Calibrated { seed, evaluation: Evaluation::of(&locator, &judged)?, locator })
         };
         queue.fitted.into_iter().map(judge).collect()
     }

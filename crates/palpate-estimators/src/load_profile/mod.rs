@@ -174,18 +174,13 @@ impl<'a> Profiler<'a> {
     /// For readings of these sensors.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::over(sensors.extent);
-        let rows: Vec<Vec<f64>> = sensors
-            .alive()
-            .map(|channel| {
-                let mean = |cell| {
-                    let points = cells.points(cell);
-                    points.iter().map(|point| channel.influence.at(*point)).sum::<f64>() / points.len() as f64
-                };
-                (0..cells.len()).map(|cell| mean(cell) / channel.noise_sd).collect()
-            })
-            .collect();
-        let influence = Array2::from_shape_fn((rows.len(), cells.len()), |(i, cell)| rows[i][cell]);
-        let worst_misfit = misfit_bound(rows.len().max(1));
+        let alive: Vec<&LoadChannel> = sensors.alive().collect();
+        let influence = Array2::from_shape_fn((alive.len(), cells.len()), |(i, cell)| {
+            let points = cells.points(cell);
+            let sum = points.iter().map(|point| alive[i].influence.at(*point)).sum::<f64>();
+            sum / points.len() as f64 / alive[i].noise_sd
+        });
+        let worst_misfit = misfit_bound(alive.len().max(1));
         Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), worst_misfit }
     }
 
@@ -248,7 +243,14 @@ impl<'a> Profiler<'a> {
 
     /// What this layout resolves at the smoothness of a profile; `None` for a profile without load.
     pub fn resolution(&self, profile: &LoadProfile) -> Option<Resolution> {
-        Resolution::of(&self.problem, self.cells, profile.smoothness?)
+        let (problem, cells) = (&self.problem, self.cells);
+        let hessian = &problem.gram + &(profile.smoothness? * &problem.roughness);
+        let factor = Cholesky::factor(hessian).ok()?;
+        let half = factor.solve_lower_matrix(problem.gram.clone());
+        // H⁻¹ = L⁻ᵀ·L⁻¹, and gram is symmetric: R = L⁻ᵀ·(L⁻¹·AᵀA).
+        let kernels = factor.inverse_lower().t().dot(&half);
+        let widths_m = (0..cells.len()).map(|cell| width_m(&cells, &kernels.row(cell).to_vec())).collect();
+        Some(Resolution { cells, kernels, widths_m })
     }
 
     /// What the channels would read of the load, and what is left of the reading, channel by channel.
@@ -530,16 +532,6 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    fn of(problem: &Problem, cells: Cells, smoothness: f64) -> Option<Self> {
-        let hessian = &problem.gram + &(smoothness * &problem.roughness);
-        let factor = Cholesky::factor(hessian).ok()?;
-        let half = factor.solve_lower_matrix(problem.gram.clone());
-        // H⁻¹ = L⁻ᵀ·L⁻¹, and gram is symmetric: R = L⁻ᵀ·(L⁻¹·AᵀA).
-        let kernels = factor.inverse_lower().t().dot(&half);
-        let widths_m = (0..cells.len()).map(|cell| width_m(&cells, &kernels.row(cell).to_vec())).collect();
-        Some(Self { cells, kernels, widths_m })
-    }
-
     /// The median of the kernels' widths, in metres.
     pub fn median_width_m(&self) -> f64 {
         median(self.widths_m.clone()).unwrap_or(0.0)

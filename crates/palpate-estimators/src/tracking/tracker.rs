@@ -4,7 +4,7 @@ use super::bank::Step;
 use super::belief::{Belief, Moments, Seen};
 use super::birth::Births;
 use super::{Track, TrackError, Tracked, TrackerConfig};
-use crate::likelihood::{Geometry, Likelihood, LineLikelihood};
+use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::Estimate;
 
 /// The most hypotheses that are held possible at once.
@@ -80,7 +80,11 @@ impl<'a> Tracker<'a> {
     /// # Errors
     /// [`TrackError`] when the time is not later than before; the reading is then as if it had not been.
     pub fn follow(&mut self, time_s: f64, reading: &[f64]) -> Result<Track, TrackError> {
-        let duration_s = self.duration(time_s)?;
+        let duration_s = match self.time_s {
+            Some(before_s) if time_s > before_s => Some(time_s - before_s),
+            Some(before_s) => return Err(TrackError::Time { time_s, before_s }),
+            None => None,
+        };
         let mut whitened = std::mem::take(&mut self.whitened);
         self.likelihood.whiten(reading, &mut whitened);
         let alone = self.likelihood.locate_alone(reading);
@@ -89,7 +93,7 @@ impl<'a> Tracker<'a> {
             Seen { likelihood: self.likelihood, whitened: &whitened, swings: self.config.swing.is_some() };
         let born = self.births(newborn, seen, &alone);
         self.update(seen);
-        self.hypotheses.extend(born);
+        born.into_iter().for_each(|(weight, belief)| self.add(weight, belief));
         let moments = self.prune();
         self.whitened = whitened;
         self.time_s = Some(time_s);
@@ -98,14 +102,6 @@ impl<'a> Tracker<'a> {
 
     fn step(&self, duration_s: f64) -> Step {
         Step::new(&self.config, duration_s, self.likelihood.known_force_n().is_some())
-    }
-
-    fn duration(&self, time_s: f64) -> Result<Option<f64>, TrackError> {
-        match self.time_s {
-            Some(before_s) if time_s > before_s => Ok(Some(time_s - before_s)),
-            Some(before_s) => Err(TrackError::Time { time_s, before_s }),
-            None => Ok(None),
-        }
     }
 
     fn most_contacts(&self) -> usize {
@@ -181,42 +177,31 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// What comes with this reading, weighed by it.
-    fn births(&mut self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<Hypothesis> {
-        let born = match self.likelihood.geometry() {
+    /// What comes with this reading, with its weight.
+    fn births(&self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<(f64, Belief)> {
+        let config = &self.config;
+        let weighted = |(evidence, belief): (f64, Belief)| {
+            (if belief.contacts() == 1 { newborn.one } else { newborn.two } + evidence, belief)
+        };
+        match self.likelihood.geometry() {
             Geometry::Line(likelihood) => {
-                self.births_on_line(newborn, &Births { likelihood, seen, config: &self.config, alone })
+                let births = Births { likelihood, seen, config, alone };
+                let mut born: Vec<_> = births.where_nothing_touched().into_iter().map(weighted).collect();
+                for hypothesis in &self.hypotheses {
+                    if let Belief::One(bank) = &hypothesis.belief {
+                        let weight = hypothesis.weight + newborn.beside;
+                        born.extend(
+                            births.beside(bank).map(|(evidence, belief)| (weight + evidence, belief)),
+                        );
+                    }
+                }
+                born
             }
             Geometry::Plane(likelihood) => {
-                let births = Births { likelihood, seen, config: &self.config, alone };
-                let weighed = |(evidence, belief)| (newborn.one + evidence, belief);
-                births.where_nothing_touched().into_iter().map(weighed).collect()
-            }
-        };
-        let first = self.next_id;
-        self.next_id += born.len() as u64;
-        let numbered = born.into_iter().zip(first..);
-        let unseen = [false; MOST_CONTACTS];
-        numbered.map(|((weight, belief), id)| Hypothesis { id, weight, belief, unseen }).collect()
-    }
-
-    fn births_on_line(
-        &self,
-        newborn: Newborn,
-        births: &Births<dyn LineLikelihood + '_>,
-    ) -> Vec<(f64, Belief)> {
-        let mut born: Vec<(f64, Belief)> = Vec::new();
-        for (evidence, belief) in births.where_nothing_touched() {
-            let weight = if belief.contacts() == 1 { newborn.one } else { newborn.two };
-            born.push((weight + evidence, belief));
-        }
-        for hypothesis in &self.hypotheses {
-            if let Belief::One(bank) = &hypothesis.belief {
-                let weight = hypothesis.weight + newborn.beside;
-                born.extend(births.beside(bank).map(|(evidence, belief)| (weight + evidence, belief)));
+                let births = Births { likelihood, seen, config, alone };
+                births.where_nothing_touched().into_iter().map(weighted).collect()
             }
         }
-        born
     }
 
     /// Makes the weights probabilities again, drops what is improbable, and lets the more probable of two that are one
@@ -287,7 +272,6 @@ fn are_one(a: &[Moments], b: &[Moments]) -> bool {
 /// A [`Tracker`] that remembers, so that it can go back.
 pub struct SmoothTracker<'a> {
     tracker: Tracker<'a>,
-    likelihood: &'a dyn Likelihood,
     tracks: Vec<Track>,
     /// The hypotheses with contacts at each reading, by their ids.
     past: Vec<Vec<(u64, Belief)>>,
@@ -296,8 +280,7 @@ pub struct SmoothTracker<'a> {
 impl<'a> SmoothTracker<'a> {
     /// A tracker that has seen nothing.
     pub fn new(likelihood: &'a dyn Likelihood, config: TrackerConfig) -> Self {
-        let tracker = Tracker::new(likelihood, config);
-        Self { tracker, likelihood, tracks: Vec::new(), past: Vec::new() }
+        Self { tracker: Tracker::new(likelihood, config), tracks: Vec::new(), past: Vec::new() }
     }
 
     /// Takes the next reading; see [`Tracker::follow`].
@@ -342,7 +325,7 @@ impl<'a> SmoothTracker<'a> {
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
             smoothed[k].contacts =
-                moments.map_or_else(Vec::new, |moments| Tracked::of(&moments, self.likelihood));
+                moments.map_or_else(Vec::new, |moments| Tracked::of(&moments, self.tracker.likelihood));
         }
         smoothed
     }
@@ -351,6 +334,6 @@ impl<'a> SmoothTracker<'a> {
     fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
         let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
-        belief.smoothed(&step, self.likelihood.geometry(), later).map(|belief| (id, belief))
+        belief.smoothed(&step, self.tracker.likelihood.geometry(), later).map(|belief| (id, belief))
     }
 }

@@ -19,7 +19,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{mean, mean_and_variance, normal_interval_95, symmetric_eigen};
 
-use training::{Trained, Training, jacobians};
+use training::{Training, jacobians};
 
 /// An ensemble of networks with tanh hidden layers and linear outputs, trained by Levenberg–Marquardt with Bayesian regularisation.
 ///
@@ -146,7 +146,7 @@ impl LevenbergMarquardt {
         watch: Watch,
     ) -> Result<Vec<Member>, LevenbergMarquardtFitError> {
         let trainings = 2 * self.ensemble;
-        let mut trained: Vec<Trained> = Vec::new();
+        let mut trained: Vec<Member> = Vec::new();
         for i in 0..trainings as u64 {
             let seed = seed.wrapping_mul(trainings as u64).wrapping_add(i);
             trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, watch)?);
@@ -156,7 +156,7 @@ impl LevenbergMarquardt {
         }
         trained.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         trained.truncate(self.ensemble);
-        Ok(trained.into_iter().map(Member::of).collect())
+        Ok(trained)
     }
 }
 
@@ -304,19 +304,6 @@ pub struct Member {
 }
 
 impl Member {
-    fn of(trained: Trained) -> Self {
-        let lower = trained.curvature.lower();
-        let rows = lower.outer_iter().enumerate();
-        Self {
-            weights: trained.weights,
-            curvature_factor: rows.flat_map(|(i, row)| row.to_vec().into_iter().take(i + 1)).collect(),
-            noise: trained.hyperparameters.betas.iter().map(|beta| 1.0 / beta).collect(),
-            effective_parameters: trained.effective_parameters,
-            log_evidence: trained.log_evidence,
-            iterations: trained.iterations,
-        }
-    }
-
     /// L⁻¹·g.
     fn solve_lower(&self, mut gradient: Vec<f64>) -> Vec<f64> {
         let mut rows = self.curvature_factor.as_slice();

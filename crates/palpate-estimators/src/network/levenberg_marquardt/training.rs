@@ -15,6 +15,7 @@
 //! Derivatives by the weights: x inputs of a layer, a = f(W·x + b) its outputs, δ = ∂output/∂z for one of the network's outputs, sent
 //! back by δ_below = f′ ∘ Wᵀ·δ; ∂output/∂w_ij = δ_i·x_j.
 
+use super::Member;
 use crate::network::{Activation, Topology};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -33,18 +34,8 @@ pub(super) struct Training<'a> {
     pub(super) max_iterations: u32,
 }
 
-/// A trained network and what the evidence says of it.
-pub(super) struct Trained {
-    pub(super) weights: Vec<f64>,
-    pub(super) hyperparameters: Hyperparameters,
-    pub(super) curvature: Cholesky,
-    pub(super) effective_parameters: f64,
-    pub(super) log_evidence: f64,
-    pub(super) iterations: u32,
-}
-
-/// Where a step starts: the errors there, and their derivatives.
-struct Place {
+/// The errors at the weights where a step starts, and their derivatives.
+struct Linearisation {
     errors: Array2<f64>,
     jacobians: Vec<Array2<f64>>,
     products: Vec<Array2<f64>>,
@@ -73,32 +64,32 @@ impl Training<'_> {
     }
 
     /// Trains from the weights of a seed; `None` when the weights leave the numbers.
-    pub(super) fn run(&self, seed: u64, watch: Watch) -> Result<Option<Trained>, Cancelled> {
+    pub(super) fn run(&self, seed: u64, watch: Watch) -> Result<Option<Member>, Cancelled> {
         let mut weights = self.initial_weights(seed);
         // Starting from little noise: where rows are few, "all is noise" is a maximum of the evidence too.
         let mut hyper = Hyperparameters { alpha: 0.01, betas: vec![1e4; self.topology.outputs()] };
         let (mut mu, mut iterations, mut calm) = (1.0, 0, 0);
-        let mut place = self.place(&weights);
+        let mut here = self.linearise(&weights);
         while iterations < self.max_iterations && calm < 3 {
             watch.round()?;
             iterations += 1;
             let before = hyper.clone();
-            let moved = self.step(&mut weights, &place, &hyper, &mut mu);
+            let moved = self.step(&mut weights, &here, &hyper, &mut mu);
             if moved {
-                place = self.place(&weights);
+                here = self.linearise(&weights);
             }
             if moved && !iterations.is_multiple_of(STEPS_A_UPDATE) {
                 continue;
             }
-            let Ok(a) = Cholesky::factor(hyper.curvature(&place.products, 0.0)) else { return Ok(None) };
-            let gammas = hyper.effective_parameters(&a, &place.products);
-            hyper.update(&gammas, self.inputs.nrows(), &squares(&place.errors), weights.dot(&weights));
+            let Ok(a) = Cholesky::factor(hyper.curvature(&here.products, 0.0)) else { return Ok(None) };
+            let gammas = hyper.effective_parameters(&a, &here.products);
+            hyper.update(&gammas, self.inputs.nrows(), &squares(&here.errors), weights.dot(&weights));
             let drift = (hyper.alpha / before.alpha).ln().abs()
                 + hyper.betas.iter().zip(&before.betas).map(|(b, old)| (b / old).ln().abs()).sum::<f64>();
             calm = if drift < SETTLED { calm + 1 } else { 0 };
             mu = mu.min(0.1 * MOST_DAMPING);
         }
-        Ok(self.finish(&weights, &place, hyper, iterations))
+        Ok(self.finish(&weights, &here, &hyper, iterations))
     }
 
     /// Weights so small that every node starts within the bend of its tanh: normal with variance 1/inputs of the node.
@@ -117,22 +108,28 @@ impl Training<'_> {
         &self.targets - &outputs(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view())
     }
 
-    fn place(&self, weights: &Array1<f64>) -> Place {
+    fn linearise(&self, weights: &Array1<f64>) -> Linearisation {
         let (outputs, jacobians) =
             jacobians(self.topology, weights.as_slice().unwrap_or(&[]), &self.inputs.view());
         let products = jacobians.iter().map(|jacobian| jacobian.t().dot(jacobian)).collect();
-        Place { errors: &self.targets - &outputs, jacobians, products }
+        Linearisation { errors: &self.targets - &outputs, jacobians, products }
     }
 
     /// w ← w + (A + μ·1)⁻¹·(Σ β_k·J_kᵀe_k − α·w), with μ grown until the objective falls; whether it could be.
-    fn step(&self, weights: &mut Array1<f64>, place: &Place, hyper: &Hyperparameters, mu: &mut f64) -> bool {
-        let start = hyper.objective(&squares(&place.errors), weights.dot(weights));
+    fn step(
+        &self,
+        weights: &mut Array1<f64>,
+        here: &Linearisation,
+        hyper: &Hyperparameters,
+        mu: &mut f64,
+    ) -> bool {
+        let start = hyper.objective(&squares(&here.errors), weights.dot(weights));
         let mut descent = &*weights * -hyper.alpha;
-        for (k, jacobian) in place.jacobians.iter().enumerate() {
-            descent.scaled_add(hyper.betas[k], &jacobian.t().dot(&place.errors.column(k)));
+        for (k, jacobian) in here.jacobians.iter().enumerate() {
+            descent.scaled_add(hyper.betas[k], &jacobian.t().dot(&here.errors.column(k)));
         }
         while *mu < MOST_DAMPING {
-            if let Ok(damped) = Cholesky::factor(hyper.curvature(&place.products, *mu)) {
+            if let Ok(damped) = Cholesky::factor(hyper.curvature(&here.products, *mu)) {
                 let there = &*weights + &damped.solve(&descent);
                 let value = hyper.objective(&squares(&self.errors(&there)), there.dot(&there));
                 if value < start {
@@ -149,19 +146,21 @@ impl Training<'_> {
     fn finish(
         &self,
         weights: &Array1<f64>,
-        place: &Place,
-        hyper: Hyperparameters,
+        here: &Linearisation,
+        hyper: &Hyperparameters,
         iterations: u32,
-    ) -> Option<Trained> {
-        let curvature = Cholesky::factor(hyper.curvature(&place.products, 0.0)).ok()?;
-        let gammas = hyper.effective_parameters(&curvature, &place.products);
-        let objective = hyper.objective(&squares(&place.errors), weights.dot(weights));
+    ) -> Option<Member> {
+        let curvature = Cholesky::factor(hyper.curvature(&here.products, 0.0)).ok()?;
+        let gammas = hyper.effective_parameters(&curvature, &here.products);
+        let objective = hyper.objective(&squares(&here.errors), weights.dot(weights));
         let log_evidence = hyper.log_evidence(objective, &curvature, self.inputs.nrows());
-        (log_evidence.is_finite() && weights.iter().all(|w| w.is_finite())).then(|| Trained {
+        let lower = curvature.lower();
+        let rows = lower.outer_iter().enumerate();
+        (log_evidence.is_finite() && weights.iter().all(|w| w.is_finite())).then(|| Member {
             weights: weights.to_vec(),
+            curvature_factor: rows.flat_map(|(i, row)| row.to_vec().into_iter().take(i + 1)).collect(),
+            noise: hyper.betas.iter().map(|beta| 1.0 / beta).collect(),
             effective_parameters: gammas.iter().sum(),
-            hyperparameters: hyper,
-            curvature,
             log_evidence,
             iterations,
         })
@@ -310,13 +309,13 @@ impl Activations {
             self.below.clear();
             self.below.resize(x.len(), 0.0);
             for (i, delta) in self.delta.iter().enumerate() {
-                let place = start + i * row_len;
+                let at = start + i * row_len;
                 for (j, x) in x.iter().enumerate() {
-                    gradient[place + j] = delta * x;
-                    self.below[j] += delta * weights[place + j];
+                    gradient[at + j] = delta * x;
+                    self.below[j] += delta * weights[at + j];
                 }
                 if topology.biases {
-                    gradient[place + x.len()] = *delta;
+                    gradient[at + x.len()] = *delta;
                 }
             }
             if layer > 0 {
