@@ -8,23 +8,18 @@
 //! the force: one Gaussian a stretch, cut off at its gauges; and where one gauge alone sees a contact of unknown
 //! force, which tells force times lever and no more, a curve of contacts that explain it alike.
 
-mod linear_theory;
-mod shape;
-
-pub use linear_theory::LinearTheory;
-pub use shape::{DigitShape, ShapePoint};
-
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault};
 use crate::likelihood::ContactFit;
 use crate::setup::Setup;
+use crate::simulate::{CleanSensors, simulate_at};
 use crate::status::{OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
-use palpate_mechanics::surface::{Digit, Surface, SurfaceSpec};
+use palpate_mechanics::surface::{Digit, Elastica, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
 use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
@@ -127,7 +122,7 @@ impl Fit for DigitEstimator {
         let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n, theory: self.theory };
         let noiseless = |sensor: &Sensor| {
             let sd = sensor.channel.reading_sd();
-            !sensor.channel.dead && !(sd > 0.0 && sd.is_finite())
+            !(sensor.channel.dead || sd > 0.0 && sd.is_finite())
         };
         if let Some(i) = locator.layout.sensors().iter().position(noiseless) {
             return Err(DigitFitError::NoNoise { gauge: i + 1 });
@@ -162,9 +157,33 @@ pub struct DigitLocator {
 }
 
 impl DigitLocator {
-    /// The shape of the finger at an estimated contact, at `steps` + 1 points from clamp to tip.
+    /// The shape of the finger at an estimated contact, at `steps` + 1 points from clamp to tip; an estimate without a force leaves it
+    /// straight.
+    ///
+    /// Its uncertainty is the contact's, carried over by the shapes one standard deviation to either side along the
+    /// columns of the covariance's Cholesky factor.
     pub fn shape(&self, contact: &ContactEstimate, steps: usize) -> DigitShape {
-        DigitShape::new(&self.digit, contact, steps)
+        let digit = &self.digit;
+        let force_n = contact.force_n.unwrap_or(0.0);
+        let at = |off_m: f64, off_n: f64| {
+            let position_m = (contact.position.x_m + off_m).max(0.0).min(digit.length_m());
+            digit
+                .shape(Contact { position: Position::along(position_m), force_n: (force_n + off_n).max(0.0) })
+        };
+        let shape = at(0.0, 0.0);
+        let beside: Vec<[Elastica; 2]> = deviations(contact).map(|[x, f]| [at(x, f), at(-x, -f)]).to_vec();
+        let steps = steps.max(1);
+        let point = |i: usize| {
+            let at_m = digit.length_m() * i as f64 / steps as f64;
+            let [x_m, y_m] = shape.point(at_m);
+            let off = |[a, b]: &[Elastica; 2]| {
+                let ([ax, ay], [bx, by]) = (a.point(at_m), b.point(at_m));
+                0.5 * (ax - bx).hypot(ay - by)
+            };
+            let sd_m = beside.iter().map(off).fold(0.0, f64::hypot);
+            ShapePoint { at_m, x_m, y_m, sd_m }
+        };
+        DigitShape { points: (0..=steps).map(point).collect() }
     }
 
     /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
@@ -710,6 +729,79 @@ fn within(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
         guess.force_n.max(1e-9 * most_n).min(most_n)
     });
     Guess { position_m, force_n }
+}
+
+/// The centre line of a finger, from clamp to tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DigitShape {
+    /// Its points, equal steps of the finger's length apart; never empty.
+    pub points: Vec<ShapePoint>,
+}
+
+/// A point of a centre line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShapePoint {
+    /// How far along the finger it is, in metres.
+    pub at_m: f64,
+    /// Where it is along the straight finger, in metres.
+    pub x_m: f64,
+    /// Where it is across, positive upward, in metres.
+    pub y_m: f64,
+    /// Root mean square distance of the true point from this one, in metres; 0 where the contact's uncertainty is not known.
+    pub sd_m: f64,
+}
+
+impl DigitShape {
+    /// The tip.
+    pub fn tip(&self) -> Option<&ShapePoint> {
+        self.points.last()
+    }
+
+    /// The largest distance of a point from the same point of the finger's exact shape under `truth`, in metres.
+    pub fn distance_m(&self, digit: &Digit, truth: Contact) -> f64 {
+        let exact = digit.shape(truth);
+        let distance = |point: &ShapePoint| {
+            let [x_m, y_m] = exact.point(point.at_m);
+            (point.x_m - x_m).hypot(point.y_m - y_m)
+        };
+        self.points.iter().map(distance).fold(0.0, f64::max)
+    }
+}
+
+/// The columns of the Cholesky factor of the contact's covariance, each as (position, force).
+fn deviations(contact: &ContactEstimate) -> [[f64; 2]; 2] {
+    let Some(uncertainty) = contact.uncertainty else { return [[0.0; 2]; 2] };
+    let [xx, _, xf, _, _, ff] = uncertainty.covariance;
+    if xx <= 0.0 {
+        return [[0.0; 2], [0.0, ff.max(0.0).sqrt()]];
+    }
+    [[xx.sqrt(), xf / xx.sqrt()], [0.0, (ff - xf * xf / xx).max(0.0).sqrt()]]
+}
+
+/// A locator by the linear theory, and the exact readings that it is asked for.
+pub struct LinearTheory<'a> {
+    locator: Fitted<DigitLocator>,
+    sensors: CleanSensors<'a>,
+}
+
+impl<'a> LinearTheory<'a> {
+    /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
+    pub fn of(setup: &Setup, digit: &'a Digit) -> Option<Self> {
+        let unknown = Setup { force_n: None, ..setup.clone() };
+        let pressed = Setup { force_n: Some(digit.characteristic_force_n()), ..setup.clone() };
+        // The estimator learns nothing, but every fit wants a recording.
+        let recording = simulate_at(&pressed, &[Position::along(digit.length_m())], 1, 0).ok()?;
+        let locator = DigitEstimator { theory: DigitTheory::Linear }.fit(&unknown, &recording).ok()?;
+        Some(Self { locator, sensors: CleanSensors::new(digit, &setup.layout) })
+    }
+
+    /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for what is not found.
+    pub fn errors(&self, contact: Contact) -> [f64; 2] {
+        let Ok(estimate) = self.locator.locate(&self.sensors.reading(contact)) else { return [f64::NAN; 2] };
+        let found = estimate.contact;
+        let off_n = found.force_n.map_or(f64::NAN, |force_n| (force_n - contact.force_n).abs());
+        [found.position.distance_m(contact.position), off_n]
+    }
 }
 
 #[cfg(test)]

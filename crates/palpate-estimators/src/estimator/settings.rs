@@ -20,8 +20,8 @@ pub struct Setting {
 }
 
 impl Setting {
-    fn new(key: &'static str, name: &'static str, value: impl ToString) -> Self {
-        Self { key, name, value: value.to_string() }
+    fn new(key: &'static str, name: &'static str, value: impl Into<String>) -> Self {
+        Self { key, name, value: value.into() }
     }
 }
 
@@ -40,11 +40,11 @@ impl Estimator {
             }
             Self::NetworkLm(LevenbergMarquardt { hidden, ensemble, max_iterations }) => vec![
                 Setting::new("hidden", "nodes in the hidden layers", nodes(hidden)),
-                Setting::new("ensemble", "networks in the ensemble", ensemble),
+                Setting::new("ensemble", "networks in the ensemble", ensemble.to_string()),
                 Setting::new("max_iterations", "iterations, at most", format_count((*max_iterations).into())),
             ],
             Self::Neighbours(config) => {
-                vec![Setting::new("most_neighbours", "neighbours tried, at most", config.most)]
+                vec![Setting::new("most_neighbours", "neighbours tried, at most", config.most.to_string())]
             }
             // They have nothing to set.
             Self::GaussianProcess(_) | Self::ClosedForm(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
@@ -68,7 +68,7 @@ fn influence(config: Influence) -> Vec<Setting> {
     };
     vec![
         Setting::new("from", "influence functions from", from),
-        Setting::new("contacts", "contacts at once, at most", config.contacts),
+        Setting::new("contacts", "contacts at once, at most", config.contacts.to_string()),
         Setting::new("force_sd", "contact force", force),
     ]
 }
@@ -107,8 +107,8 @@ fn network(config: &Network) -> Vec<Setting> {
         Setting::new("biases", "biases", if config.biases { "every node has one" } else { "none" }),
         Setting::new("output", "output", output),
         Setting::new("input_scale", "input scale", input_scale),
-        Setting::new("learning_rate", "learning rate", learning_rate),
-        Setting::new("momentum", "momentum", momentum),
+        Setting::new("learning_rate", "learning rate", learning_rate.to_string()),
+        Setting::new("momentum", "momentum", momentum.to_string()),
         Setting::new("weight_update", "weight update", "after every pattern"),
         Setting::new("order", "presentation order", order),
         Setting::new("initial_weights", "initial weights", format!("uniform within ±{initial_weights}")),

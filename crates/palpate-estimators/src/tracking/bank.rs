@@ -104,8 +104,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
             let (fit, about) = whole.less(&began);
             let results: [(Gaussian<N>, f64); M] =
                 self.members.map(|member| member.updated(&fit, &about, &std::array::from_fn(|i| i)));
-            let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-            let shares: [f64; M] = std::array::from_fn(|from| joint[from] * (results[from].1 - best).exp());
+            let (_, shares) = reweighted(&joint, &results);
             let all: f64 = shares.iter().sum();
             for from in 0..M {
                 let share = if all > 0.0 { shares[from] / all } else { joint[from] / sum };
@@ -181,15 +180,11 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     ) -> Option<(Self, f64)> {
         let results: [(Gaussian<N>, f64); M] =
             self.members.map(|member| member.updated(fit, about, &numbers.entries));
-        let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
-        if !best.is_finite() {
-            return None;
-        }
-        let weights: [f64; M] = std::array::from_fn(|i| self.shares[i] * (results[i].1 - best).exp());
+        let (best, weights) = reweighted(&self.shares, &results);
         let sum: f64 = weights.iter().sum();
         let after =
             Self { shares: weights.map(|weight| weight / sum), members: results.map(|(member, _)| member) };
-        (sum > 0.0).then(|| (after, best + sum.ln()))
+        (best.is_finite() && sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
     /// With all that a reading sees within its bounds.
@@ -201,6 +196,15 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
         self
     }
+}
+
+/// The greatest evidence, and each share by its evidence over that.
+fn reweighted<const N: usize, const M: usize>(
+    shares: &[f64; M],
+    results: &[(Gaussian<N>, f64); M],
+) -> (f64, [f64; M]) {
+    let best = results.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
+    (best, std::array::from_fn(|i| shares[i] * (results[i].1 - best).exp()))
 }
 
 impl<const K: usize> SeenNumbers<K> {
