@@ -165,7 +165,7 @@ fn dead_and_saturated_gauges_are_left_out() {
     setup
         .layout
         .edit(|sensors| {
-            sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)))
+            sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
         })
         .unwrap();
     let mut locator = locator(&setup, DigitTheory::Exact);
@@ -246,7 +246,7 @@ fn a_locator_survives_its_file_and_bad_numbers_do_not() {
             digit
                 .layout
                 .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true))
-                .unwrap()
+                .unwrap();
         }),
     ];
     insta::assert_snapshot!(shown.join("\n"));
