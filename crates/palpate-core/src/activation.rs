@@ -1,6 +1,6 @@
 //! Activation functions of a network's nodes.
 
-/// What a node does with its weighted sum z.
+/// Activation function of a node: its output for its weighted sum z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Activation {
@@ -38,7 +38,7 @@ impl Activation {
     }
 }
 
-/// What σ is computed from: σ(z) = 1 / (1 + 2^n·2^r), where −z·log₂ e = n + r, n is whole and |r| ≤ ½.
+/// Constants of the logistic function σ: σ(z) = 1 / (1 + 2^n·2^r), where −z·log₂ e = n + r, n is whole and |r| ≤ ½.
 ///
 /// 2^r is the quotient (E + r·O) / (E − r·O), with E and O polynomials in r². That costs no division, since σ is one anyway:
 /// σ = (E − r·O) / ((E − r·O) + 2^n·(E + r·O)). What rounding z·log₂ e loses grows with |z|, but σ′ falls faster, so that r needs no

@@ -1,8 +1,8 @@
-//! What locating answers.
+//! Estimates of contacts, with uncertainty and status.
 
 use crate::Position;
 
-/// Where a locator believes that the surface is touched.
+/// Estimate of the contacts that made one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// The contact: the only one, or the strongest.
@@ -48,7 +48,7 @@ pub struct Mode {
     pub probability: f64,
 }
 
-/// How far an estimate is to be believed.
+/// Status of an estimate: how far it is to be believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// A position on the surface.

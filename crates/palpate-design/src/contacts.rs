@@ -1,6 +1,5 @@
 //! The contacts that a design is for.
 
-use crate::range::{check_count, check_positions};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::OutOfRange;
@@ -9,7 +8,7 @@ use palpate_numerics::OutOfRange;
 const ALONG_A_LINE: f64 = 400.0;
 const ALONG_A_PLANE: f64 = 30.0;
 
-/// Where a surface will be touched: every so far from one place to another, both included.
+/// Prior of contact positions: every so far from one place to another, both included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactPrior {
     /// The left end, or lower left corner.
@@ -41,6 +40,25 @@ impl ContactPrior {
         let (from, to) = (Position::along(from_m), Position::along(to_m));
         Self { from, to, every_m, weights: Vec::new() }
     }
+}
+
+/// Checks that a number of things is no more than fit into memory.
+pub(crate) fn check_count(what: &'static str, count: f64) -> Result<(), OutOfRange> {
+    OutOfRange::check("at most 1,000,000", [(what, count)], |count| count <= 1e6)
+}
+
+/// Checks that positions lie on a surface.
+pub(crate) fn check_positions(
+    what: &'static str,
+    positions: impl IntoIterator<Item = Position>,
+    extent: Extent,
+) -> Result<(), OutOfRange> {
+    let outside = positions.into_iter().find(|position| !extent.contains(*position));
+    let beyond = |at: Position| {
+        let along = extent.contains(Position { y_m: 0.0, ..at });
+        OutOfRange { what, value: if along { at.y_m } else { at.x_m }, bound: "on the surface" }
+    };
+    outside.map_or(Ok(()), |at| Err(beyond(at)))
 }
 
 /// The distance that so many make along a line, or along the longer side of a plane.

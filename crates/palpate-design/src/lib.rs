@@ -38,7 +38,6 @@ mod contacts;
 #[cfg(test)]
 mod fixtures;
 pub mod positions;
-mod range;
 pub mod sensors;
 mod verification;
 

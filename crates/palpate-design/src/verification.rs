@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::contacts::WeightedContacts;
 
-/// How far calibrated locators were off, on average over the contacts of a design.
+/// Mean error of calibrated locators, over the contacts of a design.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Verification {
     /// The mean error, in metres, over all calibrations.

@@ -11,7 +11,7 @@ use crate::surface::Extent;
 use crate::units::{Dimension, Unit};
 use palpate_numerics::OutOfRange;
 
-/// What a sensor measures.
+/// Kind of a sensor: the quantity that it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorKind {
@@ -42,12 +42,7 @@ impl SensorKind {
         }
     }
 
-    /// The kind that a rig calls `name`.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// What its readings measure.
+    /// Dimension of its readings.
     pub const fn dimension(self) -> Dimension {
         match self {
             Self::Deflection => Dimension::Length,
@@ -90,7 +85,7 @@ pub struct Sensor {
     pub channel: ChannelModel,
 }
 
-/// All the sensors under one surface; a reading has one value for each, in this order.
+/// Layout: all the sensors of one surface. A reading has one value for each, in this order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Layout {
@@ -202,7 +197,7 @@ impl Layout {
         }
     }
 
-    /// How many sensors there are.
+    /// Number of sensors.
     pub fn len(&self) -> usize {
         self.sensors.len()
     }
@@ -212,7 +207,7 @@ impl Layout {
         self.sensors.is_empty()
     }
 
-    /// Where the sensors of each kind sit, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
+    /// Positions of the sensors of each kind, in words, in millimetres with two decimals at most: "deflection 35, 40 mm; strain 200 mm", and
     /// "reaction (10, 20), (10, 180) mm" on a plane.
     pub fn places_in_words(&self, extent: Extent) -> String {
         let of = |kind: SensorKind| {
@@ -223,7 +218,7 @@ impl Layout {
         SensorKind::ALL.into_iter().filter_map(of).collect::<Vec<_>>().join("; ")
     }
 
-    /// What each sensor measures.
+    /// Kind of each sensor.
     pub fn kinds(&self) -> Vec<SensorKind> {
         self.sensors.iter().map(|sensor| sensor.kind).collect()
     }
@@ -279,7 +274,7 @@ pub struct SensorGroup {
     pub channel: ChannelModel,
 }
 
-/// Where the sensors of a group sit.
+/// Placement of the sensors of a group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Placement {
     /// So many along the length l, at i·l/(count + 1) for i = 1…count.
@@ -386,7 +381,7 @@ impl ChannelErrors {
     }
 }
 
-/// What the sensors of `layout` report when the true values are `clean_reading`: gains and offsets `errors`, fresh noise
+/// Readings of faulty channels: what the sensors of `layout` report when the true values are `clean_reading`: gains and offsets `errors`, fresh noise
 /// from `rng`, quantisation, saturation.
 ///
 /// One normal number is drawn per sensor whatever its faults, so a fault of one channel leaves the noise of the others
@@ -475,7 +470,7 @@ pub enum NoiseError {
 }
 
 impl NoiseError {
-    /// What to do about it, in a rig.
+    /// Advice on what to change in a rig.
     pub const fn help(&self) -> &'static str {
         match self {
             Self::Singular { .. } => "add `noise = \"5 um\"` to [sensors], in the unit of the readings",

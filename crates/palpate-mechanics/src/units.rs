@@ -5,8 +5,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::de::{Deserializer, Visitor};
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Metres from millimetres.
 pub const fn mm(length: f64) -> f64 {
@@ -59,7 +58,7 @@ pub struct Quantity {
     pub dimension: Dimension,
 }
 
-/// Why a text is not the quantity that was wanted.
+/// Error of a text that is not the quantity that was wanted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// There is no text.
@@ -116,25 +115,11 @@ struct Symbols(Option<Dimension>);
 
 impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use Dimension::{Angle, Density, Force, Length, Modulus, Ratio, Strain};
-        use Dimension::{Frequency, RotationalStiffness, Speed, Stiffness, Time};
-        let all = [
-            Length,
-            Force,
-            Modulus,
-            Angle,
-            Strain,
-            Ratio,
-            Density,
-            Stiffness,
-            RotationalStiffness,
-            Speed,
-            Time,
-            Frequency,
-        ];
-        let units =
-            all.into_iter().filter(|d| self.0.is_none_or(|only| only == *d)).flat_map(Dimension::units);
-        for (i, unit) in units.enumerate() {
+        let wanted = |unit: &Unit| {
+            let (symbol, dimension) = (unit.symbol(), unit.dimension());
+            symbol.is_ascii() && !symbol.is_empty() && self.0.is_none_or(|only| only == dimension)
+        };
+        for (i, unit) in (0..UNITS.len()).map(Unit).filter(wanted).enumerate() {
             let comma = if i == 0 { "" } else { ", " };
             write!(f, "{comma}{unit}")?;
         }
@@ -271,58 +256,17 @@ fn readable_unit(quantity: Quantity) -> Option<Unit> {
     if magnitude == 0.0 {
         return quantity.dimension.units().find(|unit| unit.factor() == 1.0);
     }
-    let hidden: &[&str] = if magnitude < 10.0 {
-        &["m", "cm", "deg", "um/m", "mm/m", "g/cm3"]
-    } else {
-        &["cm", "deg", "um/m", "mm/m", "g/cm3"]
+    let chosen = |unit: &Unit| match unit.symbol() {
+        "m" => magnitude >= 10.0,
+        symbol => !["cm", "deg", "um/m", "mm/m", "g/cm3"].contains(&symbol),
     };
-    let mut best = None;
-    for unit in quantity.dimension.units().filter(|unit| !hidden.contains(&unit.symbol())) {
-        if best.is_none() || magnitude >= unit.factor() {
-            best = Some(unit);
-        }
-    }
-    best
+    // Units go from the smallest to the largest.
+    let fits = |unit: &Unit| magnitude >= unit.factor();
+    let units = || quantity.dimension.units().filter(chosen);
+    units().filter(fits).last().or(units().next())
 }
 
-impl<'de> Deserialize<'de> for Quantity {
-    /// From a text with a unit, or from a plain number.
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct TextOrNumber;
-
-        impl Visitor<'_> for TextOrNumber {
-            type Value = Quantity;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a quantity such as \"400 mm\", or a number")
-            }
-
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Quantity, E> {
-                text.parse().map_err(E::custom)
-            }
-
-            fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Quantity, E> {
-                if value.is_finite() {
-                    Ok(Quantity { value, dimension: Dimension::None })
-                } else {
-                    Err(E::custom(UnitError::NotFinite { text: value.to_string() }))
-                }
-            }
-
-            fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Quantity, E> {
-                self.visit_f64(value as f64)
-            }
-
-            fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Quantity, E> {
-                self.visit_f64(value as f64)
-            }
-        }
-
-        deserializer.deserialize_any(TextOrNumber)
-    }
-}
-
-/// What a quantity measures.
+/// Dimension of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dimension {
     /// A plain number.
@@ -474,12 +418,12 @@ impl Unit {
         self.entry().0
     }
 
-    /// What it measures.
+    /// Dimension of the quantities that it measures.
     pub fn dimension(self) -> Dimension {
         self.entry().1
     }
 
-    /// How many SI units one of it is.
+    /// Factor to the SI unit.
     pub fn factor(self) -> f64 {
         match self.entry().2 {
             Scale::Power(exponent) => 10f64.powi(exponent),

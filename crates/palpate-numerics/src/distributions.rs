@@ -3,7 +3,7 @@
 /// Half the width of a normal distribution's 95 % interval, in standard deviations.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// What a χ² variable of two degrees of freedom exceeds with a probability of 5 %, −2·ln 0.05: the squared size, in standard
+/// 95 % quantile of χ² with two degrees of freedom, −2·ln 0.05: the squared size, in standard
 /// deviations, of a normal distribution's 95 % ellipse.
 pub const ELLIPSE_95: f64 = 5.991_464_547_107_979;
 
@@ -19,7 +19,7 @@ pub fn held_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
     (low.max(0.0), high.min(size))
 }
 
-/// Where a rising function reaches a value: the end of what `is_below` holds for, from a range that is halved so many times.
+/// Root by bisection, where a rising function reaches a value: the end of what `is_below` holds for, from a range that is halved so many times.
 #[inline]
 pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..halvings {

@@ -76,7 +76,7 @@ struct Update<'a> {
     triangle: Vec<f64>,
 }
 
-/// Why a sparse matrix has no Cholesky factor.
+/// Error of a sparse matrix without a Cholesky factor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SparseCholeskyError {
     /// The matrix is not positive definite.

@@ -1,4 +1,4 @@
-//! What is said of some values in short.
+//! Means, variances, percentiles.
 
 /// The mean; NaN of nothing.
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {

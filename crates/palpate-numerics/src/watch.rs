@@ -1,6 +1,6 @@
 //! Watching long work: progress out, cancellation in.
 
-/// What long work reports of its progress.
+/// Progress that long work reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Progress {
     /// One more round of an iteration: an epoch, a step, a fold.

@@ -1,8 +1,8 @@
 //! What sensors read, as a Gaussian process of the contact's position, in units of their noise.
 
+use super::design::PositionError;
 use ndarray::Array2;
 
-use super::error::PositionError;
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;

@@ -24,15 +24,13 @@
 //! [`next_press`] says where to press next, and when to stop.
 
 mod design;
-mod error;
 mod forward;
 mod next;
 mod search;
 mod variance;
 
 pub use crate::verification::Verification;
-pub use design::{Placement, PositionDesign};
-pub use error::PositionError;
+pub use design::{Placement, PositionDesign, PositionError};
 pub use next::{Advice, NextPress, next_press};
 
 use crate::contacts::WeightedContacts;
@@ -131,7 +129,7 @@ impl PositionProblem {
         Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
     }
 
-    /// What is designed.
+    /// The task.
     pub fn design(&self) -> &PositionDesign {
         &self.design
     }
@@ -146,7 +144,7 @@ impl PositionProblem {
         self.force
     }
 
-    /// Where contacts may be.
+    /// Extent of the surface.
     pub fn extent(&self) -> Extent {
         self.extent
     }

@@ -1,7 +1,6 @@
 //! The next press of a recording begun, and when to stop.
 
-use super::design::PositionDesign;
-use super::error::PositionError;
+use super::design::{PositionDesign, PositionError};
 use super::forward::ForwardModel;
 use super::variance::{ExpectedError, Posterior};
 use palpate_estimators::recording::Recording;
@@ -23,7 +22,7 @@ pub struct NextPress {
     pub error_m: f64,
 }
 
-/// What a recording begun is worth, and what more presses would add.
+/// Advice on a recording begun: its expected error, and what more presses would gain.
 ///
 /// Errors are standard deviations, in metres, averaged over the contacts: the limit, where what is left unknown of the
 /// influence functions counts as noise.
@@ -70,7 +69,7 @@ impl Advice {
     }
 }
 
-/// Where to press next, for the contacts of a design and until its rule says to stop.
+/// Advice on where to press next, for the contacts of a design and until its rule says to stop.
 ///
 /// Influence functions are Gaussian processes whose smoothness and noise the recording tells; no model of the surface is needed.
 ///

@@ -1,6 +1,6 @@
 //! Positions moved about while simulated calibrations get better.
 
-use super::error::PositionError;
+use super::design::PositionError;
 use palpate_estimators::simulate::CleanSensors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::Layout;

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::SensorProblem;
 use super::candidates::{PlacedSensor, exclusion, mirrored};
+use super::design::DesignError;
 use super::design::Symmetry;
-use super::error::DesignError;
 use super::objective::{Block, ForceBelief};
 use super::sensitivity::Sensitivity;
 use crate::verification::Verification;
@@ -30,7 +30,7 @@ const READINGS: usize = 4000;
 /// The score of so many sensors is good enough when it lies within this share of the score of the most.
 const ENOUGH: f64 = 0.1;
 
-/// How good a layout is for the contacts of a design.
+/// Figures of merit of a layout for the contacts of a design.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Assessment {
     /// The criterion's value, the smaller the better: in metres of a limit, a share, or ½·ln det.

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
+use super::design::{DesignError, Exclusion};
 use super::design::{MustHave, SensorDesign, Sites, Symmetry};
-use super::error::{DesignError, Exclusion};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};

@@ -8,9 +8,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::candidates::Pool;
-use super::exchange::Found;
+use super::exchange::{Found, random_start};
 use super::objective::Objective;
-use super::starts;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 /// What the search is called where its progress is told.
@@ -36,7 +35,7 @@ pub(super) fn search(
     let all: Vec<usize> = (0..pool.units.len()).collect();
     let mut population: Vec<Found> = (0..POPULATION)
         .map(|_| {
-            let layout = starts::random(pool, &all, rng.random()).unwrap_or_else(|| feasible.to_vec());
+            let layout = random_start(pool, &all, rng.random()).unwrap_or_else(|| feasible.to_vec());
             Found::of(pool, objective, layout)
         })
         .collect();

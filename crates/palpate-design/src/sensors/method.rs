@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::design::DesignCriterion;
-use super::error::DesignError;
+use super::design::DesignError;
 use super::exchange::Found;
 use super::objective::Objective;
 use super::principal::{PrincipalComponents, Reconstruction};
@@ -14,7 +14,7 @@ use palpate_mechanics::sensing::{self, ChannelModel, Layout, Sensor, SensorKind}
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// How a layout came about.
+/// Method that made a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {

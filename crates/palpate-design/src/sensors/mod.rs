@@ -30,7 +30,6 @@
 mod assessment;
 mod candidates;
 mod design;
-mod error;
 mod exchange;
 mod exhaustive;
 mod genetic;
@@ -41,15 +40,14 @@ mod pivoting;
 mod principal;
 mod refine;
 mod sensitivity;
-mod starts;
 
 pub use crate::contacts::{ContactPrior, WeightedContacts};
 pub use crate::verification::Verification;
 pub use assessment::{Assessment, CountPoint, enough};
 pub use candidates::PlacedSensor;
 pub(crate) use design::TOLERANCE_M;
-pub use design::{DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry};
-pub use error::{DesignError, Exclusion};
+pub use design::{DesignCriterion, DesignError, Exclusion, KeepOut, MustHave, SensorDesign, SensorOffer};
+pub use design::{Sites, Symmetry};
 pub use method::{Designed, Method, best_design};
 pub use pivoting::{condition_number, pivoted_columns};
 
@@ -115,12 +113,12 @@ impl<'a> SensorProblem<'a> {
     ) -> Result<Self, DesignError> {
         let pool = Pool::new(candidates.clone(), design, sensitivity.surface.extent())?;
         let all: Vec<usize> = (0..pool.units.len()).collect();
-        let feasible = starts::feasible(&pool, &all)?;
+        let feasible = exchange::feasible(&pool, &all)?;
         let objective = sensitivity.objective(Arc::clone(&table), design.criterion, design.tolerance_m);
         Ok(Self { setup, sensitivity, candidates, table, pool, objective, feasible })
     }
 
-    /// What is designed.
+    /// The task.
     pub fn design(&self) -> &SensorDesign {
         &self.pool.design
     }
@@ -130,7 +128,7 @@ impl<'a> SensorProblem<'a> {
         &self.sensitivity.contacts
     }
 
-    /// What the locator will know of their force.
+    /// Knowledge that the locator has of the contacts' force.
     pub fn force(&self) -> Force {
         self.sensitivity.force
     }
@@ -140,12 +138,12 @@ impl<'a> SensorProblem<'a> {
         self.sensitivity.force_n
     }
 
-    /// Where contacts may be.
+    /// Extent of the surface.
     pub fn extent(&self) -> Extent {
         self.pool.extent
     }
 
-    /// How many candidates there are.
+    /// Number of candidates.
     pub fn candidates(&self) -> usize {
         self.pool.sensors.len()
     }

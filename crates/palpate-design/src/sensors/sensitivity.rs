@@ -5,8 +5,8 @@ use std::sync::Arc;
 use ndarray::Array2;
 
 use super::candidates::PlacedSensor;
+use super::design::DesignError;
 use super::design::{DesignCriterion, SensorDesign};
-use super::error::DesignError;
 use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
 use crate::contacts::WeightedContacts;

@@ -27,7 +27,7 @@ use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
 use crate::surface::{ResponseFunction, ResponseGradient, Surface};
 use bound::{inverse_information, norm};
 
-/// What is known of the contact force.
+/// Knowledge of the contact force: given, or estimated along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Force {
@@ -84,7 +84,7 @@ impl<'a> CramerRaoBound<'a> {
         self.surface
     }
 
-    /// How many sensors are alive.
+    /// Number of sensors that are alive.
     pub fn alive(&self) -> usize {
         self.channels.len()
     }
@@ -153,7 +153,7 @@ struct Columns {
     across: Option<Vec<f64>>,
 }
 
-/// Why a bench has no limit.
+/// Error of a bench for which there is no bound.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
     /// The surface has no model.

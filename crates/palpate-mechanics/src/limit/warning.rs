@@ -23,7 +23,7 @@ const NOTHING: f64 = 1e-6;
 /// A reaction that changes by less than this share of the force over the whole length does not change.
 const SAME_REACTION: f64 = 1e-6;
 
-/// Something that a bench cannot tell, whatever the estimator.
+/// Warning of contacts that no estimator can tell well on this bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LimitWarning {
     /// The limit is a large part of the surface, or there is none.
@@ -216,14 +216,14 @@ impl LimitWarning {
         }
     }
 
-    /// Where it is.
+    /// Zone of the surface that it is about.
     pub const fn zone(&self) -> Zone {
         match self {
             Self::Blind { zone, .. } | Self::Mirror { zone, .. } | Self::Faint { zone, .. } => *zone,
         }
     }
 
-    /// How bad it is where it is worst, and the bound that this is held against: metres for a blind zone, standard
+    /// Worst value, and the bound that this is held against: metres for a blind zone, standard
     /// deviations for the others. `None` where there is no limit at all.
     pub const fn value_and_bound(&self) -> (Option<f64>, f64) {
         match self {
@@ -242,7 +242,7 @@ impl LimitWarning {
         }
     }
 
-    /// What would help.
+    /// Advice on what would help.
     pub fn help(&self) -> String {
         let (value, bound) = self.value_and_bound();
         match self {

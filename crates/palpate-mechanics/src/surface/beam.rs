@@ -13,7 +13,7 @@ use crate::sensing::SensorKind;
 #[serde(try_from = "Strip", into = "Strip")]
 pub struct Beam(Strip);
 
-/// Why a beam cannot be computed.
+/// Error of a beam that cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BeamError {
     /// A dimension is not a positive, finite number.

@@ -27,7 +27,7 @@ struct Finger {
     direction: ForceDirection,
 }
 
-/// Why a digit cannot be computed.
+/// Error of a digit that cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DigitError {
     /// A dimension is not a positive, finite number.
@@ -80,7 +80,7 @@ impl Digit {
         Self(Finger { direction, ..self.0 })
     }
 
-    /// Where the contact's force points.
+    /// Direction of the contact's force.
     pub fn direction(&self) -> ForceDirection {
         self.0.direction
     }

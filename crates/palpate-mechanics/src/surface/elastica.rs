@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use palpate_numerics::{Jacobi, carlson_rd, carlson_rf};
 
-/// Where a contact's force on a finger points.
+/// Direction of a contact's force on a finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForceDirection {
@@ -113,7 +113,7 @@ impl Elastica {
         shape
     }
 
-    /// How far the finger is turned downward at σ = `at_m` metres from the clamp, in radians.
+    /// Rotation of the finger, positive downward, at σ = `at_m` metres from the clamp, in radians.
     pub fn angle(&self, at_m: f64) -> f64 {
         self.sign * (self.pendulum_angle(at_m) - FRAC_PI_2 + self.force_angle)
     }
@@ -127,7 +127,7 @@ impl Elastica {
         self.sign * 2.0 * self.q.sqrt() * self.half_cosine * sn / dn
     }
 
-    /// How the curvature at `at_m` changes as the contact moves along the finger, in 1/m², and as the force grows, in
+    /// Derivatives of the curvature at `at_m` as the contact moves along the finger, in 1/m², and as the force grows, in
     /// 1/(m·N); 0 beyond the contact, and at the contact what holds just before it.
     pub fn curvature_gradient(&self, at_m: f64) -> [f64; 2] {
         if at_m > self.contact_m {
@@ -151,7 +151,7 @@ impl Elastica {
         [self.sign * (by_distance + by_load * 2.0 * q * s), (by_q + by_load * s * s) / self.stiffness_n_m2]
     }
 
-    /// Where the point at σ = `at_m` has gone: along the straight finger, and across it (positive upward), in metres from
+    /// Position of the point σ = `at_m` of the bent finger: along the straight finger, and across it (positive upward), in metres from
     /// the clamp.
     pub fn point(&self, at_m: f64) -> [f64; 2] {
         let bent_m = at_m.min(self.contact_m);

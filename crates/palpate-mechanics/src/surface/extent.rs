@@ -75,7 +75,7 @@ impl Extent {
         }
     }
 
-    /// How many coordinates a position on it has: 1 on a line, 2 on a plane.
+    /// Number of coordinates of a position on it: 1 on a line, 2 on a plane.
     pub fn dimensions(&self) -> usize {
         match self {
             Self::Line { .. } => 1,
@@ -127,7 +127,7 @@ impl Extent {
         }
     }
 
-    /// Where positions may be, in words: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
+    /// Bounds of positions, in words: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
     pub fn bounds_in_words(&self) -> String {
         let along = format!("0 and {}", format_length_mm(self.length_m()));
         match self.width_m() {

@@ -59,13 +59,13 @@ impl UniformLoad {
         Position { x_m: self.from.x_m.midpoint(self.to.x_m), y_m: self.from.y_m.midpoint(self.to.y_m) }
     }
 
-    /// What a sensor reads per newton of it: the mean of the influence function over the stretch, in its unit.
+    /// Reading of a sensor per newton of the load: the mean of the influence function over the stretch, in its unit.
     pub fn mean(&self, influence: &dyn InfluenceFunction) -> f64 {
         let points = self.points();
         points.iter().map(|point| influence.at(*point)).sum::<f64>() / points.len() as f64
     }
 
-    /// How fast that changes as the whole load moves along x and along y, per metre.
+    /// Derivatives of that reading as the whole load moves along x and along y, per metre.
     pub fn mean_gradient(&self, influence: &dyn InfluenceFunction) -> [f64; 2] {
         let points = self.points();
         let sum = points.iter().fold([0.0, 0.0], |[sum_x, sum_y], point| {

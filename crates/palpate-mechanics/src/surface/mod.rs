@@ -86,7 +86,7 @@ pub trait Surface: Send + Sync {
     }
 }
 
-/// What one sensor reads per newton of downward force, as a function of where the force acts.
+/// Influence function of one sensor: its reading per newton of downward force, as a function of where the force acts.
 pub trait InfluenceFunction: Send + Sync {
     /// The reading per newton of downward force at `contact`, in SI units per newton (m/N, rad/N, 1/N, N/N); 0 for a raw
     /// channel, which no model explains. Off the surface the value has no meaning.
@@ -97,7 +97,7 @@ pub trait InfluenceFunction: Send + Sync {
     fn gradient(&self, contact: Position) -> [f64; 2];
 }
 
-/// What one sensor reads, as a function of where and how hard the surface is touched.
+/// Response function of one sensor: its reading as a function of the contact's position and force.
 pub trait ResponseFunction: Send + Sync {
     /// The reading at `contact`, in the sensor's SI unit; 0 for a raw channel. Off the surface the value has no meaning.
     fn at(&self, contact: Contact) -> f64;
@@ -130,7 +130,7 @@ impl ResponseFunction for Proportional<'_> {
     }
 }
 
-/// Why a sensor reads nothing, wherever the surface is touched.
+/// Reason for which a sensor reads 0 wherever the surface is touched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InsensitiveSensor {
     /// A support of a beam holds what it measures.

@@ -35,7 +35,7 @@ pub struct ModalBeam {
     damping_ratio: f64,
 }
 
-/// Why a beam's motion cannot be computed.
+/// Error of a beam whose motion cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ModalBeamError {
     /// The density is not a positive, finite number.
@@ -100,7 +100,7 @@ impl ModalBeam {
         self.wave_number(k).powi(2) * (self.beam.bending_stiffness() / self.mass_per_length()).sqrt()
     }
 
-    /// The same in hertz.
+    /// Frequency of mode `k` (from 1) without damping, in hertz.
     pub fn frequency_hz(&self, k: usize) -> f64 {
         self.angular_frequency(k) / (2.0 * PI)
     }
@@ -178,7 +178,7 @@ impl ModalResponse {
         self.loads = loads.to_vec();
     }
 
-    /// What a sensor of a kind at `sensor` reads, without any fault, in its SI unit; 0 for a raw channel.
+    /// Reading of a faultless sensor of a kind at `sensor`, in its SI unit; 0 for a raw channel.
     pub fn reading(&self, kind: SensorKind, sensor: Position) -> f64 {
         let beam = &self.beam.beam;
         let at_once = |load: &Contact| load.force_n * beam.influence(kind, sensor, load.position);
@@ -285,7 +285,7 @@ impl Oscillator {
         Self { omega, zeta, step_s, free }
     }
 
-    /// What free swinging makes of (q, q̇) in one step, by rows.
+    /// Transition matrix of (q, q̇) over one step without a load, by rows.
     pub fn free(&self) -> [[f64; 2]; 2] {
         self.free
     }

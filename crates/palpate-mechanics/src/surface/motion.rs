@@ -78,7 +78,7 @@ impl Motion {
         Ok(self)
     }
 
-    /// How long it takes, in seconds.
+    /// Duration in seconds.
     pub fn duration_s(&self) -> f64 {
         self.passes as f64 * self.pass_s() + (self.passes - 1) as f64 * self.rest_s()
     }

@@ -103,14 +103,6 @@ fn quantities_are_shown_with_a_readable_prefix() {
     assert_eq!([format_length_mm(0.4 / 9.0), format_length_mm(-1e-9)], ["44.4444 mm", "0 mm"]);
 }
 
-#[test]
-fn quantities_are_deserialised_from_texts_and_numbers() {
-    let read = |json| serde_json::from_str::<Quantity>(json).map_err(|error| error.to_string());
-    assert_eq!(read("\"400 mm\""), Ok(Quantity { value: 0.4, dimension: Dimension::Length }));
-    assert_eq!(read("7"), Ok(Quantity { value: 7.0, dimension: Dimension::None }));
-    assert!(read("\"7 apples\"").unwrap_err().starts_with("unknown unit `apples`"));
-}
-
 const SYMBOLS: [&str; 8] = ["", "nm", "um", "mm", "kN", "GPa", "ue", "%"];
 
 proptest! {

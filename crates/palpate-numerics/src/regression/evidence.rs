@@ -21,7 +21,7 @@ use crate::NotPositiveDefinite;
 /// Added to every Q_j, so that an output without any variance has a logarithm; outputs are of order 1 there.
 const LEAST_QUADRATIC: f64 = 1e-10;
 
-/// What the evidence is of.
+/// Samples and model whose evidence is computed.
 pub(super) struct Evidence<'a> {
     pub groups: &'a Groups,
     pub kernel: Kernel,

@@ -12,7 +12,7 @@ const LONGEST_STEP: f64 = 2.0;
 /// The share of the decrease promised by the gradient that a step must bring.
 const SUFFICIENT: f64 = 1e-4;
 
-/// When to stop.
+/// Stopping criterion of a minimisation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
     /// After this many evaluations.
@@ -21,7 +21,7 @@ pub(super) struct Stop {
     pub decrease: f64,
 }
 
-/// Where a search ended.
+/// Result of a minimisation.
 #[derive(Clone, Debug)]
 pub(super) struct Minimum {
     /// The variables.

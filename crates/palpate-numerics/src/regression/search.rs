@@ -9,7 +9,7 @@ use super::{GaussianProcess, Hyperparameters, Kernel, RegressionError, Samples, 
 use crate::random_order;
 use crate::watch::{Cancelled, Watch};
 
-/// How a Gaussian process is fitted.
+/// Settings by which a Gaussian process is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Regression {

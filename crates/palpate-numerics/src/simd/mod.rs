@@ -96,7 +96,7 @@ impl InstructionSet {
         Self::PORTABLE
     }
 
-    /// All that this machine has, widest first.
+    /// Instruction sets of this machine, widest first.
     pub fn available() -> Vec<Self> {
         #[cfg(target_arch = "x86_64")]
         let wide = [(has_avx512(), Set::Avx512), (has_avx2(), Set::Avx2)];

@@ -94,7 +94,7 @@ impl Plate {
         })
     }
 
-    /// What it is.
+    /// The description.
     pub fn spec(&self) -> &PlateSpec {
         &self.spec
     }
@@ -112,7 +112,7 @@ impl Plate {
         self.solved().map(|_| ()).map_err(|reason| PlateError::Unsolvable { reason })
     }
 
-    /// How many numbers the factor of its equations is stored in.
+    /// Stored numbers of the factor of its equations.
     ///
     /// # Errors
     /// As [`Plate::solve`].

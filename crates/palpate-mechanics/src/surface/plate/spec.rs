@@ -32,7 +32,7 @@ pub struct PlateSpec {
     pub elements: usize,
 }
 
-/// How each edge is held; free where nothing is said.
+/// Supports of the four edges; free where nothing is said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Edges {
@@ -46,7 +46,7 @@ pub struct Edges {
     pub top: Edge,
 }
 
-/// How an edge is held.
+/// Support of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
@@ -69,7 +69,7 @@ pub struct PointSupport {
     pub kind: PointSupportKind,
 }
 
-/// What a support at one point does.
+/// Kind of a support at one point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointSupportKind {
@@ -244,7 +244,7 @@ pub enum PlateError {
     },
 }
 
-/// Why the equations of a plate could not be solved.
+/// Error of a plate whose equations could not be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
     /// The stiffness matrix has no factor.

@@ -41,7 +41,7 @@ pub struct BeamSupport {
     pub kind: BeamSupportKind,
 }
 
-/// How a support holds the beam.
+/// Kind of a support: how it holds the beam.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum BeamSupportKind {
@@ -232,7 +232,7 @@ fn kind_in_words(kind: BeamSupportKind) -> String {
     }
 }
 
-/// Why a beam on supports cannot be computed, and what of it is at fault. Sections and supports are numbered from 1, in the
+/// Error of a beam on supports that cannot be computed, with the part that is at fault. Sections and supports are numbered from 1, in the
 /// order of the description.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SupportedBeamError {
@@ -393,7 +393,7 @@ pub enum RigidMotion {
     },
 }
 
-/// What of a beam's description is at fault.
+/// Part of a beam's description that is at fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BeamPart {
     /// All of it.
@@ -409,7 +409,7 @@ pub enum BeamPart {
 }
 
 impl SupportedBeamError {
-    /// What is at fault.
+    /// The part that is at fault.
     pub const fn part(&self) -> BeamPart {
         match *self {
             Self::NotPositive { .. } | Self::Compliance { .. } => BeamPart::Whole,
@@ -425,7 +425,7 @@ impl SupportedBeamError {
         }
     }
 
-    /// What would help.
+    /// Advice on what would help.
     pub const fn help(&self) -> Option<&'static str> {
         match self {
             Self::SectionsEnd { .. } => {
