@@ -1,3 +1,201 @@
-//! Where and how hard a surface is touched; the same types as on a microcontroller.
+//! Where and how hard a surface is touched, and how large it is. Contact and position are those of the microcontroller.
+
+use serde::{Deserialize, Serialize};
 
 pub use palpate_core::{Contact, Position};
+
+use crate::units::format_length_mm;
+
+/// The line or rectangle on which contacts lie.
+///
+/// ```
+/// use palpate_mechanics::contact::{Extent, Position};
+///
+/// let plate = Extent::Plane { length_m: 0.3, width_m: 0.2 };
+/// assert!(plate.contains(Position { x_m: 0.3, y_m: 0.1 }) && !plate.contains(Position { x_m: 0.1, y_m: 0.3 }));
+/// assert_eq!(plate.bounds_in_words(), "0 and 300 mm along, 0 and 200 mm across");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Sides", into = "Sides")]
+pub enum Extent {
+    /// A line along x, on which y is 0.
+    Line {
+        /// Length along x, in metres; greater than 0.
+        length_m: f64,
+    },
+    /// A rectangle with one corner at the origin.
+    Plane {
+        /// Length along x, in metres; greater than 0.
+        length_m: f64,
+        /// Width along y, in metres; greater than 0.
+        width_m: f64,
+    },
+}
+
+/// An extent as files have it.
+#[derive(Serialize, Deserialize)]
+struct Sides {
+    length_m: f64,
+    width_m: Option<f64>,
+}
+
+impl From<Sides> for Extent {
+    fn from(Sides { length_m, width_m }: Sides) -> Self {
+        Self::new(length_m, width_m)
+    }
+}
+
+impl From<Extent> for Sides {
+    fn from(extent: Extent) -> Self {
+        Self { length_m: extent.length_m(), width_m: extent.width_m() }
+    }
+}
+
+impl Extent {
+    /// A plane where there is a width, else a line; lengths in metres.
+    pub fn new(length_m: f64, width_m: Option<f64>) -> Self {
+        match width_m {
+            None => Self::Line { length_m },
+            Some(width_m) => Self::Plane { length_m, width_m },
+        }
+    }
+
+    /// Length along x, in metres.
+    pub fn length_m(&self) -> f64 {
+        match *self {
+            Self::Line { length_m } | Self::Plane { length_m, .. } => length_m,
+        }
+    }
+
+    /// Width along y, in metres; `None` for a line.
+    pub fn width_m(&self) -> Option<f64> {
+        match *self {
+            Self::Line { .. } => None,
+            Self::Plane { width_m, .. } => Some(width_m),
+        }
+    }
+
+    /// Number of coordinates of a position on it: 1 on a line, 2 on a plane.
+    pub fn dimensions(&self) -> usize {
+        match self {
+            Self::Line { .. } => 1,
+            Self::Plane { .. } => 2,
+        }
+    }
+
+    /// Its sides, in metres: the length, and the width of a plane; as many as a contact has coordinates.
+    pub fn sides_m(&self) -> impl Iterator<Item = f64> + use<> {
+        std::iter::once(self.length_m()).chain(self.width_m())
+    }
+
+    /// A value that a plane has across its width; `None` on a line.
+    pub fn across<T>(&self, value: T) -> Option<T> {
+        match self {
+            Self::Line { .. } => None,
+            Self::Plane { .. } => Some(value),
+        }
+    }
+
+    /// The coordinates of a position on it, in metres: x, and y on a plane.
+    pub fn coordinates_m(&self, position: Position) -> impl Iterator<Item = f64> + use<> {
+        std::iter::once(position.x_m).chain(self.across(position.y_m))
+    }
+
+    /// A position in words: "75 mm", or "75 mm, 40 mm" on a plane, and of what is beside a line.
+    pub fn place_in_words(&self, position: Position) -> String {
+        let x = format_length_mm(position.x_m);
+        match self {
+            Self::Line { .. } if position.y_m == 0.0 => x,
+            _ => format!("{x}, {}", format_length_mm(position.y_m)),
+        }
+    }
+
+    /// Positions in millimetres with two decimals at most: "35, 40 mm"; on a plane "(10, 20), (10, 180) mm", and where they
+    /// are a grid, at least two by three, "x 10, 20, 30 with y 50, 100 mm each".
+    pub fn places_in_words(&self, positions: &[Position]) -> String {
+        let listed = |place: &dyn Fn(&Position) -> String| {
+            format!("{} mm", positions.iter().map(place).collect::<Vec<_>>().join(", "))
+        };
+        match self {
+            Self::Line { .. } => listed(&|at| mm(at.x_m)),
+            Self::Plane { .. } => match grid(positions) {
+                Some((columns, rows)) => {
+                    format!("x {} with y {} mm each", columns.join(", "), rows.join(", "))
+                }
+                None => listed(&|at| format!("({}, {})", mm(at.x_m), mm(at.y_m))),
+            },
+        }
+    }
+
+    /// Bounds of positions, in words: "0 and 400 mm", or "0 and 300 mm along, 0 and 200 mm across" on a plane.
+    pub fn bounds_in_words(&self) -> String {
+        let along = format!("0 and {}", format_length_mm(self.length_m()));
+        match self.width_m() {
+            None => along,
+            Some(width_m) => format!("{along} along, 0 and {} across", format_length_mm(width_m)),
+        }
+    }
+
+    /// Whether `position` lies on it, the boundary included.
+    ///
+    /// Positions are forgiven a rounding error of 10⁻⁹ of the length.
+    pub fn contains(&self, position: Position) -> bool {
+        let slack_m = 1e-9 * self.length_m();
+        let within = |value: f64, size: f64| value >= -slack_m && value <= size + slack_m;
+        within(position.x_m, self.length_m()) && within(position.y_m, self.width_m().unwrap_or(0.0))
+    }
+}
+
+fn mm(length_m: f64) -> String {
+    let text = format!("{:.2}", length_m * 1e3);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// The columns and rows of a grid whose positions go row by row, as they are written.
+fn grid(positions: &[Position]) -> Option<(Vec<String>, Vec<String>)> {
+    let first = mm(positions.first()?.y_m);
+    let columns: Vec<String> =
+        positions.iter().take_while(|at| mm(at.y_m) == first).map(|at| mm(at.x_m)).collect();
+    let rows: Vec<String> = positions.iter().step_by(columns.len()).map(|at| mm(at.y_m)).collect();
+    let at = |i: usize| (&columns[i % columns.len()], &rows[i / columns.len()]);
+    let whole = positions.len() == columns.len() * rows.len();
+    let is_grid =
+        whole && positions.iter().enumerate().all(|(i, place)| at(i) == (&mm(place.x_m), &mm(place.y_m)));
+    (is_grid && columns.len().min(rows.len()) >= 2 && positions.len() >= 6).then_some((columns, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LINE: Extent = Extent::Line { length_m: 0.4 };
+    const PLANE: Extent = Extent::Plane { length_m: 0.4, width_m: 0.2 };
+
+    #[test]
+    fn positions_read_well() {
+        let positions = [Position { x_m: 0.035, y_m: 0.0 }, Position { x_m: 0.1 / 3.0, y_m: 0.2 }];
+        assert_eq!(LINE.places_in_words(&positions), "35, 33.33 mm");
+        assert_eq!(PLANE.places_in_words(&positions), "(35, 0), (33.33, 200) mm");
+    }
+
+    #[test]
+    fn a_grid_is_told_by_its_columns_and_rows() {
+        let at = |i: usize| Position { x_m: 0.01 * (i % 3) as f64, y_m: 0.1 * (i / 3) as f64 };
+        let mut positions: Vec<Position> = (0..6).map(at).collect();
+        assert_eq!(PLANE.places_in_words(&positions), "x 0, 10, 20 with y 0, 100 mm each");
+        assert_eq!(
+            PLANE.places_in_words(&positions[..5]),
+            "(0, 0), (10, 0), (20, 0), (0, 100), (10, 100) mm"
+        );
+        positions[4].x_m = 0.011;
+        assert!(PLANE.places_in_words(&positions).starts_with("(0, 0), (10, 0), "));
+    }
+
+    #[test]
+    fn a_file_has_the_width_of_a_line_as_null() {
+        let text = serde_json::to_string(&[LINE, PLANE]).unwrap();
+        assert_eq!(text, r#"[{"length_m":0.4,"width_m":null},{"length_m":0.4,"width_m":0.2}]"#);
+        assert_eq!(serde_json::from_str::<[Extent; 2]>(&text).unwrap(), [LINE, PLANE]);
+        assert_eq!(serde_json::from_str::<Extent>(r#"{"length_m":0.4}"#).unwrap(), LINE);
+    }
+}

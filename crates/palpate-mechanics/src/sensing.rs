@@ -6,8 +6,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Position;
-use crate::surface::Extent;
+use crate::contact::{Extent, Position};
 use crate::units::{Dimension, Unit};
 use palpate_numerics::OutOfRange;
 

@@ -3,17 +3,16 @@
 mod beam;
 mod digit;
 mod elastica;
-mod extent;
 mod load;
 pub mod modal;
 mod motion;
 pub mod plate;
 mod supported_beam;
 
+pub use crate::contact::Extent;
 pub use beam::{Beam, BeamError};
 pub use digit::{Digit, DigitError};
 pub use elastica::{Elastica, ForceDirection};
-pub use extent::Extent;
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
 pub use plate::{Plate, PlateError};
