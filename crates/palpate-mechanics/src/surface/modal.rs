@@ -8,7 +8,7 @@
 //!
 //! What finitely many modes leave out follows the load without delay, so it is added in closed form: a sensor reads its
 //! static value, plus its share of each mode's departure from that mode's static value (the mode acceleration method of
-//! D. Williams, 1945). A load that creeps is then read as exactly as by [`Beam`](super::Beam) itself.
+//! D. Williams, 1945). A load that creeps is then read as exactly as by [`Beam`] itself.
 //!
 //! The load has a force and no mass; the weight of the beam itself is tared away.
 
