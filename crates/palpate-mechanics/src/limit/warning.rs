@@ -17,11 +17,11 @@ pub const AMBIGUOUS_DISTANCE: f64 = 4.653;
 /// A touch that stands out of the noise by fewer standard deviations than this is called faint.
 pub const FAINT_SIGNAL: f64 = 5.0;
 /// Readings that differ by fewer standard deviations than this are the same.
-const SAME: f64 = 0.05;
+const INDISTINGUISHABLE: f64 = 0.05;
 /// A touch that stands out by fewer standard deviations than this does not show at all.
-const NOTHING: f64 = 1e-6;
+const NO_SIGNAL: f64 = 1e-6;
 /// A reaction that changes by less than this share of the force over the whole length does not change.
-const SAME_REACTION: f64 = 1e-6;
+const CONSTANT_REACTION: f64 = 1e-6;
 
 /// Warning of contacts that no estimator can tell well on this bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,7 +147,7 @@ impl Survey<'_> {
         let supports = surface.force_supports();
         let changes = |support: &Position| {
             let [along, across] = surface.influence_function(SensorKind::Reaction, *support).gradient(at);
-            along.hypot(across) * surface.length_m() > SAME_REACTION
+            along.hypot(across) * surface.length_m() > CONSTANT_REACTION
         };
         self.force == Force::Unknown || supports.is_empty() || supports.iter().any(changes)
     }
@@ -261,14 +261,14 @@ impl LimitWarning {
                 ways.join(", or ")
             }
             // Readings that are the same stay so, however quiet the sensors are.
-            Self::Mirror { distance, .. } if *distance < SAME => {
+            Self::Mirror { distance, .. } if *distance < INDISTINGUISHABLE => {
                 "a sensor that breaks the symmetry; less noise does not help".to_owned()
             }
             Self::Mirror { distance, .. } => {
                 format!("{}, or a sensor that tells the two apart", less_noise(bound / distance))
             }
             // Over a rigid support nothing moves, however quiet the sensors are and however hard the touch.
-            Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NOTHING => {
+            Self::Faint { signal_to_noise, reactions_would_help, .. } if *signal_to_noise < NO_SIGNAL => {
                 let sensor = if *reactions_would_help {
                     "reaction sensors at the supports"
                 } else {
@@ -316,7 +316,7 @@ impl fmt::Display for LimitWarning {
                     f,
                     "ambiguous at {zone} with {force} force: contacts there read like contacts at {twins}; "
                 )?;
-                if *distance < SAME {
+                if *distance < INDISTINGUISHABLE {
                     return write!(f, "{at} and {twin} read the same");
                 }
                 let (distance, bound) = (figure(*distance), figure(AMBIGUOUS_DISTANCE));

@@ -121,7 +121,7 @@ impl ModalBeam {
             step_s: 0.0,
         };
         for k in 1..=modes {
-            response.modes[k - 1].place = response.static_place(k, loads);
+            response.modes[k - 1].displacement = response.static_displacement(k, loads);
         }
         response
     }
@@ -182,7 +182,7 @@ impl ModalResponse {
     pub fn reading(&self, kind: SensorKind, sensor: Position) -> f64 {
         let beam = &self.beam.beam;
         let at_once = |load: &Contact| load.force_n * beam.influence(kind, sensor, load.position);
-        let late = |k: usize| self.modes[k - 1].place - self.static_place(k, &self.loads);
+        let late = |k: usize| self.modes[k - 1].displacement - self.static_displacement(k, &self.loads);
         let at_once: f64 = self.loads.iter().map(at_once).sum();
         at_once + (1..=self.modes.len()).map(|k| self.shape(k, kind, sensor.x_m) * late(k)).sum::<f64>()
     }
@@ -214,7 +214,7 @@ impl ModalResponse {
     }
 
     /// q_k in balance, in metres.
-    fn static_place(&self, k: usize, loads: &[Contact]) -> f64 {
+    fn static_displacement(&self, k: usize, loads: &[Contact]) -> f64 {
         self.acceleration(k, loads) / self.beam.angular_frequency(k).powi(2)
     }
 
@@ -265,9 +265,9 @@ pub struct Oscillator {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct State {
     /// q.
-    pub place: f64,
+    pub displacement: f64,
     /// q̇.
-    pub speed: f64,
+    pub velocity: f64,
 }
 
 impl Oscillator {
@@ -296,9 +296,12 @@ impl Oscillator {
         let slope = (to - from) / self.step_s;
         let b = slope / square;
         let a = from / square - 2.0 * self.zeta * b / self.omega;
-        let (place, speed) = (state.place - a, state.speed - b);
+        let (displacement, velocity) = (state.displacement - a, state.velocity - b);
         let [[pp, ps], [sp, ss]] = self.free;
-        State { place: a + b * self.step_s + pp * place + ps * speed, speed: b + sp * place + ss * speed }
+        State {
+            displacement: a + b * self.step_s + pp * displacement + ps * velocity,
+            velocity: b + sp * displacement + ss * velocity,
+        }
     }
 }
 

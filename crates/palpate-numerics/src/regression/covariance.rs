@@ -14,7 +14,7 @@ use crate::{Cholesky, NotPositiveDefinite};
 /// b²: the prior variance of the trend's coefficients over the signal's, for standardized coordinates.
 const TREND_VARIANCE: f64 = 1e8;
 /// Added to the diagonal of C, so that a covariance without noise has a factor despite rounding.
-const NUGGET: f64 = 1e-12;
+pub(super) const NUGGET: f64 = 1e-12;
 /// Where that is not enough, what is added grows up to this.
 const LARGEST_NUGGET: f64 = 1e-6;
 
@@ -92,7 +92,7 @@ impl Covariance {
         let basis = factor.solve_lower_matrix(basis.clone());
         let mut a = basis.t().dot(&basis);
         a.diag_mut().mapv_inplace(|value| value + 1.0 / TREND_VARIANCE);
-        let trend = factor_somehow(&a)?;
+        let trend = factor_with_nugget(&a)?;
         Ok(Self { factor, basis, trend })
     }
 
@@ -100,7 +100,7 @@ impl Covariance {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`] when even the largest leaves none.
-    pub fn steadied(points: &Points, kernel: Kernel, noise: &[f64]) -> Result<Self, NotPositiveDefinite> {
+    pub fn regularised(points: &Points, kernel: Kernel, noise: &[f64]) -> Result<Self, NotPositiveDefinite> {
         let mut nugget = NUGGET;
         loop {
             match Self::new(points.correlations(kernel, None), noise, &points.basis, nugget) {
@@ -108,18 +108,6 @@ impl Covariance {
                 done => return done,
             }
         }
-    }
-
-    /// As [`Self::new`] with the least nugget, for a search that can go elsewhere.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] when rounding leaves no factor.
-    pub fn strict(
-        correlations: Array2<f64>,
-        noise: &[f64],
-        basis: &Array2<f64>,
-    ) -> Result<Self, NotPositiveDefinite> {
-        Self::new(correlations, noise, basis, NUGGET)
     }
 
     /// ln det(K + b²·H·Hᵀ).
@@ -155,7 +143,7 @@ impl Covariance {
 
 /// Factors A. Collinear coordinates make it singular but for 1/b², which rounding can swallow; then a little more is
 /// added.
-fn factor_somehow(a: &Array2<f64>) -> Result<Cholesky, NotPositiveDefinite> {
+fn factor_with_nugget(a: &Array2<f64>) -> Result<Cholesky, NotPositiveDefinite> {
     let trace = a.diag().sum();
     let mut added = 1e-15;
     let mut done = Cholesky::factor(a.clone());

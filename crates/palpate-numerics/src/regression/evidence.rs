@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use ndarray::Array2;
 
-use super::covariance::{Covariance, Points};
+use super::covariance::{Covariance, NUGGET, Points};
 use super::groups::Groups;
 use super::{Hyperparameters, Kernel, Trend};
 use crate::NotPositiveDefinite;
@@ -59,7 +59,7 @@ impl Evidence<'_> {
         let noise = Self::noise(groups, ratio);
         let mut slopes = Array2::zeros((groups.len(), groups.len()));
         let correlations = points.correlations(self.kernel, Some(&mut slopes));
-        let covariance = Covariance::strict(correlations, &noise, &points.basis)?;
+        let covariance = Covariance::new(correlations, &noise, &points.basis, NUGGET)?;
         let (alpha, _) = covariance.solve(&groups.means);
         let quadratics = quadratic_forms(groups, ratio, &alpha);
         let rows = groups.total_rows() as f64;

@@ -60,7 +60,7 @@ impl GaussianProcess {
         let scales = &hyperparameters.length_scales;
         let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
         let noise = Evidence::noise(groups, ratio);
-        let covariance = Covariance::steadied(&points, kernel, &noise)?;
+        let covariance = Covariance::regularised(&points, kernel, &noise)?;
         let (alpha, beta) = covariance.solve(&groups.means);
         let signal = Evidence::signal_variances(groups, ratio, &alpha);
         let data = PosteriorData {
@@ -263,7 +263,7 @@ impl TryFrom<PosteriorData> for GaussianProcess {
         let coordinates = shape(&data.inputs, n, d).reversed_axes();
         let scales = &data.hyperparameters.length_scales;
         let points = Points::new(&coordinates.view(), &data.centre, &data.spread, scales, data.trend);
-        let covariance = Covariance::steadied(&points, data.kernel, &data.noise)?;
+        let covariance = Covariance::regularised(&points, data.kernel, &data.noise)?;
         let weights = shape(&data.weights, m, n);
         let trend = shape(&data.trend_coefficients, m, data.trend.size(d));
         Ok(Self { data, points, covariance, weights, trend })

@@ -103,7 +103,7 @@ fn a_sensors_modes_add_up_to_its_static_reading() {
 fn energy_j(ModalResponse { beam, modes, .. }: &ModalResponse) -> f64 {
     let energy = |(i, mode): (usize, &State)| {
         let omega = beam.angular_frequency(i + 1);
-        0.5 * beam.modal_mass() * (mode.speed.powi(2) + (omega * mode.place).powi(2))
+        0.5 * beam.modal_mass() * (mode.velocity.powi(2) + (omega * mode.displacement).powi(2))
     };
     modes.iter().enumerate().map(energy).sum()
 }
@@ -111,7 +111,7 @@ fn energy_j(ModalResponse { beam, modes, .. }: &ModalResponse) -> f64 {
 /// The power that the loads put into the modes, in watts: Σ W_j·ẇ(a_j).
 fn power_w(ModalResponse { beam, modes, loads, .. }: &ModalResponse) -> f64 {
     let speed_at = |x_m: f64| -> f64 {
-        modes.iter().enumerate().map(|(i, mode)| (beam.wave_number(i + 1) * x_m).sin() * mode.speed).sum()
+        modes.iter().enumerate().map(|(i, mode)| (beam.wave_number(i + 1) * x_m).sin() * mode.velocity).sum()
     };
     loads.iter().map(|load| load.force_n * speed_at(load.position.x_m)).sum()
 }

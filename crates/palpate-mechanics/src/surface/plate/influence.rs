@@ -46,11 +46,11 @@ impl PlateInfluence {
 
 impl InfluenceFunction for PlateInfluence {
     fn at(&self, contact: Position) -> f64 {
-        self.mesh.value(&self.degrees, self.mesh.place(contact), Derivative::None)
+        self.mesh.value(&self.degrees, self.mesh.locate(contact), Derivative::None)
     }
 
     fn gradient(&self, contact: Position) -> [f64; 2] {
-        let place = self.mesh.place(contact);
+        let place = self.mesh.locate(contact);
         [Derivative::X, Derivative::Y].map(|of| self.mesh.value(&self.degrees, place, of))
     }
 }
@@ -69,14 +69,14 @@ impl InfluenceFunction for NotANumber {
 }
 
 fn weights(mesh: &Mesh, at: Position, of: Derivative) -> Functional {
-    mesh.weights(mesh.place(at), of).to_vec()
+    mesh.weights(mesh.locate(at), of).to_vec()
 }
 
 /// ∂²w/∂x², which jumps from element to element: between two, the mean of both sides.
 fn curvature(mesh: &Mesh, at: Position) -> Functional {
-    let place = mesh.place(at);
+    let place = mesh.locate(at);
     let here = mesh.weights(place, Derivative::XX);
-    match mesh.place_before(place) {
+    match mesh.seen_from_before(place) {
         None => here.to_vec(),
         Some(before) => {
             let before = mesh.weights(before, Derivative::XX);

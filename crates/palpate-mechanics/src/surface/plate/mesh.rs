@@ -39,9 +39,9 @@ pub(super) enum Derivative {
     XX,
 }
 
-/// A place in the mesh: an element, and where in it.
+/// Point of the mesh: an element, and where in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
+pub(super) struct MeshPoint {
     column: usize,
     row: usize,
     xi: f64,
@@ -77,26 +77,26 @@ impl Mesh {
         NODE_DEGREES * (row * (self.across + 1) + column)
     }
 
-    /// Where `position` is; off the plate, the place in the nearest element that its polynomial continues to.
-    pub fn place(&self, position: Position) -> Place {
+    /// The point of the mesh at `position`; off the plate, that in the nearest element that its polynomial continues to.
+    pub fn locate(&self, position: Position) -> MeshPoint {
         let (column, xi) = along(position.x_m / self.side_x_m, self.across);
         let (row, eta) = along(position.y_m / self.side_y_m, self.up);
-        Place { column, row, xi, eta }
+        MeshPoint { column, row, xi, eta }
     }
 
-    /// The same place seen from the element before it along x, when it lies on the boundary between two.
-    pub fn place_before(&self, place: Place) -> Option<Place> {
-        let on_boundary = place.xi.abs() < 1e-9 && place.column > 0;
-        on_boundary.then(|| Place { column: place.column - 1, xi: 1.0 + place.xi, ..place })
+    /// The same point seen from the element before it along x, when it lies on the boundary between two.
+    pub fn seen_from_before(&self, point: MeshPoint) -> Option<MeshPoint> {
+        let on_boundary = point.xi.abs() < 1e-9 && point.column > 0;
+        on_boundary.then(|| MeshPoint { column: point.column - 1, xi: 1.0 + point.xi, ..point })
     }
 
-    /// The value of the derivative `of` at `place` when the degrees of freedom are `degrees`.
+    /// The value of the derivative `of` at `point` when the degrees of freedom are `degrees`.
     #[inline]
-    pub fn value(&self, degrees: &[f64], place: Place, of: Derivative) -> f64 {
-        let (along_x, along_y) = self.factors(place, of);
+    pub fn value(&self, degrees: &[f64], point: MeshPoint, of: Derivative) -> f64 {
+        let (along_x, along_y) = self.factors(point, of);
         let mut sum = 0.0;
         for (end_y, weights_y) in along_y.chunks_exact(2).enumerate() {
-            let first = self.first_degree(place.column, place.row + end_y);
+            let first = self.first_degree(point.column, point.row + end_y);
             let nodes = &degrees[first..first + 2 * NODE_DEGREES];
             for (node, weights_x) in nodes.chunks_exact(NODE_DEGREES).zip(along_x.chunks_exact(2)) {
                 sum += weights_y[0] * (weights_x[0] * node[0] + weights_x[1] * node[1])
@@ -107,19 +107,19 @@ impl Mesh {
     }
 
     /// By how much each degree of freedom is multiplied in that value: pairs of degree and factor.
-    pub fn weights(&self, place: Place, of: Derivative) -> [(usize, f64); 16] {
-        let (along_x, along_y) = self.factors(place, of);
+    pub fn weights(&self, point: MeshPoint, of: Derivative) -> [(usize, f64); 16] {
+        let (along_x, along_y) = self.factors(point, of);
         std::array::from_fn(|i| {
             let (x, y) = (i % 4, i / 4);
-            let node = self.first_degree(place.column + x / 2, place.row + y / 2);
+            let node = self.first_degree(point.column + x / 2, point.row + y / 2);
             (node + x % 2 + 2 * (y % 2), along_x[x] * along_y[y])
         })
     }
 
     /// The factors of the shape functions along x and along y.
     #[inline]
-    fn factors(&self, place: Place, of: Derivative) -> (Four, Four) {
-        let Place { xi, eta, .. } = place;
+    fn factors(&self, point: MeshPoint, of: Derivative) -> (Four, Four) {
+        let MeshPoint { xi, eta, .. } = point;
         let over = |functions: Four, side_m: f64| functions.map(|value| value / side_m);
         match of {
             Derivative::None => (values(xi), values(eta)),

@@ -65,11 +65,11 @@ impl Solved {
         let each = loads.chunks(TOGETHER).flat_map(|loads| {
             let functionals: Vec<&Functional> = loads.iter().map(|(functional, _)| functional).collect();
             let mut solved = solve(&self.unknowns, &self.factor, &functionals);
-            let spread = |(u, (_, factor)): (&mut [f64], &(Functional, f64))| {
+            let expanded = |(u, (_, factor)): (&mut [f64], &(Functional, f64))| {
                 self.simple_supports.hold(&self.unknowns, u);
-                self.unknowns.spread(u, *factor)
+                self.unknowns.expand(u, *factor)
             };
-            solved.chunks_exact_mut(self.unknowns.count().max(1)).zip(loads).map(spread).collect::<Vec<_>>()
+            solved.chunks_exact_mut(self.unknowns.count().max(1)).zip(loads).map(expanded).collect::<Vec<_>>()
         });
         each.collect()
     }
@@ -85,7 +85,7 @@ impl Solved {
         for (weight, solution) in held.compliance.solve(&unit).iter().zip(&held.solutions) {
             add(&mut sum, *weight, solution);
         }
-        Some(self.unknowns.spread(&sum, 1.0))
+        Some(self.unknowns.expand(&sum, 1.0))
     }
 }
 
@@ -130,7 +130,7 @@ impl SimpleSupports {
 fn springs(spec: &PlateSpec, mesh: &Mesh) -> Vec<Spring> {
     let own_n_per_m = spec.flexural_rigidity() / (spec.length_m * spec.width_m);
     let spring = |support: &PointSupport| Spring {
-        deflection: mesh.weights(mesh.place(support.position), Derivative::None).to_vec(),
+        deflection: mesh.weights(mesh.locate(support.position), Derivative::None).to_vec(),
         stiffness_n_per_m: match support.kind {
             PointSupportKind::Simple => own_n_per_m,
             PointSupportKind::Elastic { stiffness_n_per_m } => stiffness_n_per_m,
@@ -207,7 +207,7 @@ impl Unknowns {
     }
 
     /// All degrees of freedom, the held ones 0, when the unknowns are `unknowns`, times `factor`.
-    pub fn spread(&self, unknowns: &[f64], factor: f64) -> Vec<f64> {
+    pub fn expand(&self, unknowns: &[f64], factor: f64) -> Vec<f64> {
         self.places.iter().map(|place| place.map_or(0.0, |place| factor * unknowns[place as usize])).collect()
     }
 }
