@@ -1,12 +1,13 @@
-//! Reading palpate's files, with complaints that point at the place.
+//! What a command is given: palpate's files, with complaints that point at the place, and quantities.
 
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::estimator::{Locator, LocatorFileError};
-use palpate_estimators::recording::CsvError;
+use palpate_estimators::recording::{CsvError, Recording};
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_rig::{Rig, RigError};
 use palpate_studies::Study;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The text of a file.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
@@ -56,37 +57,97 @@ pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
 }
 
+/// Whether a file is a rig or a study by its name.
+pub fn is_toml(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// A rig or a locator, either of which knows its bench.
+pub enum RigOrLocator {
+    Rig(Box<Rig>),
+    Locator(Box<Locator>),
+}
+
+impl RigOrLocator {
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        Ok(if is_toml(path) {
+            Self::Rig(Box::new(read_rig(path)?))
+        } else {
+            Self::Locator(Box::new(read_locator(path)?))
+        })
+    }
+
+    pub fn setup(&self) -> &Setup {
+        match self {
+            Self::Rig(rig) => &rig.setup,
+            Self::Locator(locator) => &locator.setup,
+        }
+    }
+}
+
+/// A recording: one file, or readings and contacts apart.
+#[derive(clap::Args)]
+pub struct RecordingFiles {
+    /// A recording [default: simulations, where the rig has a model]
+    #[arg(long, value_name = "FILE.csv")]
+    pub data: Option<PathBuf>,
+    /// The recording's contacts, where --data has the readings alone; row by row
+    #[arg(long, value_name = "FILE.csv", requires = "data")]
+    pub contacts: Option<PathBuf>,
+}
+
+impl RecordingFiles {
+    /// The recording of this bench, with its warnings said on stderr; `None` where no file is named.
+    pub fn read(&self, setup: &Setup) -> Result<Option<Recording>, Failure> {
+        let Some(data) = &self.data else { return Ok(None) };
+        let Some(contacts) = &self.contacts else { return read_recording(setup, data).map(Some) };
+        let (readings, pressed) = (read_bytes(data)?, read_bytes(contacts)?);
+        let names = [data, contacts].map(|path| path.display().to_string());
+        let recording =
+            setup.read_recording_pair((&names[0], readings.as_slice()), (&names[1], pressed.as_slice()));
+        with_warnings(recording, &names[0]).map(Some)
+    }
+}
+
+/// A recording of a bench in one file, with its warnings said on stderr.
+pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> {
+    let (bytes, name) = (read_bytes(path)?, path.display().to_string());
+    with_warnings(setup.read_recording(&name, bytes.as_slice()), &name)
+}
+
+fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
+    let recording = recording.map_err(|error| csv_complaint(&error))?;
+    recording.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
+    Ok(recording)
+}
+
 /// A length in metres, from a command line argument.
 pub fn length(text: &str) -> Result<f64, String> {
-    match Quantity::parse_as(text, Dimension::Length) {
-        Ok(length_m) if length_m > 0.0 => Ok(length_m),
-        Ok(_) => Err(format!("`{text}` must be greater than 0")),
-        Err(error) => Err(error.to_string()),
-    }
+    greater_than_0(text, Quantity::parse_as(text, Dimension::Length), |length_m| *length_m)
 }
 
 /// A force in newtons, from a command line argument.
 pub fn force(text: &str) -> Result<f64, String> {
-    match Quantity::parse_as(text, Dimension::Force) {
-        Ok(force_n) if force_n > 0.0 => Ok(force_n),
-        Ok(_) => Err(format!("`{text}` must be greater than 0")),
-        Err(error) => Err(error.to_string()),
-    }
+    greater_than_0(text, Quantity::parse_as(text, Dimension::Force), |force_n| *force_n)
 }
 
 /// A frequency in hertz, from a command line argument.
 pub fn frequency(text: &str) -> Result<f64, String> {
-    match Quantity::parse_as(text, Dimension::Frequency) {
-        Ok(frequency_hz) if frequency_hz > 0.0 => Ok(frequency_hz),
-        Ok(_) => Err(format!("`{text}` must be greater than 0")),
-        Err(error) => Err(error.to_string()),
-    }
+    greater_than_0(text, Quantity::parse_as(text, Dimension::Frequency), |frequency_hz| *frequency_hz)
 }
 
 /// A quantity greater than 0 in whatever unit, from a command line argument.
 pub fn quantity(text: &str) -> Result<Quantity, String> {
-    match text.parse::<Quantity>() {
-        Ok(quantity) if quantity.value > 0.0 => Ok(quantity),
+    greater_than_0(text, text.parse::<Quantity>(), |quantity| quantity.value)
+}
+
+fn greater_than_0<T>(
+    text: &str,
+    parsed: Result<T, impl std::fmt::Display>,
+    value: fn(&T) -> f64,
+) -> Result<T, String> {
+    match parsed {
+        Ok(parsed) if value(&parsed) > 0.0 => Ok(parsed),
         Ok(_) => Err(format!("`{text}` must be greater than 0")),
         Err(error) => Err(error.to_string()),
     }
@@ -98,17 +159,8 @@ fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
         Some(help) => complaint.help(help),
         None => complaint,
     };
-    complaint_at(complaint, &path.display().to_string(), text, error.span).into()
-}
-
-fn complaint_at(
-    complaint: Complaint,
-    name: &str,
-    text: &str,
-    span: Option<std::ops::Range<usize>>,
-) -> Complaint {
     // What is not there at all is said of the first line.
-    complaint.at_span(name, text, span.unwrap_or(0..0))
+    complaint.at_span(&path.display().to_string(), text, error.span.unwrap_or(0..0)).into()
 }
 
 fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Complaint {

@@ -1,7 +1,9 @@
-//! Lines of a file of readings, or of stdin, as they come.
+//! Readings of a file, or of stdin, as they come.
 
 use crate::failure::{Complaint, Failure};
-use crate::{interrupt, output};
+use crate::{input, output, progress};
+use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
+use palpate_estimators::setup::Setup;
 use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal};
 use std::path::Path;
@@ -34,12 +36,71 @@ impl Lines {
     /// The next line, with its end; `None` after the last, and once Ctrl-C was pressed.
     pub fn next(&mut self) -> Result<Option<&[u8]>, Failure> {
         self.line.clear();
-        if interrupt::asked() {
+        if progress::interrupted() {
             return Ok(None);
         }
         let read = self.source.read_until(b'\n', &mut self.line);
         let read = read.map_err(|error| Complaint::new(format!("cannot read {}: {error}", self.name)))?;
         self.count += u64::from(read > 0);
         Ok((read > 0).then_some(self.line.as_slice()))
+    }
+}
+
+/// The readings of a file, one a line; lines that hold none are said on stderr and counted.
+pub struct Readings {
+    pub lines: Lines,
+    parser: ReadingParser,
+    lost: u64,
+}
+
+impl Readings {
+    /// The readings of a bench in a file; `-` is stdin. Without a header, columns are the channels in their order.
+    pub fn open(path: &Path, setup: &Setup, no_header: bool) -> Result<Self, Failure> {
+        let mut columns: Columns = setup.recording_columns();
+        if no_header {
+            columns.header = Header::Absent;
+            for (i, channel) in columns.channels.iter_mut().enumerate() {
+                channel.column = Column::Number(i + 1);
+            }
+        }
+        let lines = Lines::open(path)?;
+        Ok(Self { parser: ReadingParser::new(&lines.name, &columns), lines, lost: 0 })
+    }
+
+    /// The next reading.
+    pub fn next(&mut self) -> Result<Option<Vec<f64>>, Failure> {
+        while let Some(line) = self.lines.next()? {
+            match self.parser.parse_line(line) {
+                Ok(None) => {}
+                Ok(Some(reading)) => return Ok(Some(reading)),
+                Err(error) if self.parser.awaits_columns() => return Err(input::csv_complaint(&error)),
+                Err(error) => self.lose(&error),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether not even a header has come.
+    pub fn awaits_columns(&self) -> bool {
+        self.parser.awaits_columns()
+    }
+
+    /// Whether every line so far was read.
+    pub fn is_whole(&self) -> bool {
+        self.lost == 0
+    }
+
+    /// Counts a line that gave nothing.
+    pub fn lose(&mut self, error: &dyn std::fmt::Display) {
+        self.lost += 1;
+        eprintln!("palpate: skipped: {error}");
+    }
+
+    /// The failure that some lines gave no such `answer`, if they did not.
+    pub fn finish(self, answer: &str) -> Result<(), Failure> {
+        match self.lost {
+            0 => Ok(()),
+            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no {answer}", self.lines.count))),
+        }
     }
 }

@@ -4,12 +4,10 @@
 mod commands;
 mod failure;
 mod input;
-mod interrupt;
+mod json;
 mod lines;
 mod output;
 mod progress;
-mod recording_files;
-mod table;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -41,7 +39,7 @@ enum Command {
 
 fn main() -> ExitCode {
     failure::install_handler();
-    interrupt::install_handler();
+    progress::install_interrupt_handler();
     let result = match Arguments::parse().command {
         Command::Study(arguments) => commands::study::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),

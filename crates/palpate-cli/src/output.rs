@@ -1,6 +1,8 @@
-//! What a command leaves behind: files that appear whole or not at all, and lines on stdout.
+//! What a command leaves behind: files that appear whole or not at all, and lines and tables on stdout.
 
 use crate::failure::{Complaint, Failure};
+use comfy_table::{CellAlignment, presets};
+use palpate_mechanics::units::format_count;
 use palpate_report::ReportFile;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -70,6 +72,14 @@ pub fn cannot(what: &str, path: &Path, error: &std::io::Error) -> Failure {
     Complaint::new(format!("cannot {what} {}: {error}", path.display())).into()
 }
 
+/// Says where the report of a folder is, where there is one; `before` stands before it.
+pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
+    match folder {
+        Some(folder) => say(format!("{before}Report: {}", folder.join("report.html").display())),
+        None => Ok(()),
+    }
+}
+
 /// Prints a line on stdout.
 pub fn say(line: impl Display) -> Result<(), Failure> {
     print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())
@@ -91,4 +101,69 @@ pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
         _ => Complaint::new(format!("cannot write to the output: {error}")).into(),
     })
+}
+
+/// A table for people, made column by column; the columns after the first are aligned to the right.
+pub struct Table<R> {
+    rows: Vec<R>,
+    heading: Vec<String>,
+    cells: Vec<Vec<String>>,
+}
+
+impl<R> Table<R> {
+    pub fn of(rows: impl IntoIterator<Item = R>) -> Self {
+        let rows: Vec<R> = rows.into_iter().collect();
+        Self { cells: vec![Vec::new(); rows.len()], heading: Vec::new(), rows }
+    }
+
+    /// Adds a column with what it says of each row.
+    pub fn column(mut self, heading: impl Into<String>, cell: impl Fn(&R) -> String) -> Self {
+        self.heading.push(heading.into());
+        self.cells.iter_mut().zip(&self.rows).for_each(|(cells, row)| cells.push(cell(row)));
+        self
+    }
+
+    /// Adds a row that is of another kind than the others.
+    pub fn row(mut self, cells: Vec<String>) -> Self {
+        self.cells.push(cells);
+        self
+    }
+}
+
+impl<R> Display for Table<R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut table = comfy_table::Table::new();
+        table.load_preset(presets::NOTHING).set_header(&self.heading).add_rows(&self.cells);
+        for (i, column) in table.column_iter_mut().enumerate() {
+            column.set_padding((0, 2));
+            column.set_cell_alignment(if i == 0 { CellAlignment::Left } else { CellAlignment::Right });
+        }
+        f.write_str(&table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n"))
+    }
+}
+
+/// Three decimals, or a whole number where there are many digits before them; a dash for none.
+pub fn figure(value: Option<f64>) -> String {
+    match value {
+        None => "–".to_owned(),
+        Some(value) if value >= 100.0 => format_count(value.round() as u64),
+        Some(value) => format!("{value:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let table = Table::of([("a", 1), ("long", 100)])
+            .column("arm", |(name, _)| (*name).to_owned())
+            .column("epochs", |(_, epochs)| epochs.to_string());
+        insta::assert_snapshot!(table.to_string(), @r"
+        arm   epochs
+        a          1
+        long     100
+        ");
+    }
 }

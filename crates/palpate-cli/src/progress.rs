@@ -1,10 +1,29 @@
-//! Progress of long work: on a terminal a bar with rate and time left, in a pipe nothing.
+//! Long work as people see it: on a terminal a bar with rate and time left, in a pipe nothing; and Ctrl-C, which stops it.
 
-use crate::interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
-use palpate_numerics::watch::Progress;
+use palpate_numerics::watch::{Progress, Watch};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// From now on Ctrl-C (and a polite kill) asks long work to stop, and the second time ends the process.
+pub fn install_interrupt_handler() {
+    let installed = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+    if let Err(error) = installed {
+        eprintln!("Ctrl-C will end palpate at once: {error}");
+    }
+}
+
+/// Whether somebody pressed Ctrl-C.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
 
 /// A bar of `length` steps on stderr.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
@@ -18,7 +37,7 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// Observes long work for a [`Watch`](palpate_numerics::watch::Watch): a bar on a terminal, and Ctrl-C.
+/// What observes long work: a bar on a terminal, and Ctrl-C.
 pub struct Observer {
     bar: ProgressBar,
     state: Mutex<State>,
@@ -48,14 +67,19 @@ impl Observer {
         Self { bar, state: Mutex::new(State { rounds: 0, stage: "", start: Instant::now() }) }
     }
 
+    /// Does some work under its eyes.
+    pub fn watch<T>(&self, work: impl FnOnce(Watch) -> T) -> T {
+        work(Watch::new(&|progress| self.observe(progress)))
+    }
+
     /// Shows progress; false once somebody pressed Ctrl-C.
-    pub fn observe(&self, progress: Progress) -> bool {
+    fn observe(&self, progress: Progress) -> bool {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match progress {
             Progress::Round => self.round(&mut state),
             Progress::Stage { name, share } => self.stage(&mut state, name, share),
         }
-        !interrupt::asked()
+        !interrupted()
     }
 
     fn round(&self, state: &mut State) {

@@ -1,9 +1,9 @@
 //! A beam on its bench as SVG text: supports, sensors, load and the deflected shape.
 
+use super::drawing::axis::plain;
 use super::drawing::geometry::{Point, Rect};
 use super::drawing::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, REFERENCE, Svg, palette};
 use super::drawing::text;
-use super::drawing::ticks::plain;
 use super::numbers::stated;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::error_lines::{in_milli, limit_in_words, limit_line};
 use super::maps::error_map;
 use super::numbers::{counted, number};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Series};
 use palpate_estimators::estimator::Comparison;
 use palpate_estimators::evaluation::{Evaluation, limit_ratio, percentage_error};
@@ -73,36 +73,6 @@ impl ComparisonReport<'_> {
     }
 
     fn table(&self) -> Table {
-        let rows = self.comparisons.iter().filter_map(|comparison| {
-            let evaluation = &comparison.tried.evaluation;
-            let summary = evaluation.summary(None)?;
-            Some(vec![
-                text(comparison.estimator.kind()),
-                value_mm(summary.average_m),
-                value(percentage_error(summary.average_m, evaluation.length_m)),
-                value_mm(summary.median_m),
-                value_mm(summary.p95_m),
-                value_mm(summary.rmse_m),
-                value(evaluation.effective_percent(self.tolerance_m)),
-                value(evaluation.coverage_percent()),
-                value(limit_ratio(self.setup, evaluation)),
-                value(comparison.tried.fit_seconds * 1e3),
-                value(comparison.tried.locate_ns * 1e-3),
-            ])
-        });
-        let columns = [
-            short("estimator"),
-            numeric("mean"),
-            numeric("% of length"),
-            numeric("median"),
-            numeric("95th"),
-            numeric("RMS"),
-            numeric("effective, %"),
-            numeric("covered, %"),
-            numeric("× limit"),
-            numeric("fit, ms"),
-            numeric("a reading, µs"),
-        ];
         let small = match self.extent() {
             Extent::Line { .. } => "1/200",
             Extent::Plane { .. } => "1/20",
@@ -113,7 +83,23 @@ impl ComparisonReport<'_> {
              error over what physics allows, where the limit is at most " (small)
             " of the length, 1/80 of it away from the ends. A dash: the estimator or the bench has none."
         };
-        Table::new(columns, rows, caption)
+        let tried = self.comparisons.iter().filter_map(|comparison| {
+            let evaluation = &comparison.tried.evaluation;
+            Some((comparison, evaluation, evaluation.summary(None)?))
+        });
+        Table::of(tried)
+            .short("estimator", |(comparison, ..)| comparison.estimator.kind())
+            .mm("mean", |(.., summary)| summary.average_m)
+            .number("% of length", |(_, of, summary)| percentage_error(summary.average_m, of.length_m))
+            .mm("median", |(.., summary)| summary.median_m)
+            .mm("95th", |(.., summary)| summary.p95_m)
+            .mm("RMS", |(.., summary)| summary.rmse_m)
+            .number("effective, %", |(_, evaluation, _)| evaluation.effective_percent(self.tolerance_m))
+            .number("covered, %", |(_, evaluation, _)| evaluation.coverage_percent())
+            .number("× limit", |(_, evaluation, _)| limit_ratio(self.setup, evaluation))
+            .number("fit, ms", |(comparison, ..)| comparison.tried.fit_seconds * 1e3)
+            .number("a reading, µs", |(comparison, ..)| comparison.tried.locate_ns * 1e-3)
+            .caption(caption)
     }
 
     fn left_out_in_words(&self) -> Markup {

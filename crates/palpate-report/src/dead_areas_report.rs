@@ -4,12 +4,12 @@ use maud::{Markup, html};
 
 use super::error_lines::tolerance_mark;
 use super::numbers::{mm, number};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Series};
-use palpate_studies::dead_areas::{DeadAreaFindings, DeadAreaRow, DeadAreas};
+use palpate_studies::dead_areas::{DeadAreaResults, DeadAreaRow, DeadAreas};
 
 /// Reports the dead areas: `report.html`, one self-contained page, and its figures as SVG files.
-pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Vec<ReportFile> {
+pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaResults) -> Vec<ReportFile> {
     let report = DeadAreasReport { study, findings };
     let folded = study.counts.iter().map(|count| report.folded_figure(*count));
     let sections = vec![
@@ -27,7 +27,7 @@ pub fn dead_areas_report(study: &DeadAreas, findings: &DeadAreaFindings) -> Vec<
 
 struct DeadAreasReport<'a> {
     study: &'a DeadAreas,
-    findings: &'a DeadAreaFindings,
+    findings: &'a DeadAreaResults,
 }
 
 impl DeadAreasReport<'_> {
@@ -104,40 +104,27 @@ impl DeadAreasReport<'_> {
     }
 
     fn effective_table(&self) -> Table {
-        let row = |arm: (&str, &'static str)| {
-            let cell = |count: &usize| value(self.row(arm, *count).map(|row| row.effective_percent));
-            std::iter::once(text(name(arm))).chain(self.study.counts.iter().map(cell)).collect()
+        let table = Table::of(self.arms()).short("sensing, estimator", |arm| name(*arm));
+        let add = |table: Columns<_>, count: &usize| {
+            table.number(format!("{count} sensors"), |arm| Some(self.row(*arm, *count)?.effective_percent))
         };
-        let counts = self.study.counts.iter().map(|count| numeric(format!("{count} sensors")));
-        let columns: Vec<_> = std::iter::once(short("sensing, estimator")).chain(counts).collect();
         let caption = html! { "Effective length in %. A dash: the estimator could not be fitted." };
-        Table::new(columns, self.arms().into_iter().map(row), caption)
+        self.study.counts.iter().fold(table, add).caption(caption)
     }
 
     fn folded_table(&self) -> Table {
-        let row = |row: &DeadAreaRow| {
-            vec![
-                text(name((&row.sensing, row.estimator))),
-                text(row.sensors.to_string()),
-                value_mm(row.folded.at_sensors_m),
-                value_mm(row.folded.between_m),
-                value(row.folded.between_m / row.folded.at_sensors_m),
-                value(row.folded.dead_percent),
-            ]
-        };
-        let columns = [
-            short("sensing, estimator"),
-            numeric("sensors"),
-            numeric("over sensors, mm"),
-            numeric("between, mm"),
-            numeric("ratio"),
-            numeric("dead, %"),
-        ];
         let caption = html! {
             "Mean errors within a tenth of a pitch from a sensor and from the middle of a gap, their ratio, and the share of the \
              contacts between the outermost sensors that are off by more than the tolerance."
         };
-        Table::new(columns, self.findings.rows.iter().map(row), caption)
+        Table::of(&self.findings.rows)
+            .short("sensing, estimator", |row| name((&row.sensing, row.estimator)))
+            .numeric("sensors", |row| row.sensors.to_string())
+            .mm("over sensors, mm", |row| row.folded.at_sensors_m)
+            .mm("between, mm", |row| row.folded.between_m)
+            .number("ratio", |row| row.folded.between_m / row.folded.at_sensors_m)
+            .number("dead, %", |row| row.folded.dead_percent)
+            .caption(caption)
     }
 
     fn how(&self) -> Markup {

@@ -3,16 +3,16 @@
 use maud::{Markup, html};
 
 use super::bench_figures::{bench_figure, sites_chart};
-use super::drawing::extremes::Extremes;
+use super::drawing::chart::Extremes;
 use super::error_lines::in_milli;
 use super::maps::{self, compared_maps, limits_mm, sensors_mm};
-use super::numbers::{counted, mm, number, quantity, stated};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
+use super::numbers::{NOTHING, counted, mm, number, quantity, stated};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Mark, Marker, Series};
 use palpate_design::sensors::{
-    Assessment, CountPoint, Designed, Method, SensorProblem, Verification, best_design, enough,
+    Assessment, CountPoint, DesignCriterion, Designed, KeepOut, Method, SensorProblem, Symmetry,
+    Verification, best_design, enough,
 };
-use palpate_design::sensors::{DesignCriterion, KeepOut, Symmetry};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -119,43 +119,8 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn table(&self) -> Table {
-        let design = self.problem.design();
-        let scale = design.criterion.score_scale();
-        let rows = self.designed.iter().map(|designed| {
-            let assessed = &designed.assessment;
-            let star = if assessed.keeps_constraints { "" } else { " *" };
-            let verified = self.verification(designed.method);
-            let error = verified.map_or("–".to_owned(), |verified| {
-                format!("{:.3} ± {:.3}", verified.mean_error_m * 1e3, verified.standard_error_m * 1e3)
-            });
-            let mut cells = vec![
-                text(format!("{}{star}", designed.method.name())),
-                value(assessed.score * scale),
-                value_mm(assessed.mean_limit_m),
-                value_mm(assessed.worst_limit_m),
-                value(assessed.within_tolerance_percent),
-                value(assessed.score_one_dead.map(|score| score * scale)),
-                value_mm(assessed.mean_error_m),
-                text(error),
-            ];
-            if design.has_costs() {
-                cells.push(text(stated(assessed.cost)));
-            }
-            cells
-        });
-        let mut columns = vec![
-            short("layout"),
-            numeric("score"),
-            numeric("mean limit, mm"),
-            numeric("largest, mm"),
-            numeric(format!("within {} mm, %", mm(design.tolerance_m))),
-            numeric("one dead: score"),
-            numeric("expected error, mm"),
-            numeric("simulated error, mm"),
-        ];
-        if design.has_costs() {
-            columns.push(numeric("cost"));
-        }
+        let scale = self.problem.design().criterion.score_scale();
+        let (design, assessed) = (self.problem.design(), |designed: &&'a Designed| &designed.assessment);
         let broken = self.designed.iter().any(|designed| !designed.assessment.keeps_constraints);
         let caption = html! {
             "The layouts. Score: " (score_in_words(design.criterion)) ", the smaller the better. One dead: the worst score when \
@@ -163,15 +128,42 @@ impl<'a> SensorDesignReport<'a> {
              calibrated with noise and asked. A dash: the readings do not tell some contact, or the layout was not simulated."
             @if broken { " *: breaks a constraint." }
         };
-        Table::new(columns, rows, caption)
+        let mut table = Table::of(self.designed)
+            .short("layout", |designed| {
+                format!(
+                    "{}{}",
+                    designed.method.name(),
+                    if assessed(designed).keeps_constraints { "" } else { " *" }
+                )
+            })
+            .number("score", |designed| assessed(designed).score * scale)
+            .mm("mean limit, mm", |designed| assessed(designed).mean_limit_m)
+            .mm("largest, mm", |designed| assessed(designed).worst_limit_m)
+            .number(format!("within {} mm, %", mm(design.tolerance_m)), |designed| {
+                assessed(designed).within_tolerance_percent
+            })
+            .number("one dead: score", |designed| {
+                assessed(designed).score_one_dead.map(|score| score * scale)
+            })
+            .mm("expected error, mm", |designed| assessed(designed).mean_error_m)
+            .numeric("simulated error, mm", |designed| match self.verification(designed.method) {
+                None => NOTHING.to_owned(),
+                Some(verified) => {
+                    format!("{:.3} ± {:.3}", verified.mean_error_m * 1e3, verified.standard_error_m * 1e3)
+                }
+            });
+        if design.has_costs() {
+            table = table.numeric("cost", |designed| stated(assessed(designed).cost));
+        }
+        table.caption(caption)
     }
 
     fn places(&self) -> Table {
         let extent = self.problem.extent();
-        let rows = self.designed.iter().map(|designed| {
-            vec![text(designed.method.name()), text(designed.layout.places_in_words(extent))]
-        });
-        Table::new([short("layout"), wide("sensors")], rows, html! { "Where their sensors sit." })
+        Table::of(self.designed)
+            .short("layout", |designed| designed.method.name())
+            .wide("sensors", |designed| designed.layout.places_in_words(extent))
+            .caption(html! { "Where their sensors sit." })
     }
 
     /// Every layout a row.

@@ -3,13 +3,13 @@
 use maud::{Markup, html};
 
 use super::numbers::{NOTHING, mm, number, spread, whole};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, ErrorPoint, Marker, Series};
 use palpate_estimators::evaluation::Quantiles;
-use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, INNER};
+use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottResults, INNER};
 
 /// Reports the study: `report.html`, one self-contained page, and its figures as SVG files.
-pub fn elliott_report(study: &Elliott, findings: &ElliottFindings) -> Vec<ReportFile> {
+pub fn elliott_report(study: &Elliott, findings: &ElliottResults) -> Vec<ReportFile> {
     let report = ElliottReport { study, findings };
     let sections = vec![
         Section::new("components", "Errors by the number of components").figure(report.pressed_figure()),
@@ -25,7 +25,7 @@ pub fn elliott_report(study: &Elliott, findings: &ElliottFindings) -> Vec<Report
 
 struct ElliottReport<'a> {
     study: &'a Elliott,
-    findings: &'a ElliottFindings,
+    findings: &'a ElliottResults,
 }
 
 impl ElliottReport<'_> {
@@ -133,33 +133,23 @@ impl ElliottReport<'_> {
     }
 
     fn table(&self) -> Table {
-        let row = |row: &ChainRow| {
-            let shown = |figure: Option<Quantiles>| {
-                text(figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number)))
-            };
-            let over = row.error_m.zip(row.limit_m).map(|(error, limit_m)| error.median / limit_m);
-            vec![
-                text(row.chain.to_string()),
-                shown(row.error_m.map(|error| error.scaled(1e3))),
-                value_mm(row.limit_m),
-                value(over),
-                shown(row.effective_percent),
-                shown(Some(row.moving_error_m.scaled(1e3))),
-            ]
-        };
-        let columns = [
-            short("chain"),
-            numeric("error, mm"),
-            numeric("limit, mm"),
-            numeric("ratio"),
-            numeric("effective area, %"),
-            numeric("moving, mm"),
-        ];
         let caption = html! {
             "Mean errors within the inner plate and under the moving load, over " (self.study.calibrations) " calibrations: median and \
              5th to 95th percentile. Limit: of what the chain sees, a reading at a time."
         };
-        Table::new(columns, self.findings.rows.iter().map(row), caption)
+        let shown = |figure: Option<Quantiles>| {
+            figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number))
+        };
+        Table::of(&self.findings.rows)
+            .short("chain", |row| row.chain.to_string())
+            .numeric("error, mm", |row| shown(row.error_m.map(|error| error.scaled(1e3))))
+            .mm("limit, mm", |row| row.limit_m)
+            .number("ratio", |row| {
+                row.error_m.zip(row.limit_m).map(|(error, limit_m)| error.median / limit_m)
+            })
+            .numeric("effective area, %", |row| shown(row.effective_percent))
+            .numeric("moving, mm", |row| shown(Some(row.moving_error_m.scaled(1e3))))
+            .caption(caption)
     }
 
     fn how(&self) -> Markup {

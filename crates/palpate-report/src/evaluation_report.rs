@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::error_lines::{banded, in_milli, limit_in_words, limit_line, tolerance_mark};
 use super::maps::error_map;
 use super::numbers::{counted, listed, mm, number, stretch, whole};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, words};
+use super::page::{Figure, Page, ReportFile, Section, Table, text};
 use super::{Axis, Chart, Marker, Series};
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{
@@ -206,13 +206,15 @@ impl EvaluationReport<'_> {
         let everywhere = std::iter::once(("everywhere".to_owned(), None));
         let portions = self.portions.iter().map(|portion| (stretch(*portion), Some(*portion)));
         let rows = everywhere.chain(portions).filter_map(|(name, portion)| {
-            Some(self.error_row(&name, portion, self.evaluation.summary(portion)?))
+            let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
+            let located = self.evaluation.located.iter().filter(inside).copied().collect();
+            let part = Evaluation { length_m: self.evaluation.length_m, located };
+            Some((name, part, self.evaluation.summary(portion)?))
         });
-        let in_units = |name: &str| numeric(format!("{name}, mm (%)"));
-        let columns = [short("portion"), numeric("readings")]
-            .into_iter()
-            .chain(["average", "median", "95th percentile", "largest", "root mean square"].map(in_units))
-            .chain([numeric(format!("within {} mm, %", mm(self.tolerance_m)))]);
+        let both = |error_m: f64| {
+            let percent = percentage_error(error_m, self.evaluation.length_m);
+            format!("{} ({})", number(error_m * 1e3), number(percent))
+        };
         let effective = match self.extent() {
             Extent::Line { .. } => "length",
             Extent::Plane { .. } => "area",
@@ -221,22 +223,18 @@ impl EvaluationReport<'_> {
             "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly over the surface, the \
              share within the tolerance is the effective " (effective) "."
         };
-        Table::new(columns.collect::<Vec<_>>(), rows, caption)
-    }
-
-    fn error_row(&self, name: &str, portion: Option<Portion>, summary: ErrorSummary) -> Vec<Markup> {
-        let both = |error_m: f64| {
-            let percent = percentage_error(error_m, self.evaluation.length_m);
-            format!("{} ({})", number(error_m * 1e3), number(percent))
-        };
-        let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
-        let located = self.evaluation.located.iter().filter(inside).copied().collect();
-        let part = Evaluation { length_m: self.evaluation.length_m, located };
-        let ErrorSummary { count, average_m, median_m, p95_m, largest_m, rmse_m } = summary;
-        let mut cells = vec![name.to_owned(), whole(count as f64)];
-        cells.extend([average_m, median_m, p95_m, largest_m, rmse_m].map(both));
-        cells.push(number(part.effective_percent(self.tolerance_m)));
-        cells.iter().map(text).collect()
+        Table::of(rows)
+            .short("portion", |(name, ..)| name.clone())
+            .numeric("readings", |(.., summary)| whole(summary.count as f64))
+            .numeric("average, mm (%)", |(.., summary)| both(summary.average_m))
+            .numeric("median, mm (%)", |(.., summary)| both(summary.median_m))
+            .numeric("95th percentile, mm (%)", |(.., summary)| both(summary.p95_m))
+            .numeric("largest, mm (%)", |(.., summary)| both(summary.largest_m))
+            .numeric("root mean square, mm (%)", |(.., summary)| both(summary.rmse_m))
+            .number(format!("within {} mm, %", mm(self.tolerance_m)), |(_, part, _)| {
+                part.effective_percent(self.tolerance_m)
+            })
+            .caption(caption)
     }
 
     fn facts_table(&self) -> Table {
@@ -251,9 +249,10 @@ impl EvaluationReport<'_> {
             Judged::Locator(locator) => locator_facts(locator),
             Judged::CrossValidated { rig, folds, seed } => rig_facts(rig, folds, seed),
         });
-        let rows = facts.into_iter().map(|(name, value)| vec![text(name), value]);
-        let caption = html! { "What was judged, and where it comes from." };
-        Table::new([short("fact"), words("value")], rows, caption)
+        Table::of(facts)
+            .short("fact", |(name, _)| *name)
+            .column("text", "value", |(_, value)| value.clone())
+            .caption(html! { "What was judged, and where it comes from." })
     }
 
     fn surface_in_words(&self) -> String {

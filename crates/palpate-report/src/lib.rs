@@ -39,7 +39,6 @@ mod paper_report;
 mod png;
 mod position_report;
 mod profile_report;
-mod study_parts;
 mod study_report;
 mod track_report;
 

@@ -4,13 +4,11 @@ use maud::{Markup, html};
 
 use super::bench_figures::bench_figure;
 use super::digit_figures::{force_limit_figure, linear_theory_figures};
-use super::drawing::extremes::Extremes;
+use super::drawing::chart::Extremes;
 use super::error_lines::in_milli;
 use super::maps::{limits_mm, sensors_mm};
 use super::numbers::{counted, mm, number, place, quantity, stated};
-use super::page::{
-    Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide, words,
-};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
 use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
@@ -212,29 +210,21 @@ impl LimitReport<'_> {
     }
 
     fn limit_table(&self) -> Table {
-        let rows = self.listed.iter().map(|&position| {
+        let bounds = self.listed.iter().map(|&position| {
             let contact = Contact { position, force_n: self.known.force_n };
-            let [known, unknown] = [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force));
-            vec![
-                text(place(position, self.known.extent)),
-                value_mm(known.map(|bound| bound.sd_position_m)),
-                value_mm(known.map(|bound| bound.mean_error_m())),
-                value_mm(unknown.map(|bound| bound.sd_position_m)),
-                value(unknown.and_then(|bound| bound.sd_force_n)),
-            ]
+            (position, [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force)))
         });
-        let columns = [
-            short("position, mm"),
-            numeric("force known: limit, mm"),
-            numeric("mean error, mm"),
-            numeric("force unknown: limit, mm"),
-            numeric("of the force, N"),
-        ];
         let caption = html! {
             "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: \
              the readings do not tell."
         };
-        Table::new(columns, rows, caption)
+        Table::of(bounds)
+            .short("position, mm", |(position, _)| place(*position, self.known.extent))
+            .mm("force known: limit, mm", |(_, [known, _])| known.map(|bound| bound.sd_position_m))
+            .mm("mean error, mm", |(_, [known, _])| known.map(|bound| bound.mean_error_m()))
+            .mm("force unknown: limit, mm", |(_, [_, unknown])| unknown.map(|bound| bound.sd_position_m))
+            .number("of the force, N", |(_, [_, unknown])| unknown.and_then(|bound| bound.sd_force_n))
+            .caption(caption)
     }
 
     fn warnings_in_words(&self) -> Markup {
@@ -255,16 +245,12 @@ impl LimitReport<'_> {
     }
 
     fn sensor_table(&self) -> Table {
-        let rows = self.setup.layout.sensors().iter().enumerate().map(|(i, sensor)| {
-            vec![
-                text((i + 1).to_string()),
-                text(sensor.kind.name()),
-                text(place(sensor.position, self.known.extent)),
-                text(noise_in_words(sensor)),
-            ]
-        });
-        let columns = [short("sensor"), words("measures"), numeric("position, mm"), wide("noise")];
-        Table::new(columns, rows, html! { "The sensors and their noise, from which the limit follows." })
+        Table::of(self.setup.layout.sensors().iter().zip(1..))
+            .short("sensor", |(_, number)| number.to_string())
+            .words("measures", |(sensor, _)| sensor.kind.name())
+            .numeric("position, mm", |(sensor, _)| place(sensor.position, self.known.extent))
+            .wide("noise", |(sensor, _)| noise_in_words(sensor))
+            .caption(html! { "The sensors and their noise, from which the limit follows." })
     }
 }
 

@@ -111,12 +111,10 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    pub fn new(
-        columns: impl Into<Vec<Column>>,
-        rows: impl IntoIterator<Item = Vec<Markup>>,
-        caption: Markup,
-    ) -> Self {
-        Self { caption, columns: columns.into(), rows: rows.into_iter().collect() }
+    /// A table with a row for each of some things; its first column heads the rows.
+    pub fn of<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
+        let rows: Vec<R> = rows.into_iter().collect();
+        Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
     }
 
     fn markup(&self, number: usize) -> Markup {
@@ -148,39 +146,65 @@ pub(crate) struct Column {
     class: &'static str,
 }
 
-/// A column of words.
-pub(crate) fn words(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), class: "text" }
+/// A table that is made column by column, with what each column says of every row.
+pub(crate) struct Columns<R> {
+    rows: Vec<R>,
+    columns: Vec<Column>,
+    cells: Vec<Vec<Markup>>,
 }
 
-/// A column of words that are not broken over lines.
-pub(crate) fn short(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), class: "short" }
-}
+impl<R> Columns<R> {
+    /// A column of words.
+    pub fn words<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.column("text", heading, |row| text(cell(row)))
+    }
 
-/// A column of sentences, which needs room.
-pub(crate) fn wide(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), class: "wide" }
-}
+    /// A column of words that are not broken over lines.
+    pub fn short<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.column("short", heading, |row| text(cell(row)))
+    }
 
-/// A column of numbers.
-pub(crate) fn numeric(heading: impl Into<String>) -> Column {
-    Column { heading: heading.into(), class: "number" }
+    /// A column of sentences, which needs room.
+    pub fn wide<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.column("wide", heading, |row| text(cell(row)))
+    }
+
+    /// A column of numbers that are written already.
+    pub fn numeric<T: AsRef<str>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.column("number", heading, |row| text(cell(row)))
+    }
+
+    /// A column of numbers with about three digits; a dash for none.
+    pub fn number<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.column("number", heading, |row| text(number(cell(row).into().unwrap_or(f64::NAN))))
+    }
+
+    /// A column of lengths in metres, shown in millimetres; a dash for none.
+    pub fn mm<T: Into<Option<f64>>>(self, heading: impl Into<String>, cell: impl Fn(&R) -> T) -> Self {
+        self.number(heading, |row| cell(row).into().map(|length_m| length_m * 1e3))
+    }
+
+    /// A column of cells of this CSS class.
+    pub fn column(
+        mut self,
+        class: &'static str,
+        heading: impl Into<String>,
+        cell: impl Fn(&R) -> Markup,
+    ) -> Self {
+        self.columns.push(Column { heading: heading.into(), class });
+        self.cells.iter_mut().zip(&self.rows).for_each(|(cells, row)| cells.push(cell(row)));
+        self
+    }
+
+    /// The whole table.
+    pub fn caption(self, caption: Markup) -> Table {
+        Table { caption, columns: self.columns, rows: self.cells }
+    }
 }
 
 /// A text as markup.
 pub(crate) fn text(text: impl AsRef<str>) -> Markup {
     html! { (text.as_ref()) }
-}
-
-/// A number as markup; a dash for none.
-pub(crate) fn value(value: impl Into<Option<f64>>) -> Markup {
-    text(number(value.into().unwrap_or(f64::NAN)))
-}
-
-/// A length in metres as a number of millimetres; a dash for none.
-pub(crate) fn value_mm(length_m: impl Into<Option<f64>>) -> Markup {
-    value(length_m.into().map(|length_m| length_m * 1e3))
 }
 
 /// A good or bad verdict in words.

@@ -3,10 +3,10 @@
 use maud::{Markup, html};
 
 use super::bench_figures::{row_axis, row_height};
-use super::drawing::extremes::Extremes;
+use super::drawing::chart::Extremes;
 use super::maps::{Designed, compared_maps, in_mm};
 use super::numbers::{counted, mm, number};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, wide};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, Marker, Series};
 use palpate_design::positions::{Placed, Placement, PositionProblem, best_placed};
 use palpate_estimators::estimator::Cells;
@@ -83,34 +83,27 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn table(&self) -> Table {
-        let rows = self.placed.iter().map(|placed| {
-            let verified = &placed.verification;
-            vec![
-                text(placed.placement.name()),
-                value_mm(verified.median_error_m),
-                value_mm(verified.mean_error_m),
-                value_mm(verified.standard_error_m),
-                value(verified.within_tolerance_percent),
-            ]
-        });
-        let columns = [
-            short("positions"),
-            numeric("median error, mm"),
-            numeric("mean error, mm"),
-            numeric("±, mm"),
-            numeric(format!("within {} mm, %", mm(self.problem.design().tolerance_m))),
-        ];
         let caption = html! {
             "Errors after calibrating, averaged over " (counted(self.problem.contacts().len(), "contact", "contacts"))
             ": the median and the mean of the calibrations, and the standard error of the mean."
         };
-        Table::new(columns, rows, caption)
+        Table::of(self.placed)
+            .short("positions", |placed| placed.placement.name())
+            .mm("median error, mm", |placed| placed.verification.median_error_m)
+            .mm("mean error, mm", |placed| placed.verification.mean_error_m)
+            .mm("±, mm", |placed| placed.verification.standard_error_m)
+            .number(format!("within {} mm, %", mm(self.problem.design().tolerance_m)), |placed| {
+                placed.verification.within_tolerance_percent
+            })
+            .caption(caption)
     }
 
     fn places(&self) -> Table {
-        let places = |placed: &Placed| self.problem.extent().places_in_words(&placed.positions);
-        let rows = self.placed.iter().map(|placed| vec![text(placed.placement.name()), text(places(placed))]);
-        Table::new([short("positions"), wide("where")], rows, html! { "Where to press." })
+        let extent = self.problem.extent();
+        Table::of(self.placed)
+            .short("positions", |placed| placed.placement.name())
+            .wide("where", |placed| extent.places_in_words(&placed.positions))
+            .caption(html! { "Where to press." })
     }
 
     /// Every arrangement a row, the first uppermost.

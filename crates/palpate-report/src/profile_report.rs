@@ -3,11 +3,11 @@
 use maud::{Markup, html};
 
 use super::maps::sensors_mm;
-use super::numbers::{counted, mm, number, place, stated};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm, words};
+use super::numbers::{NOTHING, counted, mm, number, place, stated};
+use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
 use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
-use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, UniformLoad};
 
 /// Places whose averaging kernels are drawn, as shares of the length, and on a plane of the width.
@@ -60,7 +60,7 @@ pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
     Page::new(report.title, report.summary(), sections).files()
 }
 
-impl ProfileReport<'_> {
+impl<'a> ProfileReport<'a> {
     fn extent(&self) -> Extent {
         self.profile.cells.extent
     }
@@ -252,75 +252,62 @@ impl ProfileReport<'_> {
     }
 
     fn patch_table(&self) -> Table {
+        type Row<'r> = (&'r Patch, Option<&'r PatchLimit>, usize);
         // Stretch, centre, its interval and its limit: along the surface, and on a plane across it.
-        let columns_of =
-            |stretch, centre| [numeric(stretch), numeric(centre), numeric("95 %, mm"), numeric("limit, mm")];
-        let cells_of = |from_m: f64, to_m: f64, centre_m: f64, interval_m, limit_m: Option<f64>| {
-            [
-                text(format!("{}–{}", mm(from_m), mm(to_m))),
-                text(tenths_mm(centre_m)),
-                text(interval_mm(interval_m)),
-                value_mm(limit_m),
-            ]
+        let stretch = |from_m: f64, to_m: f64| format!("{}–{}", mm(from_m), mm(to_m));
+        let along = |table: Columns<Row<'a>>, [to, centre]: [&str; 2]| {
+            table
+                .numeric(to, |(patch, ..)| stretch(patch.from.x_m, patch.to.x_m))
+                .numeric(centre, |(patch, ..)| tenths_mm(patch.centre.position.x_m))
+                .numeric("95 %, mm", |(patch, ..)| interval_mm(patch.centre.x_95_m()))
+                .mm("limit, mm", |(_, limit, _)| limit.map(|limit| limit.sd_x_m))
         };
-        let mut columns = vec![short("patch")];
-        match self.extent() {
-            Extent::Line { .. } => columns.extend(columns_of("stretch, mm", "centre, mm")),
-            Extent::Plane { .. } => {
-                columns.extend(columns_of("along, mm", "centre x, mm"));
-                columns.extend(columns_of("across, mm", "centre y, mm"));
-            }
-        }
-        columns.extend([numeric("force, N"), numeric("95 %, N"), numeric("limit, N")]);
-        let row = |(i, patch): (usize, &Patch)| {
-            let limit = self.limits.and_then(|limits| limits.get(i));
-            let Patch { from, to, centre, .. } = patch;
-            let mut row = vec![text((i + 1).to_string())];
-            let sd_x_m = limit.map(|limit| limit.sd_x_m);
-            row.extend(cells_of(from.x_m, to.x_m, centre.position.x_m, centre.x_95_m(), sd_x_m));
-            if let Extent::Plane { .. } = self.extent() {
-                let sd_y_m = limit.map(|limit| limit.sd_y_m);
-                row.extend(cells_of(from.y_m, to.y_m, centre.position.y_m, centre.y_95_m(), sd_y_m));
-            }
-            let (low_n, high_n) = patch.force_95_n();
-            let interval = text(format!("{}–{}", number(low_n), number(high_n)));
-            row.extend([value(patch.force_n), interval, value(limit.map(|limit| limit.sd_force_n))]);
-            row
+        let across = |table: Columns<Row<'a>>| {
+            table
+                .numeric("across, mm", |(patch, ..)| stretch(patch.from.y_m, patch.to.y_m))
+                .numeric("centre y, mm", |(patch, ..)| tenths_mm(patch.centre.position.y_m))
+                .numeric("95 %, mm", |(patch, ..)| interval_mm(patch.centre.y_95_m()))
+                .mm("limit, mm", |(_, limit, _)| limit.map(|limit| limit.sd_y_m))
         };
+        let limit = |i: usize| self.limits.and_then(|limits| limits.get(i));
+        let rows = self.profile.patches.iter().enumerate().map(|(i, patch)| (patch, limit(i), i + 1));
+        let table = Table::of(rows).short("patch", |(.., number)| number.to_string());
+        let table = match self.extent() {
+            Extent::Line { .. } => along(table, ["stretch, mm", "centre, mm"]),
+            Extent::Plane { .. } => across(along(table, ["along, mm", "centre x, mm"])),
+        };
+        let interval = |(low_n, high_n): (f64, f64)| format!("{}–{}", number(low_n), number(high_n));
         let caption = html! {
             "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
              standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have."
         };
-        Table::new(columns, self.profile.patches.iter().enumerate().map(row), caption)
+        table
+            .number("force, N", |(patch, ..)| patch.force_n)
+            .numeric("95 %, N", |(patch, ..)| interval(patch.force_95_n()))
+            .number("limit, N", |(_, limit, _)| limit.map(|limit| limit.sd_force_n))
+            .caption(caption)
     }
 
     fn reading_table(&self) -> Table {
-        let rows = self.layout.sensors().iter().enumerate().map(|(i, sensor)| {
-            let unit = sensor.kind.unit();
-            let shown = |value: Option<f64>| {
-                text(value.map_or_else(|| "–".to_owned(), |value| format!("{:.4}", value / unit.factor())))
-            };
-            vec![
-                text((i + 1).to_string()),
-                text(format!("{}, {}", sensor.kind.name(), unit.symbol())),
-                text(place(sensor.position, self.profile.cells.extent)),
-                shown(self.reading.get(i).copied()),
-                shown(self.profile.fitted.get(i).copied().flatten()),
-                value(self.profile.residuals.get(i).copied().flatten()),
-            ]
-        });
-        let columns = [
-            short("sensor"),
-            words("measures"),
-            numeric("position, mm"),
-            numeric("read"),
-            numeric("of the profile"),
-            numeric("left, sd"),
-        ];
+        let shown = |sensor: &Sensor, value: Option<f64>| match value {
+            Some(value) => format!("{:.4}", value / sensor.kind.unit().factor()),
+            None => NOTHING.to_owned(),
+        };
         let caption = html! {
             "What each sensor read, what it would read of the profile, and the difference in standard deviations of its noise."
         };
-        Table::new(columns, rows, caption)
+        Table::of(self.layout.sensors().iter().enumerate())
+            .short("sensor", |(i, _)| (i + 1).to_string())
+            .words("measures", |(_, sensor)| {
+                format!("{}, {}", sensor.kind.name(), sensor.kind.unit().symbol())
+            })
+            .numeric("position, mm", |(_, sensor)| place(sensor.position, self.extent()))
+            .numeric("read", |(i, sensor)| shown(sensor, self.reading.get(*i).copied()))
+            .numeric("of the profile", |(i, sensor)| {
+                shown(sensor, self.profile.fitted.get(*i).copied().flatten())
+            })
+            .number("left, sd", |(i, _)| self.profile.residuals.get(*i).copied().flatten())
+            .caption(caption)
     }
 }
 

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::maps::in_mm;
 use super::numbers::{counted, number, stated, whole};
-use super::page::{Figure, Page, ReportFile, Section, Table, numeric, short, text, value, value_mm};
+use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, Marker, Series};
 use palpate_estimators::estimator::Track;
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
@@ -215,58 +215,32 @@ impl TrackReport<'_> {
     }
 
     fn errors_table(&self) -> Table {
-        let rows = self.errors.iter().map(|(name, errors)| {
-            vec![
-                text(name),
-                text(whole(errors.tracked as f64)),
-                value_mm(errors.track_m),
-                value_mm(errors.single_m),
-                value(errors.ratio()),
-                value(errors.track_covered * 100.0),
-                value(errors.single_covered * 100.0),
-                value(errors.track_number_right * 100.0),
-            ]
-        });
-        let columns = [
-            short("track"),
-            numeric("contacts"),
-            numeric("average error, mm"),
-            numeric("of single readings, mm"),
-            numeric("ratio"),
-            numeric("covered, %"),
-            numeric("of single readings, %"),
-            numeric("number right, %"),
-        ];
         let caption = html! {
             "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as \
              many contacts were found as touched."
         };
-        Table::new(columns, rows, caption)
+        Table::of(self.errors)
+            .short("track", |(name, _)| *name)
+            .numeric("contacts", |(_, errors)| whole(errors.tracked as f64))
+            .mm("average error, mm", |(_, errors)| errors.track_m)
+            .mm("of single readings, mm", |(_, errors)| errors.single_m)
+            .number("ratio", |(_, errors)| errors.ratio())
+            .number("covered, %", |(_, errors)| errors.track_covered * 100.0)
+            .number("of single readings, %", |(_, errors)| errors.single_covered * 100.0)
+            .number("number right, %", |(_, errors)| errors.track_number_right * 100.0)
+            .caption(caption)
     }
 
     fn sweep_table(&self) -> Table {
-        let rows = self.sweep.iter().map(|speed| {
-            let SpeedErrors { ratio, speed_m_per_s, filtered, smoothed } = speed;
-            vec![
-                text(stated(*ratio)),
-                value(*speed_m_per_s),
-                value_mm(filtered.single_m),
-                value_mm(filtered.track_m),
-                value_mm(smoothed.track_m),
-                value(filtered.track_covered * 100.0),
-                value(smoothed.track_covered * 100.0),
-            ]
-        });
-        let columns = [
-            numeric("ratio"),
-            numeric("speed, m/s"),
-            numeric("single, mm"),
-            numeric("filter, mm"),
-            numeric("smoother, mm"),
-            numeric("filter covers, %"),
-            numeric("smoother covers, %"),
-        ];
-        Table::new(columns, rows, html! { "Average errors against the speed over the critical speed." })
+        Table::of(self.sweep)
+            .numeric("ratio", |speed| stated(speed.ratio))
+            .number("speed, m/s", |speed| speed.speed_m_per_s)
+            .mm("single, mm", |speed| speed.filtered.single_m)
+            .mm("filter, mm", |speed| speed.filtered.track_m)
+            .mm("smoother, mm", |speed| speed.smoothed.track_m)
+            .number("filter covers, %", |speed| speed.filtered.track_covered * 100.0)
+            .number("smoother covers, %", |speed| speed.smoothed.track_covered * 100.0)
+            .caption(html! { "Average errors against the speed over the critical speed." })
     }
 }
 

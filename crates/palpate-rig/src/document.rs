@@ -9,9 +9,8 @@
 //! - `#[serde(rename = "by shape")]`: by what is written: `Text` or `Number`, or `Scalar` for both; `List`; `Table`.
 //! - Any other name: by a word.
 
-use std::fmt::Display;
 use std::marker::PhantomData;
-use std::ops::{Deref, Range};
+use std::ops::Deref;
 
 use serde::de::value::StrDeserializer;
 use serde::de::{
@@ -22,24 +21,13 @@ use serde::{Deserialize, forward_to_deserialize_any};
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use crate::error::{RigError, RigProblem};
+use crate::error::{Place, RigError, RigProblem};
 
 /// A value and its place.
 #[derive(Clone, Debug)]
 pub(crate) struct At<T> {
     value: T,
     pub place: Place,
-}
-
-/// Where a value stands, and what is written there.
-#[derive(Clone, Debug)]
-pub(crate) struct Place {
-    /// Its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
-    pub path: String,
-    /// Its bytes in the document.
-    pub span: Range<usize>,
-    /// The value as messages quote it.
-    pub written: String,
 }
 
 /// The values of a document.
@@ -72,38 +60,6 @@ impl<T> Deref for At<T> {
 /// The place of a key, if it is there.
 pub(crate) fn place<T>(key: &Option<At<T>>) -> Option<&Place> {
     key.as_ref().map(|key| &key.place)
-}
-
-impl Place {
-    pub fn key(&self) -> &str {
-        self.path.rsplit('.').next().unwrap_or_default()
-    }
-
-    /// The error for a value outside its bound.
-    pub fn refuse(&self, bound: impl Display) -> RigError {
-        self.refuse_as(&self.written, bound)
-    }
-
-    /// The same, for a value in other words than it is written in.
-    pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
-        let (value, bound) = (value.to_string(), bound.to_string());
-        RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at(self)
-    }
-
-    /// The error for a value that is not what its key wants, for this reason.
-    pub fn invalid(&self, reason: impl Display) -> RigError {
-        RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at(self)
-    }
-
-    /// The error for a table that lacks a key.
-    pub fn missing(&self, key: &str) -> RigError {
-        RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at(self)
-    }
-
-    /// The error for a key that means nothing beside what else is written.
-    pub fn unused(&self, with: impl Display) -> RigError {
-        RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at(self)
-    }
 }
 
 /// The name by which [`At`] asks for a value's place.

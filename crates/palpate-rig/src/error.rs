@@ -13,8 +13,6 @@ use palpate_mechanics::surface::{
 use palpate_numerics::OutOfRange;
 use serde::de::{Expected, Unexpected};
 
-use crate::document::Place;
-
 /// A rig or study file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
@@ -153,6 +151,49 @@ pub enum RigProblem {
         "the surface is to be simulated at these training positions, but neither [training] nor [contact] has a `force`"
     )]
     NoForce,
+}
+
+/// Where a value stands, and what is written there.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// Its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
+    pub path: String,
+    /// Its bytes in the document.
+    pub span: Range<usize>,
+    /// The value as messages quote it.
+    pub written: String,
+}
+
+impl Place {
+    pub fn key(&self) -> &str {
+        self.path.rsplit('.').next().unwrap_or_default()
+    }
+
+    /// The error for a value outside its bound.
+    pub fn refuse(&self, bound: impl Display) -> RigError {
+        self.refuse_as(&self.written, bound)
+    }
+
+    /// The same, for a value in other words than it is written in.
+    pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
+        let (value, bound) = (value.to_string(), bound.to_string());
+        RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at(self)
+    }
+
+    /// The error for a value that is not what its key wants, for this reason.
+    pub fn invalid(&self, reason: impl Display) -> RigError {
+        RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at(self)
+    }
+
+    /// The error for a table that lacks a key.
+    pub fn missing(&self, key: &str) -> RigError {
+        RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at(self)
+    }
+
+    /// The error for a key that means nothing beside what else is written.
+    pub fn unused(&self, with: impl Display) -> RigError {
+        RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at(self)
+    }
 }
 
 impl RigError {

@@ -144,6 +144,13 @@ mod tests {
 
     const RIG: &str = include_str!("../../../examples/moving-load.toml");
 
+    /// What is wrong with a rig, and the line where.
+    fn complaint(text: &str) -> String {
+        let error = Rig::from_toml(text).unwrap_err();
+        let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));
+        format!("{error} | {place}")
+    }
+
     #[test]
     fn a_motion_is_read_with_its_beam() {
         let moving = Rig::from_toml(RIG).unwrap().motion.unwrap();
@@ -176,10 +183,7 @@ mod tests {
         ];
         let told = cases.map(|(good, bad)| {
             assert!(PLATE.contains(good));
-            let text = PLATE.replacen(good, &bad, 1);
-            let error = Rig::from_toml(&text).unwrap_err();
-            let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));
-            format!("{error} | {place}")
+            complaint(&PLATE.replacen(good, &bad, 1))
         });
         insta::assert_snapshot!(told.join("\n"));
     }
@@ -203,14 +207,8 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_second_contact_is_said_with_its_place() {
         let third = "[[motion]]\nfrom = \"1 mm\"\nto = \"9 mm\"\nspeed = \"1 m/s\"";
-        let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third].map(|keys| {
-            let text = with_second(keys);
-            let error = Rig::from_toml(&text).unwrap_err();
-            format!(
-                "{error} | {}",
-                error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""))
-            )
-        });
+        let told = ["rate = \"1 kHz\"", "damping = 0.1", "force = \"-1 N\"", third]
+            .map(|keys| complaint(&with_second(keys)));
         insta::assert_snapshot!(told.join("\n"), @r#"
         `rate` does not go with a second [[motion]]; the first says it for both | "1 kHz"
         `damping` does not go with a second [[motion]]; the first says it for both | 0.1
@@ -237,12 +235,7 @@ mod tests {
             ("passes = 4", "touch = \"10 ms\""),
             ("speed = \"0.5 m/s\"", "speed = \"0.5 m\""),
         ];
-        let told = cases.map(|(good, bad)| {
-            let text = RIG.replacen(good, bad, 1);
-            let error = Rig::from_toml(&text).unwrap_err();
-            let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));
-            format!("{error} | {place}")
-        });
+        let told = cases.map(|(good, bad)| complaint(&RIG.replacen(good, bad, 1)));
         insta::assert_snapshot!(told.join("\n"));
     }
 }

@@ -27,19 +27,15 @@ pub(crate) struct RecordingKeys {
     pub x: Option<At<ColumnKey>>,
     /// Its position across a plane's width.
     pub y: Option<At<ColumnKey>>,
-    /// The unit of positions.
     pub position_unit: Option<At<String>>,
     /// Each sensor's readings.
     pub channels: Option<At<Vec<At<ColumnKey>>>>,
     /// The unit of readings, or that of each channel.
     pub channel_unit: Option<At<ChannelUnitKeys>>,
-    /// The contact's force.
     pub force: Option<At<ColumnKey>>,
-    /// The unit of forces.
     pub force_unit: Option<At<String>>,
     /// A coordinate that readings depend on and nobody wants to know.
     pub nuisance: Option<At<ColumnKey>>,
-    /// The unit of that coordinate.
     pub nuisance_unit: Option<At<String>>,
     /// The file's coordinates of the surface's left end or lower left corner.
     pub origin: Option<At<Vec<Quantity<Length>>>>,

@@ -14,12 +14,11 @@ use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::DeValue;
 
-use crate::Rig;
 use crate::design::DesignKeys;
 use crate::document::{self, At, place};
 use crate::error::{RigError, RigProblem};
 use crate::estimator::EstimatorKeys;
-use crate::file::RigFile;
+use crate::rig::{Rig, RigFile};
 use crate::sensors::SensorsKeys;
 use crate::surface::SurfaceKeys;
 use crate::training::{ContactKeys, TrainingKeys};
@@ -83,7 +82,6 @@ pub struct Judging {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyFile {
-    /// Its name.
     name: At<String>,
     /// How many seeds each arm is fitted from; 100 unless said otherwise.
     seeds: Option<Count<1, 1_000_000>>,
@@ -105,7 +103,6 @@ struct StudyFile {
     design: Option<At<DesignKeys>>,
     /// Where and how locators are judged.
     evaluation: Option<EvaluationKeys>,
-    /// The arms.
     #[serde(default)]
     arm: Vec<ArmKeys>,
 }
@@ -140,17 +137,13 @@ struct PortionKeys(Positive<Length>, Positive<Length>);
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ArmKeys {
-    /// Its name.
     name: At<String>,
     /// The title of a figure that it shares with other arms.
     figure: Option<String>,
     /// The method that places its sensors.
     layout: Option<At<Method>>,
-    /// Its own sensors.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
-    /// Its own contact.
     contact: Option<ContactKeys>,
-    /// Its own calibration.
     training: Option<At<TrainingKeys>>,
     /// Its own keys of the estimator. Read by [`estimator`].
     #[serde(rename = "estimator")]
@@ -162,6 +155,16 @@ impl Study {
     ///
     /// # Errors
     /// [`RigError`], with the place in `text`, the value and its bound.
+    ///
+    /// ```
+    /// use palpate_rig::Study;
+    ///
+    /// let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../studies/paper.toml"));
+    /// let study = Study::from_toml(text)?;
+    /// assert_eq!((study.name.as_str(), study.arms.len()), ("paper", 12));
+    /// assert_eq!(study.arms[0].rig.setup.layout.len(), 8);
+    /// # Ok::<(), palpate_rig::RigError>(())
+    /// ```
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
         let document = document::parse(text)?;
         let file: StudyFile = document::read("", &document)?;

@@ -8,8 +8,8 @@ use palpate_mechanics::surface::{
     PlateError, SupportedBeam, SupportedBeamSpec, SurfaceSpec,
 };
 
-use crate::document::{At, Place, place};
-use crate::error::{RigError, RigProblem};
+use crate::document::{At, place};
+use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Density, Length, Modulus, Number, Point, Positive, Quantity};
 use crate::values::{RotationalStiffness, Stiffness};
 
@@ -31,13 +31,11 @@ pub(crate) enum SurfaceKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BeamKeys {
-    /// Length.
     pub length: Positive<Length>,
     /// Width of the section; that of `sections` which have none of their own.
     pub width: Option<Positive<Length>>,
     /// Thickness of the section; that of `sections` which have none of their own.
     pub thickness: Option<Positive<Length>>,
-    /// Young's modulus.
     pub youngs_modulus: Positive<Modulus>,
     /// What holds it.
     pub supports: Option<At<BeamSupportsKeys>>,
@@ -106,15 +104,10 @@ pub(crate) struct SectionKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlateKeys {
-    /// Length.
     pub length: Positive<Length>,
-    /// Width.
     pub width: Positive<Length>,
-    /// Thickness.
     pub thickness: Positive<Length>,
-    /// Young's modulus.
     pub youngs_modulus: Positive<Modulus>,
-    /// Poisson's ratio.
     pub poissons_ratio: At<Quantity<Number>>,
     /// How its edges are held; free unless said otherwise.
     pub edges: Option<At<EdgesKeys>>,
@@ -164,13 +157,9 @@ pub(crate) enum PointSupportKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DigitKeys {
-    /// Length.
     pub length: Positive<Length>,
-    /// Width of the section.
     pub width: Positive<Length>,
-    /// Thickness of the section.
     pub thickness: Positive<Length>,
-    /// Young's modulus.
     pub youngs_modulus: Positive<Modulus>,
     /// Where a contact's force points.
     pub direction: ForceDirection,
@@ -180,7 +169,6 @@ pub(crate) struct DigitKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredKeys {
-    /// Length.
     pub length: Positive<Length>,
     /// Width, if it is touched along and across.
     pub width: Option<Positive<Length>>,

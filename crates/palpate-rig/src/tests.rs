@@ -5,6 +5,8 @@ mod plates;
 
 use super::*;
 use palpate_estimators::arrangement::Arrangement;
+use palpate_estimators::arrangement::Training;
+use palpate_estimators::estimator::Estimator;
 use palpate_estimators::network::{InputScale, Network, OutputCoding};
 use palpate_estimators::recording::{Column, PositionColumns};
 use palpate_mechanics::sensing::Layout;

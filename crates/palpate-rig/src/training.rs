@@ -5,8 +5,8 @@ use serde::Deserialize;
 use palpate_estimators::arrangement::{Arrangement, ArrangementError, Training};
 use palpate_mechanics::surface::{Digit, Extent, SurfaceSpec, UniformLoad};
 
-use crate::document::{At, Place, place};
-use crate::error::{RigError, RigProblem};
+use crate::document::{At, place};
+use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Force, Grid, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
 
 /// More training positions, or presses of one position, than anyone makes.
@@ -70,7 +70,6 @@ pub(crate) struct LoadKeys {
     pub from: At<Point>,
     /// The right end, or upper right corner.
     pub to: At<Point>,
-    /// The whole force.
     pub force: Positive<Force>,
 }
 

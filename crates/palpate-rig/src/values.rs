@@ -7,8 +7,8 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{self, Dimension, UnitError};
 use serde::de::{Deserialize, Deserializer, Error, Unexpected};
 
-use crate::document::{At, Place};
-use crate::error::RigError;
+use crate::document::At;
+use crate::error::{Place, RigError};
 
 /// A quantity in SI units that measures `D` and keeps to the bound `B`: "400 mm" becomes 0.4.
 #[derive(Clone, Copy, Debug)]

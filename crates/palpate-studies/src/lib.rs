@@ -3,6 +3,55 @@
 //! There are two ways to fit an arm. Networks on perfect sensors, as the founding paper has them, share one recording: what a seed
 //! changes is the network's random start, and many are trained at once, in lanes. Of every other arm each seed makes a recording of
 //! its own, with fresh noise, to which the estimator is fitted and by which it is judged.
+//!
+//! ```
+//! use palpate_numerics::watch::Watch;
+//! use palpate_studies::{PreparedStudy, RunOptions, Study, StudyResults};
+//!
+//! let study = Study::from_toml(
+//!     r#"
+//!     name = "sensors"
+//!
+//!     [surface]
+//!     kind = "beam"
+//!     length = "400 mm"
+//!     width = "40 mm"
+//!     thickness = "1.2 mm"
+//!     youngs_modulus = "200 GPa"
+//!
+//!     [contact]
+//!     force = "3 N"
+//!
+//!     [training]
+//!     count = 10
+//!
+//!     [estimator]
+//!     kind = "influence"
+//!
+//!     [evaluation]
+//!     from = "20 mm"
+//!     to = "380 mm"
+//!     step = "20 mm"
+//!
+//!     [[arm]]
+//!     name = "four"
+//!     sensors = { measure = "deflection", count = 4, noise = "5 um" }
+//!
+//!     [[arm]]
+//!     name = "sixteen"
+//!     sensors = { measure = "deflection", count = 16, noise = "5 um" }
+//! "#,
+//! )?;
+//! let study = PreparedStudy::new(study, Watch::NONE)?;
+//! let options = RunOptions { seeds: 1, threads: 1 };
+//! let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE)?;
+//! let results = StudyResults::of(&outcomes, &study);
+//! assert!(results.arms[1].error_percent.median < results.arms[0].error_percent.median);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Beside studies from files there are three built in: [`paper`], the founding paper's; [`dead_areas`], what lies between sensors;
+//! and [`elliott`], components of a plate's readings and a network.
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
@@ -11,22 +60,17 @@
 
 pub mod dead_areas;
 pub mod elliott;
-mod layouts;
-mod limits;
 mod networks_csv;
 pub mod paper;
-mod prepare;
 mod results;
 mod run;
-mod seed_by_seed;
 
 pub use networks_csv::{Checkpoint, CheckpointError, NetworksCsv};
 pub use palpate_rig::{Arm, AskedLayout, Judging, Study};
-pub use prepare::{PreparedStudy, StudyRunError};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,
 };
-pub use run::{ArmOutcome, OnTrained, RunOptions, Trained, TrainedSeed};
+pub use run::{ArmOutcome, OnTrained, PreparedStudy, RunOptions, StudyRunError, Trained, TrainedSeed};
 
 #[cfg(test)]
 mod tests;

@@ -1,15 +1,219 @@
-//! Running a study: every arm's seeds, in lanes and threads.
+//! A study made ready and run: its layouts found, its recordings made, and every arm's seeds fitted, in lanes and threads.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::prepare::{InLanes, PreparedArm};
-use super::seed_by_seed::SeedBySeed;
-use super::{PreparedStudy, StudyRunError};
-use palpate_estimators::estimator::{FitError, Locator, Method};
-use palpate_estimators::evaluation::{Calibrated, EvaluationError, Located, Quantiles};
-use palpate_estimators::fit::{Fit, SeedQueue};
+use palpate_design::sensors::{DesignError, Method as DesignMethod, SensorDesign, SensorProblem};
+use palpate_estimators::estimator::{Estimator, FitError, Locator, Method};
+use palpate_estimators::evaluation::{
+    Calibrated, Calibration, Evaluation, EvaluationError, Located, Quantiles, Split,
+};
+use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
+use palpate_estimators::network::{Network, TrainingOutcome};
+use palpate_estimators::setup::Setup;
+use palpate_mechanics::sensing::{ChannelModel, Layout};
 use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_rig::{Arm, AskedLayout, Judging, RigSimulationError, Study};
+
+/// Why a study cannot be run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StudyRunError {
+    /// The layout that an arm asks for cannot be had.
+    #[error("arm `{arm}`: {error}")]
+    Design {
+        /// The arm.
+        arm: String,
+        /// The bytes of the study file that ask for it.
+        place: Range<usize>,
+        /// Why.
+        error: DesignError,
+    },
+    /// An arm's bench cannot be simulated.
+    #[error("arm `{arm}`: {error}")]
+    Simulate {
+        /// The arm.
+        arm: String,
+        /// Why.
+        error: RigSimulationError,
+    },
+    /// An arm's estimator cannot be fitted, or evaluated.
+    #[error("arm `{arm}`: {error}")]
+    Fit {
+        /// The arm.
+        arm: String,
+        /// Why.
+        error: EvaluationError<FitError>,
+    },
+    /// The run was stopped; what was finished has been observed.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+/// A study that is ready to be run.
+#[derive(Clone, Debug)]
+pub struct PreparedStudy {
+    /// The study, with the layouts that its arms asked for.
+    pub study: Study,
+    arms: Vec<PreparedArm>,
+}
+
+/// How an arm is fitted.
+#[derive(Clone, Debug)]
+enum PreparedArm {
+    /// Networks on perfect sensors: one recording for all seeds, and one to judge by.
+    InLanes(Box<InLanes>),
+    /// Anything else: a calibration that is simulated anew for each seed.
+    SeedBySeed {
+        calibration: Box<Calibration>,
+        /// Patterns of an epoch; 0 for an estimator that is not trained by epochs.
+        patterns: usize,
+    },
+}
+
+/// An arm of networks on perfect sensors.
+#[derive(Clone, Debug)]
+struct InLanes {
+    /// What is fitted: networks.
+    estimator: Estimator,
+    setup: Setup,
+    trial: Split,
+}
+
+impl InLanes {
+    fn task<'a>(&'a self, watch: Watch<'a>) -> FitTask<'a> {
+        FitTask::new(&self.setup, &self.trial.training).watch(watch)
+    }
+}
+
+impl PreparedStudy {
+    /// Finds the layouts that arms ask for, and makes the recordings that all seeds of an arm share.
+    ///
+    /// # Errors
+    /// [`StudyRunError`], naming the arm, or when `watch` stopped the search for layouts.
+    pub fn new(study: Study, watch: Watch) -> Result<Self, StudyRunError> {
+        let study = lay_out(study, watch)?;
+        let arms = study.arms.iter().map(|arm| PreparedArm::of(arm, &study));
+        let arms = arms.collect::<Result<_, _>>()?;
+        Ok(Self { study, arms })
+    }
+
+    /// Whether an arm's networks are trained in lanes, and so kept in `networks.csv`. Others are fitted again when a run is resumed.
+    pub fn is_in_lanes(&self, arm: usize) -> bool {
+        matches!(self.arms[arm], PreparedArm::InLanes(_))
+    }
+
+    /// Patterns that an epoch of each arm presents; 0 for an estimator that is not trained by epochs.
+    pub fn patterns(&self, arm: usize) -> usize {
+        match &self.arms[arm] {
+            PreparedArm::InLanes(arm) => arm.trial.training.rows.len(),
+            PreparedArm::SeedBySeed { patterns, .. } => *patterns,
+        }
+    }
+
+    /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
+    fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
+        let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
+        let evaluation = Evaluation::of(&locator, &prepared.trial.judged).ok()?;
+        Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
+    }
+
+    /// A network that was trained in lanes, from its weights and outcome, and judged; `None` when their number is not the network's,
+    /// or for another arm.
+    pub fn restore(
+        &self,
+        arm: usize,
+        seed: u64,
+        weights: Vec<f64>,
+        outcome: TrainingOutcome,
+    ) -> Option<Trained> {
+        let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
+        let Estimator::Network(network) = &prepared.estimator else { return None };
+        let task = prepared.task(Watch::NONE).seed(seed);
+        let locator = network.restore(task, weights, outcome).ok()??;
+        self.judge(arm, seed, locator.map(Method::Network))
+    }
+
+    /// How the study judges.
+    pub fn judging(&self) -> &Judging {
+        &self.study.judging
+    }
+}
+
+impl PreparedArm {
+    fn of(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
+        let judging = &study.judging;
+        let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
+        let setup = &arm.rig.setup;
+        let perfect = setup.layout.sensors().iter().all(|sensor| sensor.channel == ChannelModel::default());
+        match &arm.rig.estimator {
+            Estimator::Network(network) if perfect => {
+                let calibration = arm.rig.calibration().map_err(simulated)?.judged_at(&judging.positions, 1);
+                let trial = calibration.simulate(0).map_err(|error| simulated(error.into()))?;
+                let network = Network { precision: study.precision, ..network.clone() };
+                let estimator = Estimator::Network(network);
+                Ok(Self::InLanes(Box::new(InLanes { estimator, setup: setup.clone(), trial })))
+            }
+            estimator => {
+                // Where sensors have noise, locators are judged by as many readings at each position as the study says.
+                let noisy = setup.layout.sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
+                let readings = if noisy { judging.readings } else { 1 };
+                let calibration = arm.rig.calibration().map_err(simulated)?;
+                let calibration = calibration.judged_at(&judging.positions, readings);
+                let is_network = matches!(estimator, Estimator::Network(_));
+                let patterns = if is_network { calibration.presses().len() } else { 0 };
+                Ok(Self::SeedBySeed { calibration: Box::new(calibration), patterns })
+            }
+        }
+    }
+}
+
+/// Seed of the searches, the same whatever the study's seeds are: a layout is part of what an arm is.
+const LAYOUT_SEED: u64 = 0;
+
+/// Gives every arm that asks for a layout the one that the study's `[design]` leads to; arms that ask alike get the same.
+fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
+    let mut found: Vec<(LayoutRequest, Layout)> = Vec::new();
+    for arm in &mut study.arms {
+        let Some((asked, request)) = request(arm) else { continue };
+        let layout = match found.iter().find(|(other, _)| *other == request) {
+            Some((_, layout)) => layout.clone(),
+            None => {
+                let layout = request.layout(watch).map_err(|error| match error {
+                    DesignError::Cancelled(cancelled) => StudyRunError::Cancelled(cancelled),
+                    error => StudyRunError::Design { arm: arm.name.clone(), place: asked.place, error },
+                })?;
+                found.push((request, layout.clone()));
+                layout
+            }
+        };
+        arm.rig.setup.layout = layout;
+    }
+    Ok(study)
+}
+
+/// What a layout follows from.
+#[derive(PartialEq)]
+struct LayoutRequest {
+    method: DesignMethod,
+    setup: Setup,
+    design: SensorDesign,
+}
+
+impl LayoutRequest {
+    fn layout(&self, watch: Watch) -> Result<Layout, DesignError> {
+        let problem = SensorProblem::new(&self.setup, &self.design, watch)?;
+        Ok(problem.by_method(self.method, LAYOUT_SEED, watch)?.layout)
+    }
+}
+
+fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
+    let asked = arm.layout.clone()?;
+    let setup = arm.rig.pressed_setup();
+    let design = arm.rig.design.clone().or_else(|| SensorDesign::of(&arm.rig.setup).ok())?;
+    let method = asked.method;
+    Some((asked, LayoutRequest { method, setup, design }))
+}
 
 /// One fitted seed of an arm.
 pub type TrainedSeed = Calibrated<Method>;
@@ -61,8 +265,8 @@ pub struct RunOptions {
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
-    /// Fits every seed of every arm but those in `done`, which may hold networks trained in lanes only, and answers with all of them. A seed gives the same locator
-    /// whatever the number of threads and whatever was done before.
+    /// Fits every seed of every arm but those in `done`, which may hold networks trained in lanes only, and answers with all
+    /// of them. A seed gives the same locator whatever the number of threads and whatever was done before.
     ///
     /// # Errors
     /// [`StudyRunError`] when an estimator cannot be fitted to what its arm's sensors read, or when `watch` stopped the run; what
@@ -95,7 +299,7 @@ impl PreparedStudy {
                         queue.arm = arm;
                         let fitted = match &self.arms[arm] {
                             PreparedArm::InLanes(prepared) => queue.fit_in_lanes(prepared, watch),
-                            PreparedArm::SeedBySeed(prepared) => queue.fit_each(prepared, watch),
+                            PreparedArm::SeedBySeed { calibration, .. } => queue.fit_each(calibration, watch),
                         };
                         if let Err(error) = fitted {
                             // The first error is the cause; a cancellation by it comes later.
@@ -166,11 +370,12 @@ impl Queue<'_> {
     }
 
     /// Fits seed after seed of an arm, until none is left.
-    fn fit_each(&mut self, prepared: &SeedBySeed, watch: Watch) -> Result<(), StudyRunError> {
+    fn fit_each(&mut self, calibration: &Calibration, watch: Watch) -> Result<(), StudyRunError> {
         let arm = &self.study.study.arms[self.arm];
         while let Some(seed) = self.next_seed() {
             watch.round()?;
-            let fit = prepared.fit((&arm.name, &arm.rig), seed, watch)?;
+            let fit = calibration.run(&arm.rig.estimator, seed, watch);
+            let fit = fit.map_err(|error| unfitted(&arm.name, error))?;
             self.finish(Trained { arm: self.arm, fit });
         }
         Ok(())
@@ -183,7 +388,7 @@ impl Queue<'_> {
 }
 
 /// Why an arm cannot be fitted, or that it was stopped.
-pub(super) fn unfitted(arm: &str, error: EvaluationError<FitError>) -> StudyRunError {
+fn unfitted(arm: &str, error: EvaluationError<FitError>) -> StudyRunError {
     if Cancelled::caused(&error) {
         return Cancelled.into();
     }

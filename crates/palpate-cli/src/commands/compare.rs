@@ -1,14 +1,17 @@
 //! `palpate compare`: every estimator on the same trials, against the limit.
 
+use super::evaluate::ErrorFigures;
 use crate::failure::{Complaint, Failure};
-use crate::recording_files::RecordingFiles;
-use crate::table::table;
-use crate::{input, interrupt, output, progress};
+use crate::input::RecordingFiles;
+use crate::json::object;
+use crate::output::Table;
+use crate::{input, output, progress};
 use palpate_estimators::estimator::{Comparison, contenders};
 use palpate_estimators::evaluation::{Split, evaluate_splits, limit_ratio, percentage_error};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -42,42 +45,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What is printed, or written as JSON.
-#[derive(serde::Serialize)]
-struct Findings {
-    palpate: &'static str,
-    rig: String,
-    data: String,
-    trials: usize,
-    readings: usize,
-    seed: u64,
-    length_mm: f64,
-    tolerance_mm: f64,
-    estimators: Vec<Row>,
-    left_out: Vec<LeftOut>,
-}
-
-#[derive(serde::Serialize)]
-struct Row {
-    name: &'static str,
-    error_mm: Figures,
-    error_percent: f64,
-    effective_percent: f64,
-    coverage_95: Option<f64>,
-    limit_ratio: Option<f64>,
-    fit_seconds: f64,
-    locate_ns: f64,
-}
-
-#[derive(serde::Serialize)]
-struct Figures {
-    mean: f64,
-    median: f64,
-    p95: f64,
-    rmse: f64,
-    max: f64,
-}
-
 /// An estimator that does not suit the rig or the recording.
 #[derive(serde::Serialize)]
 struct LeftOut {
@@ -89,30 +56,31 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, how, trials } = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
+    let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
     if let Some(out) = &arguments.out {
         write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
     }
-    let rows = comparisons.iter().filter_map(|comparison| row(&rig, comparison, arguments.tolerance));
-    let findings = Findings {
-        palpate: env!("CARGO_PKG_VERSION"),
-        rig: arguments.rig.display().to_string(),
-        data,
-        trials: trials.len(),
-        readings: trials.iter().map(|trial| trial.judged.rows.len()).sum(),
-        seed: arguments.seed,
-        length_mm: rig.setup.surface.extent().length_m() * 1e3,
-        tolerance_mm: arguments.tolerance * 1e3,
-        estimators: rows.collect(),
-        left_out,
-    };
     if arguments.json {
-        return output::say_json(&findings);
+        let estimators = comparisons.iter().filter_map(|comparison| json_row(&rig, comparison, arguments));
+        return output::say_json(&object! {
+            "palpate": env!("CARGO_PKG_VERSION"),
+            "rig": arguments.rig.display().to_string(),
+            "data": data,
+            "trials": trials.len(),
+            "readings": readings,
+            "seed": arguments.seed,
+            "length_mm": rig.setup.surface.extent().length_m() * 1e3,
+            "tolerance_mm": arguments.tolerance * 1e3,
+            "estimators": estimators.collect::<Vec<_>>(),
+            "left_out": &left_out,
+        });
     }
-    print(&findings, &how)?;
-    match &arguments.out {
-        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
-        None => Ok(()),
+    output::say(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
+    output::say(table(&rig, &comparisons, arguments))?;
+    for LeftOut { name, why } in &left_out {
+        output::say(format!("\n{name} is left out: {why}"))?;
     }
+    output::say_report("\n", arguments.out.as_deref())
 }
 
 fn write_report(
@@ -182,7 +150,7 @@ fn compare(
     for contender in contenders {
         bar.set_prefix(contender.kind());
         let clock = || start.elapsed().as_secs_f64();
-        let go_on = |_| !interrupt::asked();
+        let go_on = |_| !progress::interrupted();
         match evaluate_splits(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
             Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
@@ -199,61 +167,46 @@ fn mean_m(comparison: &Comparison) -> f64 {
     comparison.tried.evaluation.summary(None).map_or(f64::INFINITY, |summary| summary.average_m)
 }
 
-fn row(rig: &Rig, comparison: &Comparison, tolerance_m: f64) -> Option<Row> {
+fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option<impl Serialize> {
     let evaluation = &comparison.tried.evaluation;
     let summary = evaluation.summary(None)?;
-    Some(Row {
-        name: comparison.estimator.kind(),
-        error_mm: Figures {
-            mean: summary.average_m * 1e3,
-            median: summary.median_m * 1e3,
-            p95: summary.p95_m * 1e3,
-            rmse: summary.rmse_m * 1e3,
-            max: summary.largest_m * 1e3,
-        },
-        error_percent: percentage_error(summary.average_m, evaluation.length_m),
-        effective_percent: evaluation.effective_percent(tolerance_m),
-        coverage_95: evaluation.coverage_percent(),
-        limit_ratio: limit_ratio(&rig.setup, evaluation),
-        fit_seconds: comparison.tried.fit_seconds,
-        locate_ns: comparison.tried.locate_ns,
+    Some(object! {
+        "name": comparison.estimator.kind(),
+        "error_mm": ErrorFigures::of(&summary, |error_m| error_m * 1e3),
+        "error_percent": percentage_error(summary.average_m, evaluation.length_m),
+        "effective_percent": evaluation.effective_percent(arguments.tolerance),
+        "coverage_95": evaluation.coverage_percent(),
+        "limit_ratio": limit_ratio(&rig.setup, evaluation),
+        "fit_seconds": comparison.tried.fit_seconds,
+        "locate_ns": comparison.tried.locate_ns,
     })
 }
 
-fn print(findings: &Findings, how: &str) -> Result<(), Failure> {
-    output::say(format!("{}: {how}; {} readings\n", findings.rig, findings.readings))?;
-    let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-    let rows = findings.estimators.iter().map(|row| {
-        vec![
-            row.name.to_owned(),
-            format!("{:.4} ({:.4})", row.error_mm.mean, row.error_percent),
-            format!("{:.4}", row.error_mm.median),
-            format!("{:.3}", row.error_mm.p95),
-            format!("{:.3}", row.error_mm.max),
-            format!("{:.1}", row.effective_percent),
-            or_dash(row.coverage_95.map(|percent| format!("{percent:.1}"))),
-            or_dash(row.limit_ratio.map(|ratio| format!("{ratio:.3}"))),
-            time(row.fit_seconds),
-            time(row.locate_ns * 1e-9),
-        ]
+fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String {
+    let rows = comparisons.iter().filter_map(|comparison| {
+        let evaluation = &comparison.tried.evaluation;
+        Some((comparison, evaluation, evaluation.summary(None)?))
     });
-    let heading = [
-        "error, mm (% of length)",
-        "mean",
-        "median",
-        "p95",
-        "largest",
-        "effective, %",
-        "95 % covers, %",
-        "× limit",
-        "fit",
-        "a reading",
-    ];
-    output::say(table(&heading, rows))?;
-    for left_out in &findings.left_out {
-        output::say(format!("\n{} is left out: {}", left_out.name, left_out.why))?;
-    }
-    Ok(())
+    let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
+    Table::of(rows)
+        .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.kind().to_owned())
+        .column("mean", |(_, evaluation, summary)| {
+            let percent = percentage_error(summary.average_m, evaluation.length_m);
+            format!("{:.4} ({percent:.4})", summary.average_m * 1e3)
+        })
+        .column("median", |(.., summary)| format!("{:.4}", summary.median_m * 1e3))
+        .column("p95", |(.., summary)| format!("{:.3}", summary.p95_m * 1e3))
+        .column("largest", |(.., summary)| format!("{:.3}", summary.largest_m * 1e3))
+        .column("effective, %", |(_, of, _)| format!("{:.1}", of.effective_percent(arguments.tolerance)))
+        .column("95 % covers, %", |(_, evaluation, _)| {
+            or_dash(evaluation.coverage_percent().map(|percent| format!("{percent:.1}")))
+        })
+        .column("× limit", |(_, evaluation, _)| {
+            or_dash(limit_ratio(&rig.setup, evaluation).map(|ratio| format!("{ratio:.3}")))
+        })
+        .column("fit", |(comparison, ..)| time(comparison.tried.fit_seconds))
+        .column("a reading", |(comparison, ..)| time(comparison.tried.locate_ns * 1e-9))
+        .to_string()
 }
 
 /// A short time with three digits.
@@ -264,12 +217,6 @@ fn time(seconds: f64) -> String {
         s if s < 1.0 => (s * 1e3, "ms"),
         s => (s, "s"),
     };
-    let digits = if value < 10.0 {
-        2
-    } else if value < 100.0 {
-        1
-    } else {
-        0
-    };
+    let digits = usize::from(value < 10.0) + usize::from(value < 100.0);
     format!("{value:.digits$} {unit}")
 }

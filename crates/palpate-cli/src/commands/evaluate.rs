@@ -1,9 +1,10 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
 use crate::failure::{Complaint, Failure};
+use crate::input::{RecordingFiles, RigOrLocator};
+use crate::json::object;
+use crate::output::Table;
 use crate::progress::Observer;
-use crate::recording_files::RecordingFiles;
-use crate::table::table;
 use crate::{input, output};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
@@ -12,10 +13,9 @@ use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::watch::Watch;
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Errors by position, by portion, and the effective length of a locator; or, of a rig, cross-validated by position.
 #[derive(clap::Args)]
@@ -44,71 +44,58 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What is printed, or written as JSON.
+/// The errors of the whole surface or of a portion.
 #[derive(serde::Serialize)]
-struct Findings {
-    palpate: &'static str,
-    subject: String,
-    data: String,
-    folds: Option<u16>,
-    seed: u64,
-    length_mm: f64,
-    tolerance_mm: f64,
-    #[serde(skip)]
-    extent: Extent,
-    effective_percent: f64,
-    errors: Vec<Errors>,
-}
-
-#[derive(serde::Serialize)]
-struct Errors {
+struct PortionErrors {
     portion: String,
     count: usize,
-    error_mm: Figures,
-    error_percent: Figures,
+    error_mm: ErrorFigures,
+    error_percent: ErrorFigures,
 }
 
+/// Figures of location errors, all in one unit.
 #[derive(serde::Serialize)]
-struct Figures {
-    mean: f64,
-    median: f64,
-    p95: f64,
-    rmse: f64,
-    max: f64,
+pub struct ErrorFigures {
+    pub mean: f64,
+    pub median: f64,
+    pub p95: f64,
+    pub rmse: f64,
+    pub max: f64,
+}
+
+impl ErrorFigures {
+    /// In the unit to which `unit` takes metres.
+    pub fn of(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
+        Self {
+            mean: unit(summary.average_m),
+            median: unit(summary.median_m),
+            p95: unit(summary.p95_m),
+            rmse: unit(summary.rmse_m),
+            max: unit(summary.largest_m),
+        }
+    }
 }
 
 /// Answers, and what gave them.
 struct Answers {
     evaluation: Evaluation,
     recording: Provenance,
-    subject: Subject,
-}
-
-enum Subject {
-    Locator(Box<Locator>),
-    Rig(Box<Rig>),
-}
-
-impl Answers {
-    fn extent(&self) -> Extent {
-        let setup = match &self.subject {
-            Subject::Locator(locator) => &locator.setup,
-            Subject::Rig(rig) => &rig.setup,
-        };
-        setup.surface.extent()
-    }
+    subject: RigOrLocator,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let answers = if is_toml(&arguments.subject) { cross_validated(arguments)? } else { located(arguments)? };
-    let findings = findings(arguments, &answers)?;
+    let answers = match RigOrLocator::read(&arguments.subject)? {
+        RigOrLocator::Rig(rig) => cross_validated(arguments, rig)?,
+        RigOrLocator::Locator(locator) => located(arguments, locator)?,
+    };
+    let errors = errors_by_portion(arguments, &answers)?;
     if let Some(out) = &arguments.out {
         let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
-            title: &format!("Location errors of {}", findings.subject),
+            title: &format!("Location errors of {}", arguments.subject.display()),
             judged: match &answers.subject {
-                Subject::Locator(locator) => Judged::Locator(locator),
-                Subject::Rig(rig) => Judged::CrossValidated { rig, folds, seed },
+                RigOrLocator::Locator(locator) => Judged::Locator(locator),
+                RigOrLocator::Rig(rig) => Judged::CrossValidated { rig, folds, seed },
             },
             evaluation: &answers.evaluation,
             recording: &answers.recording,
@@ -117,32 +104,40 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         };
         output::write_report(out, evaluation_report(&report))?;
     }
-    if arguments.json { output::say_json(&findings) } else { print(&findings, arguments) }
-}
-
-fn is_toml(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    let evaluation = &answers.evaluation;
+    let folds = matches!(answers.subject, RigOrLocator::Rig(_)).then_some(arguments.folds);
+    if !arguments.json {
+        return print(arguments, &answers, folds, &errors);
+    }
+    output::say_json(&object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "subject": arguments.subject.display().to_string(),
+        "data": &answers.recording.source,
+        "folds": folds,
+        "seed": arguments.seed,
+        "length_mm": evaluation.length_m * 1e3,
+        "tolerance_mm": arguments.tolerance * 1e3,
+        "effective_percent": evaluation.effective_percent(arguments.tolerance),
+        "errors": errors,
+    })
 }
 
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.
-fn cross_validated(arguments: &Arguments) -> Result<Answers, Failure> {
-    let rig = input::read_rig(&arguments.subject)?;
+fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
-    let observer = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds());
-    let observe = |progress| observer.observe(progress);
-    let task = FitTask::new(&rig.setup, &recording).seed(seed).watch(Watch::new(&observe));
-    let evaluation = cross_validate(&rig.estimator, task, folds).map_err(|error| Failure::of(&error))?;
-    drop(observer);
-    Ok(Answers { evaluation, recording: recording.provenance, subject: Subject::Rig(Box::new(rig)) })
+    let task = FitTask::new(&rig.setup, &recording).seed(seed);
+    let evaluation = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds())
+        .watch(|watch| cross_validate(&rig.estimator, task.watch(watch), folds))
+        .map_err(|error| Failure::of(&error))?;
+    Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
 /// A locator, judged by a recording or by its own bench's simulation.
-fn located(arguments: &Arguments) -> Result<Answers, Failure> {
-    let locator = input::read_locator(&arguments.subject)?;
+fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Failure> {
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
@@ -151,8 +146,7 @@ fn located(arguments: &Arguments) -> Result<Answers, Failure> {
         None => simulated(&locator, arguments.seed)?,
     };
     let evaluation = Evaluation::of(&locator, &recording).map_err(Complaint::new)?;
-    let subject = Subject::Locator(Box::new(locator));
-    Ok(Answers { evaluation, recording: recording.provenance, subject })
+    Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Locator(locator) })
 }
 
 fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
@@ -180,8 +174,8 @@ fn portion(text: &str) -> Result<Portion, String> {
     if portion.from_m < portion.to_m { Ok(portion) } else { Err(format!("`{text}` does not rise")) }
 }
 
-fn findings(arguments: &Arguments, answers: &Answers) -> Result<Findings, Failure> {
-    let (evaluation, data) = (&answers.evaluation, answers.recording.source.clone());
+fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<PortionErrors>, Failure> {
+    let (evaluation, data) = (&answers.evaluation, &answers.recording.source);
     let named = |portion: &Portion| format!("{}–{} mm", portion.from_m * 1e3, portion.to_m * 1e3);
     let portions = std::iter::once((None, "whole surface".to_owned()))
         .chain(arguments.portion.iter().map(|portion| (Some(*portion), named(portion))));
@@ -189,64 +183,48 @@ fn findings(arguments: &Arguments, answers: &Answers) -> Result<Findings, Failur
         let summary = evaluation.summary(portion).ok_or_else(|| {
             Complaint::new(format!("{name} has no contact in {data}")).help("name a portion that was pressed")
         })?;
-        Ok(errors(name, &summary, evaluation.length_m))
+        let percent = |error_m| percentage_error(error_m, evaluation.length_m);
+        Ok(PortionErrors {
+            portion: name,
+            count: summary.count,
+            error_mm: ErrorFigures::of(&summary, |error_m| error_m * 1e3),
+            error_percent: ErrorFigures::of(&summary, percent),
+        })
     });
-    let folds = matches!(answers.subject, Subject::Rig(_)).then_some(arguments.folds);
-    Ok(Findings {
-        palpate: env!("CARGO_PKG_VERSION"),
-        subject: arguments.subject.display().to_string(),
-        folds,
-        seed: arguments.seed,
-        length_mm: evaluation.length_m * 1e3,
-        tolerance_mm: arguments.tolerance * 1e3,
-        extent: answers.extent(),
-        effective_percent: evaluation.effective_percent(arguments.tolerance),
-        errors: errors.collect::<Result<_, Failure>>()?,
-        data,
-    })
+    errors.collect()
 }
 
-fn errors(portion: String, summary: &ErrorSummary, length_m: f64) -> Errors {
-    let figures = |unit: &dyn Fn(f64) -> f64| Figures {
-        mean: unit(summary.average_m),
-        median: unit(summary.median_m),
-        p95: unit(summary.p95_m),
-        rmse: unit(summary.rmse_m),
-        max: unit(summary.largest_m),
-    };
-    let error_percent = figures(&|error_m| percentage_error(error_m, length_m));
-    Errors { portion, count: summary.count, error_mm: figures(&|error_m| error_m * 1e3), error_percent }
-}
-
-fn print(findings: &Findings, arguments: &Arguments) -> Result<(), Failure> {
-    let how = match findings.folds {
+fn print(
+    arguments: &Arguments,
+    answers: &Answers,
+    folds: Option<u16>,
+    errors: &[PortionErrors],
+) -> Result<(), Failure> {
+    let how = match folds {
         Some(folds) => format!("cross-validated in {folds} folds by position"),
         None => "located".to_owned(),
     };
-    let count = findings.errors.first().map_or(0, |errors| errors.count);
-    output::say(format!("{}: {count} readings of {}, {how}\n", findings.subject, findings.data))?;
-    let cell = |mm: f64, percent: f64| format!("{mm:.3} ({percent:.2})");
-    let rows = findings.errors.iter().map(|errors| {
-        let (mm, percent) = (&errors.error_mm, &errors.error_percent);
-        vec![
-            errors.portion.clone(),
-            errors.count.to_string(),
-            cell(mm.mean, percent.mean),
-            cell(mm.median, percent.median),
-            cell(mm.p95, percent.p95),
-            cell(mm.max, percent.max),
-        ]
-    });
-    let heading = ["error, mm (% of length)", "contacts", "average", "median", "95th percentile", "largest"];
-    output::say(table(&heading, rows))?;
-    let (share, tolerance) = (findings.effective_percent, findings.tolerance_mm);
-    let what = match findings.extent {
+    let count = errors.first().map_or(0, |errors| errors.count);
+    let (subject, data) = (arguments.subject.display(), &answers.recording.source);
+    output::say(format!("{subject}: {count} readings of {data}, {how}\n"))?;
+    let cell = |errors: &PortionErrors, of: fn(&ErrorFigures) -> f64| {
+        format!("{:.3} ({:.2})", of(&errors.error_mm), of(&errors.error_percent))
+    };
+    output::say(
+        Table::of(errors)
+            .column("error, mm (% of length)", |errors| errors.portion.clone())
+            .column("contacts", |errors| errors.count.to_string())
+            .column("average", |errors| cell(errors, |figures| figures.mean))
+            .column("median", |errors| cell(errors, |figures| figures.median))
+            .column("95th percentile", |errors| cell(errors, |figures| figures.p95))
+            .column("largest", |errors| cell(errors, |figures| figures.max)),
+    )?;
+    let share = answers.evaluation.effective_percent(arguments.tolerance);
+    let tolerance = arguments.tolerance * 1e3;
+    let what = match answers.subject.setup().surface.extent() {
         Extent::Line { .. } => "effective",
         Extent::Plane { .. } => "effective area",
     };
     output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
-    match &arguments.out {
-        Some(out) => output::say(format!("Report: {}", out.join("report.html").display())),
-        None => Ok(()),
-    }
+    output::say_report("", arguments.out.as_deref())
 }

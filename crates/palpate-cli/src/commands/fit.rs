@@ -1,11 +1,11 @@
 //! `palpate fit`: calibrate an estimator.
 
 use crate::failure::{Complaint, Failure};
-use crate::progress::Observer;
-use crate::recording_files::RecordingFiles;
-use crate::{input, interrupt, output};
-use palpate_estimators::estimator::choose;
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator};
+use crate::input::RecordingFiles;
+use crate::json::object;
+use crate::progress::{self, Observer};
+use crate::{input, output};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
@@ -32,17 +32,6 @@ pub struct Arguments {
     json: bool,
 }
 
-#[derive(serde::Serialize)]
-struct Outcome<'a> {
-    palpate: &'static str,
-    locator: String,
-    estimator: &'a str,
-    seed: u64,
-    rows: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    training: Option<palpate_estimators::network::TrainingOutcome>,
-}
-
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     output::check_writable(&arguments.out)?;
     let rig = input::read_rig(&arguments.rig)?;
@@ -56,11 +45,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;
-    let observer = Observer::of_rounds(rig.estimator.most_rounds());
-    let observe = |progress| observer.observe(progress);
-    let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed).watch(Watch::new(&observe));
-    let locator = rig.estimator.fit_task(task).map_err(|error| Failure::of(&error))?;
-    drop(observer);
+    let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
+    let locator = Observer::of_rounds(rig.estimator.most_rounds())
+        .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
+        .map_err(|error| Failure::of(&error))?;
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
@@ -71,13 +59,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let json = locator.to_json().map_err(Complaint::new)?;
     output::write_file(&arguments.out, json.as_bytes())?;
     if arguments.json {
-        return output::say_json(&Outcome {
-            palpate: env!("CARGO_PKG_VERSION"),
-            locator: arguments.out.display().to_string(),
-            estimator: locator.kind(),
-            seed: arguments.seed,
-            rows: recording.rows.len(),
-            training,
+        return output::say_json(&object! {
+            "palpate": env!("CARGO_PKG_VERSION"),
+            "locator": arguments.out.display().to_string(),
+            "estimator": locator.kind(),
+            "seed": arguments.seed,
+            "rows": recording.rows.len(),
+            "training"?: training,
         });
     }
     let ended = training.map_or_else(String::new, |outcome| format!("; {}", in_words(outcome)));
@@ -94,7 +82,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     if rig.estimator != Estimator::Auto {
         return Ok(rig);
     }
-    let go_on = |_| !interrupt::asked();
+    let go_on = |_| !progress::interrupted();
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
     let choice = choose(task).map_err(|error| Failure::of(&error))?;
     let errors: Vec<String> = choice

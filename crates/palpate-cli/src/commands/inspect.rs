@@ -1,9 +1,8 @@
 //! `palpate inspect`: what any of palpate's files holds, in words.
 
 use crate::failure::Failure;
-use crate::recording_files::read_recording;
 use crate::{input, output};
-use palpate_estimators::arrangement::Training;
+use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::InfluenceLocator;
@@ -11,9 +10,9 @@ use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
 use palpate_estimators::network::Topology;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
-use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_mechanics::units::{Dimension, Quantity, format_count, format_length_mm};
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
@@ -55,36 +54,28 @@ fn rig(rig: &Rig) -> Vec<String> {
 
 fn setup(setup: &Setup) -> Vec<String> {
     let extent = setup.surface.extent();
+    let modulus = |value| Quantity { value, dimension: Dimension::Modulus };
     let surface = match &setup.surface {
         SurfaceSpec::Beam(beam) => format!(
             "simply supported beam, {} × {} × {}, Young's modulus {}",
             format_length_mm(beam.length_m()),
             format_length_mm(beam.width_m()),
             format_length_mm(beam.thickness_m()),
-            Quantity {
-                value: beam.youngs_modulus_pa(),
-                dimension: palpate_mechanics::units::Dimension::Modulus
-            }
+            modulus(beam.youngs_modulus_pa())
         ),
         SurfaceSpec::SupportedBeam(beam) => format!(
             "beam, {} long, {}; section {}; Young's modulus {}",
             format_length_mm(extent.length_m()),
             beam.spec().supports_in_words(),
             beam.spec().sections_in_words(),
-            Quantity {
-                value: beam.spec().youngs_modulus_pa,
-                dimension: palpate_mechanics::units::Dimension::Modulus
-            }
+            modulus(beam.spec().youngs_modulus_pa)
         ),
         SurfaceSpec::Plate(plate) => format!(
             "plate, {} × {} × {}, Young's modulus {}, Poisson's ratio {}",
             format_length_mm(plate.spec().length_m),
             format_length_mm(plate.spec().width_m),
             format_length_mm(plate.spec().thickness_m),
-            Quantity {
-                value: plate.spec().youngs_modulus_pa,
-                dimension: palpate_mechanics::units::Dimension::Modulus
-            },
+            modulus(plate.spec().youngs_modulus_pa),
             plate.spec().poissons_ratio
         ),
         SurfaceSpec::Digit(digit) => format!(
@@ -92,10 +83,7 @@ fn setup(setup: &Setup) -> Vec<String> {
             format_length_mm(digit.length_m()),
             format_length_mm(digit.width_m()),
             format_length_mm(digit.thickness_m()),
-            Quantity {
-                value: digit.youngs_modulus_pa(),
-                dimension: palpate_mechanics::units::Dimension::Modulus
-            },
+            modulus(digit.youngs_modulus_pa()),
             digit.direction().name(),
             digit.characteristic_force_n()
         ),
@@ -119,7 +107,7 @@ fn layout(layout: &Layout, extent: Extent) -> String {
         .sensors()
         .iter()
         .map(|sensor| match sensor.kind {
-            palpate_mechanics::sensing::SensorKind::Raw => sensor.name.clone(),
+            SensorKind::Raw => sensor.name.clone(),
             kind => format!("{kind} at {}", extent.place_in_words(sensor.position)),
         })
         .collect();
@@ -131,7 +119,6 @@ fn layout(layout: &Layout, extent: Extent) -> String {
 }
 
 fn training_words(training: &Training) -> String {
-    use palpate_estimators::arrangement::Arrangement;
     let rule = match &training.arrangement {
         Arrangement::Even => "evenly".to_owned(),
         Arrangement::Chebyshev => "at Chebyshev's nodes".to_owned(),
@@ -273,7 +260,7 @@ fn shape(topology: &Topology) -> String {
 fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return Ok(table(text)) };
     let setup = input::read_rig(rig)?.setup;
-    let recording = read_recording(&setup, path)?;
+    let recording = input::read_recording(&setup, path)?;
     let positions = recording.distinct_positions();
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))

@@ -1,8 +1,9 @@
 //! `palpate limit`: what physics allows on a rig's bench, position by position.
 
 use crate::failure::{Complaint, Failure};
-use crate::table::table;
-use crate::{input, output};
+use crate::input;
+use crate::json::object;
+use crate::output::{self, Table, figure};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
@@ -10,8 +11,9 @@ use palpate_mechanics::limit::{
 };
 use palpate_mechanics::sensing::{NoiseError, Sensor};
 use palpate_mechanics::surface::Extent;
-use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_mechanics::units::{Quantity, format_length_mm};
 use palpate_report::{LimitReport, limit_report};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, and what the bench cannot tell.
@@ -39,57 +41,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What is printed as JSON. A limit that is not there, because the readings do not tell, is null.
-#[derive(serde::Serialize)]
-struct Findings {
-    palpate: &'static str,
-    rig: String,
-    length_mm: f64,
-    sensors: usize,
-    sensors_alive: usize,
-    force_n: f64,
-    /// What the rig knows of it: what the warnings are about.
-    force: Force,
-    known_force: Option<Summary>,
-    unknown_force: Option<Summary>,
-    positions: Vec<At>,
-    warnings: Vec<Warning>,
-}
-
-/// Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
-#[derive(serde::Serialize)]
-struct Summary {
-    mean_mm: f64,
-    median_mm: f64,
-    mean_error_mm: f64,
-    least_mm: f64,
-    least_at_mm: [f64; 2],
-    largest_mm: f64,
-    largest_at_mm: [f64; 2],
-    positions_without: usize,
-}
-
-#[derive(serde::Serialize)]
-struct At {
-    x_mm: f64,
-    y_mm: f64,
-    known_force_mm: Option<f64>,
-    unknown_force_mm: Option<f64>,
-    force_sd_n: Option<f64>,
-}
-
-#[derive(serde::Serialize)]
-struct Warning {
-    kind: &'static str,
-    from_mm: [f64; 2],
-    to_mm: [f64; 2],
-    /// Millimetres for a blind zone, standard deviations for the others.
-    value: Option<f64>,
-    bound: f64,
-    message: String,
-    help: String,
-}
-
 /// The limit for both kinds of knowledge of the force.
 struct Limits<'a> {
     limit: &'a CramerRaoBound<'a>,
@@ -110,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         write_report(&limits, &setup, arguments, out)?;
     }
     if arguments.json {
-        output::say_json(&findings(&limits, &setup, arguments))
+        output::say_json(&json(&limits, &setup, arguments))
     } else {
         print(&limits, &setup, arguments)
     }
@@ -213,61 +164,61 @@ fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Pat
         warnings: &limits.warnings,
         listed: &limits.listed,
     };
-    let files = limit_report(&report);
-    output::write_report(out, files)
+    output::write_report(out, limit_report(&report))
 }
 
-fn findings(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Findings {
-    let at = |&position: &Position| {
-        let [known, unknown] = limits.at(position);
-        let [x_mm, y_mm] = in_mm(position);
-        At {
-            x_mm,
-            y_mm,
-            known_force_mm: known.map(|bound| bound.sd_position_m * 1e3),
-            unknown_force_mm: unknown.map(|bound| bound.sd_position_m * 1e3),
-            force_sd_n: unknown.and_then(|bound| bound.sd_force_n),
+/// What is printed as JSON. A limit that is not there, because the readings do not tell, is null.
+fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize {
+    // Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
+    let summary = |summary: LimitSummary| {
+        object! {
+            "mean_mm": summary.mean_m * 1e3,
+            "median_mm": summary.median_m * 1e3,
+            "mean_error_mm": summary.mean_error_m * 1e3,
+            "least_mm": summary.best.1 * 1e3,
+            "least_at_mm": in_mm(summary.best.0),
+            "largest_mm": summary.worst.1 * 1e3,
+            "largest_at_mm": in_mm(summary.worst.0),
+            "positions_without": summary.without,
         }
     };
-    Findings {
-        palpate: env!("CARGO_PKG_VERSION"),
-        rig: arguments.rig.display().to_string(),
-        length_mm: setup.surface.extent().length_m() * 1e3,
-        sensors: setup.layout.len(),
-        sensors_alive: limits.limit.alive(),
-        force_n: limits.force_n,
-        force: limits.force,
-        known_force: limits.known.summary().map(summary),
-        unknown_force: limits.unknown.summary().map(summary),
-        positions: limits.listed.iter().map(at).collect(),
-        warnings: limits.warnings.iter().map(warning).collect(),
-    }
-}
-
-fn summary(summary: LimitSummary) -> Summary {
-    Summary {
-        mean_mm: summary.mean_m * 1e3,
-        median_mm: summary.median_m * 1e3,
-        mean_error_mm: summary.mean_error_m * 1e3,
-        least_mm: summary.best.1 * 1e3,
-        least_at_mm: in_mm(summary.best.0),
-        largest_mm: summary.worst.1 * 1e3,
-        largest_at_mm: in_mm(summary.worst.0),
-        positions_without: summary.without,
-    }
-}
-
-fn warning(warning: &LimitWarning) -> Warning {
-    let unit = if matches!(warning, LimitWarning::Blind { .. }) { 1e3 } else { 1.0 };
-    let ((value, bound), zone) = (warning.value_and_bound(), warning.zone());
-    Warning {
-        kind: warning.kind(),
-        from_mm: in_mm(zone.from),
-        to_mm: in_mm(zone.to),
-        value: value.map(|value| value * unit),
-        bound: bound * unit,
-        message: warning.to_string(),
-        help: warning.help(),
+    let at = |&position: &Position| {
+        let [known, unknown] = limits.at(position);
+        object! {
+            "x_mm": position.x_m * 1e3,
+            "y_mm": position.y_m * 1e3,
+            "known_force_mm": known.map(|bound| bound.sd_position_m * 1e3),
+            "unknown_force_mm": unknown.map(|bound| bound.sd_position_m * 1e3),
+            "force_sd_n": unknown.and_then(|bound| bound.sd_force_n),
+        }
+    };
+    let warning = |warning: &LimitWarning| {
+        // Millimetres for a blind zone, standard deviations for the others.
+        let unit = if matches!(warning, LimitWarning::Blind { .. }) { 1e3 } else { 1.0 };
+        let ((value, bound), zone) = (warning.value_and_bound(), warning.zone());
+        object! {
+            "kind": warning.kind(),
+            "from_mm": in_mm(zone.from),
+            "to_mm": in_mm(zone.to),
+            "value": value.map(|value| value * unit),
+            "bound": bound * unit,
+            "message": warning.to_string(),
+            "help": warning.help(),
+        }
+    };
+    object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "rig": arguments.rig.display().to_string(),
+        "length_mm": setup.surface.extent().length_m() * 1e3,
+        "sensors": setup.layout.len(),
+        "sensors_alive": limits.limit.alive(),
+        "force_n": limits.force_n,
+        // What the rig knows of it: what the warnings are about.
+        "force": limits.force,
+        "known_force": limits.known.summary().map(summary),
+        "unknown_force": limits.unknown.summary().map(summary),
+        "positions": limits.listed.iter().map(at).collect::<Vec<_>>(),
+        "warnings": limits.warnings.iter().map(warning).collect::<Vec<_>>(),
     }
 }
 
@@ -291,21 +242,18 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
-    match &arguments.out {
-        Some(out) => output::say(format!("\nReport: {}", out.join("report.html").display())),
-        None => Ok(()),
-    }
+    output::say_report("\n", arguments.out.as_deref())
 }
 
 fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
-    let heading = ["limit, mm", "force known", "force unknown", "force itself, N"];
-    let rows = limits.listed.iter().map(|&position| {
-        let [known, unknown] = limits.at(position);
-        let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
-        let force = figure(unknown.and_then(|bound| bound.sd_force_n));
-        vec![extent.place_in_words(position), limit(known), limit(unknown), force]
-    });
-    output::say(table(&heading, rows.chain(summary_rows(limits))))
+    let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
+    let rows = limits.listed.iter().map(|&position| (position, limits.at(position)));
+    let table = Table::of(rows)
+        .column("limit, mm", |(position, _)| extent.place_in_words(*position))
+        .column("force known", |(_, [known, _])| limit(*known))
+        .column("force unknown", |(_, [_, unknown])| limit(*unknown))
+        .column("force itself, N", |(_, [_, unknown])| figure(unknown.and_then(|bound| bound.sd_force_n)));
+    output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
 /// A row of numbers a row of positions, the uppermost first, and a table for each knowledge of the force; where that would
@@ -319,22 +267,23 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
         return print_line(limits, limits.known.extent);
     }
     for (force, name) in [(Force::Known, "force known"), (Force::Unknown, "force unknown")] {
-        let heading: Vec<String> = std::iter::once(format!("limit, mm, {name}"))
-            .chain(columns.iter().map(|at| format!("x {}", format_length_mm(at.x_m))))
-            .collect();
-        let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
-        let cell = |&position: &Position| {
+        let cell = |position: Position| {
             let bound = limits.limit.at(Contact { position, force_n: limits.force_n }, force);
             figure(bound.map(|bound| bound.sd_position_m * 1e3))
         };
-        let line = |row: &&[Position]| {
-            let name = row.first().map_or(String::new(), |at| format!("y {}", format_length_mm(at.y_m)));
-            std::iter::once(name).chain(row.iter().map(cell)).collect::<Vec<_>>()
-        };
-        output::say(table(&heading, rows.iter().map(line)) + "\n")?;
+        let table = Table::of(rows.iter().copied()).column(format!("limit, mm, {name}"), |row| {
+            row.first().map_or(String::new(), |at| format!("y {}", format_length_mm(at.y_m)))
+        });
+        let table = columns.iter().enumerate().fold(table, |table, (i, at)| {
+            table.column(format!("x {}", format_length_mm(at.x_m)), |row| cell(row[i]))
+        });
+        output::say(format!("{table}\n"))?;
     }
-    let heading = ["limit, mm", "force known", "force unknown", ""];
-    output::say(table(&heading, summary_rows(limits)))
+    let table = Table::of([]).column("limit, mm", |()| String::new());
+    let table = ["force known", "force unknown", ""]
+        .into_iter()
+        .fold(table, |t, name| t.column(name, |()| String::new()));
+    output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
 /// Of the whole surface, whatever positions are listed.
@@ -350,13 +299,4 @@ fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
         row("largest", |summary| summary.worst.1),
         row("mean error at the limit", |summary| summary.mean_error_m),
     ]
-}
-
-/// Three decimals, or a whole number where there are many digits before them; a dash for none.
-fn figure(value: Option<f64>) -> String {
-    match value {
-        None => "–".to_owned(),
-        Some(value) if value >= 100.0 => format_count(value.round() as u64),
-        Some(value) => format!("{value:.3}"),
-    }
 }

@@ -1,12 +1,11 @@
 //! `palpate locate`: readings in, estimates out, line by line.
 
-use super::estimate_line;
 use crate::failure::{Complaint, Failure};
-use crate::lines::Lines;
+use crate::lines::Readings;
 use crate::{input, output};
-use palpate_estimators::estimator::Locator;
-use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
-use palpate_estimators::setup::Setup;
+use palpate_estimators::digit::{DigitShape, ShapePoint};
+use palpate_estimators::estimator::{ContactEstimate, Estimate, Mode, Uncertainty};
+use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -43,84 +42,154 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let complaint = format!("--shape: a locator of kind `{}` does not tell the shape", locator.kind());
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
-    let lines = Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?;
-    let mut stream = Stream { locator: &locator, json: arguments.json, shape: arguments.shape, lost: 0 };
-    stream.run(lines, &columns(&locator.setup, arguments.no_header))
-}
-
-/// Which columns of readings are the channels.
-pub fn columns(setup: &Setup, no_header: bool) -> Columns {
-    let mut columns = setup.recording_columns();
-    if no_header {
-        columns.header = Header::Absent;
-        for (i, channel) in columns.channels.iter_mut().enumerate() {
-            channel.column = Column::Number(i + 1);
-        }
+    let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
+    let mut readings = Readings::open(path, &locator.setup, arguments.no_header)?;
+    let extent = locator.setup.surface.extent();
+    let mut out = std::io::stdout().lock();
+    if !arguments.json {
+        output::print(&mut out, heading(extent).as_bytes())?;
     }
-    columns
-}
-
-struct Stream<'a> {
-    locator: &'a Locator,
-    json: bool,
-    /// Points of the shape, where it is asked for.
-    shape: Option<u16>,
-    /// Rows that gave no estimate.
-    lost: u64,
-}
-
-impl Stream<'_> {
-    fn run(&mut self, mut lines: Lines, columns: &Columns) -> Result<(), Failure> {
-        let mut out = std::io::stdout().lock();
-        let mut parser = ReadingParser::new(&lines.name, columns);
-        if !self.json {
-            output::print(&mut out, estimate_line::heading(self.extent()).as_bytes())?;
-        }
-        while let Some(line) = lines.next()? {
-            match parser.parse_line(line) {
-                Ok(None) => {}
-                Ok(Some(reading)) => self.locate(&reading, lines.count, &mut out)?,
-                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
-                Err(error) => self.lose(&error),
-            }
-        }
-        if parser.awaits_columns() {
-            let complaint = Complaint::new(format!("{} holds no reading", lines.name));
-            return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
-        }
-        match self.lost {
-            0 => Ok(()),
-            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", lines.count))),
-        }
-    }
-
-    fn locate(&mut self, reading: &[f64], line: u64, out: &mut impl Write) -> Result<(), Failure> {
-        match self.locator.locate(reading) {
-            Ok(estimate) => {
-                let text = if self.json {
-                    let shape =
-                        self.shape.and_then(|points| self.locator.shape(&estimate, usize::from(points) - 1));
-                    estimate_line::json(&estimate, line, self.extent(), shape.as_ref())?
-                } else {
-                    estimate_line::csv(&estimate, self.extent())
-                };
-                output::print(out, text.as_bytes())?;
-                // A reader at the other end of a pipe wants each estimate now.
-                out.flush().map_err(|_| Failure::NobodyReads)
-            }
+    while let Some(reading) = readings.next()? {
+        let estimate = match locator.locate(&reading) {
+            Ok(estimate) => estimate,
             Err(error) => {
-                self.lose(&error);
-                Ok(())
+                readings.lose(&error);
+                continue;
             }
+        };
+        let text = if arguments.json {
+            let shape = arguments.shape.and_then(|points| locator.shape(&estimate, usize::from(points) - 1));
+            json(&estimate, readings.lines.count, extent, shape.as_ref())?
+        } else {
+            csv(&estimate, extent)
+        };
+        output::print(&mut out, text.as_bytes())?;
+        // A reader at the other end of a pipe wants each estimate now.
+        out.flush().map_err(|_| Failure::NobodyReads)?;
+    }
+    if readings.awaits_columns() {
+        let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name));
+        return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
+    }
+    readings.finish("estimate")
+}
+
+/// The columns of [`csv`].
+fn heading(extent: Extent) -> &'static str {
+    match extent {
+        Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,status\n",
+        Extent::Plane { .. } => "x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n",
+    }
+}
+
+/// An estimate as a line of CSV: position, force, the ends of the 95 % interval, status. What a locator does not estimate stays empty.
+fn csv(estimate: &Estimate, extent: Extent) -> String {
+    let contact = &estimate.contact;
+    let mm = |at_m: f64| format!("{:.4}", at_m * 1e3);
+    let mut cells: Vec<String> = extent.coordinates_m(contact.position).map(mm).collect();
+    cells.push(contact.force_n.map_or_else(String::new, |force_n| format!("{force_n:.4}")));
+    cells.extend(match contact.uncertainty {
+        None => vec![String::new(); 2 * extent.dimensions()],
+        Some(Uncertainty { x_95_m: x, y_95_m: y, .. }) => {
+            [x.0, x.1, y.0, y.1].map(mm).into_iter().take(2 * extent.dimensions()).collect()
         }
-    }
+    });
+    cells.push(estimate.status.name().to_owned());
+    csv_row(cells)
+}
 
-    fn lose(&mut self, error: &dyn std::fmt::Display) {
-        self.lost += 1;
-        eprintln!("palpate: skipped: {error}");
-    }
+/// An estimate as JSON.
+#[derive(serde::Serialize)]
+struct JsonEstimate {
+    line: u64,
+    #[serde(flatten)]
+    contact: JsonContact,
+    status: &'static str,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    modes: Vec<JsonMode>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    further: Vec<JsonContact>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shape: Option<Vec<JsonShapePoint>>,
+}
 
-    fn extent(&self) -> Extent {
-        self.locator.setup.surface.extent()
+/// A point of the bent finger's centre line: how far along it, where, and how sure.
+#[derive(serde::Serialize)]
+struct JsonShapePoint {
+    at_mm: f64,
+    x_mm: f64,
+    y_mm: f64,
+    sd_mm: f64,
+}
+
+#[derive(serde::Serialize)]
+struct JsonMode {
+    #[serde(flatten)]
+    contact: JsonContact,
+    probability: f64,
+}
+
+#[derive(serde::Serialize)]
+struct JsonContact {
+    x_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    x_95_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_95_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd_force_n: Option<f64>,
+}
+
+/// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
+fn json(
+    estimate: &Estimate,
+    line: u64,
+    extent: Extent,
+    shape: Option<&DigitShape>,
+) -> Result<String, Failure> {
+    let mode = |mode: &Mode| JsonMode {
+        contact: json_contact(&mode.contact, extent),
+        probability: mode.probability,
+    };
+    let object = JsonEstimate {
+        line,
+        contact: json_contact(&estimate.contact, extent),
+        status: estimate.status.name(),
+        modes: estimate.modes.as_slice().iter().map(mode).collect(),
+        further: estimate.further.as_slice().iter().map(|further| json_contact(further, extent)).collect(),
+        shape: shape.map(json_shape),
+    };
+    serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+}
+
+fn json_shape(shape: &DigitShape) -> Vec<JsonShapePoint> {
+    let point = |point: &ShapePoint| JsonShapePoint {
+        at_mm: point.at_m * 1e3,
+        x_mm: point.x_m * 1e3,
+        y_mm: point.y_m * 1e3,
+        sd_mm: point.sd_m * 1e3,
+    };
+    shape.points.iter().map(point).collect()
+}
+
+fn json_contact(contact: &ContactEstimate, extent: Extent) -> JsonContact {
+    let uncertainty = contact.uncertainty.as_ref();
+    let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
+    // JSON has no infinity: what is not known at all is left out.
+    let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
+    JsonContact {
+        x_mm: contact.position.x_m * 1e3,
+        y_mm: extent.across(contact.position.y_m * 1e3),
+        force_n: contact.force_n,
+        x_95_mm: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
+        y_95_mm: uncertainty.and_then(|uncertainty| extent.across(mm(uncertainty.y_95_m))),
+        sd_mm: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
+        sd_force_n: uncertainty.and_then(|u| sd(u.covariance[5])),
     }
 }

@@ -2,7 +2,6 @@
 
 pub mod compare;
 pub mod design;
-pub mod estimate_line;
 pub mod evaluate;
 pub mod fit;
 pub mod inspect;

@@ -1,22 +1,16 @@
 //! `palpate profile`: how force is spread over the surface, reading by reading.
 
-mod findings;
-mod tables;
-
-use crate::commands::locate::columns;
 use crate::failure::{Complaint, Failure};
-use crate::lines::Lines;
-use crate::{input, output};
-use findings::Findings;
+use crate::input::RigOrLocator;
+use crate::lines::Readings;
+use crate::output::{self, Table};
 use palpate_estimators::estimator::{
-    LoadProfile, LoadSensors, LoadSensorsError, Locator, PatchLimit, Profiler, patch_limits,
+    CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, patch_limits,
 };
-use palpate_estimators::recording::ReadingParser;
-use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_loads;
-use palpate_mechanics::surface::UniformLoad;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::{Extent, UniformLoad};
 use palpate_report::{ProfileReport, profile_report};
-use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
 /// Tell how force is spread over the surface: total, centre of pressure and patches, with intervals and limits.
@@ -40,43 +34,15 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What readings are told by.
-enum Subject {
-    Rig(Box<Rig>),
-    Locator(Box<Locator>),
-}
-
-impl Subject {
-    fn setup(&self) -> &Setup {
-        match self {
-            Self::Rig(rig) => &rig.setup,
-            Self::Locator(locator) => &locator.setup,
-        }
-    }
-
-    /// Loads that are simulated where there are no readings.
-    fn loads(&self) -> &[UniformLoad] {
-        match self {
-            Self::Rig(rig) => &rig.loads,
-            Self::Locator(_) => &[],
-        }
-    }
-}
-
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(report) = &arguments.report {
         output::check_writable(report)?;
     }
     let path = &arguments.subject;
-    let is_rig = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    let subject = if is_rig {
-        Subject::Rig(Box::new(input::read_rig(path)?))
-    } else {
-        Subject::Locator(Box::new(input::read_locator(path)?))
-    };
+    let subject = RigOrLocator::read(path)?;
     let sensors = match &subject {
-        Subject::Rig(rig) => LoadSensors::of(&rig.setup),
-        Subject::Locator(locator) => locator.load_sensors(),
+        RigOrLocator::Rig(rig) => LoadSensors::of(&rig.setup),
+        RigOrLocator::Locator(locator) => locator.load_sensors(),
     };
     let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);
     let mut printer = Printer { arguments, subject: &subject, profiler: &profiler, truth: &[], told: 0 };
@@ -96,7 +62,7 @@ fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
 
 struct Printer<'a> {
     arguments: &'a Arguments,
-    subject: &'a Subject,
+    subject: &'a RigOrLocator,
     profiler: &'a Profiler<'a>,
     /// The loads that were simulated.
     truth: &'a [UniformLoad],
@@ -106,7 +72,10 @@ struct Printer<'a> {
 
 impl Printer<'_> {
     fn simulated(&mut self) -> Result<(), Failure> {
-        let loads = self.subject.loads();
+        let loads: &[UniformLoad] = match self.subject {
+            RigOrLocator::Rig(rig) => &rig.loads,
+            RigOrLocator::Locator(_) => &[],
+        };
         if loads.is_empty() {
             let path = self.arguments.subject.display();
             let complaint =
@@ -123,28 +92,14 @@ impl Printer<'_> {
     }
 
     fn stream(&mut self, path: &Path) -> Result<(), Failure> {
-        let mut lines = Lines::open(path)?;
-        let columns = columns(self.subject.setup(), self.arguments.no_header);
-        let mut parser = ReadingParser::new(&lines.name, &columns);
-        let mut lost = 0;
-        while let Some(line) = lines.next()? {
-            match parser.parse_line(line) {
-                Ok(None) => {}
-                Ok(Some(reading)) => self.tell(&reading, Some(lines.count))?,
-                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
-                Err(error) => {
-                    lost += 1;
-                    eprintln!("palpate: skipped: {error}");
-                }
-            }
+        let mut readings = Readings::open(path, self.subject.setup(), self.arguments.no_header)?;
+        while let Some(reading) = readings.next()? {
+            self.tell(&reading, Some(readings.lines.count))?;
         }
-        if self.told == 0 && lost == 0 {
-            return Err(Complaint::new(format!("{} holds no reading", lines.name)).into());
+        if self.told == 0 && readings.is_whole() {
+            return Err(Complaint::new(format!("{} holds no reading", readings.lines.name)).into());
         }
-        match lost {
-            0 => Ok(()),
-            lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no profile", lines.count))),
-        }
+        readings.finish("profile")
     }
 
     /// Prints the profile of a reading, and writes the page about the first.
@@ -157,12 +112,12 @@ impl Printer<'_> {
         if let (1, Some(path)) = (self.told, &self.arguments.report) {
             self.write_report(reading, &profile, limits.as_deref(), path)?;
         }
-        let findings = Findings::of(self.profiler, &profile, limits.as_deref(), self.truth, line);
+        let told = JsonProfile::of(self.profiler, &profile, limits.as_deref(), self.truth, line);
         if self.arguments.json {
-            let json = serde_json::to_string(&findings).map_err(Complaint::new)?;
+            let json = serde_json::to_string(&told).map_err(Complaint::new)?;
             return output::say(json);
         }
-        tables::print(&findings)?;
+        print(&told)?;
         match (self.told, &self.arguments.report) {
             (1, Some(path)) => output::say(format!("\nReport: {}", path.display())),
             _ => Ok(()),
@@ -191,4 +146,238 @@ impl Printer<'_> {
         let page = files.iter().find(|file| file.name.ends_with(".html"));
         page.map_or(Ok(()), |page| output::write_file(path, &page.bytes))
     }
+}
+
+/// What people read of a profile.
+fn print(told: &JsonProfile) -> Result<(), Failure> {
+    let interval = |value: &Interval, unit: &str| {
+        format!("{:.3} {unit} ({:.3} to {:.3})", value.value, value.low, value.high)
+    };
+    let heading = match told.line {
+        Some(line) => format!("line {line}: {}", told.status),
+        None => format!("simulated: {}", told.status),
+    };
+    output::say(heading)?;
+    output::say(format!("misfit {:.1}; noise seldom makes more than {:.1}", told.misfit, told.worst_misfit))?;
+    let Some(centre) = &told.centre_x_mm else { return Ok(()) };
+    output::say(format!("total force         {}", interval(&told.total_n, "N")))?;
+    output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
+    if let Some(across) = &told.centre_y_mm {
+        output::say(format!("            across  {}", interval(across, "mm")))?;
+    }
+    if let Some(width_mm) = told.resolution_mm {
+        output::say(format!(
+            "resolution          {width_mm:.0} mm, the median width of the averaging kernels"
+        ))?;
+    }
+    let interval = |value: &Interval| format!("{:.3} ({:.3} to {:.3})", value.value, value.low, value.high);
+    output::say(format!("\n{}", JsonPatch::columns(&told.patches, "patch", told.extent, interval)))?;
+    if told.loads.is_empty() {
+        return Ok(());
+    }
+    let number = |value: &f64| format!("{value:.3}");
+    output::say(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
+}
+
+/// All that a reading tells of the load; what it does not tell is null.
+#[derive(serde::Serialize)]
+struct JsonProfile {
+    /// The line of the reading; null for a simulated one.
+    line: Option<u64>,
+    status: &'static str,
+    misfit: f64,
+    worst_misfit: f64,
+    total_n: Interval,
+    centre_x_mm: Option<Interval>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    centre_y_mm: Option<Interval>,
+    /// Median width of the averaging kernels.
+    resolution_mm: Option<f64>,
+    patches: Vec<JsonPatch<Interval>>,
+    /// The loads that were simulated.
+    loads: Vec<JsonPatch<f64>>,
+    profile: Vec<JsonCell>,
+    /// Residual of each channel over its noise; null for dead ones.
+    residuals: Vec<Option<f64>>,
+    #[serde(skip)]
+    extent: Extent,
+}
+
+/// A value, its standard deviation and the ends of its 95 % interval.
+#[derive(serde::Serialize)]
+struct Interval {
+    value: f64,
+    sd: f64,
+    low: f64,
+    high: f64,
+}
+
+/// A patch of the profile, or with plain numbers a load that was simulated.
+#[derive(serde::Serialize)]
+struct JsonPatch<T> {
+    stretch_mm: [f64; 2],
+    centre_x_mm: T,
+    /// What a plane has besides.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    across: Option<Across<T>>,
+    force_n: T,
+    /// Least standard deviations for evenly loaded patches of this number and these sizes.
+    limit_x_mm: Option<f64>,
+    limit_force_n: Option<f64>,
+}
+
+/// A patch or a load across the width of a plane.
+#[derive(serde::Serialize)]
+struct Across<T> {
+    stretch_y_mm: [f64; 2],
+    centre_y_mm: T,
+    limit_y_mm: Option<f64>,
+}
+
+/// A cell of the surface with its density, in N/mm on a line and N/mm² on a plane.
+#[derive(serde::Serialize)]
+struct JsonCell {
+    x_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<f64>,
+    density: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Interval {
+    fn new(value: f64, sd: f64, (low, high): (f64, f64), unit: f64) -> Self {
+        Self { value: value * unit, sd: sd * unit, low: low * unit, high: high * unit }
+    }
+}
+
+impl JsonProfile {
+    fn of(
+        profiler: &Profiler,
+        profile: &LoadProfile,
+        limits: Option<&[PatchLimit]>,
+        truth: &[UniformLoad],
+        line: Option<u64>,
+    ) -> Self {
+        let extent = profile.cells.extent;
+        let of_truth = patch_limits(profiler.sensors(), truth);
+        let limit =
+            |limits: Option<&[PatchLimit]>, i: usize| limits.and_then(|limits| limits.get(i).copied());
+        let patches = profile.patches.iter().enumerate();
+        let loads = truth.iter().enumerate();
+        Self {
+            line,
+            status: profile.status.name(),
+            misfit: profile.misfit,
+            worst_misfit: profile.worst_misfit,
+            total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.total_95_n(), 1.0),
+            centre_x_mm: profile.centre.map(|centre| x_mm(&centre)),
+            centre_y_mm: profile.centre.and_then(|centre| extent.across(y_mm(&centre))),
+            resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
+            patches: patches.map(|(i, patch)| JsonPatch::of_patch(patch, limit(limits, i), extent)).collect(),
+            loads: loads
+                .map(|(i, load)| JsonPatch::of_load(load, limit(of_truth.as_deref(), i), extent))
+                .collect(),
+            profile: (0..profile.cells.len()).map(|cell| JsonCell::of(profile, cell)).collect(),
+            residuals: profile.residuals.clone(),
+            extent,
+        }
+    }
+}
+
+impl JsonPatch<Interval> {
+    fn of_patch(patch: &Patch, limit: Option<PatchLimit>, extent: Extent) -> Self {
+        let Patch { from, to, centre, .. } = patch;
+        let force_n = Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0);
+        Self::new([*from, *to], (x_mm(centre), y_mm(centre)), force_n, limit, extent)
+    }
+}
+
+impl JsonPatch<f64> {
+    fn of_load(load: &UniformLoad, limit: Option<PatchLimit>, extent: Extent) -> Self {
+        let centre = load.centre();
+        Self::new(
+            [load.from(), load.to()],
+            (centre.x_m * 1e3, centre.y_m * 1e3),
+            load.force_n(),
+            limit,
+            extent,
+        )
+    }
+}
+
+impl<T> JsonPatch<T> {
+    fn new(
+        [from, to]: [Position; 2],
+        (centre_x_mm, centre_y_mm): (T, T),
+        force_n: T,
+        limit: Option<PatchLimit>,
+        extent: Extent,
+    ) -> Self {
+        Self {
+            stretch_mm: [from.x_m * 1e3, to.x_m * 1e3],
+            centre_x_mm,
+            across: extent.across(Across {
+                stretch_y_mm: [from.y_m * 1e3, to.y_m * 1e3],
+                centre_y_mm,
+                limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
+            }),
+            force_n,
+            limit_x_mm: limit.map(|limit| limit.sd_x_m * 1e3),
+            limit_force_n: limit.map(|limit| limit.sd_force_n),
+        }
+    }
+
+    fn columns(rows: &[Self], what: &str, extent: Extent, cell: fn(&T) -> String) -> String {
+        fn stretch([from, to]: [f64; 2]) -> String {
+            format!("{from:.0}–{to:.0}")
+        }
+        let limit = |limit: Option<f64>| limit.map_or_else(|| "–".to_owned(), |limit| format!("{limit:.3}"));
+        let across =
+            |row: &Self, of: &dyn Fn(&Across<T>) -> String| row.across.as_ref().map_or(String::new(), of);
+        let table = Table::of(rows.iter().zip(1..)).column(what, |(_, number)| number.to_string());
+        let table = match extent {
+            Extent::Line { .. } => table
+                .column("stretch, mm", |(row, _)| stretch(row.stretch_mm))
+                .column("centre, mm", |(row, _)| cell(&row.centre_x_mm))
+                .column("limit", |(row, _)| limit(row.limit_x_mm)),
+            Extent::Plane { .. } => table
+                .column("x, mm", |(row, _)| stretch(row.stretch_mm))
+                .column("y, mm", |(row, _)| across(row, &|across| stretch(across.stretch_y_mm)))
+                .column("centre x, mm", |(row, _)| cell(&row.centre_x_mm))
+                .column("limit", |(row, _)| limit(row.limit_x_mm))
+                .column("centre y, mm", |(row, _)| across(row, &|across| cell(&across.centre_y_mm)))
+                .column("limit", |(row, _)| across(row, &|across| limit(across.limit_y_mm))),
+        };
+        table
+            .column("force, N", |(row, _)| cell(&row.force_n))
+            .column("limit", |(row, _)| limit(row.limit_force_n))
+            .to_string()
+    }
+}
+
+impl JsonCell {
+    fn of(profile: &LoadProfile, cell: usize) -> Self {
+        let extent = profile.cells.extent;
+        let per_mm = match extent {
+            Extent::Line { .. } => 1e-3,
+            Extent::Plane { .. } => 1e-6,
+        };
+        let (centre, (density, (low, high))) = (profile.cells.centre(cell), profile.density(cell));
+        Self {
+            x_mm: centre.x_m * 1e3,
+            y_mm: extent.across(centre.y_m * 1e3),
+            density: density * per_mm,
+            low: low * per_mm,
+            high: high * per_mm,
+        }
+    }
+}
+
+fn x_mm(centre: &CentreOfPressure) -> Interval {
+    Interval::new(centre.position.x_m, centre.sd_x_m, centre.x_95_m(), 1e3)
+}
+
+fn y_mm(centre: &CentreOfPressure) -> Interval {
+    Interval::new(centre.position.y_m, centre.sd_y_m, centre.y_95_m(), 1e3)
 }

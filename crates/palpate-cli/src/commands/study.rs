@@ -1,16 +1,14 @@
 //! `palpate study`: a set of experiments, the founding paper's built in.
 
 use crate::failure::{Complaint, Failure};
+use crate::output::Table;
 use crate::progress::Observer;
-use crate::table::table;
-use crate::{input, interrupt, output, progress};
+use crate::{input, output, progress};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::units::format_count;
 use palpate_numerics::simd::InstructionSet;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
-use palpate_studies::dead_areas::DeadAreas;
-use palpate_studies::elliott::Elliott;
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
     ArmOutcome, ArmResults, NetworksCsv, PreparedStudy, RunFacts, RunOptions, StudyResults, StudyRunError,
@@ -19,14 +17,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 mod built_in;
-mod checkpoint;
-mod dead_areas;
-mod elliott;
-mod tally;
+mod fits;
 
-use built_in::BuiltIn;
-use checkpoint::CheckpointFile;
-use tally::Tally;
+use fits::{CheckpointFile, Tally};
 
 /// Run a set of experiments: arms by seeds; `paper` is the founding paper's study.
 #[derive(clap::Args)]
@@ -67,11 +60,10 @@ struct ResultsFile<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.study == Path::new(DeadAreas::NAME) {
-        return built_in::run(&dead_areas::study(arguments)?, arguments);
-    }
-    if arguments.study == Path::new(Elliott::NAME) {
-        return built_in::run(&elliott::study(arguments)?, arguments);
+    match arguments.study.to_str() {
+        Some("dead-areas") => return built_in::dead_areas(arguments),
+        Some("elliott") => return built_in::elliott(arguments),
+        _ => {}
     }
     let is_paper = arguments.study == Path::new("paper");
     let (name, text) = if is_paper {
@@ -85,11 +77,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         threads: arguments.threads.map_or_else(cores, usize::from),
     };
     let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(&study.name));
-    let observer = Observer::of_stages();
-    let observe = |progress| observer.observe(progress);
-    let prepared = PreparedStudy::new(study, Watch::new(&observe));
-    drop(observer);
-    let prepared = prepared.map_err(|error| complaint(&error, &name, &text))?;
+    let prepared = Observer::of_stages()
+        .watch(|watch| PreparedStudy::new(study, watch))
+        .map_err(|error| complaint(&error, &name, &text))?;
     let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
 
     let results = StudyResults::of(&outcomes, &prepared);
@@ -114,7 +104,7 @@ fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     match error {
         StudyRunError::Cancelled(_) => Failure::stopped(),
         StudyRunError::Design { place, error, .. } => {
-            complaint.help(super::design::help::for_sensors(error)).at_span(name, text, place.clone()).into()
+            complaint.help(super::design::help(error)).at_span(name, text, place.clone()).into()
         }
         _ => complaint.into(),
     }
@@ -143,7 +133,7 @@ fn train(
     let resumed: Vec<(usize, u64)> = done.iter().map(|trained| (trained.arm, trained.fit.seed)).collect();
     let tally = Tally::new(prepared, options, &table, file, &done);
     let start = Instant::now();
-    let go_on = |_| !interrupt::asked() && !tally.failed();
+    let go_on = |_| !progress::interrupted() && !tally.failed();
     let outcomes = prepared.run(options, done, &|trained| tally.note(trained), Watch::new(&go_on));
     let seconds = start.elapsed().as_secs_f64();
     let finished = tally.finish()?;
@@ -152,7 +142,7 @@ fn train(
         return Err(Failure::Interrupted(if keeps {
             let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
             let kept: u64 = kept.map(|(_, fits)| fits).sum();
-            let path = out.join(checkpoint::NAME);
+            let path = out.join(fits::NETWORKS_CSV);
             format!(
                 "stopped; {kept} of {wanted} networks are in {}; --resume goes on from them",
                 path.display()
@@ -164,7 +154,7 @@ fn train(
     }
     let outcomes = outcomes.map_err(Complaint::new)?;
     if keeps {
-        checkpoint::write_sorted(out, &table, prepared, &outcomes)?;
+        fits::write_sorted(out, &table, prepared, &outcomes)?;
     }
     Ok((outcomes.clone(), facts(prepared, options, &outcomes, &resumed, seconds)))
 }
@@ -179,7 +169,7 @@ fn facts(
     let mut presentations = 0;
     for (arm, outcome) in outcomes.iter().enumerate() {
         for fit in outcome.fits.iter().filter(|fit| !resumed.contains(&(arm, fit.seed))) {
-            presentations += tally::presentations(prepared, arm, fit);
+            presentations += fits::presentations(prepared, arm, fit);
         }
     }
     let precision = prepared.study.precision;
@@ -201,25 +191,31 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     output::say("Medians over the seeds (5th to 95th percentile)\n")?;
     output::say(arms_table(&file.results.arms))?;
     if let Some(figures) = &file.published {
-        let rows = figures.iter().map(|figure| {
-            let digits = if figure.median >= 1000.0 { 0 } else { 2 };
-            let show = |value: f64| if digits == 0 { whole(value) } else { format!("{value:.2}") };
-            let ours = format!("{} ({}–{})", show(figure.median), show(figure.p05), show(figure.p95));
-            let name = format!("{}: {}", figure.arm, figure.what);
-            vec![name, show(figure.published), ours, if figure.agrees { "yes" } else { "NO" }.to_owned()]
-        });
         let Agreement { agreeing, of } = Agreement::among(figures);
         output::say(format!("\nPublished against replicated: {agreeing} of {of} agree\n"))?;
-        output::say(table(&["figure", "published", "ours", "agrees"], rows))?;
+        let show = |figure: &PublishedFigure, value: f64| {
+            if figure.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
+        };
+        output::say(
+            Table::of(figures)
+                .column("figure", |figure| format!("{}: {}", figure.arm, figure.what))
+                .column("published", |figure| show(figure, figure.published))
+                .column("ours", |figure| {
+                    let [median, low, high] =
+                        [figure.median, figure.p05, figure.p95].map(|value| show(figure, value));
+                    format!("{median} ({low}–{high})")
+                })
+                .column("agrees", |figure| if figure.agrees { "yes" } else { "NO" }.to_owned()),
+        )?;
     }
     if let Some(claims) = &file.claims {
-        let rows = claims.iter().map(|claim| {
-            let verdict = if claim.holds { "holds" } else { "DOES NOT HOLD" };
-            let share = format!("{:.0} %", 100.0 * claim.share_of_seeds);
-            vec![format!("{} {}", claim.id, short(claim.claim)), verdict.to_owned(), share]
-        });
         output::say("\nThe paper's claims, in the medians and in the share of single seeds\n")?;
-        output::say(table(&["claim", "verdict", "seeds"], rows))?;
+        output::say(
+            Table::of(claims)
+                .column("claim", |claim| format!("{} {}", claim.id, short(claim.claim)))
+                .column("verdict", |claim| if claim.holds { "holds" } else { "DOES NOT HOLD" }.to_owned())
+                .column("seeds", |claim| format!("{:.0} %", 100.0 * claim.share_of_seeds)),
+        )?;
     }
     let run = file.run;
     let seconds = progress::duration(run.seconds);
@@ -229,19 +225,18 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     } else {
         format!("\n{seconds} on {} threads", run.threads)
     })?;
-    output::say(format!("Report: {}", out.join("report.html").display()))
+    output::say_report("", Some(out))
 }
 
 /// Every arm a row; a column only where some arm fills it.
 fn arms_table(arms: &[ArmResults]) -> String {
-    let columns = arm_columns(arms);
-    let filled = || columns.iter().filter(|(_, of)| arms.iter().any(|arm| of(arm).is_some()));
-    let headings: Vec<&str> = filled().map(|(heading, _)| heading.as_str()).collect();
-    let rows = arms.iter().map(|arm| {
-        let cells = filled().map(|(_, of)| of(arm).unwrap_or_else(|| "–".to_owned()));
-        cells.collect::<Vec<String>>()
-    });
-    table(&headings, rows)
+    let mut table = Table::of(arms);
+    for (heading, of) in arm_columns(arms) {
+        if arms.iter().any(|arm| of(arm).is_some()) {
+            table = table.column(heading, |arm| of(arm).unwrap_or_else(|| "–".to_owned()));
+        }
+    }
+    table.to_string()
 }
 
 /// A heading, and what an arm has to say under it.

@@ -1,13 +1,13 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
-mod track_line;
-
 use crate::failure::{Complaint, Failure};
 use crate::lines::Lines;
-use crate::table::table;
+use crate::output::Table;
 use crate::{input, output};
-use palpate_estimators::estimator::{Locator, SmoothTracker, Swing, Track, Tracker, TrackerConfig};
-use palpate_estimators::recording::{CsvError, TimedParser, TimedReading};
+use palpate_estimators::estimator::{
+    Across, Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig,
+};
+use palpate_estimators::recording::{TimedParser, TimedReading, csv_row};
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
@@ -15,7 +15,6 @@ use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_report::{TrackReport, track_report};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use track_line::Columns;
 
 /// Follow a moving contact, or two: readings in time in (a CSV file, or stdin), the track out.
 ///
@@ -148,7 +147,10 @@ impl Stream<'_> {
                 Ok(None) => {}
                 Ok(Some(reading)) => self.follow(&reading, &mut out)?,
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
-                Err(error) => self.skip(&error),
+                Err(error) => {
+                    self.lost += 1;
+                    eprintln!("palpate: skipped: {error}");
+                }
             }
             if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let complaint = Complaint::new(format!("{} has no column `time_s`", self.lines.name));
@@ -208,16 +210,11 @@ impl Stream<'_> {
 
     fn print(&self, track: &Track, line: u64, out: &mut impl Write) -> Result<(), Failure> {
         let line = if self.arguments.json {
-            track_line::json(track, line, self.extent)? + "\n"
+            json(track, line, self.extent)? + "\n"
         } else {
             self.columns.csv(track)
         };
         output::print(out, line.as_bytes())
-    }
-
-    fn skip(&mut self, error: &CsvError) {
-        self.lost += 1;
-        eprintln!("palpate: skipped: {error}");
     }
 
     /// The errors of both, where the truth is known.
@@ -236,31 +233,18 @@ impl Stream<'_> {
         if errors.is_empty() {
             return;
         }
-        let row = |(name, errors): &(&'static str, TrackErrors)| {
-            let mm = |error_m: f64| format!("{:.3}", error_m * 1e3);
-            let percent = |share: f64| format!("{:.1}", share * 100.0);
-            vec![
-                (*name).to_owned(),
-                errors.tracked.to_string(),
-                mm(errors.track_m),
-                mm(errors.single_m),
-                format!("{:.2}", errors.ratio()),
-                percent(errors.track_covered),
-                percent(errors.single_covered),
-                percent(errors.track_number_right),
-            ]
-        };
-        let heading = [
-            "average error, mm",
-            "contacts",
-            "track",
-            "single",
-            "ratio",
-            "covered, %",
-            "single, %",
-            "number right, %",
-        ];
-        eprintln!("{}", table(&heading, errors.iter().map(row)));
+        let mm = |error_m: f64| format!("{:.3}", error_m * 1e3);
+        let percent = |share: f64| format!("{:.1}", share * 100.0);
+        let table = Table::of(errors)
+            .column("average error, mm", |(name, _)| (*name).to_owned())
+            .column("contacts", |(_, errors)| errors.tracked.to_string())
+            .column("track", |(_, errors)| mm(errors.track_m))
+            .column("single", |(_, errors)| mm(errors.single_m))
+            .column("ratio", |(_, errors)| format!("{:.2}", errors.ratio()))
+            .column("covered, %", |(_, errors)| percent(errors.track_covered))
+            .column("single, %", |(_, errors)| percent(errors.single_covered))
+            .column("number right, %", |(_, errors)| percent(errors.track_number_right));
+        eprintln!("{table}");
     }
 
     fn report(
@@ -282,5 +266,161 @@ impl Stream<'_> {
             sweep,
         };
         output::write_report(folder, track_report(&report))
+    }
+}
+
+/// What a line of CSV has room for; the cells of a contact that does not touch are empty.
+#[derive(Clone, Copy)]
+enum Columns {
+    /// One contact on a line.
+    One,
+    /// Two contacts on a line.
+    Two,
+    /// One contact on a plane.
+    Plane,
+}
+
+impl Columns {
+    fn heading(self) -> String {
+        let one = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching";
+        let second = "position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
+        match self {
+            Self::One => one.to_owned(),
+            Self::Two => format!("{one},{second}"),
+            Self::Plane => "time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
+        }
+    }
+
+    /// A line of CSV.
+    fn csv(self, track: &Track) -> String {
+        let (first, second) = (track.contacts.first(), track.contacts.get(1));
+        let mut cells = vec![track.time_s.to_string()];
+        cells.extend(match self {
+            Self::One | Self::Two => cells_on_line(first),
+            Self::Plane => cells_on_plane(first),
+        });
+        cells.push(cell(track.touching()));
+        if let Self::Two = self {
+            cells.extend(cells_on_line(second));
+            cells.push(cell(track.numbers[2]));
+        }
+        csv_row(cells)
+    }
+}
+
+fn cells_on_line(contact: Option<&Tracked>) -> Vec<String> {
+    let Some(tracked) = contact else { return vec![String::new(); 5] };
+    let (low_m, high_m) = tracked.x_95_m;
+    [tracked.x_m * 1e3, tracked.speed_m_per_s, tracked.force_n, low_m * 1e3, high_m * 1e3].map(cell).to_vec()
+}
+
+fn cells_on_plane(contact: Option<&Tracked>) -> Vec<String> {
+    let on_plane = contact.and_then(|tracked| Some((tracked, tracked.across?)));
+    let Some((tracked, across)) = on_plane else { return vec![String::new(); 9] };
+    let ((x_low_m, x_high_m), (y_low_m, y_high_m)) = (tracked.x_95_m, across.y_95_m);
+    let numbers = [
+        tracked.x_m * 1e3,
+        across.y_m * 1e3,
+        tracked.speed_m_per_s,
+        across.speed_m_per_s,
+        tracked.force_n,
+        x_low_m * 1e3,
+        x_high_m * 1e3,
+        y_low_m * 1e3,
+        y_high_m * 1e3,
+    ];
+    numbers.map(cell).to_vec()
+}
+
+fn cell(number: f64) -> String {
+    format!("{number:.4}")
+}
+
+/// A track as JSON.
+#[derive(serde::Serialize)]
+struct JsonTrack {
+    line: u64,
+    time_s: f64,
+    touching: f64,
+    /// The first contact, or the only one.
+    #[serde(flatten)]
+    contact: Option<JsonContact>,
+    two_touching: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<JsonContact>,
+    /// Where the reading by itself shows the contact; on a plane its x and y.
+    single_mm: JsonPosition,
+    single_status: &'static str,
+}
+
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+enum JsonPosition {
+    OnLine(f64),
+    OnPlane([f64; 2]),
+}
+
+#[derive(serde::Serialize)]
+struct JsonContact {
+    x_mm: f64,
+    speed_m_per_s: f64,
+    force_n: f64,
+    x_95_mm: [f64; 2],
+    sd_mm: f64,
+    sd_speed_m_per_s: f64,
+    sd_force_n: f64,
+    #[serde(flatten)]
+    across: Option<JsonAcross>,
+}
+
+#[derive(serde::Serialize)]
+struct JsonAcross {
+    y_mm: f64,
+    speed_y_m_per_s: f64,
+    y_95_mm: [f64; 2],
+    sd_y_mm: f64,
+    sd_speed_y_m_per_s: f64,
+    covariance_mm2: f64,
+}
+
+/// A line of JSON: all that is known of the reading in line `line` of its source.
+fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
+    let position = track.alone.contact.position;
+    let object = JsonTrack {
+        line,
+        time_s: track.time_s,
+        touching: track.touching(),
+        contact: track.contacts.first().map(json_contact),
+        two_touching: track.numbers[2],
+        second: track.contacts.get(1).map(json_contact),
+        single_mm: match extent {
+            Extent::Line { .. } => JsonPosition::OnLine(position.x_m * 1e3),
+            Extent::Plane { .. } => JsonPosition::OnPlane([position.x_m * 1e3, position.y_m * 1e3]),
+        },
+        single_status: track.alone.status.name(),
+    };
+    serde_json::to_string(&object).map_err(|error| Complaint::new(error).into())
+}
+
+fn json_contact(tracked: &Tracked) -> JsonContact {
+    let mm = |(low_m, high_m): (f64, f64)| [low_m * 1e3, high_m * 1e3];
+    let [sd_m, sd_speed_m_per_s, sd_force_n] = tracked.sd;
+    let across = |across: Across| JsonAcross {
+        y_mm: across.y_m * 1e3,
+        speed_y_m_per_s: across.speed_m_per_s,
+        y_95_mm: mm(across.y_95_m),
+        sd_y_mm: across.sd[0] * 1e3,
+        sd_speed_y_m_per_s: across.sd[1],
+        covariance_mm2: across.covariance_m2 * 1e6,
+    };
+    JsonContact {
+        x_mm: tracked.x_m * 1e3,
+        speed_m_per_s: tracked.speed_m_per_s,
+        force_n: tracked.force_n,
+        x_95_mm: mm(tracked.x_95_m),
+        sd_mm: sd_m * 1e3,
+        sd_speed_m_per_s,
+        sd_force_n,
+        across: tracked.across.map(across),
     }
 }

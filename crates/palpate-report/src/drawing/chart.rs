@@ -1,6 +1,6 @@
-//! The chart as data: axes, series and marks, with no drawing in it.
+//! The chart as data: series, marks and what they span, with no drawing in it.
 
-use super::ticks::plain;
+use super::axis::Axis;
 
 /// A chart of one plot area, its title, axes, series and legend.
 ///
@@ -45,59 +45,6 @@ impl Chart {
     pub fn with_marks(self, marks: Vec<Mark>) -> Self {
         Chart { marks, ..self }
     }
-}
-
-/// One axis of a chart.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Axis {
-    /// What is measured, with its unit: "load position, mm".
-    pub label: String,
-    /// First and last value shown, in either order. `None`, a span of nothing, and ends that the scale cannot show (not finite, or not
-    /// positive on a logarithmic axis): from the data and marks, with padding; a linear axis then ends on round numbers and is not
-    /// padded across zero.
-    pub range: Option<(f64, f64)>,
-    /// How values map to lengths.
-    pub scale: Scale,
-    /// Values with a labelled tick, each with its label, where they lie in the range; one whose label would touch its neighbour's is
-    /// left out. `None`: round numbers, as many as are readable.
-    pub ticks: Option<Vec<(f64, String)>>,
-}
-
-impl Axis {
-    /// A linear axis with automatic range and ticks.
-    pub fn linear(label: impl Into<String>) -> Self {
-        Axis { label: label.into(), ..Axis::default() }
-    }
-
-    /// A logarithmic axis with automatic range and ticks.
-    pub fn log10(label: impl Into<String>) -> Self {
-        Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
-    }
-
-    /// The same axis from `low` to `high`.
-    pub fn from_to(self, low: f64, high: f64) -> Self {
-        Axis { range: Some((low, high)), ..self }
-    }
-
-    /// The same axis with names instead of numbers.
-    pub fn named(self, names: Vec<(f64, String)>) -> Self {
-        Axis { ticks: Some(names), ..self }
-    }
-
-    /// The same axis with ticks at `values` only.
-    pub fn ticks_at(self, values: impl IntoIterator<Item = f64>) -> Self {
-        self.named(values.into_iter().map(|value| (value, plain(value))).collect())
-    }
-}
-
-/// How values map to lengths along an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scale {
-    /// Equal differences have equal lengths.
-    #[default]
-    Linear,
-    /// Equal ratios have equal lengths.
-    Log10,
 }
 
 /// One thing that is drawn, with one entry in the legend.
@@ -261,4 +208,57 @@ pub enum Mark {
         /// Its name; empty for none.
         label: String,
     },
+}
+
+/// Positive values whose greatest is this many times the least are drawn on a logarithmic axis.
+const LOGARITHMIC_FROM: f64 = 10.0;
+
+/// The least and the greatest of some values; zeros where none of them is a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Extremes {
+    pub least: f64,
+    pub greatest: f64,
+}
+
+impl Extremes {
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let finite = values.into_iter().filter(|value| value.is_finite());
+        let wider = |extremes: Option<Self>, value: f64| {
+            let Self { least, greatest } = extremes.unwrap_or(Self { least: value, greatest: value });
+            Some(Self { least: least.min(value), greatest: greatest.max(value) })
+        };
+        finite.fold(None, wider).unwrap_or_default()
+    }
+
+    /// Of the heights of all lines.
+    pub fn of_lines(series: &[Series]) -> Self {
+        Self::of(series.iter().flat_map(|series| match &series.kind {
+            SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
+            _ => Vec::new(),
+        }))
+    }
+
+    /// Whether only a logarithmic axis shows both ends.
+    pub fn are_far_apart(self) -> bool {
+        self.least > 0.0 && self.greatest >= LOGARITHMIC_FROM * self.least
+    }
+
+    /// An axis that shows both ends: logarithmic where they are far apart.
+    pub fn axis(self, label: &str) -> Axis {
+        if self.are_far_apart() { Axis::log10(label) } else { Axis::linear(label) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_does_not_count() {
+        let extremes = Extremes::of([3.0, f64::NAN, 0.3, f64::INFINITY]);
+        assert_eq!(extremes, Extremes { least: 0.3, greatest: 3.0 });
+        assert!(extremes.are_far_apart());
+        assert!(!Extremes::of([0.0, 3.0]).are_far_apart());
+        assert_eq!(Extremes::of([f64::NAN]), Extremes::default());
+    }
 }

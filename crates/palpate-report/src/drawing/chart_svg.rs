@@ -1,11 +1,10 @@
 //! A chart as SVG text.
 
+use super::axis::minor_ticks;
 use super::chart::{BandPoint, Chart, ErrorPoint, Mark, Marker, Series, SeriesKind, Stroke};
 use super::geometry::{Point, Rect};
-use super::layout::Layout;
-use super::legend::Named;
+use super::layout::{Layout, Named};
 use super::svg::{BLACK, Colour, GRID, MINOR_GRID, QUIET_INK, REFERENCE, Svg, WHITE, palette};
-use super::ticks;
 
 const LINE_WIDTH: f64 = 1.8;
 const REFERENCE_WIDTH: f64 = 1.2;
@@ -69,8 +68,8 @@ impl Painter<'_> {
             let up = self.layout.up(y.tick_share(value));
             [(plot.left, up), (plot.right, up)]
         };
-        let minor_columns = ticks::minor(x, x_ticks).into_iter().map(column);
-        let minor_rows = ticks::minor(y, y_ticks).into_iter().map(row);
+        let minor_columns = minor_ticks(x, x_ticks).into_iter().map(column);
+        let minor_rows = minor_ticks(y, y_ticks).into_iter().map(row);
         let columns = x_ticks.iter().map(|tick| column(tick.value));
         let rows = y_ticks.iter().map(|tick| row(tick.value));
         minor_columns.chain(minor_rows).for_each(|line| self.svg.line(&line, 1.0, MINOR_GRID));

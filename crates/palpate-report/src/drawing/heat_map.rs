@@ -1,12 +1,10 @@
 //! A quantity over a plane as colours: one map, or several of the same plane and scale beside each other.
 
-use super::chart::Axis;
-use super::extremes::Extremes;
+use super::axis::{Axis, AxisScale, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels};
+use super::chart::Extremes;
 use super::geometry::{Point, Rect};
-use super::scale::AxisScale;
 use super::svg::{Anchor, Colour, GRID, INK, Label, QUIET_INK, Svg, WHITE};
 use super::text;
-use super::ticks::{self, TICK_SIZE, Tick, columns_fit, rows_fit, tick_labels};
 use palpate_estimators::estimator::Cells;
 
 const MARGIN: f64 = 12.0;
@@ -146,8 +144,8 @@ impl Layout {
         let height = (top + rows * row_height).max(bar.bottom + FOOT) + NAME_LINE + MARGIN;
         let axis = |size_mm: f64| AxisScale::new(&Axis::linear("").from_to(0.0, size_mm), &[]);
         let (x, y) = (axis(length_mm), axis(width_mm));
-        let x_ticks = ticks::choose(&x, None, &|ticks| columns_fit(&x, ticks, map_width));
-        let y_ticks = ticks::choose(&y, None, &|ticks| rows_fit(&y, ticks, map_height));
+        let x_ticks = choose_ticks(&x, None, &|ticks| columns_fit(&x, ticks, map_width));
+        let y_ticks = choose_ticks(&y, None, &|ticks| rows_fit(&y, ticks, map_height));
         Self { height, plots, bar, colours: colours(map), x: (x, x_ticks), y: (y, y_ticks) }
     }
 
@@ -194,7 +192,7 @@ impl Layout {
             svg.rectangle(area, colour_of((i as f64 + 0.5) / STEPS as f64));
         }
         let fits = |ticks: &[Tick]| rows_fit(&self.colours, ticks, bottom - top);
-        for Tick { value, label } in ticks::choose(&self.colours, None, &fits) {
+        for Tick { value, label } in choose_ticks(&self.colours, None, &fits) {
             let y = bottom - self.colours.tick_share(value) * (bottom - top);
             svg.line(&[(right, y), (right + 4.0, y)], 1.0, QUIET_INK);
             let at = (right + 8.0, y);

@@ -3,13 +3,13 @@
 //! From top to bottom: title, label of the vertical axis, names of vertical marks, plot, tick labels, label of
 //! the horizontal axis, legend. Each has a strip of its own, so no text can lie over data.
 
-use super::chart::{Chart, Mark};
+use super::axis::{
+    AxisScale, LABEL_GAP, TICK_GAP, TICK_SIZE, Tick, choose_ticks, columns_fit, rows_fit, tick_labels,
+};
+use super::chart::{Chart, Mark, Series, SeriesKind};
 use super::geometry::{Point, Rect};
-use super::legend::{self, Legend};
-use super::scale::{self, AxisScale};
 use super::svg::{Anchor, INK, Label, QUIET_INK};
 use super::text;
-use super::ticks::{self, LABEL_GAP, TICK_GAP, TICK_SIZE, Tick, columns_fit, rows_fit, tick_labels};
 
 const MARGIN: f64 = 12.0;
 const TITLE_SIZE: f64 = 15.0;
@@ -50,7 +50,7 @@ impl<'a> Layout<'a> {
     pub fn new(chart: &'a Chart) -> Self {
         let (width_px, height_px) = (chart.width_px.clamp(320, 4000), chart.height_px.clamp(280, 4000));
         let (width, height) = (f64::from(width_px), f64::from(height_px));
-        let (x_values, y_values) = scale::values(chart);
+        let (x_values, y_values) = values(chart);
         let (x, y) = (AxisScale::new(&chart.x, &x_values), AxisScale::new(&chart.y, &y_values));
 
         let (mut labels, header_bottom) = header(chart, width);
@@ -58,15 +58,15 @@ impl<'a> Layout<'a> {
         let footer = TICK_LINE + line_if(&chart.x.label, AXIS_LABEL_LINE) + STRIP_GAP + MARGIN;
         let free = height - header_bottom - most_mark_rows as f64 * MARK_LINE - footer;
         let least_plot = (LEAST_PLOT_SHARE * height).max(60.0);
-        let legend_rows = ((free - least_plot) / legend::ROW_HEIGHT).floor().max(1.0) as usize;
+        let legend_rows = ((free - least_plot) / ROW_HEIGHT).floor().max(1.0) as usize;
         let legend = Legend::new(chart, width - 2.0 * MARGIN, legend_rows);
 
         let least_height = free - legend.height;
-        let y_ticks = ticks::choose(&y, chart.y.ticks.as_deref(), &|ticks| rows_fit(&y, ticks, least_height));
+        let y_ticks = choose_ticks(&y, chart.y.ticks.as_deref(), &|ticks| rows_fit(&y, ticks, least_height));
         let left = MARGIN + (widest(&y_ticks) + TICK_GAP).max(LEAST_GUTTER);
         let least_width = width - left - MARGIN - OVERHANG;
         let x_ticks =
-            ticks::choose(&x, chart.x.ticks.as_deref(), &|ticks| columns_fit(&x, ticks, least_width));
+            choose_ticks(&x, chart.x.ticks.as_deref(), &|ticks| columns_fit(&x, ticks, least_width));
         let right = width - MARGIN - overhang(&x, &x_ticks, least_width);
 
         let (mark_rows, mark_labels) = mark_labels(chart, &x, (left, right), header_bottom);
@@ -205,4 +205,166 @@ fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
         half - (1.0 - axis.tick_share(tick.value)) * width
     });
     reach.clamp(4.0, OVERHANG)
+}
+
+/// Every x and every y that the chart's data and marks name.
+fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
+    let (mut xs, mut ys) = (Vec::new(), Vec::new());
+    for series in &chart.series {
+        match &series.kind {
+            SeriesKind::Line { points, .. } | SeriesKind::Points { points, .. } => {
+                for &(x, y) in points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+                    xs.push(x);
+                    ys.push(y);
+                }
+            }
+            SeriesKind::Band { points } => {
+                xs.extend(points.iter().map(|point| point.x));
+                ys.extend(points.iter().flat_map(|point| [point.low, point.high]));
+            }
+            SeriesKind::ErrorBars { points, .. } => {
+                xs.extend(points.iter().map(|point| point.x));
+                ys.extend(points.iter().flat_map(|point| [point.low, point.y, point.high]));
+            }
+        }
+    }
+    for mark in &chart.marks {
+        match mark {
+            Mark::VerticalLine { x, .. } => xs.push(*x),
+            Mark::HorizontalLine { y, .. } => ys.push(*y),
+            Mark::Span { low, high, .. } => xs.extend([*low, *high]),
+        }
+    }
+    (xs, ys)
+}
+
+/// Height of a row of the legend.
+const ROW_HEIGHT: f64 = 20.0;
+const NAME_SIZE: f64 = 12.0;
+const SWATCH_WIDTH: f64 = 24.0;
+/// From the left of a swatch to the left of its name.
+const INDENT: f64 = 31.0;
+const GAP: f64 = 18.0;
+
+/// What an entry names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Named<'a> {
+    Series(&'a Series),
+    /// A horizontal reference line.
+    Reference,
+}
+
+/// One name and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry<'a> {
+    pub named: Named<'a>,
+    /// Where the sample of its drawing goes.
+    pub swatch: Rect,
+    pub label: Label,
+    /// All the room it takes.
+    pub area: Rect,
+}
+
+/// The legend of a chart, with its own left and top at zero until it is moved.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Legend<'a> {
+    pub entries: Vec<Entry<'a>>,
+    /// Says how many names found no room.
+    pub remainder: Option<Label>,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl<'a> Legend<'a> {
+    /// Entries from left to right in rows of `width`, in no more than `most_rows` rows.
+    pub fn new(chart: &'a Chart, width: f64, most_rows: usize) -> Self {
+        let names: Vec<(Named<'_>, String)> =
+            names(chart).map(|(named, name)| (named, text::fit(name, NAME_SIZE, width - INDENT))).collect();
+        let mut kept = names.len();
+        let mut places = arrange(&names, kept, width);
+        while kept > 0 && places.last().is_some_and(|place| place.row >= most_rows) {
+            kept -= 1;
+            places = arrange(&names, kept, width);
+        }
+        if places.last().is_some_and(|place| place.row >= most_rows) {
+            places.clear();
+        }
+        let entries =
+            names.iter().zip(&places).take(kept).map(|((named, name), place)| entry(*named, name, place));
+        Legend {
+            entries: entries.collect(),
+            remainder: places
+                .get(kept)
+                .map(|place| label(remainder(names.len() - kept), place.left, place.row)),
+            width: places.iter().map(|place| place.left + place.width).fold(0.0, f64::max),
+            height: places.last().map_or(0.0, |place| (place.row + 1) as f64 * ROW_HEIGHT),
+        }
+    }
+
+    /// The legend with its left upper corner elsewhere.
+    pub fn moved(mut self, left: f64, top: f64) -> Self {
+        for entry in &mut self.entries {
+            entry.swatch = entry.swatch.moved(left, top);
+            entry.area = entry.area.moved(left, top);
+        }
+        for label in self.entries.iter_mut().map(|entry| &mut entry.label).chain(&mut self.remainder) {
+            label.at = (label.at.0 + left, label.at.1 + top);
+        }
+        self
+    }
+}
+
+/// Where an entry goes.
+struct Place {
+    left: f64,
+    row: usize,
+    width: f64,
+}
+
+/// Places of the first `kept` names and, if that is not all of them, of the remark about the others.
+fn arrange(names: &[(Named<'_>, String)], kept: usize, width: f64) -> Vec<Place> {
+    let mut widths: Vec<f64> =
+        names[..kept].iter().map(|(_, name)| INDENT + text::width(name, NAME_SIZE)).collect();
+    if kept < names.len() {
+        widths.push(text::width(&remainder(names.len() - kept), NAME_SIZE));
+    }
+    let (mut left, mut row) = (0.0, 0);
+    let mut places = Vec::new();
+    for entry_width in widths {
+        if left > 0.0 && left + entry_width > width {
+            (left, row) = (0.0, row + 1);
+        }
+        places.push(Place { left, row, width: entry_width });
+        left += entry_width + GAP;
+    }
+    places
+}
+
+fn names(chart: &Chart) -> impl Iterator<Item = (Named<'_>, &str)> {
+    let series = chart.series.iter().map(|series| (Named::Series(series), series.label.as_str()));
+    let references = chart.marks.iter().filter_map(|mark| match mark {
+        Mark::HorizontalLine { label, .. } => Some((Named::Reference, label.as_str())),
+        Mark::VerticalLine { .. } | Mark::Span { .. } => None,
+    });
+    series.chain(references).filter(|(_, name)| !name.trim().is_empty())
+}
+
+fn remainder(count: usize) -> String {
+    format!("and {count} more")
+}
+
+fn label(text: String, left: f64, row: usize) -> Label {
+    let middle = (row as f64 + 0.5) * ROW_HEIGHT;
+    Label { text, at: (left, middle), anchor: Anchor::Start, size: NAME_SIZE, colour: INK }
+}
+
+fn entry<'a>(named: Named<'a>, name: &str, place: &Place) -> Entry<'a> {
+    let top = place.row as f64 * ROW_HEIGHT;
+    let left = place.left;
+    Entry {
+        named,
+        swatch: Rect { left, top: top + 4.0, right: left + SWATCH_WIDTH, bottom: top + ROW_HEIGHT - 4.0 },
+        label: label(name.to_owned(), left + INDENT, place.row),
+        area: Rect { left, top, right: left + place.width, bottom: top + ROW_HEIGHT },
+    }
 }

@@ -5,7 +5,7 @@ use maud::html;
 use super::Paper;
 use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
-use crate::study_parts::{ArmLine, along, error_chart};
+use crate::study_report::{ArmLine, along, error_chart};
 use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;

@@ -1,14 +1,20 @@
-//! The paper's tables 1 to 3, computed from the arrangements and the fits.
+//! The paper's tables 1 to 3 computed again; published against replicated, the claims and what does not replicate; and what the
+//! paper leaves open.
 
 use maud::{Markup, html};
 
 use super::{Paper, ours};
-use crate::numbers::{NOTHING, listed, mm, number, spread, stretch};
-use crate::page::{Table, numeric, short, text, wide};
+use crate::numbers::{NOTHING, as_written, listed, mm, number, spread, stated, stretch, whole};
+use crate::page::{Table, verdict};
 use palpate_estimators::arrangement::{Arrangement, Training};
+use palpate_estimators::estimator::Setting;
 use palpate_estimators::evaluation::{Portion, Quantiles};
 use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Surface;
+use palpate_rig::Rig;
 use palpate_studies::PortionResults;
+use palpate_studies::paper::{Claim, ClaimPart, PublishedFigure, Yardstick};
 
 /// Arms with the same training positions.
 struct Set<'a> {
@@ -39,87 +45,65 @@ impl Paper<'_> {
 
     pub(super) fn even_table(&self) -> Table {
         let sets = self.sets(|arrangement| *arrangement == Arrangement::Even);
-        let rows = sets.iter().enumerate().map(|(i, set)| {
-            vec![
-                text((i + 1).to_string()),
-                text(set.positions.len().to_string()),
-                text(end(set.positions.first())),
-                text(even_pitch(&set.positions)),
-                text(end(set.positions.last())),
-                text(listed(&set.arms)),
-            ]
-        });
-        let columns = [
-            short("set"),
-            numeric("positions"),
-            numeric("first, mm"),
-            numeric("pitch, mm"),
-            numeric("last, mm"),
-            short("arms"),
-        ];
-        let caption = html! { "Equally spaced sets of training positions, computed from their rule." };
-        Table::new(columns, rows, caption)
+        Table::of(sets.iter().zip(1..))
+            .short("set", |(_, number)| number.to_string())
+            .numeric("positions", |(set, _)| set.positions.len().to_string())
+            .numeric("first, mm", |(set, _)| end(set.positions.first()))
+            .numeric("pitch, mm", |(set, _)| even_pitch(&set.positions))
+            .numeric("last, mm", |(set, _)| end(set.positions.last()))
+            .short("arms", |(set, _)| listed(&set.arms))
+            .caption(html! { "Equally spaced sets of training positions, computed from their rule." })
     }
 
     pub(super) fn edge_dense_table(&self) -> Table {
         let length_m = self.report.length_m();
         let sets = self.sets(|arrangement| matches!(arrangement, Arrangement::EdgeDense { .. }));
-        let columns = [
-            short("set"),
-            numeric("positions"),
-            numeric("in the middle"),
-            numeric("in each edge"),
-            numeric("start, mm"),
-            numeric("pitch in the edges, mm"),
-            numeric("pitch in the middle, mm"),
-            wide("positions, mm"),
-            short("arm"),
-        ];
         let caption = html! {
             "Sets with few training positions in the middle portion and the others near the supports, computed from their \
              rule. The middle portion" (middle_in_words(&sets, length_m)) " begins and ends with a training position; dots \
              part it from the edges."
         };
-        Table::new(columns, sets.iter().filter_map(|set| edge_dense_row(set, length_m)), caption)
+        Table::of(sets.iter().filter_map(EdgeDense::of))
+            .short("set", |row| paper_name(row.set.positions.len(), row.middle))
+            .numeric("positions", |row| row.set.positions.len().to_string())
+            .numeric("in the middle", |row| row.middle.to_string())
+            .numeric("in each edge", |row| row.edge.to_string())
+            .numeric("start, mm", |row| end(row.set.positions.first()))
+            .numeric("pitch in the edges, mm", |row| mm(row.portion.0 * length_m / (row.edge + 1) as f64))
+            .numeric("pitch in the middle, mm", |row| even_pitch(row.parts()[1]))
+            .wide("positions, mm", |row| {
+                let parts = row.parts().into_iter().filter(|part| !part.is_empty());
+                parts.map(run_of).collect::<Vec<_>>().join(" · ")
+            })
+            .short("arm", |row| listed(&row.set.arms))
+            .caption(caption)
     }
 
     pub(super) fn portions_table(&self) -> Table {
-        let mut rows = Vec::new();
+        let mut rows: Vec<(&str, Portion, String, Quantiles)> = Vec::new();
         if let Some(arm) = self.report.results.arm("position-10") {
             let all = self.report.judged_portion();
-            rows.extend(all.map(|all| self.portion_row("average", all, "error_percent", arm.error_percent)));
+            rows.extend(all.map(|all| ("average", all, "error_percent".to_owned(), arm.error_percent)));
             rows.extend(arm.portions.iter().map(|PortionResults { portion, error_percent, .. }| {
-                let key = format!("error_percent_{}", portion.key());
-                self.portion_row("average", *portion, &key, *error_percent)
+                ("average", *portion, format!("error_percent_{}", portion.key()), *error_percent)
             }));
             rows.extend(arm.portions.iter().map(|PortionResults { portion, max_error_percent, .. }| {
-                let key = format!("max_error_percent_{}", portion.key());
-                self.portion_row("largest", *portion, &key, *max_error_percent)
+                ("largest", *portion, format!("max_error_percent_{}", portion.key()), *max_error_percent)
             }));
         }
-        let columns = [
-            short("portion"),
-            short("error"),
-            numeric("published, %"),
-            numeric("found, %"),
-            numeric("found, mm"),
-        ];
+        let published = |key: &str| self.published("position-10", key);
+        let mm_per_percent = self.report.length_m() * 1e3 / 100.0;
         let caption = html! {
             "Percentage errors of the plain position output with ten training positions, by portion of the beam: what the \
              paper prints, and the median found here (5–95 % of the seeds)."
         };
-        Table::new(columns, rows, caption)
-    }
-
-    fn portion_row(&self, kind: &str, portion: Portion, key: &str, found: Quantiles) -> Vec<Markup> {
-        let published = self.published("position-10", key);
-        vec![
-            text(stretch(portion)),
-            text(kind),
-            text(published.map_or(NOTHING.to_owned(), super::verdicts::printed)),
-            text(spread(published.map_or(found, ours), number)),
-            text(spread(found.scaled(self.report.length_m() * 1e3 / 100.0), number)),
-        ]
+        Table::of(rows)
+            .short("portion", |(_, portion, ..)| stretch(*portion))
+            .short("error", |(kind, ..)| *kind)
+            .numeric("published, %", |(_, _, key, _)| published(key).map_or(NOTHING.to_owned(), printed))
+            .numeric("found, %", |(_, _, key, found)| spread(published(key).map_or(*found, ours), number))
+            .numeric("found, mm", |(.., found)| spread(found.scaled(mm_per_percent), number))
+            .caption(caption)
     }
 }
 
@@ -143,26 +127,27 @@ fn paper_name(count: usize, middle: usize) -> String {
     }
 }
 
-fn edge_dense_row(set: &Set, length_m: f64) -> Option<Vec<Markup>> {
-    let Arrangement::EdgeDense { middle, portion } = &set.training.arrangement else { return None };
-    let count = set.positions.len();
-    let edge = (count - middle) / 2;
-    let parts =
-        [&set.positions[..edge], &set.positions[edge..edge + middle], &set.positions[edge + middle..]];
-    let edge_pitch = portion.0 * length_m / (edge + 1) as f64;
-    let compact: Vec<String> =
-        parts.iter().filter(|part| !part.is_empty()).map(|part| run_of(part)).collect();
-    Some(vec![
-        text(paper_name(count, *middle)),
-        text(count.to_string()),
-        text(middle.to_string()),
-        text(edge.to_string()),
-        text(end(set.positions.first())),
-        text(mm(edge_pitch)),
-        text(even_pitch(parts[1])),
-        text(compact.join(" · ")),
-        text(listed(&set.arms)),
-    ])
+/// A set with a middle portion and two edges.
+struct EdgeDense<'a> {
+    set: &'a Set<'a>,
+    middle: usize,
+    /// Positions in each edge.
+    edge: usize,
+    portion: (f64, f64),
+}
+
+impl<'a> EdgeDense<'a> {
+    fn of(set: &'a Set<'a>) -> Option<Self> {
+        let Arrangement::EdgeDense { middle, portion } = set.training.arrangement else { return None };
+        Some(Self { set, middle, edge: (set.positions.len() - middle) / 2, portion })
+    }
+
+    /// Left edge, middle, right edge.
+    fn parts(&self) -> [&'a [Position]; 3] {
+        let (edge, middle) = (self.edge, self.middle);
+        let positions = &self.set.positions;
+        [&positions[..edge], &positions[edge..edge + middle], &positions[edge + middle..]]
+    }
 }
 
 /// " (100–300 mm)" where every set has the same middle portion.
@@ -187,5 +172,258 @@ fn run_of(positions: &[Position]) -> String {
             format!("{}, {} … {}", shown(first), shown(second), shown(last))
         }
         _ => positions.iter().map(shown).collect::<Vec<_>>().join(", "),
+    }
+}
+
+/// A share of seeds below this is worth a remark where the medians hold.
+const MOST_SEEDS: f64 = 0.5;
+
+impl Paper<'_> {
+    pub(super) fn about_published(&self) -> Markup {
+        if self.published.is_empty() {
+            return html! { p { "No arm with a published figure was run." } };
+        }
+        html! {
+            p {
+                "Each published figure comes from one network that the author trained; another random start would have given \
+                 another figure. How far ours may be off to count as agreeing was fixed beforehand."
+            }
+        }
+    }
+
+    pub(super) fn published_table(&self) -> Table {
+        let caption = html! {
+            "Every figure that the paper prints and that belongs to an arm here, beside the median found here (5–95 % of \
+             the seeds)."
+        };
+        Table::of(&self.published)
+            .short("arm", |figure| figure.arm)
+            .short("figure", |figure| figure.what)
+            .numeric("published", |figure| printed(figure))
+            .numeric("found", |figure| spread(ours(figure), shown(figure)))
+            .short("agrees if within", |figure| yardstick(figure))
+            .column("short", "verdict", |figure| verdict(figure.agrees, "agrees", "differs"))
+            .caption(caption)
+    }
+
+    pub(super) fn about_claims(&self) -> Markup {
+        html! {
+            @if self.claims.is_empty() { p { "The arms that the paper's claims are about were not all run." } }
+        }
+    }
+
+    pub(super) fn claims_table(&self) -> Table {
+        let caption = html! {
+            "The paper's claims in our words, each parted into what a program can check. A claim holds when every part of \
+             it holds in the medians. ✓ and ✗ say whether a part does; beside them is the share of the seeds for which it \
+             holds, each seed of one arm beside the same seed of another, and in the last column the share of those for \
+             which every part holds."
+        };
+        let in_words = |claim: &&Claim| {
+            html! { (claim.claim) ul { @for part in &claim.parts { li { (part_in_words(part)) } } } }
+        };
+        Table::of(&self.claims)
+            .short("claim", |claim| claim.id)
+            .column("wide", "in words, and its parts", in_words)
+            .column("short", "verdict", |claim| verdict(claim.holds, "holds", "does not hold"))
+            .numeric("share of seeds", |claim| share(claim.share_of_seeds))
+            .caption(caption)
+    }
+
+    pub(super) fn not_replicated(&self) -> Markup {
+        let figures: Vec<&PublishedFigure> = self.published.iter().filter(|figure| !figure.agrees).collect();
+        let failed: Vec<&Claim> = self.claims.iter().filter(|claim| !claim.holds).collect();
+        let unsteady: Vec<&Claim> =
+            self.claims.iter().filter(|claim| claim.holds && claim.share_of_seeds < MOST_SEEDS).collect();
+        html! {
+            @if self.published.is_empty() && self.claims.is_empty() {
+                p { "Nothing was compared." }
+            } @else if figures.is_empty() && failed.is_empty() {
+                p { "Every published figure that was compared agrees, and every claim that was judged holds in the medians." }
+            }
+            @if !figures.is_empty() {
+                h3 { "Figures" }
+                ul { @for figure in &figures { li { (difference(figure)) } } }
+            }
+            @if !failed.is_empty() {
+                h3 { "Claims" }
+                ul { @for claim in &failed { li { (failure(claim)) } } }
+            }
+            @if !unsteady.is_empty() {
+                h3 { "Claims that a single run may well miss" }
+                p { "They hold in the medians, but for fewer than half of the seeds by themselves:" }
+                ul {
+                    @for claim in &unsteady {
+                        li { b { (claim.id) } " (" (claim.claim) "): every part holds for " (share(claim.share_of_seeds)) " of the seeds." }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What the paper prints; a bound with its sign.
+fn printed(figure: &PublishedFigure) -> String {
+    let sign = if figure.yardstick == Yardstick::Below { "< " } else { "" };
+    format!("{sign}{}", as_written(figure.published))
+}
+
+fn shown(figure: &PublishedFigure) -> fn(f64) -> String {
+    if matches!(figure.yardstick, Yardstick::Factor(_)) { whole } else { number }
+}
+
+fn yardstick(figure: &PublishedFigure) -> String {
+    match figure.yardstick {
+        Yardstick::Within(difference) => format!("±{difference} points"),
+        Yardstick::Factor(factor) => format!("a factor of {factor}"),
+        Yardstick::Below => format!("below {}", as_written(figure.published)),
+    }
+}
+
+fn difference(figure: &PublishedFigure) -> Markup {
+    let inside = (figure.p05..=figure.p95).contains(&figure.published);
+    html! {
+        b { (figure.arm) } ", " (figure.what) ": the paper prints " (printed(figure)) ", the median found here is "
+        (shown(figure)(figure.median)) ", not " @if figure.yardstick != Yardstick::Below { "within " } (yardstick(figure)) ". "
+        @if figure.yardstick == Yardstick::Below {
+            @if figure.p05 < figure.published { "Some seeds do stay below it." }
+            @else { "Hardly any seed stays below it." }
+        } @else if inside {
+            "The published figure is within the range of the seeds."
+        } @else {
+            "The published figure is outside the range of the seeds."
+        }
+    }
+}
+
+fn failure(claim: &Claim) -> Markup {
+    let failed: Vec<&ClaimPart> = claim.parts.iter().filter(|part| !part.holds).collect();
+    html! {
+        b { (claim.id) } " says: " (claim.claim) ". "
+        @if failed.len() == claim.parts.len() { "None of its parts holds in the medians:" }
+        @else { "In the medians, " (failed.len()) " of its " (claim.parts.len()) " parts " (fails(failed.len())) ":" }
+        ul { @for part in &failed { li { (part.what) " (holds for " (share(part.share_of_seeds)) " of the seeds)" } } }
+    }
+}
+
+fn fails(count: usize) -> &'static str {
+    if count == 1 { "does not hold" } else { "do not hold" }
+}
+
+fn part_in_words(part: &ClaimPart) -> Markup {
+    html! {
+        span.share.yes[part.holds].no[!part.holds] {
+            @if part.holds { "✓ " } @else { "✗ " } (share(part.share_of_seeds))
+        }
+        (part.what)
+    }
+}
+
+fn share(share: f64) -> String {
+    format!("{:.0} %", share * 100.0)
+}
+
+/// Young's modulus as the paper prints it, in pascals.
+const PRINTED_MODULUS_PA: f64 = 200e6;
+
+/// What the paper says of an estimator's setting, by its key; the keys in the order of the table.
+const OF_THE_NETWORK: [(&str, &str); 13] = [
+    ("input_scale", "not stated"),
+    ("biases", "not stated"),
+    ("initial_weights", "not stated"),
+    ("order", "not stated"),
+    ("weight_update", "not stated"),
+    ("aggregate_error", "stops at an aggregate error of 0.001 %, without saying of what it is the sum"),
+    ("max_epochs", "at most a million iterations, without saying what one iteration is"),
+    ("hidden", "10"),
+    ("hidden_activation", "sigmoid"),
+    ("output_activation", "sigmoid"),
+    ("output", "both, compared"),
+    ("learning_rate", "0.7"),
+    ("momentum", "0.9"),
+];
+
+impl Paper<'_> {
+    pub(super) fn about_open(&self) -> Markup {
+        html! {
+            p {
+                "The paper does not say everything that a replication has to know. Where it is silent, the study's file decides; \
+                 the table lists its decisions as they were in this run."
+            }
+            (self.why_not_the_printed_modulus())
+        }
+    }
+
+    pub(super) fn open_table(&self) -> Table {
+        let mut rows: Vec<[String; 3]> = Vec::new();
+        if let Some((rig, beam, force_n)) = self.setup() {
+            let modulus = format!("{} GPa", stated(beam.youngs_modulus_pa() / 1e9));
+            rows.push(row("Young's modulus", "200 MPa, taken for a slip", modulus));
+            rows.push(row("sensor noise", "none: readings are computed", noise_in_words(rig)));
+            rows.push(row("force", "3 N, known", format!("{} N, known", stated(force_n))));
+        }
+        rows.extend(OF_THE_NETWORK.iter().filter_map(|(key, paper)| self.network_row(key, paper)));
+        rows.push(row("iteration", "undefined", "one epoch: every training position shown once"));
+        rows.push(row("networks of each kind", "one", self.report.seeds_in_words()));
+        Table::of(rows)
+            .words("setting", |[setting, ..]| setting.clone())
+            .words("the paper", |[_, paper, _]| paper.clone())
+            .words("this study", |[.., study]| study.clone())
+            .caption(html! { "Settings of this study, beside what the paper says of them." })
+    }
+
+    /// What the beam would do with the modulus as printed, unless the study uses it.
+    fn why_not_the_printed_modulus(&self) -> Markup {
+        let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
+        if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {
+            return Markup::default();
+        }
+        let sag_m = |youngs_modulus_pa: f64| {
+            // The deflection is inversely proportional to the modulus.
+            force_n * beam.full_scale(SensorKind::Deflection) * beam.youngs_modulus_pa() / youngs_modulus_pa
+        };
+        html! {
+            p {
+                "One value is not followed: the paper prints a Young's modulus of 200 MPa. With it, the load in the middle would \
+                 bend this " (stated(beam.length_m() * 1e3)) " mm beam by " (number(sag_m(PRINTED_MODULUS_PA)))
+                " m, far outside the small deflections that the beam equation is made for. Steel has 200 GPa, so the print is \
+                 taken for a slip. With " (stated(beam.youngs_modulus_pa() / 1e9)) " GPa, as here, it bends by "
+                (number(sag_m(beam.youngs_modulus_pa()) * 1e3)) " mm."
+            }
+        }
+    }
+
+    /// The setting with that key, with every value that an arm gives it.
+    fn network_row(&self, key: &str, paper: &str) -> Option<[String; 3]> {
+        let arms = self.report.study.study.arms.iter();
+        let found: Vec<Setting> =
+            arms.flat_map(|arm| arm.rig.estimator.settings()).filter(|setting| setting.key == key).collect();
+        let name = found.first()?.name;
+        let mut values: Vec<String> = Vec::new();
+        for setting in found {
+            if !values.contains(&setting.value) {
+                values.push(setting.value);
+            }
+        }
+        let mut value = values.join(", or ");
+        if key == "input_scale"
+            && let Some((_, beam, force_n)) = self.setup()
+        {
+            let full_scale_mm = force_n * beam.full_scale(SensorKind::Deflection) * 1e3;
+            value += &format!("; the full scale of the deflection is {full_scale_mm:.4} mm");
+        }
+        Some(row(name, paper, value))
+    }
+}
+
+fn row(setting: &str, paper: &str, study: impl Into<String>) -> [String; 3] {
+    [setting.to_owned(), paper.to_owned(), study.into()]
+}
+
+fn noise_in_words(rig: &Rig) -> &'static str {
+    if rig.setup.layout.sensors().iter().any(|sensor| sensor.channel != Default::default()) {
+        "the sensors have faults, as the study's file states"
+    } else {
+        "none: readings are exact"
     }
 }

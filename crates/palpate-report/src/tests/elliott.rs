@@ -3,7 +3,7 @@
 use crate::elliott_report;
 use palpate_estimators::evaluation::Quantiles;
 use palpate_rig::Rig;
-use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottFindings, RIG_TOML};
+use palpate_studies::elliott::{Chain, ChainRow, Elliott, ElliottResults, RIG_TOML};
 
 #[test]
 fn elliotts_chain_has_its_page() {
@@ -32,7 +32,7 @@ fn elliotts_chain_has_its_page() {
         row(Chain::Smoother, 0.3e-3, false),
     ];
     let variance_percent = (0..25).map(|i| 50.0 * 0.5f64.powi(i)).collect();
-    let files = elliott_report(&study, &ElliottFindings { variance_percent, rows });
+    let files = elliott_report(&study, &ElliottResults { variance_percent, rows });
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     assert_eq!(names, ["report.html", "figure-1.svg", "figure-2.svg", "figure-3.svg"]);
     let page = std::str::from_utf8(&files[0].bytes).unwrap();

@@ -1,9 +1,8 @@
 //! Properties of the parts that a chart is laid out with.
 
 use crate::Axis;
+use crate::drawing::axis::{AxisScale, Tick, choose_ticks, minor_ticks};
 use crate::drawing::geometry::Rect;
-use crate::drawing::scale::AxisScale;
-use crate::drawing::ticks::{self, Tick};
 use crate::drawing::{svg, text};
 use proptest::prelude::*;
 
@@ -17,7 +16,7 @@ fn up_to(most: usize) -> impl Fn(&[Tick]) -> bool {
 
 fn tick_labels(axis: &Axis, most: usize) -> Vec<String> {
     let scale = AxisScale::new(axis, &[]);
-    labels(&ticks::choose(&scale, axis.ticks.as_deref(), &up_to(most)))
+    labels(&choose_ticks(&scale, axis.ticks.as_deref(), &up_to(most)))
         .into_iter()
         .map(str::to_owned)
         .collect()
@@ -58,7 +57,7 @@ fn ticks_stand_at_the_values_that_were_asked_for() {
 fn only_successive_decades_have_minor_lines() {
     let minor = |low, high, most| {
         let scale = AxisScale::new(&Axis::log10("").from_to(low, high), &[]);
-        ticks::minor(&scale, &ticks::choose(&scale, None, &up_to(most)))
+        minor_ticks(&scale, &choose_ticks(&scale, None, &up_to(most)))
     };
     assert_eq!(minor(1.0, 1000.0, 8).len(), 24);
     assert_eq!(minor(1.0, 100.0, 8).len(), 0);

@@ -6,7 +6,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-fn study(counts: &[usize]) -> DeadAreaFindings {
+fn study(counts: &[usize]) -> DeadAreaResults {
     let study = DeadAreas {
         rig: Rig::from_toml(RIG_TOML).unwrap(),
         counts: counts.to_vec(),

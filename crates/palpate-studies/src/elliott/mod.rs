@@ -105,7 +105,7 @@ pub struct ChainRow {
 
 /// What the study found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ElliottFindings {
+pub struct ElliottResults {
     /// The share of the readings' variance that each component carries, in %, of the first calibration.
     pub variance_percent: Vec<f64>,
     /// A row a chain.
@@ -150,7 +150,7 @@ pub enum ElliottError {
 
 /// The errors of one chain in one calibration.
 #[derive(Clone, Copy, Debug)]
-struct Judged {
+struct ChainErrors {
     /// Mean error in metres and effective percentage.
     pressed: Option<(f64, f64)>,
     moving_error_m: f64,
@@ -162,7 +162,7 @@ impl Elliott {
     /// # Errors
     /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
     /// are not there.
-    pub fn run(&self, watch: Watch) -> Result<ElliottFindings, ElliottError> {
+    pub fn run(&self, watch: Watch) -> Result<ElliottResults, ElliottError> {
         let sensors = self.rig.setup.layout.len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
             return Err(ElliottError::Components { components, sensors });
@@ -183,10 +183,10 @@ impl Elliott {
         }
         let first = reductions.first().ok_or(ElliottError::NoCalibration)?;
         let contacts: Vec<Vec<ResponseGradient>> = self.gradients(&trials)?;
-        let row = |(chain, judged): (Chain, Vec<Judged>)| self.row(chain, &judged, first, &contacts);
+        let row = |(chain, judged): (Chain, Vec<ChainErrors>)| self.row(chain, &judged, first, &contacts);
         let rows = self.chains().into_iter().zip(judged).map(row).collect::<Option<_>>();
         let rows = rows.ok_or(ElliottError::NoCalibration)?;
-        Ok(ElliottFindings { variance_percent: first.variance_percent(), rows })
+        Ok(ElliottResults { variance_percent: first.variance_percent(), rows })
     }
 
     /// The most often that [`Elliott::run`] asks whether to go on while it fits.
@@ -213,7 +213,7 @@ impl Elliott {
     }
 
     /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
-    fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<Judged>, ElliottError> {
+    fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<ChainErrors>, ElliottError> {
         let whole = &self.rig.setup;
         let network = Estimator::Network(self.network());
         let mut judged = Vec::new();
@@ -242,25 +242,25 @@ impl Elliott {
     }
 
     /// A locator's errors, reading by reading.
-    fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<Judged, ElliottError> {
+    fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
         let mut pressed = Evaluation::of(locator, &setup.trial.judged)?;
         let extent = self.rig.setup.surface.extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
         let moving = Evaluation::of(locator, &setup.moving.recording)?;
         let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
-        Ok(Judged {
+        Ok(ChainErrors {
             pressed: Some((mean_m(&pressed), pressed.effective_percent(self.tolerance_m))),
             moving_error_m: mean_m(&moving),
         })
     }
 
     /// The errors of a locator's tracker, as readings come and with all of them.
-    fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[Judged; 2], ElliottError> {
+    fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[ChainErrors; 2], ElliottError> {
         let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
         let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface.extent());
-        let judge = |tracks: &[Track]| -> Result<Judged, ElliottError> {
+        let judge = |tracks: &[Track]| -> Result<ChainErrors, ElliottError> {
             let errors = TrackErrors::of(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
-            Ok(Judged { pressed: None, moving_error_m: errors.track_m })
+            Ok(ChainErrors { pressed: None, moving_error_m: errors.track_m })
         };
         Ok([judge(&followed.filtered)?, judge(&followed.smoothed)?])
     }
@@ -284,7 +284,7 @@ impl Elliott {
     fn row(
         &self,
         chain: Chain,
-        judged: &[Judged],
+        judged: &[ChainErrors],
         reduction: &KarhunenLoeve,
         contacts: &[Vec<ResponseGradient>],
     ) -> Option<ChainRow> {

@@ -1,20 +1,24 @@
 //! `palpate design positions`: where to press, against even positions; and the next press of a recording begun.
 
-mod findings;
-mod next;
-mod rig_file;
-mod tables;
-
-use super::{help, say_files};
+use super::{changed_rig, say_files};
 use crate::failure::{Complaint, Failure};
+use crate::input::{self, RecordingFiles};
+use crate::json::object;
+use crate::output::{self, Table};
 use crate::progress::Observer;
-use crate::recording_files::RecordingFiles;
-use crate::{input, output};
-use palpate_design::positions::{Placed, PositionDesign, PositionError, PositionProblem, best_placed};
-use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_design::positions::{
+    Advice, Placed, Placement, PositionDesign, PositionError, PositionProblem, best_placed, next_press,
+};
+use palpate_estimators::recording::Recording;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{format_count, format_length_mm};
+use palpate_numerics::watch::Cancelled;
 use palpate_report::{PositionDesignReport, position_design_report};
 use palpate_rig::Rig;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
+use toml_edit::{Array, DocumentMut, Item, Table as TomlTable, Value, value};
 
 /// Where to press: training positions by rules and by search, scored by the location error after calibrating.
 ///
@@ -63,7 +67,7 @@ pub struct Arguments {
 }
 
 /// Everything that was found out.
-pub struct Outcome<'a> {
+struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
     problem: &'a PositionProblem,
@@ -78,25 +82,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let files = RecordingFiles { data: arguments.data.clone(), contacts: arguments.contacts.clone() };
     if let Some(recording) = files.read(&rig.setup)? {
-        return next::run(arguments, &rig, &recording);
+        return advise(arguments, &rig, &recording);
     }
     let complain = |error: PositionError| complaint(&error, &arguments.rig);
     let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(complain)?;
-    let observer = Observer::of_stages();
-    let observe = |progress| observer.observe(progress);
-    let placed = problem.all(Watch::new(&observe)).map_err(complain)?;
-    drop(observer);
+    let placed = Observer::of_stages().watch(|watch| problem.all(watch)).map_err(complain)?;
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
     if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
-        rig_file::write(path, &text, best, problem.design().repeats, problem.extent())?;
+        let (_, written) = changed_rig(path, &text, "positions", |rig| {
+            place_presses(rig, &best.positions, problem.design().repeats, problem.extent());
+        })?;
+        output::write_file(path, written.as_bytes())?;
     }
     if let Some(out) = &arguments.out {
         write_report(&outcome, &rig, out)?;
     }
     if arguments.json {
-        return output::say_json(&findings::findings(&outcome));
+        return output::say_json(&to_json(&outcome));
     }
-    tables::print(&outcome)?;
+    print(&outcome)?;
     say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
@@ -139,5 +143,237 @@ fn complaint(error: &PositionError, rig: &Path) -> Failure {
     if Cancelled::caused(error) {
         return Failure::stopped();
     }
-    Complaint::new(format!("{}: {error}", rig.display())).help(help::for_positions(error)).into()
+    Complaint::new(format!("{}: {error}", rig.display())).help(help(error)).into()
+}
+
+/// What would help to place training positions.
+fn help(error: &PositionError) -> &'static str {
+    match error {
+        PositionError::Cancelled(_) => "start it again",
+        PositionError::NoModel => {
+            "give a surface with a model, such as `kind = \"beam\"`; or --data with a recording begun, for the next press"
+        }
+        PositionError::NoForce => {
+            "add `force = \"3 N\"` to [contact], or to [training] where it is not known afterwards"
+        }
+        PositionError::Auto => "say which: `kind = \"influence\"` in [estimator]",
+        PositionError::TooFew { .. } => "--count takes a larger number",
+        PositionError::Arrangement(_) | PositionError::Calibration(_) | PositionError::Regression(_) => {
+            "check [training], [sensors] and [estimator] of the rig"
+        }
+        PositionError::OutOfRange(_) => "check it on the command line, or in [design]",
+        PositionError::Channels { .. } => "check `channels` in [recording], or the rig's sensors",
+        PositionError::TooFewPresses { .. } => "begin with evenly spaced presses, ends included",
+        PositionError::NoNoise { .. } => "press some positions twice, or add `noise = \"5 um\"` to [sensors]",
+    }
+}
+
+/// The findings as people read them.
+fn print(outcome: &Outcome) -> Result<(), Failure> {
+    let (problem, design) = (outcome.problem, outcome.problem.design());
+    output::say(format!(
+        "{}: {} training positions, {} press{} each, for the `{}` estimator; {} contacts, force {}; {} calibrations verify\n",
+        outcome.rig.display(),
+        design.count,
+        format_count(design.repeats as u64),
+        if design.repeats == 1 { "" } else { "es" },
+        outcome.estimator,
+        problem.contacts().len(),
+        problem.force().name(),
+        design.verifications,
+    ))?;
+    output::say(errors(outcome))?;
+    output::say("")?;
+    for placed in &outcome.placed {
+        let places = problem.extent().places_in_words(&placed.positions);
+        output::say(format!("{}: {places}", placed.placement.name()))?;
+    }
+    match best_placed(&outcome.placed) {
+        Some(best) => output::say(format!("\nBest: {}", gain(outcome, best))),
+        None => Ok(()),
+    }
+}
+
+fn errors(outcome: &Outcome) -> String {
+    let tolerance = format!("within {}, %", format_length_mm(outcome.problem.design().tolerance_m));
+    let even_m = even(outcome).map(|even| even.verification.median_error_m);
+    Table::of(&outcome.placed)
+        .column("positions", |placed| placed.placement.name().to_owned())
+        .column("mean error, mm", |placed| {
+            let told = &placed.verification;
+            format!("{} ± {}", figure(told.mean_error_m * 1e3), figure(told.standard_error_m * 1e3))
+        })
+        .column("median, mm", |placed| figure(placed.verification.median_error_m * 1e3))
+        .column(tolerance, |placed| format!("{:.1}", placed.verification.within_tolerance_percent))
+        .column("less than even, %", |placed| {
+            let less = |even_m: f64| 100.0 * (1.0 - placed.verification.median_error_m / even_m);
+            even_m.map_or_else(|| "–".to_owned(), |even_m| format!("{:.1}", less(even_m)))
+        })
+        .to_string()
+}
+
+/// Three decimals, or as many as a small number needs for two digits that matter.
+fn figure(value: f64) -> String {
+    if value >= 0.01 || value == 0.0 { format!("{value:.3}") } else { format!("{value:.1e}") }
+}
+
+fn even<'a>(outcome: &'a Outcome) -> Option<&'a Placed> {
+    outcome.placed.iter().find(|placed| placed.placement == Placement::Even)
+}
+
+fn gain(outcome: &Outcome, best: &Placed) -> String {
+    let (name, best_m) = (best.placement.name(), best.verification.median_error_m);
+    match even(outcome).map(|even| even.verification.median_error_m) {
+        _ if best.placement == Placement::Even => {
+            "even; no other is better by more than the noise of the calibrations".to_owned()
+        }
+        Some(even_m) => format!(
+            "{name}, median error {} mm, {:.1} % below the even positions' {} mm",
+            figure(best_m * 1e3),
+            100.0 * (1.0 - best_m / even_m),
+            figure(even_m * 1e3),
+        ),
+        None => format!("{name}, median error {} mm", figure(best_m * 1e3)),
+    }
+}
+
+/// What is printed as JSON.
+fn to_json(outcome: &Outcome) -> impl Serialize {
+    let (problem, asked) = (outcome.problem, outcome.problem.design());
+    let design = |placed: &Placed| {
+        let told = &placed.verification;
+        object! {
+            "method": placed.placement,
+            "positions": placed.positions.iter().copied().map(in_mm).collect::<Vec<_>>(),
+            "mean_error_mm": told.mean_error_m * 1e3,
+            "standard_error_mm": told.standard_error_m * 1e3,
+            "median_error_mm": told.median_error_m * 1e3,
+            "within_tolerance_percent": told.within_tolerance_percent,
+            "calibrations": told.calibrations,
+        }
+    };
+    object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "rig": outcome.rig.display().to_string(),
+        "seed": asked.seed,
+        "estimator": outcome.estimator,
+        "force": problem.force(),
+        "count": asked.count,
+        "repeats": asked.repeats,
+        "tolerance_mm": asked.tolerance_m * 1e3,
+        "contacts": problem.contacts().len(),
+        "designs": outcome.placed.iter().map(design).collect::<Vec<_>>(),
+    }
+}
+
+fn in_mm(position: Position) -> impl Serialize {
+    object! { "x_mm": position.x_m * 1e3, "y_mm": position.y_m * 1e3 }
+}
+
+/// Keys of [training] that say where to press.
+const PLACES: [&str; 6] = ["arrangement", "count", "grid", "middle", "portion", "positions"];
+
+/// Puts other training positions into a rig; everything else of its text stays as it was.
+fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, extent: Extent) {
+    let own = rig.get("training").and_then(Item::as_table).cloned();
+    let mut training = own.unwrap_or_else(TomlTable::new);
+    PLACES.iter().for_each(|key| drop(training.remove(key)));
+    training.insert("arrangement", value("explicit"));
+    training.insert("positions", value(listed(positions, extent)));
+    if repeats > 1 || training.contains_key("repeats") {
+        training.insert("repeats", value(i64::try_from(repeats).unwrap_or(i64::MAX)));
+    }
+    rig.insert("training", Item::Table(training));
+}
+
+/// Along a line lengths, on a plane pairs of them, to a micrometre.
+fn listed(positions: &[Position], extent: Extent) -> Array {
+    let length = |at_m: f64| format!("{} mm", (at_m * 1e6).round() / 1e3);
+    let place = |at: &Position| match extent {
+        Extent::Line { .. } => Value::from(length(at.x_m)),
+        Extent::Plane { .. } => Value::from(Array::from_iter([length(at.x_m), length(at.y_m)])),
+    };
+    positions.iter().map(place).collect()
+}
+
+/// Presses that a table shows.
+const SHOWN: usize = 5;
+
+/// Says where to press next.
+fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
+    let design = what_to_design(arguments, rig);
+    let advice = Observer::of_stages()
+        .watch(|watch| next_press(&rig.setup, recording, &design, watch))
+        .map_err(|error| complaint(&error, &arguments.rig))?;
+    if arguments.json {
+        return output::say_json(&advice_to_json(arguments, &advice));
+    }
+    print_advice(&advice, rig.setup.surface.extent())
+}
+
+/// What is printed as JSON; standard deviations are averaged over the contacts.
+fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
+    let next = advice.next.iter().map(|press| {
+        object! {
+            "x_mm": press.position.x_m * 1e3,
+            "y_mm": press.position.y_m * 1e3,
+            "expected_error_mm": press.error_m * 1e3,
+        }
+    });
+    object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "rig": arguments.rig.display().to_string(),
+        "presses": advice.presses,
+        "positions": advice.positions,
+        "expected_error_mm": advice.error_m * 1e3,
+        "endless_error_mm": advice.endless_error_m * 1e3,
+        "to_gain_percent": advice.to_gain_percent(),
+        "stop_below_percent": advice.stop_percent,
+        "enough": advice.is_enough(),
+        "next": next.collect::<Vec<_>>(),
+        // Presses to come until it is enough; null where more than are looked ahead.
+        "presses_to_go": advice.gets_there().then_some(advice.next.len()),
+    }
+}
+
+fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
+    output::say(format!(
+        "{} presses at {} positions: expected error {:.4} mm; with endless presses {:.4} mm, {:.1} % less",
+        advice.presses,
+        advice.positions,
+        advice.error_m * 1e3,
+        advice.endless_error_m * 1e3,
+        advice.to_gain_percent(),
+    ))?;
+    if advice.is_enough() {
+        return output::say(format!("Enough: less than {} % is left to gain.", advice.stop_percent));
+    }
+    let mut before_m = advice.error_m;
+    let rows = advice.next.iter().take(SHOWN).map(|press| {
+        let gain = 100.0 * (1.0 - press.error_m / before_m);
+        before_m = press.error_m;
+        (press, gain)
+    });
+    let table = Table::of(rows)
+        .column("press next at, mm", |(press, _)| {
+            let (x, y) = (press.position.x_m * 1e3, press.position.y_m * 1e3);
+            match extent {
+                Extent::Line { .. } => format!("{x:.1}"),
+                Extent::Plane { .. } => format!("({x:.1}, {y:.1})"),
+            }
+        })
+        .column("expected error, mm", |(press, _)| format!("{:.4}", press.error_m * 1e3))
+        .column("gain, %", |(_, gain)| format!("{gain:.2}"));
+    output::say(format!("\n{table}"))?;
+    if advice.gets_there() {
+        let count = advice.next.len();
+        let words = if count == 1 { "press leaves" } else { "presses leave" };
+        output::say(format!("\n{count} {words} less than {} % to gain.", advice.stop_percent))
+    } else {
+        output::say(format!(
+            "\nMore than {} presses are needed to leave less than {} % to gain.",
+            Advice::MOST_AHEAD,
+            advice.stop_percent
+        ))
+    }
 }

@@ -1,26 +1,29 @@
 //! `palpate design sensors`: which sensors where, against the even layout.
 
-mod counts;
-mod findings;
-mod rig_file;
-mod tables;
-
-use super::{help, say_files};
+use super::{changed_rig, say_files};
 use crate::failure::{Complaint, Failure};
+use crate::input;
+use crate::json::{Object, fields, object};
+use crate::output::{self, Table, figure};
 use crate::progress::Observer;
-use crate::{input, output};
-use counts::{Counts, counts};
-use palpate_design::sensors::SensorDesign;
 use palpate_design::sensors::{
-    CountPoint, DesignError, Designed, Method, SensorProblem, Verification, best_design,
+    Assessment, CountPoint, DesignCriterion, DesignError, Designed, Method, SensorDesign, SensorProblem,
+    Verification, best_design, enough,
 };
 use palpate_estimators::estimator::FitError;
 use palpate_estimators::evaluation::EvaluationError;
 use palpate_estimators::setup::Setup;
+use palpate_mechanics::limit::LimitError;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{SensorDesignReport, sensor_design_report};
 use palpate_rig::Rig;
+use serde::Serialize;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, Value, value};
 
 /// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
 ///
@@ -35,7 +38,7 @@ pub struct Arguments {
     count: Option<u16>,
     /// How the limit falls with the number of sensors, as in `--counts 2..16`
     #[arg(long, value_name = "FROM..TO", value_parser = counts)]
-    counts: Option<Counts>,
+    counts: Option<RangeInclusive<usize>>,
     /// The contact force [default: the rig's]
     #[arg(long, value_name = "FORCE", value_parser = input::force)]
     force: Option<f64>,
@@ -61,7 +64,7 @@ pub struct Arguments {
 }
 
 /// Everything that was found out.
-pub struct Outcome<'a> {
+struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
     designed: Vec<Designed>,
@@ -85,22 +88,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let (setup, design) = what_to_design(arguments, &rig)?;
     let observer = Observer::of_stages();
-    let observe = |progress| observer.observe(progress);
-    let watch = Watch::new(&observe);
-    let problem =
-        SensorProblem::new(&setup, &design, watch).map_err(|error| complaint(&error, &arguments.rig))?;
-    let outcome = outcome(arguments, &rig, &problem, watch)?;
+    let problem = observer
+        .watch(|watch| SensorProblem::new(&setup, &design, watch))
+        .map_err(|error| complaint(&error, &arguments.rig))?;
+    let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
-        rig_file::write(path, &text, &best.layout)?;
+        let extent = setup.surface.extent();
+        let (rig, written) =
+            changed_rig(path, &text, "layout", |rig| place_sensors(rig, &best.layout, extent))?;
+        if rig.setup.layout.len() != best.layout.len() {
+            return Err(Complaint::new("the rig does not take the layout").into());
+        }
+        output::write_file(path, written.as_bytes())?;
     }
     if let Some(out) = &arguments.out {
         write_report(&outcome, &setup, out)?;
     }
     if arguments.json {
-        return output::say_json(&findings::findings(&outcome));
+        return output::say_json(&to_json(&outcome));
     }
-    tables::print(&outcome)?;
+    print(&outcome)?;
     say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
@@ -172,13 +180,313 @@ fn write_report(outcome: &Outcome, setup: &Setup, out: &Path) -> Result<(), Fail
         counts: &outcome.counts,
         seed: outcome.seed,
     };
-    let files = sensor_design_report(&report);
-    output::write_report(out, files)
+    output::write_report(out, sensor_design_report(&report))
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {
     if Cancelled::caused(error) {
         return Failure::stopped();
     }
-    Complaint::new(format!("{}: {error}", rig.display())).help(help::for_sensors(error)).into()
+    Complaint::new(format!("{}: {error}", rig.display())).help(help(error)).into()
 }
+
+/// More sensors than a curve is drawn for.
+const MOST_COUNT: usize = 200;
+
+/// "2..16" as a range, both ends included.
+fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
+    let form = || format!("`{text}` is no range; write the least and the most, as in 2..16");
+    let (from, to) = text.split_once("..").ok_or_else(form)?;
+    let number = |text: &str| text.trim_start_matches('=').trim().parse::<usize>().map_err(|_| form());
+    let (from, to) = (number(from)?, number(to)?);
+    if from < 1 || to > MOST_COUNT || from > to {
+        return Err(format!("`{text}` must go from at least 1 to at most {MOST_COUNT}, the lesser first"));
+    }
+    Ok(from..=to)
+}
+
+/// What would help to place sensors.
+pub fn help(error: &DesignError) -> &'static str {
+    match error {
+        DesignError::Limit(LimitError::NoModel) => "give a surface with a model, such as `kind = \"beam\"`",
+        DesignError::Limit(LimitError::NoForce | LimitError::Force { .. }) => {
+            "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
+        }
+        DesignError::Limit(LimitError::Noise(error)) => error.help(),
+        DesignError::Cancelled(_) => "start it again",
+        DesignError::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
+        DesignError::OutOfRange(_) | DesignError::Layout(_) => "check it in [design]",
+        DesignError::SingularNoise { .. } => {
+            "add `noise = \"5 um\"` to [sensors], or to the kind in [design] `kinds`"
+        }
+        DesignError::TooFewSites { .. } => {
+            "lower `count`, bring `sites` closer together, or make `keep_out` smaller"
+        }
+        DesignError::Spacing { .. } => "lower `count` or `spacing`, or make `keep_out` smaller",
+        DesignError::NoMirror { .. } => "lower `count`, bring `sites` closer together, or allow symmetry",
+        DesignError::Budget { .. } => "raise `budget`, lower `count`, or offer cheaper `kinds`",
+        DesignError::TooManyMustHaves { .. } => "raise `count`, or take some from `must_have`",
+        DesignError::MustHaveReadsNothing { .. } => "move it, or leave it out",
+        DesignError::MustHaveKeptOut { .. } => "move it, or change the zone",
+        DesignError::MustHavesExclude { .. } => "move one of them, or relax the constraint",
+        DesignError::MustHaveWithoutTwin { .. } => "move it, or leave `symmetry` out",
+        DesignError::Symmetry { .. } => {
+            "choose `sites` that mirror each other, such as a distance that divides the length, or an even `count`"
+        }
+        DesignError::NoLayout { .. } => {
+            "ask for another method, relax the constraints, or offer sensors other than reactions"
+        }
+        DesignError::TooLarge { .. } => "set `sites` or the contacts' `every` wider apart",
+    }
+}
+
+/// The designs as people read them.
+fn print(outcome: &Outcome) -> Result<(), Failure> {
+    let (problem, design) = (outcome.problem, outcome.problem.design());
+    output::say(format!(
+        "{}: {} of {} candidate sensors, {} contacts, {} N, force {}; score: {}\n",
+        outcome.rig.display(),
+        design.count,
+        format_count(problem.candidates() as u64),
+        problem.contacts().len(),
+        problem.force_n(),
+        problem.force().name(),
+        score_in_words(design.criterion)
+    ))?;
+    output::say(designs(outcome))?;
+    if outcome.designed.iter().any(|designed| !designed.assessment.keeps_constraints) {
+        output::say("* breaks a constraint of [design]")?;
+    }
+    output::say("")?;
+    for designed in &outcome.designed {
+        output::say(format!(
+            "{}: {}",
+            designed.method.name(),
+            designed.layout.places_in_words(outcome.problem.extent())
+        ))?;
+    }
+    if let Some(best) = best_design(&outcome.designed) {
+        output::say(format!("\nBest: {}", gain(outcome, best)))?;
+    }
+    if outcome.counts.is_empty() { Ok(()) } else { print_counts(outcome) }
+}
+
+fn score_in_words(criterion: DesignCriterion) -> &'static str {
+    match criterion {
+        DesignCriterion::MeanLimit => "mean limit with the prior, mm",
+        DesignCriterion::WorstLimit => "largest limit with the prior, mm",
+        DesignCriterion::WithinTolerance => "contacts beyond the tolerance, %",
+        DesignCriterion::DOptimality => "mean of ½·ln det of the least covariance",
+    }
+}
+
+fn designs(outcome: &Outcome) -> String {
+    let design = outcome.problem.design();
+    let tolerance = format!("within {}, %", format_length_mm(design.tolerance_m));
+    let unit = design.criterion.score_scale();
+    let mm = |limit_m: Option<f64>| figure(limit_m.map(|limit_m| limit_m * 1e3));
+    let mut table = Table::of(&outcome.designed)
+        .column("layout", |designed| {
+            let star = if designed.assessment.keeps_constraints { "" } else { " *" };
+            format!("{}{star}", designed.method.name())
+        })
+        .column("score", |designed| figure(Some(designed.assessment.score * unit)))
+        .column("mean limit, mm", |designed| mm(designed.assessment.mean_limit_m))
+        .column("largest, mm", |designed| mm(designed.assessment.worst_limit_m))
+        .column(tolerance, |designed| format!("{:.1}", designed.assessment.within_tolerance_percent))
+        .column("one dead: score", |designed| {
+            figure(designed.assessment.score_one_dead.map(|score| score * unit))
+        });
+    if design.has_costs() {
+        table = table.column("cost", |designed| designed.assessment.cost.to_string());
+    }
+    if !outcome.verified.is_empty() {
+        table = table.column("simulated error, mm", |designed| {
+            let told = outcome.verification(designed.method);
+            told.map_or_else(
+                || "–".to_owned(),
+                |told| format!("{:.3} ± {:.3}", told.mean_error_m * 1e3, told.standard_error_m * 1e3),
+            )
+        });
+    }
+    table.to_string()
+}
+
+/// How much better than the even layout.
+fn gain(outcome: &Outcome, best: &Designed) -> String {
+    let name = best.method.name();
+    let even = outcome.designed.iter().find(|designed| designed.method.name() == "even");
+    let limits = even.and_then(|even| {
+        let (even_m, best_m) = (even.assessment.mean_limit_m?, best.assessment.mean_limit_m?);
+        Some((even_m * 1e3, best_m * 1e3, 100.0 * (1.0 - best_m / even_m)))
+    });
+    let Some((even_mm, best_mm, percent)) = limits else { return name.to_owned() };
+    let compared = |percent: f64| {
+        if percent >= 0.0 { format!("{percent:.1} % below") } else { format!("{:.1} % above", -percent) }
+    };
+    let mut words = format!(
+        "{name}, mean limit {best_mm:.3} mm, {} the even layout's {even_mm:.3} mm",
+        compared(percent)
+    );
+    let errors =
+        even.and_then(|even| Some((outcome.verification(even.method)?, outcome.verification(best.method)?)));
+    if let Some((even, best)) = errors {
+        let percent = 100.0 * (1.0 - best.mean_error_m / even.mean_error_m);
+        words += &format!(
+            "; in simulation its error is {:.3} mm, {} the even layout's {:.3} mm",
+            best.mean_error_m * 1e3,
+            compared(percent),
+            even.mean_error_m * 1e3
+        );
+    }
+    words
+}
+
+fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
+    let unit = outcome.problem.design().criterion.score_scale();
+    let mm = |limit_m: Option<f64>| figure(limit_m.map(|limit_m| limit_m * 1e3));
+    let table = Table::of(&outcome.counts)
+        .column("sensors", |point| point.count.to_string())
+        .column("even: score", |point| figure(point.even.as_ref().map(|even| even.score * unit)))
+        .column("mean limit, mm", |point| mm(point.even.as_ref().and_then(|even| even.mean_limit_m)))
+        .column("designed: score", |point| figure(Some(point.designed.score * unit)))
+        .column("mean limit, mm", |point| mm(point.designed.mean_limit_m))
+        .column("largest, mm", |point| mm(point.designed.worst_limit_m))
+        .column("within, %", |point| format!("{:.1}", point.designed.within_tolerance_percent));
+    output::say(format!("\n{table}"))?;
+    match enough(&outcome.counts) {
+        Some(count) => output::say(format!("\n{count} sensors come within 10 % of the score of the most.")),
+        None => Ok(()),
+    }
+}
+
+/// What is printed as JSON. A limit that is not there, because the readings do not tell some contact, is null. Scores of limits
+/// are in mm, of the share beyond the tolerance in %, of D-optimality ½·ln det.
+fn to_json(outcome: &Outcome) -> impl Serialize {
+    let (problem, design) = (outcome.problem, outcome.problem.design());
+    let scale = design.criterion.score_scale();
+    let mm = |length_m: Option<f64>| length_m.map(|length_m| length_m * 1e3);
+    let assessment = |assessed: &Assessment| {
+        fields! {
+            "score": assessed.score * scale,
+            "mean_limit_mm": mm(assessed.mean_limit_m),
+            "worst_limit_mm": mm(assessed.worst_limit_m),
+            "mean_error_at_limit_mm": mm(assessed.mean_error_m),
+            "within_tolerance_percent": assessed.within_tolerance_percent,
+            "score_one_dead": assessed.score_one_dead.map(|score| score * scale),
+            "cost": assessed.cost,
+            "keeps_constraints": assessed.keeps_constraints,
+        }
+    };
+    let position = |sensor: &Sensor| object! { "measure": sensor.kind, "x_mm": sensor.position.x_m * 1e3, "y_mm": sensor.position.y_m * 1e3 };
+    // Of simulated calibrations.
+    let simulated = |verification: &Verification| {
+        object! {
+            "mean_error_mm": verification.mean_error_m * 1e3,
+            "standard_error_mm": verification.standard_error_m * 1e3,
+            "within_tolerance_percent": verification.within_tolerance_percent,
+            "calibrations": verification.calibrations,
+        }
+    };
+    let designed = |designed: &Designed| {
+        object! {
+            "method": designed.method,
+            "positions": designed.layout.sensors().iter().map(position).collect::<Vec<_>>(),
+            ..assessment(&designed.assessment),
+            "simulated": outcome.verification(designed.method).map(simulated),
+        }
+    };
+    let count = |point: &CountPoint| {
+        object! {
+            "count": point.count,
+            "even": point.even.as_ref().map(|even| Object(assessment(even))),
+            "designed": Object(assessment(&point.designed)),
+        }
+    };
+    object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "rig": outcome.rig.display().to_string(),
+        "seed": outcome.seed,
+        "force_n": problem.force_n(),
+        "force": problem.force(),
+        "criterion": design.criterion.name(),
+        "tolerance_mm": design.tolerance_m * 1e3,
+        "candidates": problem.candidates(),
+        "contacts": problem.contacts().len(),
+        "designs": outcome.designed.iter().map(designed).collect::<Vec<_>>(),
+        "counts": outcome.counts.iter().map(count).collect::<Vec<_>>(),
+    }
+}
+
+/// Keys of a section that say where its sensors are, or which of them are dead.
+const PLACES: [&str; 4] = ["count", "grid", "positions", "dead"];
+
+/// Puts other sensors into a rig, a section a kind; everything else of its text stays as it was.
+fn place_sensors(rig: &mut DocumentMut, layout: &Layout, extent: Extent) {
+    let own = sections(rig.get("sensors"));
+    let mut new = ArrayOfTables::new();
+    for kind in SensorKind::ALL {
+        let sensors: Vec<&Sensor> = layout.sensors().iter().filter(|sensor| sensor.kind == kind).collect();
+        if let Some(first) = sensors.first() {
+            let mut section = section(kind, &own, &first.channel);
+            section.insert("positions", value(positions(&sensors, extent)));
+            new.push(section);
+        }
+    }
+    if let (Some(first), Some(table)) = (own.first(), new.get_mut(0)) {
+        table.decor_mut().clone_from(first.decor());
+    }
+    // Where the old sections stood.
+    let position = own.first().and_then(TomlTable::position);
+    for table in new.iter_mut() {
+        table.set_position(position);
+    }
+    rig.insert("sensors", Item::ArrayOfTables(new));
+}
+
+fn sections(sensors: Option<&Item>) -> Vec<TomlTable> {
+    match sensors {
+        Some(Item::Table(table)) => vec![table.clone()],
+        Some(Item::ArrayOfTables(tables)) => tables.iter().cloned().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The rig's section of this kind without its places, or a new one; its noise is the design's.
+fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlTable {
+    let measures = |table: &&TomlTable| table.get("measure").and_then(Item::as_str) == Some(kind.name());
+    let mut section = own.iter().find(measures).cloned().unwrap_or_default();
+    PLACES.iter().for_each(|key| drop(section.remove(key)));
+    if section.get("measure").is_none() {
+        section.decor_mut().set_prefix("\n");
+        section.insert("measure", value(kind.name()));
+    }
+    for (key, si) in [("noise", channel.noise_sd), ("resolution", channel.resolution)] {
+        let written = section.get(key).and_then(Item::as_str);
+        let same = written.and_then(|text| Quantity::parse_as(text, kind.dimension()).ok()) == Some(si);
+        if !same && (si > 0.0 || written.is_some()) {
+            section.insert(key, value(Quantity { value: si, dimension: kind.dimension() }.to_string()));
+        }
+    }
+    section
+}
+
+/// Along a line lengths, on a plane pairs of them.
+fn positions(sensors: &[&Sensor], extent: Extent) -> Array {
+    let length = |sensor: &Sensor, at_m: f64| {
+        // A reaction sensor must meet its support to the last digit; a micrometre is enough for the others.
+        let mm = if sensor.kind == SensorKind::Reaction { at_m * 1e3 } else { (at_m * 1e6).round() / 1e3 };
+        format!("{mm} mm")
+    };
+    let place = |sensor: &&Sensor| match extent {
+        Extent::Line { .. } => Value::from(length(sensor, sensor.position.x_m)),
+        Extent::Plane { .. } => {
+            let pair = [length(sensor, sensor.position.x_m), length(sensor, sensor.position.y_m)];
+            Value::from(Array::from_iter(pair))
+        }
+    };
+    sensors.iter().map(place).collect()
+}
+
+#[cfg(test)]
+mod tests;

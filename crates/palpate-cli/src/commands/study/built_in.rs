@@ -2,37 +2,22 @@
 
 use super::Arguments;
 use crate::failure::Failure;
-use crate::output;
+use crate::input;
+use crate::output::{self, Table};
 use crate::progress::Observer;
+use palpate_estimators::evaluation::Quantiles;
 use palpate_numerics::watch::Watch;
-use palpate_report::ReportFile;
+use palpate_report::{ReportFile, dead_areas_report, elliott_report};
+use palpate_studies::dead_areas::{self, DeadAreaResults, DeadAreas};
+use palpate_studies::elliott::{self, Elliott, ElliottResults};
 use std::path::Path;
 
-/// What sets one such study apart from another.
-pub trait BuiltIn {
-    /// The name under which `palpate study` knows it.
-    const NAME: &'static str;
-    type Findings: serde::Serialize;
-    type Error: std::error::Error + 'static;
+/// Calibrations, unless `--seeds` says another number.
+const CALIBRATIONS: u64 = 3;
 
-    /// Calibrations, and the seed of the first.
-    fn seeds(&self) -> (u64, u64);
-
-    /// The most often that [`BuiltIn::run`] asks whether to go on.
-    fn most_rounds(&self) -> u64;
-
-    /// What it finds.
-    fn run(&self, watch: Watch) -> Result<Self::Findings, Self::Error>;
-
-    fn report(&self, findings: &Self::Findings) -> Vec<ReportFile>;
-
-    /// The findings for people.
-    fn tell(findings: &Self::Findings) -> String;
-}
-
-/// Everything that `results.json` holds.
+/// What a study is and what it found: all that `results.json` holds.
 #[derive(serde::Serialize)]
-struct ResultsFile<F> {
+struct Results<F> {
     palpate: &'static str,
     study: &'static str,
     calibrations: u64,
@@ -41,21 +26,92 @@ struct ResultsFile<F> {
     findings: F,
 }
 
-/// Runs a study, writes its report and results, and prints them.
-pub fn run<S: BuiltIn>(study: &S, arguments: &Arguments) -> Result<(), Failure> {
-    let observer = Observer::of_rounds(study.most_rounds());
-    let observe = |progress| observer.observe(progress);
-    let findings = study.run(Watch::new(&observe)).map_err(|error| Failure::of(&error))?;
-    drop(observer);
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(S::NAME));
-    output::write_report(&out, study.report(&findings))?;
-    let (calibrations, seed) = study.seeds();
-    let palpate = env!("CARGO_PKG_VERSION");
-    let file = ResultsFile { palpate, study: S::NAME, calibrations, seed, findings };
-    output::write_file(&out.join("results.json"), (output::to_json(&file)? + "\n").as_bytes())?;
+/// `palpate study dead-areas`: errors between sensors, by estimator and by the number of sensors.
+pub fn dead_areas(arguments: &Arguments) -> Result<(), Failure> {
+    let study = DeadAreas {
+        rig: input::parse_rig(Path::new("examples/dead-areas.toml"), dead_areas::RIG_TOML)?,
+        counts: dead_areas::COUNTS.to_vec(),
+        calibrations: arguments.seeds.unwrap_or(CALIBRATIONS),
+        tolerance_m: 2e-3,
+        without: Vec::new(),
+        seed: 0,
+    };
+    let results = |findings| results("dead-areas", study.calibrations, study.seed, findings);
+    let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
+    write(arguments, &results, dead_areas_report(&study, &results.findings), tell_dead_areas)
+}
+
+/// `palpate study elliott`: components of a plate's readings and a network, beside the influence locator and its tracker.
+pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
+    let study = Elliott {
+        rig: input::parse_rig(Path::new("examples/elliott.toml"), elliott::RIG_TOML)?,
+        components: elliott::COMPONENTS.to_vec(),
+        presentations: elliott::PRESENTATIONS,
+        calibrations: arguments.seeds.unwrap_or(CALIBRATIONS),
+        tolerance_m: 5e-3,
+        seed: 0,
+    };
+    let results = |findings| results("elliott", study.calibrations, study.seed, findings);
+    let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
+    write(arguments, &results, elliott_report(&study, &results.findings), tell_elliott)
+}
+
+fn results<F>(study: &'static str, calibrations: u64, seed: u64, findings: F) -> Results<F> {
+    Results { palpate: env!("CARGO_PKG_VERSION"), study, calibrations, seed, findings }
+}
+
+/// Runs a study that asks at most so often whether to go on.
+fn fit<F, E>(most_rounds: u64, run: impl FnOnce(Watch) -> Result<F, E>) -> Result<F, Failure>
+where
+    E: std::error::Error + 'static,
+{
+    Observer::of_rounds(most_rounds).watch(run).map_err(|error| Failure::of(&error))
+}
+
+/// Writes a study's report and results, and prints them.
+fn write<F: serde::Serialize>(
+    arguments: &Arguments,
+    results: &Results<F>,
+    report: Vec<ReportFile>,
+    tell: fn(&F) -> String,
+) -> Result<(), Failure> {
+    let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(results.study));
+    output::write_report(&out, report)?;
+    output::write_file(&out.join("results.json"), (output::to_json(results)? + "\n").as_bytes())?;
     if arguments.json {
-        return output::say_json(&file);
+        return output::say_json(results);
     }
-    output::say(S::tell(&file.findings))?;
-    output::say(format!("\nReport: {}", out.join("report.html").display()))
+    output::say(tell(&results.findings))?;
+    output::say_report("\n", Some(&out))
+}
+
+fn tell_dead_areas(findings: &DeadAreaResults) -> String {
+    let mut told = Table::of(&findings.rows)
+        .column("sensing", |row| row.sensing.clone())
+        .column("estimator", |row| row.estimator.to_owned())
+        .column("sensors", |row| row.sensors.to_string())
+        .column("effective, %", |row| format!("{:.1}", row.effective_percent))
+        .column("over sensors, mm", |row| format!("{:.3}", row.folded.at_sensors_m * 1e3))
+        .column("between, mm", |row| format!("{:.3}", row.folded.between_m * 1e3))
+        .column("dead between, %", |row| format!("{:.1}", row.folded.dead_percent))
+        .to_string();
+    for (sensing, estimator, sensors, why) in &findings.left_out {
+        told += &format!("\n{sensing}, {estimator}, {sensors} sensors: left out: {why}");
+    }
+    told
+}
+
+fn tell_elliott(findings: &ElliottResults) -> String {
+    let mm = |spread: Quantiles| format!("{:.3}", spread.median * 1e3);
+    Table::of(&findings.rows)
+        .column("chain", |row| row.chain.to_string())
+        .column("error, mm", |row| row.error_m.map_or_else(String::new, mm))
+        .column("limit, mm", |row| {
+            row.limit_m.map_or_else(String::new, |limit_m| format!("{:.3}", limit_m * 1e3))
+        })
+        .column("effective area, %", |row| {
+            row.effective_percent.map_or_else(String::new, |percent| format!("{:.1}", percent.median))
+        })
+        .column("moving, mm", |row| mm(row.moving_error_m))
+        .to_string()
 }

@@ -1,10 +1,168 @@
-//! Round numbers along an axis, how they are written, and where their labels stand.
+//! An axis: what it shows, where its values lie along it, and its round numbers with their labels.
 
-use super::chart::Scale;
 use super::geometry::Rect;
-use super::scale::{AxisScale, round_step_above};
 use super::svg::{Anchor, Label, QUIET_INK};
 use super::text;
+
+/// One axis of a chart.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Axis {
+    /// What is measured, with its unit: "load position, mm".
+    pub label: String,
+    /// First and last value shown, in either order. `None`, a span of nothing, and ends that the scale cannot show (not finite, or not
+    /// positive on a logarithmic axis): from the data and marks, with padding; a linear axis then ends on round numbers and is not
+    /// padded across zero.
+    pub range: Option<(f64, f64)>,
+    /// How values map to lengths.
+    pub scale: Scale,
+    /// Values with a labelled tick, each with its label, where they lie in the range; one whose label would touch its neighbour's is
+    /// left out. `None`: round numbers, as many as are readable.
+    pub ticks: Option<Vec<(f64, String)>>,
+}
+
+impl Axis {
+    /// A linear axis with automatic range and ticks.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Axis { label: label.into(), ..Axis::default() }
+    }
+
+    /// A logarithmic axis with automatic range and ticks.
+    pub fn log10(label: impl Into<String>) -> Self {
+        Axis { label: label.into(), scale: Scale::Log10, ..Axis::default() }
+    }
+
+    /// The same axis from `low` to `high`.
+    pub fn from_to(self, low: f64, high: f64) -> Self {
+        Axis { range: Some((low, high)), ..self }
+    }
+
+    /// The same axis with names instead of numbers.
+    pub fn named(self, names: Vec<(f64, String)>) -> Self {
+        Axis { ticks: Some(names), ..self }
+    }
+
+    /// The same axis with ticks at `values` only.
+    pub fn ticks_at(self, values: impl IntoIterator<Item = f64>) -> Self {
+        self.named(values.into_iter().map(|value| (value, plain(value))).collect())
+    }
+}
+
+/// How values map to lengths along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// Equal differences have equal lengths.
+    #[default]
+    Linear,
+    /// Equal ratios have equal lengths.
+    Log10,
+}
+
+/// Largest magnitude that is drawn; beyond it a range could overflow.
+const LARGEST: f64 = 1e300;
+/// Smallest value drawn on a logarithmic axis.
+const SMALLEST: f64 = 1e-300;
+/// Share of the range that an automatic axis leaves free at each end.
+const PADDING: f64 = 0.04;
+
+/// An axis with its ends settled: `low` < `high`, and both positive on a logarithmic axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct AxisScale {
+    pub low: f64,
+    pub high: f64,
+    pub scale: Scale,
+}
+
+impl AxisScale {
+    /// The ends that the axis asks for, or those that its values need.
+    pub fn new(axis: &Axis, values: &[f64]) -> Self {
+        let (low, high) = fixed_ends(axis).unwrap_or_else(|| automatic_ends(axis.scale, values));
+        AxisScale { low, high, scale: axis.scale }
+    }
+
+    /// Where a value of the data lies: 0 at the low end, 1 at the high end, outside them beyond (held within
+    /// ±1e6). `None` where the scale cannot show it.
+    pub fn share(&self, value: f64) -> Option<f64> {
+        drawable(self.scale, value).then(|| self.tick_share(value))
+    }
+
+    /// As [`AxisScale::share`] for a value on the axis itself, whose rounded ends may exceed what data may be.
+    pub fn tick_share(&self, value: f64) -> f64 {
+        let share = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Log10 => (value.log10() - self.low.log10()) / (self.high.log10() - self.low.log10()),
+        };
+        share.clamp(-1e6, 1e6)
+    }
+
+    /// As [`AxisScale::share`], but a finite value that is not positive lies on the low end of a logarithmic axis.
+    pub fn share_or_low_end(&self, value: f64) -> Option<f64> {
+        match self.scale {
+            Scale::Log10 if value <= 0.0 && value.is_finite() => Some(0.0),
+            _ => self.share(value),
+        }
+    }
+}
+
+fn drawable(scale: Scale, value: f64) -> bool {
+    match scale {
+        Scale::Linear => value.abs() <= LARGEST,
+        Scale::Log10 => (SMALLEST..=LARGEST).contains(&value),
+    }
+}
+
+fn fixed_ends(axis: &Axis) -> Option<(f64, f64)> {
+    let (low, high) = axis.range?;
+    let (low, high) = (low.min(high), low.max(high));
+    let usable = drawable(axis.scale, low) && drawable(axis.scale, high) && !too_narrow(low, high);
+    usable.then_some((low, high))
+}
+
+/// Whether neighbouring ticks between the two could not be told apart.
+fn too_narrow(low: f64, high: f64) -> bool {
+    high - low <= 1e-9 * low.abs().max(high.abs()) || high - low < SMALLEST
+}
+
+fn automatic_ends(scale: Scale, values: &[f64]) -> (f64, f64) {
+    let shown = || values.iter().copied().filter(|&value| drawable(scale, value));
+    let (low, high) = (shown().fold(f64::INFINITY, f64::min), shown().fold(f64::NEG_INFINITY, f64::max));
+    match scale {
+        Scale::Linear if low > high => (0.0, 1.0),
+        Scale::Linear => linear_ends(low, high),
+        Scale::Log10 if low > high => (1.0, 10.0),
+        Scale::Log10 => log_ends(low, high),
+    }
+}
+
+fn linear_ends(low: f64, high: f64) -> (f64, f64) {
+    if too_narrow(low, high) {
+        let middle = low / 2.0 + high / 2.0;
+        let margin = if middle.abs() < SMALLEST { 1.0 } else { 0.1 * middle.abs() };
+        return (middle - margin, middle + margin);
+    }
+    let span = high - low;
+    let step = round_step_above(span / 20.0);
+    let padded_low = ((low - PADDING * span) / step).floor() * step;
+    let padded_high = ((high + PADDING * span) / step).ceil() * step;
+    (
+        if low >= 0.0 { padded_low.max(0.0) } else { padded_low },
+        if high <= 0.0 { padded_high.min(0.0) } else { padded_high },
+    )
+}
+
+fn log_ends(low: f64, high: f64) -> (f64, f64) {
+    let factor = (high / low).powf(PADDING).max(if high / low < 1.5 { 3.0 } else { 1.0 });
+    ((low / factor).max(SMALLEST), (high * factor).min(LARGEST))
+}
+
+/// The smallest of 1, 2 or 5 times a power of ten that is at least `least` (which is positive).
+fn round_step_above(least: f64) -> f64 {
+    let decade = 10_f64.powi(least.log10().floor() as i32);
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|m| m * decade)
+        .find(|&step| step >= least * (1.0 - 1e-9))
+        .unwrap_or(10.0 * decade)
+}
 
 /// Most ticks on one axis.
 const MOST: usize = 11;
@@ -29,7 +187,7 @@ pub(crate) struct Tick {
 }
 
 /// The ticks that are asked for where they fit; else the finest round ones that `fits` accepts. `fits` must accept a single tick.
-pub(crate) fn choose(
+pub(crate) fn choose_ticks(
     axis: &AxisScale,
     asked: Option<&[(f64, String)]>,
     fits: &dyn Fn(&[Tick]) -> bool,
@@ -43,7 +201,7 @@ pub(crate) fn choose(
 
 /// Positions of unlabelled grid lines between the decades of a logarithmic axis; none where the ticks are not
 /// successive decades.
-pub(crate) fn minor(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
+pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     let decades =
         ticks.len() > 1 && ticks.windows(2).all(|pair| (pair[1].value / pair[0].value - 10.0).abs() < 1e-6);
     if axis.scale == Scale::Linear || !decades {

@@ -1,3 +1,4 @@
+use super::super::with_changes;
 use super::*;
 use palpate_mechanics::contact::Position;
 use palpate_rig::Rig;
@@ -21,6 +22,8 @@ noise = \"5 um\"     # by the data sheet
 force = \"3 N\" # a weight
 ";
 
+const LINE: Extent = Extent::Line { length_m: 0.4 };
+
 fn sensor(kind: SensorKind, x_m: f64, noise_sd: f64) -> Sensor {
     let channel = ChannelModel { noise_sd, ..ChannelModel::default() };
     Sensor { kind, position: Position::along(x_m), name: format!("{kind}_1"), channel }
@@ -35,11 +38,20 @@ fn only_the_sensors_change() {
         sensor(SensorKind::Reaction, 0.4, 0.005),
     ])
     .unwrap();
-    let written = with_layout(RIG, &layout).unwrap();
+    let written = with_changes(RIG, |rig| place_sensors(rig, &layout, LINE)).unwrap();
     insta::assert_snapshot!(written);
     let rig = Rig::from_toml(&written).unwrap();
     let places: Vec<f64> = rig.setup.layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
     assert_eq!(places, [0.035, 0.26, 0.123457, 0.4]);
-    let again = with_layout(&written, &layout).unwrap();
+    let again = with_changes(&written, |rig| place_sensors(rig, &layout, LINE)).unwrap();
     assert_eq!(again, written);
+}
+
+#[test]
+fn ranges_are_read_and_others_refused() {
+    assert_eq!(counts("2..16"), Ok(2..=16));
+    assert_eq!(counts("3..=3"), Ok(3..=3));
+    for text in ["", "5", "0..4", "5..2", "2..1000", "a..b", "-1..3"] {
+        assert!(counts(text).is_err(), "{text}");
+    }
 }

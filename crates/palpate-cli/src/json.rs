@@ -1,0 +1,65 @@
+//! JSON objects written where their values are: keys in the order of the source, no type for each.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+/// A JSON object of these keys and values. `"key"?: value` leaves the key out of a `None`; `..fields` takes in another's keys.
+macro_rules! object {
+    ($($fields:tt)*) => { $crate::json::Object($crate::json::fields!($($fields)*)) };
+}
+
+/// The keys and values of [`object`] alone.
+macro_rules! fields {
+    () => { $crate::json::End };
+    (..$fields:expr $(, $($rest:tt)*)?) => { $crate::json::Joined($fields, $crate::json::fields!($($($rest)*)?)) };
+    ($key:literal: $value:expr $(, $($rest:tt)*)?) => {
+        $crate::json::Field($key, Some($value), $crate::json::fields!($($($rest)*)?))
+    };
+    ($key:literal?: $value:expr $(, $($rest:tt)*)?) => {
+        $crate::json::Field($key, $value, $crate::json::fields!($($($rest)*)?))
+    };
+}
+pub(crate) use {fields, object};
+
+/// Keys and values of an object, from the first on.
+pub trait Fields {
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error>;
+}
+
+/// An object, from its fields.
+pub struct Object<F>(pub F);
+/// A key with its value, unless there is none; and the fields after it.
+pub struct Field<V, R>(pub &'static str, pub Option<V>, pub R);
+/// Fields, and those after them.
+pub struct Joined<F, R>(pub F, pub R);
+/// No field.
+pub struct End;
+
+impl<F: Fields> Serialize for Object<F> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        self.0.write(&mut map)?;
+        map.end()
+    }
+}
+
+impl<V: Serialize, R: Fields> Fields for Field<V, R> {
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        if let Some(value) = &self.1 {
+            map.serialize_entry(self.0, value)?;
+        }
+        self.2.write(map)
+    }
+}
+
+impl<F: Fields, R: Fields> Fields for Joined<F, R> {
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        self.0.write(map)?;
+        self.1.write(map)
+    }
+}
+
+impl Fields for End {
+    fn write<M: SerializeMap>(&self, _: &mut M) -> Result<(), M::Error> {
+        Ok(())
+    }
+}

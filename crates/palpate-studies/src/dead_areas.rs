@@ -1,0 +1,351 @@
+//! Dead areas: is the surface between sensors located as well as the surface over them?
+//!
+//! After Brett and Li: whether there are dead areas depends on how readings are interpreted, not on how many sensors there are.
+//! Every estimator is calibrated on the same bench with 2, 4, 8, … sensors, and beside them an [`ArraySensor`], whose sensors
+//! each respond to contacts near them only. Errors are then folded over all gaps between sensors.
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+use palpate_estimators::centroid::Centroid;
+use palpate_estimators::estimator::{Estimator, contenders};
+use palpate_estimators::evaluation::{Evaluation, Located, Split, evaluate_splits};
+use palpate_estimators::recording::{Provenance, Recording, Row};
+use palpate_estimators::setup::Setup;
+use palpate_estimators::simulate::SimulateError;
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
+use palpate_mechanics::surface::{Extent, SurfaceSpec};
+use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_rig::{Rig, RigSimulationError};
+
+/// The bench of the study, as a rig.
+pub const RIG_TOML: &str = include_str!("../../../examples/dead-areas.toml");
+/// Sensor counts of the study.
+pub const COUNTS: [usize; 4] = [2, 4, 8, 16];
+/// Standard deviation of the array sensor's point spread where it is the same at every count, in metres.
+const FIXED_SPREAD_M: f64 = 0.01;
+/// Presentations after which a network trained by back-propagation stops.
+const MOST_PRESENTATIONS: usize = 2_000_000;
+
+/// What the study is to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeadAreas {
+    /// Beam, noise, force and training positions; its sensors' kind and noise, not their count.
+    pub rig: Rig,
+    /// Sensor counts.
+    pub counts: Vec<usize>,
+    /// Calibrations at each count, each with noise of its own.
+    pub calibrations: u64,
+    /// An error up to this, in metres, is good enough for the effective length.
+    pub tolerance_m: f64,
+    /// Kinds of estimators that are left out.
+    pub without: Vec<&'static str>,
+    /// Seed of noise and fits.
+    pub seed: u64,
+}
+
+/// How one estimator did at one sensor count.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeadAreaRow {
+    /// "distributive", or what the array sensor's point spread is.
+    pub sensing: String,
+    /// The estimator's kind.
+    pub estimator: &'static str,
+    /// Sensors.
+    pub sensors: usize,
+    /// Share of the contacts located within the tolerance, in %.
+    pub effective_percent: f64,
+    /// Mean error in metres.
+    pub mean_error_m: f64,
+    /// Errors folded over the gaps between sensors.
+    pub folded: FoldedErrors,
+}
+
+/// What the study found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeadAreaResults {
+    /// A row an estimator and count.
+    pub rows: Vec<DeadAreaRow>,
+    /// Estimators that could not be fitted: sensing, kind, count and why.
+    pub left_out: Vec<(String, &'static str, usize, String)>,
+}
+
+/// Why a study of dead areas does not come to its end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DeadAreasError {
+    /// The rig cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] RigSimulationError),
+    /// It was stopped.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
+}
+
+impl DeadAreas {
+    /// Runs the study.
+    ///
+    /// # Errors
+    /// [`DeadAreasError`] for a rig without a model, a force or training positions, or when `watch` stopped it.
+    pub fn run(&self, watch: Watch) -> Result<DeadAreaResults, DeadAreasError> {
+        let mut findings = DeadAreaResults { rows: Vec::new(), left_out: Vec::new() };
+        for &count in &self.counts {
+            let rig = self.with_sensors(count);
+            let trials = rig.trials(self.calibrations, self.seed)?;
+            for estimator in self.estimators(&rig) {
+                self.judge("distributive", &rig, &estimator, &trials, &mut findings, watch)?;
+            }
+            for spread in [PointSpread::Metres(FIXED_SPREAD_M), PointSpread::Pitches(0.5)] {
+                let array = ArraySensor::like(&rig, count, spread)?;
+                let trials = array.trials(self.calibrations, self.seed);
+                let estimator = Estimator::Centroid(Centroid);
+                self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
+            }
+        }
+        Ok(findings)
+    }
+
+    /// The most often that [`DeadAreas::run`] asks whether to go on while it fits.
+    pub fn most_rounds(&self) -> u64 {
+        let rounds = |count: &usize| {
+            let estimators = self.estimators(&self.with_sensors(*count));
+            estimators.iter().map(Estimator::most_rounds).sum::<u64>()
+        };
+        self.calibrations * self.counts.iter().map(rounds).sum::<u64>()
+    }
+
+    /// The rig with so many sensors of its first kind, evenly placed.
+    fn with_sensors(&self, count: usize) -> Rig {
+        let mut rig = self.rig.clone();
+        let length_m = rig.setup.surface.extent().length_m();
+        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors().first().cloned() {
+            let mut layout = Layout::even(kind, count, length_m);
+            // A channel of the rig, which was checked.
+            if layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel = channel)).is_ok() {
+                rig.setup.layout = layout;
+            }
+        }
+        rig
+    }
+
+    fn estimators(&self, rig: &Rig) -> Vec<Estimator> {
+        let rows = rig.training.as_ref().map_or(1, |training| training.count * training.repeats);
+        let mut estimators = contenders(&rig.setup, &rig.estimator, rows);
+        estimators.retain(|estimator| !self.without.contains(&estimator.kind()));
+        for estimator in &mut estimators {
+            if let Estimator::Network(config) = estimator {
+                let most = u32::try_from(MOST_PRESENTATIONS / rows.max(1)).unwrap_or(u32::MAX).max(1);
+                config.training.max_epochs = config.training.max_epochs.min(most);
+            }
+        }
+        estimators
+    }
+
+    /// Adds an estimator's row.
+    fn judge(
+        &self,
+        sensing: &str,
+        rig: &Rig,
+        estimator: &Estimator,
+        trials: &[Split],
+        findings: &mut DeadAreaResults,
+        watch: Watch,
+    ) -> Result<(), Cancelled> {
+        let sensors = rig.setup.layout.len();
+        match evaluate_splits(&rig.setup, estimator, trials, self.seed, &|| 0.0, watch) {
+            Ok(tried) => {
+                let evaluation = &tried.evaluation;
+                findings.rows.push(DeadAreaRow {
+                    sensing: sensing.to_owned(),
+                    estimator: estimator.kind(),
+                    sensors,
+                    effective_percent: evaluation.effective_percent(self.tolerance_m),
+                    mean_error_m: evaluation.summary(None).map_or(f64::NAN, |summary| summary.average_m),
+                    folded: FoldedErrors::of(evaluation, &rig.setup.layout, self.tolerance_m),
+                });
+            }
+            Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
+            Err(error) => {
+                findings.left_out.push((sensing.to_owned(), estimator.kind(), sensors, error.to_string()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Width of a sensor's point spread: its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PointSpread {
+    /// In metres, whatever the pitch.
+    Metres(f64),
+    /// In pitches of the array.
+    Pitches(f64),
+}
+
+/// A line of n sensors at (i + ½)·l/n. Sensor i reads exp(−(a − x_i)²/(2·s²)) of a contact at a, its response over itself being
+/// 1, plus Gaussian noise; s is its point spread. It is a surface without a model: raw channels, known by recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArraySensor {
+    rig: Rig,
+    spread: PointSpread,
+    spread_m: f64,
+    noise_sd: f64,
+    training: Vec<Position>,
+    repeats: usize,
+}
+
+impl ArraySensor {
+    /// An array as long as a rig's surface, pressed at the same training positions with the same force. Its noise has the
+    /// same share of the full scale as that of the rig's first sensor.
+    ///
+    /// # Errors
+    /// [`RigSimulationError`] for a rig without a model or training positions.
+    pub fn like(rig: &Rig, count: usize, spread: PointSpread) -> Result<Self, RigSimulationError> {
+        let model = rig.setup.surface.model().ok_or(SimulateError::NoModel)?;
+        let force_n = rig.setup.force_n.ok_or(SimulateError::NoForce)?;
+        let training = rig.training()?;
+        let length_m = model.length_m();
+        let share = |sensor: &Sensor| sensor.channel.noise_sd / (force_n * model.full_scale(sensor.kind));
+        let noise_sd = rig.setup.layout.sensors().first().map_or(0.0, share);
+        let pitch_m = length_m / count as f64;
+        let sensor = |i: usize| Sensor {
+            kind: SensorKind::Raw,
+            position: Position::along((i as f64 + 0.5) * pitch_m),
+            name: format!("raw_{}", i + 1),
+            channel: ChannelModel { noise_sd, ..ChannelModel::default() },
+        };
+        let setup = Setup {
+            surface: SurfaceSpec::Measured(Extent::Line { length_m }),
+            layout: Layout::new((0..count).map(sensor).collect()).map_err(SimulateError::from)?,
+            force_n: Some(force_n),
+            columns: None,
+        };
+        let spread_m = match spread {
+            PointSpread::Metres(spread_m) => spread_m,
+            PointSpread::Pitches(pitches) => pitches * pitch_m,
+        };
+        let (positions, repeats) =
+            (training.positions(setup.surface.extent()).map_err(SimulateError::from)?, training.repeats);
+        let rig = Rig { setup, loads: Vec::new(), ..rig.clone() };
+        Ok(Self { rig, spread, spread_m, noise_sd, training: positions, repeats })
+    }
+
+    /// Its bench, with the rig's training positions.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// "array, spread 10 mm", or "array, spread 0.5 pitch".
+    pub fn name(&self) -> String {
+        match self.spread {
+            PointSpread::Metres(spread_m) => format!("array, spread {} mm", spread_m * 1e3),
+            PointSpread::Pitches(pitches) => format!("array, spread {pitches} pitch"),
+        }
+    }
+
+    /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
+    pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
+        let length_m = self.rig.setup.surface.extent().length_m();
+        let pressed: Vec<Position> =
+            self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
+        let judged: Vec<Position> =
+            (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
+        let trial = |k: u64| {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
+            let training = self.recording(&pressed, seed, &mut rng);
+            Split { training, judged: self.recording(&judged, seed, &mut rng) }
+        };
+        (0..count).map(trial).collect()
+    }
+
+    fn recording(&self, positions: &[Position], seed: u64, rng: &mut Xoshiro256PlusPlus) -> Recording {
+        let layout = &self.rig.setup.layout;
+        let row = |position: &Position| {
+            let reading = layout.sensors().iter().map(|sensor| {
+                let off = position.distance_m(sensor.position) / self.spread_m;
+                (-0.5 * off * off).exp() + self.noise_sd * rng.sample::<f64, _>(StandardNormal)
+            });
+            Row {
+                position: *position,
+                force_n: self.rig.setup.force_n,
+                nuisance: None,
+                reading: reading.collect(),
+            }
+        };
+        let rows: Vec<Row> = positions.iter().map(row).collect();
+        let source = "simulation of an array sensor".to_owned();
+        let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
+        Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
+    }
+}
+
+/// Parts into which half a gap between sensors is divided.
+pub const FOLDS: usize = 10;
+
+/// Errors of all contacts between the outermost sensors, folded over all gaps.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoldedErrors {
+    /// From over a sensor to half-way between two; parts that no contact fell into are left out.
+    pub folds: Vec<Fold>,
+    /// Mean error within a tenth of a pitch from a sensor, in metres.
+    pub at_sensors_m: f64,
+    /// Mean error within a tenth of a pitch from the middle of a gap, in metres.
+    pub between_m: f64,
+    /// Share of the contacts between the outermost sensors that are off by more than the tolerance, in %.
+    pub dead_percent: f64,
+}
+
+/// Errors at one distance from the nearest sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Fold {
+    /// Middle of the part: distance from the nearest sensor over the pitch, 0 to 0.5.
+    pub pitches: f64,
+    /// Mean error, in metres.
+    pub mean_error_m: f64,
+    /// Contacts.
+    pub contacts: usize,
+}
+
+impl FoldedErrors {
+    /// Folds the errors of an evaluation over the gaps of a layout along a line.
+    pub fn of(evaluation: &Evaluation, layout: &Layout, tolerance_m: f64) -> Self {
+        let mut places: Vec<f64> = layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
+        places.sort_by(f64::total_cmp);
+        let folded: Vec<(f64, f64)> = evaluation
+            .located
+            .iter()
+            .filter_map(|located| Some((pitches_off(&places, located)?, located.error_m())))
+            .collect();
+        let mean_within = |from: f64, to: f64| {
+            let errors =
+                folded.iter().filter(|(pitches, _)| (from..=to).contains(pitches)).map(|(_, error)| error);
+            let (sum, count) = errors.fold((0.0, 0), |(sum, count), error| (sum + error, count + 1));
+            (sum / f64::from(count), count as usize)
+        };
+        let width = 0.5 / FOLDS as f64;
+        let fold = |i: usize| {
+            let from = i as f64 * width;
+            let (mean_error_m, contacts) = mean_within(from, from + width);
+            (contacts > 0).then_some(Fold { pitches: from + 0.5 * width, mean_error_m, contacts })
+        };
+        let dead = folded.iter().filter(|(_, error_m)| *error_m > tolerance_m).count();
+        Self {
+            folds: (0..FOLDS).filter_map(fold).collect(),
+            at_sensors_m: mean_within(0.0, 0.1).0,
+            between_m: mean_within(0.4, 0.5).0,
+            dead_percent: 100.0 * dead as f64 / folded.len() as f64,
+        }
+    }
+}
+
+/// Distance of a contact from the nearest sensor over the distance of the two sensors around it; `None` beyond the outermost.
+fn pitches_off(places: &[f64], located: &Located) -> Option<f64> {
+    let x_m = located.truth.x_m;
+    let gap = places.windows(2).find(|gap| gap[0] <= x_m && x_m <= gap[1] && gap[0] < gap[1])?;
+    Some((x_m - gap[0]).min(gap[1] - x_m) / (gap[1] - gap[0]))
+}
+
+#[cfg(test)]
+mod tests;
