@@ -35,7 +35,7 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Wri
     write_lines(comment, std::iter::once(header(&columns)).chain(rows), out)
 }
 
-/// Writes a recording as [`write`] does, with the time first.
+/// Writes a recording as [`write()`] does, with the time first.
 ///
 /// # Errors
 /// Whatever `out` reports.
