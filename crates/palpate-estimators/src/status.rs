@@ -30,12 +30,12 @@ pub fn misfit_bound(freedom: usize) -> f64 {
 }
 
 /// Places along a line that readings tell apart.
-const PLACES: f64 = 33.0;
+pub const LINE_PLACES: usize = 33;
 
-/// What a contact with so many unknowns costs in χ², read by so many channels, by the extended Bayesian information criterion (Chen and
-/// Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln P, with P the places it could have been at.
-pub fn contact_cost(unknowns: usize, channels: usize) -> f64 {
-    unknowns as f64 * (channels as f64).ln() + 2.0 * PLACES.ln()
+/// Cost in χ² of a contact with so many unknowns, read by so many channels, that could have been at so many places, by the extended
+/// Bayesian information criterion (Chen and Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln places.
+pub fn contact_cost(unknowns: usize, channels: usize, places: usize) -> f64 {
+    unknowns as f64 * (channels as f64).ln() + 2.0 * (places as f64).ln()
 }
 
 /// The estimate of a method that does not know the noise of its channels: located, or outside the surface.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
-use crate::status::{OTHER_PLACE, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -234,7 +234,7 @@ impl Locate for ClosedFormLocator {
         let posterior = Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise };
         let found = posterior.explanations();
         let least = found.iter().fold(f64::INFINITY, |least, explanation| least.min(explanation.chi_squared));
-        if quiet && size <= least + contact_cost(self.unknowns(), channels.len()) {
+        if quiet && size <= least + contact_cost(self.unknowns(), channels.len(), LINE_PLACES) {
             return Estimate::of_position(Position::default(), Status::NoContact);
         }
         match scales {

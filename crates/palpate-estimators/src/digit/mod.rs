@@ -15,7 +15,7 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault};
 use crate::likelihood::ContactFit;
 use crate::setup::Setup;
 use crate::simulate::{CleanSensors, simulate_at};
-use crate::status::{OTHER_PLACE, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -262,7 +262,7 @@ impl Locate for DigitLocator {
             Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
         let posterior = Posterior::new(&likelihood);
         let least = posterior.pieces.iter().fold(f64::INFINITY, |least, piece| least.min(piece.chi_squared));
-        if quiet && size <= least + contact_cost(self.unknowns(), gauges.len()) {
+        if quiet && size <= least + contact_cost(self.unknowns(), gauges.len(), LINE_PLACES) {
             return Estimate::of_position(Position::default(), Status::NoContact);
         }
         self.estimate(posterior, gauges.len().saturating_sub(self.unknowns()))

@@ -15,7 +15,7 @@ use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
 use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
-use crate::status::misfit_bound;
+use crate::status::{contact_cost, misfit_bound};
 use palpate_numerics::simd::Eight;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
@@ -156,10 +156,9 @@ fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
     raw
 }
 
-/// What a contact with `unknowns` costs by the extended Bayesian information criterion, for `channels` channels and as many places as
-/// the search looks at: unknowns·ln channels + 2·ln places (Chen and Chen, Biometrika 95, 2008).
+/// Cost of a contact with `unknowns`, for `channels` channels and as many places as the search looks at.
 pub(super) fn penalty(unknowns: usize, channels: usize) -> f64 {
-    unknowns as f64 * (channels as f64).ln() + 2.0 * (COARSE as f64).ln()
+    contact_cost(unknowns, channels, COARSE)
 }
 
 /// Memory for locating readings, to be used again; up to sixteen channels it lies in place, without allocation.

@@ -9,7 +9,7 @@ use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::table::{Lanes, Patches, PlaneTable};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
-use crate::status::misfit_bound;
+use crate::status::{contact_cost, misfit_bound};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, Matrix, add_outer};
 
@@ -91,7 +91,7 @@ impl Search {
         let channels = live.len();
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
-            charge: unknowns as f64 * (channels as f64).ln() + 2.0 * (coarse.cells() as f64).ln(),
+            charge: contact_cost(unknowns, channels, coarse.cells()),
             misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
             noise_bound: misfit_bound(channels),
             size_m: [table.length_m, table.width_m],
