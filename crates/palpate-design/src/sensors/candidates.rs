@@ -330,11 +330,7 @@ pub(super) fn exclusion(
 /// How close a sensor may come to the mirror image of another where symmetry is forbidden: the spacing, or more than half
 /// the distance of sites, so that sites next to each other are told apart.
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
-    let pitch_m = match &design.sites {
-        Sites::Every(every_m) => *every_m,
-        Sites::Count(count) => extent.length_m() / (*count + 1) as f64,
-        Sites::At(_) => 0.0,
-    };
+    let pitch_m = design.sites.distance_m(extent.length_m()).unwrap_or(0.0);
     design.spacing_m.max(0.5 * pitch_m).max(2e-9 * extent.length_m())
 }
 

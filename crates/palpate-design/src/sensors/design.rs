@@ -69,6 +69,17 @@ pub enum Sites {
     At(Vec<Position>),
 }
 
+impl Sites {
+    /// The distance of neighbouring sites along a surface of this length, in metres; `None` of listed ones.
+    pub(super) fn distance_m(&self, length_m: f64) -> Option<f64> {
+        match self {
+            Self::Every(every_m) => Some(*every_m),
+            Self::Count(count) => Some(length_m / (*count + 1) as f64),
+            Self::At(_) => None,
+        }
+    }
+}
+
 /// Part of the surface where no sensor may sit, its boundary excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOut {

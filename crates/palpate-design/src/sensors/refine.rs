@@ -2,7 +2,7 @@
 
 use super::SensorProblem;
 use super::candidates::{PlacedSensor, exclusion, mirrored, reads_something};
-use super::design::{Sites, Symmetry};
+use super::design::Symmetry;
 use super::objective::{Block, ForceBelief, State};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
@@ -28,7 +28,7 @@ pub(super) fn refine(
         .iter()
         .map(|unit| pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect())
         .collect();
-    let Some(mut step_m) = site_distance(&pool.design.sites, pool.extent.length_m()) else {
+    let Some(mut step_m) = pool.design.sites.distance_m(pool.extent.length_m()) else {
         return Ok(groups.concat());
     };
     let halvings = match pool.extent {
@@ -49,15 +49,6 @@ pub(super) fn refine(
         step_m *= 0.5;
     }
     Ok(groups.concat())
-}
-
-/// `None` where the sites are those listed and no others.
-fn site_distance(sites: &Sites, length_m: f64) -> Option<f64> {
-    match sites {
-        Sites::Every(every_m) => Some(*every_m),
-        Sites::Count(count) => Some(length_m / (*count + 1) as f64),
-        Sites::At(_) => None,
-    }
 }
 
 /// Moves one group by a step, if that improves the score.
@@ -106,7 +97,7 @@ fn shifted(problem: &SensorProblem, group: &[PlacedSensor], [x_m, y_m]: [f64; 2]
 fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedSensor]) -> bool {
     let pool = &problem.pool;
     // Sites keep sensors of a kind apart; without them nothing would stop them from meeting in one place.
-    let apart_m = site_distance(&pool.design.sites, pool.extent.length_m()).unwrap_or(0.0);
+    let apart_m = pool.design.sites.distance_m(pool.extent.length_m()).unwrap_or(0.0);
     let slack_m = 1e-9 * pool.extent.length_m();
     let together = |a: &PlacedSensor, b: &PlacedSensor| {
         let crowded = a.offer == b.offer && a.position.distance_m(b.position) < apart_m - slack_m;
