@@ -27,8 +27,8 @@ pub(super) struct GaussNewton {
     /// 1/(1 + v) in every cell, v the calibration's variance of a reading over the noise's at the known force or the
     /// calibration's, in groups of eight channels.
     pub weights: Vec<[f64; 8]>,
-    /// How the influences bend in every cell.
-    bends: Vec<Bend>,
+    /// Curvature of the influences in every cell.
+    curvatures: Vec<Curvature>,
     /// Where places end: at the surface's ends, or a little before.
     pub ends_m: [f64; 2],
     length_m: f64,
@@ -61,7 +61,7 @@ impl GaussNewton {
             spacing: table.spacing(),
             groups: table.sensors.div_ceil(8),
             rows: paired(group(&table.values), group(&table.slopes)),
-            bends: bends(table, &weights, force),
+            curvatures: curvatures(table, &weights, force),
             weights,
             ends_m: ends_m(table, force),
             length_m: table.length_m,
@@ -109,7 +109,7 @@ impl GaussNewton {
                 covariance: normal.covariance,
             };
             let step = normal.step(moved, &here);
-            let allowed = self.bend::<V, N>(cell.node).allows(&step, self.weights_grown(force_n));
+            let allowed = self.curvature::<V, N>(cell.node).allows(&step, self.weights_grown(force_n));
             let small = (allowed | step.square.at_most(least)) & self.weighs_alike(force_n, normal.force_n);
             let now = if taken == steps { N::ALL } else { small };
             minimum = here.or(now & !arrived, minimum);
@@ -122,16 +122,16 @@ impl GaussNewton {
         (minimum, arrived)
     }
 
-    /// How the influences bend in the cell after a node.
+    /// Curvature of the influences in the cell after a node.
     #[inline(always)]
-    fn bend<V: Eight, N: Abreast<V>>(&self, node: N) -> Bend<N> {
+    fn curvature<V: Eight, N: Abreast<V>>(&self, node: N) -> Curvature<N> {
         let (mut kappa_square, mut lambda_square) = (N::each(0.0), N::each(0.0));
-        let bends = kappa_square.as_mut().iter_mut().zip(lambda_square.as_mut());
-        for ((kappa_square, lambda_square), node) in bends.zip(node.lanes().as_ref()) {
-            let bend = &self.bends[*node as u32 as usize];
-            (*kappa_square, *lambda_square) = (bend.kappa_square, bend.lambda_square);
+        let curvatures = kappa_square.as_mut().iter_mut().zip(lambda_square.as_mut());
+        for ((kappa_square, lambda_square), node) in curvatures.zip(node.lanes().as_ref()) {
+            let curvature = &self.curvatures[*node as u32 as usize];
+            (*kappa_square, *lambda_square) = (curvature.kappa_square, curvature.lambda_square);
         }
-        Bend { kappa_square: N::of(&kappa_square), lambda_square: N::of(&lambda_square) }
+        Curvature { kappa_square: N::of(&kappa_square), lambda_square: N::of(&lambda_square) }
     }
 
     /// Whether the calibration's variance counts alike, to a twentieth, for two forces.
@@ -153,7 +153,7 @@ impl GaussNewton {
     /// The sums of the normal equations at a place; of those about the force only where it is not known.
     #[inline(always)]
     fn sums<V: Eight, N: Abreast<V>>(&self, whitened: &[[f64; 8]], cell: Cell<N>, force_n: N) -> Sums<N> {
-        let places = Places::new::<V, N>(cell, force_n);
+        let places = Points::new::<V, N>(cell, force_n);
         if let ForceBelief::Known(_) = self.force {
             let mut vectors = N::each([V::splat(0.0); 3]);
             for (reading, of_reading) in vectors.as_mut().iter_mut().enumerate() {
@@ -176,9 +176,9 @@ impl GaussNewton {
     /// Of one reading: e², g², eg, f², fg and ef, summed over groups of eight channels. The calibration's variance counts
     /// `grown` times; not given where the force is known, as the weights are then those for that force.
     #[inline(always)]
-    fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Place, grown: Option<f64>) -> [V; 6] {
+    fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Point, grown: Option<f64>) -> [V; 6] {
         let [mut square, mut gg, mut eg, mut ff, mut fg, mut ef] = [V::splat(0.0); 6];
-        let Place { reading, cell, force_n } = place;
+        let Point { reading, cell, force_n } = place;
         let (groups, force, node) = (self.groups, V::splat(*force_n), cell.node as u32 as usize);
         let (left, right) = self.rows[node * groups..][..2 * groups].split_at(groups);
         let weights = &self.weights[node * groups..][..groups];
@@ -252,19 +252,19 @@ impl<N: Number> Backtracking<N> {
 }
 
 /// Where a reading is looked for, and with which force.
-struct Place {
+struct Point {
     reading: usize,
     cell: Cell<f64>,
     force_n: f64,
 }
 
 /// The places of all readings, number by number.
-struct Places<L> {
+struct Points<L> {
     cell: Cell<L>,
     force_n: L,
 }
 
-impl<L: AsRef<[f64]>> Places<L> {
+impl<L: AsRef<[f64]>> Points<L> {
     #[inline(always)]
     fn new<V: Copy, N: Abreast<V, Each<f64> = L>>(cell: Cell<N>, force_n: N) -> Self {
         let ([v0, v1, v2, v3], [s0, s1, s2, s3]) = (cell.value, cell.slope);
@@ -277,7 +277,7 @@ impl<L: AsRef<[f64]>> Places<L> {
     }
 
     #[inline(always)]
-    fn of(&self, reading: usize) -> Place {
+    fn of(&self, reading: usize) -> Point {
         let at = |lanes: &L| lanes.as_ref()[reading];
         let Cell { node, value: [v0, v1, v2, v3], slope: [s0, s1, s2, s3] } = &self.cell;
         let cell = Cell {
@@ -285,7 +285,7 @@ impl<L: AsRef<[f64]>> Places<L> {
             value: [at(v0), at(v1), at(v2), at(v3)],
             slope: [at(s0), at(s1), at(s2), at(s3)],
         };
-        Place { reading, cell, force_n: at(&self.force_n) }
+        Point { reading, cell, force_n: at(&self.force_n) }
     }
 }
 
@@ -412,9 +412,9 @@ impl<N: Number> Normal<N> {
     }
 }
 
-/// How the influences bend in a cell of the table.
+/// Curvature of the influences in a cell of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Bend<N = f64> {
+struct Curvature<N = f64> {
     /// κ², in m⁻².
     pub kappa_square: N,
     /// λ², in m⁻⁴; 0 where the force is known.
@@ -434,7 +434,7 @@ struct Step<N> {
     pub signal: N,
 }
 
-impl<N: Number> Bend<N> {
+impl<N: Number> Curvature<N> {
     /// Whether a step leaves so little that it may be the last, a bit for each reading: less than a twentieth of the
     /// position's standard deviation along g, and less than a tenth of the misfit's unit along f. The calibration's
     /// variance counts `grown` times as much as where κ was found, and weighs channels against each other by no more.
@@ -451,25 +451,28 @@ impl<N: Number> Bend<N> {
     }
 }
 
-/// How a whitened table bends in every cell; `weights` of the cells' channels, in groups of eight.
-fn bends(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Vec<Bend> {
+/// Curvature of a whitened table in every cell; `weights` of the cells' channels, in groups of eight.
+fn curvatures(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Vec<Curvature> {
     const PARTS: usize = 4;
     let groups = table.sensors.div_ceil(8);
     let cells = weights.chunks_exact(groups).enumerate();
     cells
         .map(|(cell, weights)| {
-            let at =
-                |part: usize| bend(table, weights.as_flattened(), force, cell, part as f64 / PARTS as f64);
-            (0..=PARTS).map(at).fold(Bend::<f64> { kappa_square: 0.0, lambda_square: 0.0 }, |a, b| Bend {
-                kappa_square: a.kappa_square.max(b.kappa_square),
-                lambda_square: a.lambda_square.max(b.lambda_square),
+            let at = |part: usize| {
+                curvature(table, weights.as_flattened(), force, cell, part as f64 / PARTS as f64)
+            };
+            (0..=PARTS).map(at).fold(Curvature::<f64> { kappa_square: 0.0, lambda_square: 0.0 }, |a, b| {
+                Curvature {
+                    kappa_square: a.kappa_square.max(b.kappa_square),
+                    lambda_square: a.lambda_square.max(b.lambda_square),
+                }
             })
         })
         .collect()
 }
 
 /// At part `t` of a cell; infinite where a reading does not tell the position.
-fn bend(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize, t: f64) -> Bend {
+fn curvature(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize, t: f64) -> Curvature {
     let h_m = table.spacing_m();
     let place = Cell { node: cell as f64, ..table.spacing().cell(t * h_m) };
     // Products of f, f′ and f″.
@@ -488,12 +491,12 @@ fn bend(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: usize
     };
     let (gg, gb) = (ss - c * fs, sb - c * fb);
     let across = (bb - along_f * fb - gb * gb / gg).max(0.0) / gg;
-    let bend = Bend {
+    let curvature = Curvature {
         kappa_square: (0.5 * gb / gg - c).powi(2).max(across),
         lambda_square: (0.5 * along_f).powi(2),
     };
-    let told = gg > 0.0 && bend.kappa_square.is_finite() && bend.lambda_square.is_finite();
-    if told { bend } else { Bend { kappa_square: f64::INFINITY, lambda_square: f64::INFINITY } }
+    let told = gg > 0.0 && curvature.kappa_square.is_finite() && curvature.lambda_square.is_finite();
+    if told { curvature } else { Curvature { kappa_square: f64::INFINITY, lambda_square: f64::INFINITY } }
 }
 
 /// Where places end. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
@@ -549,11 +552,14 @@ mod tests {
         for (force, kappa, lambda) in
             [(ForceBelief::Known(1.0), turn, 0.0), (ForceBelief::Unknown, 0.0, 0.5 * turn * turn)]
         {
-            for bend in bends(&table, &weights, force) {
-                assert!((bend.kappa_square.sqrt() - kappa).abs() < 1e-2 * turn, "{bend:?}, {force:?}");
+            for curvature in curvatures(&table, &weights, force) {
                 assert!(
-                    (bend.lambda_square.sqrt() - lambda).abs() < 1e-2 * turn * turn,
-                    "{bend:?}, {force:?}"
+                    (curvature.kappa_square.sqrt() - kappa).abs() < 1e-2 * turn,
+                    "{curvature:?}, {force:?}"
+                );
+                assert!(
+                    (curvature.lambda_square.sqrt() - lambda).abs() < 1e-2 * turn * turn,
+                    "{curvature:?}, {force:?}"
                 );
             }
         }

@@ -148,12 +148,12 @@ struct Cell {
 
 /// A place, and how well it explains the reading.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct Candidate {
     place: usize,
     residual: f64,
 }
 
-impl Seen {
+impl Candidate {
     /// Whether somewhere `reach` closer, in deviations, could matter beside the residual `least`.
     fn within(&self, reach: f64, least: f64) -> bool {
         let closest = (self.residual.sqrt() - reach).max(0.0);
@@ -176,11 +176,12 @@ impl<'a> Posterior<'a> {
     /// those the cells that could, cut finely.
     fn of(locator: &'a MeasuredLocator, reading: &[f64]) -> Self {
         let (table, noise) = (&locator.table, &locator.whitening);
-        let look = |place: usize| Seen { place, residual: table.line(place).residual(reading, noise) };
-        let nearest =
-            |seen: &mut dyn Iterator<Item = Seen>| seen.min_by(|a, b| a.residual.total_cmp(&b.residual));
+        let look = |place: usize| Candidate { place, residual: table.line(place).residual(reading, noise) };
+        let nearest = |candidate: &mut dyn Iterator<Item = Candidate>| {
+            candidate.min_by(|a, b| a.residual.total_cmp(&b.residual))
+        };
         let mut posterior = Self { locator, cells: Vec::new(), parts: Vec::new(), residual: f64::INFINITY };
-        let blocks: Vec<Seen> = table.blocks().map(look).collect();
+        let blocks: Vec<Candidate> = table.blocks().map(look).collect();
         let Some(block) = nearest(&mut blocks.iter().copied()) else { return posterior };
         let Some(best) = nearest(&mut table.block(block.place).map(look)) else { return posterior };
         let mut buffer = LineBuffer::default();
@@ -190,9 +191,9 @@ impl<'a> Posterior<'a> {
         }
         // From a block's middle to its other places is twice the reach, and from there half as far as that again.
         for block in blocks.iter().filter(|block| block.within(3.5 * table.reaches[block.place], least)) {
-            for seen in table.block(block.place).map(look) {
-                if seen.within(table.reaches[seen.place], least) {
-                    posterior.add_cell(seen.place, reading, least, &mut buffer);
+            for candidate in table.block(block.place).map(look) {
+                if candidate.within(table.reaches[candidate.place], least) {
+                    posterior.add_cell(candidate.place, reading, least, &mut buffer);
                 }
             }
         }

@@ -89,7 +89,7 @@ pub(super) struct Patches {
 
 /// A place within a patch, and the weights of its corners.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct PatchPoint {
     /// The corner at the lower left.
     node: usize,
     /// Weights along: of value left and right, of derivative left and right; then those of the function's derivative.
@@ -128,16 +128,16 @@ impl Patches {
 
     /// The patch that holds a place, which is held to the surface.
     #[inline]
-    pub fn place(&self, x_m: f64, y_m: f64) -> Place {
+    pub fn place(&self, x_m: f64, y_m: f64) -> PatchPoint {
         let (column, along) = hermite(x_m * self.inverse_spacing[0], self.columns);
         let (row, across) = hermite(y_m * self.inverse_spacing[1], self.rows);
-        Place { node: row * self.columns + column, along, across }
+        PatchPoint { node: row * self.columns + column, along, across }
     }
 
     /// f and its gradient at a place, of the sensors of a group.
     #[inline]
-    pub fn values(&self, place: &Place, group: usize) -> Values {
-        let Place { node, along: [u, du], across: [v, dv] } = place;
+    pub fn values(&self, place: &PatchPoint, group: usize) -> Values {
+        let PatchPoint { node, along: [u, du], across: [v, dv] } = place;
         let mut values = Values { f: [0.0; 8], along: [0.0; 8], across: [0.0; 8] };
         for side in 0..4 {
             let (right, up) = (side % 2, side / 2);
@@ -162,8 +162,8 @@ impl Patches {
 
     /// f alone at a place, of the sensors of a group.
     #[inline]
-    pub fn value(&self, place: &Place, group: usize) -> Lanes {
-        let Place { node, along: [u, _], across: [v, _] } = place;
+    pub fn value(&self, place: &PatchPoint, group: usize) -> Lanes {
+        let PatchPoint { node, along: [u, _], across: [v, _] } = place;
         let mut value = [0.0; 8];
         for side in 0..4 {
             let (right, up) = (side % 2, side / 2);
