@@ -19,29 +19,18 @@ use anyhow::Result;
 
 use project::Project;
 
-/// Something that breaks a rule, or comes near to it.
+/// Something that breaks a rule.
 #[derive(Debug, PartialEq, Eq)]
 struct Finding {
     path: String,
     /// Counted from 1.
     line: usize,
     message: String,
-    weight: Weight,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Weight {
-    Warning,
-    Failure,
 }
 
 impl Finding {
-    fn failure(path: &str, line: usize, message: impl Into<String>) -> Self {
-        Self { path: path.into(), line, message: message.into(), weight: Weight::Failure }
-    }
-
-    fn warning(path: &str, line: usize, message: impl Into<String>) -> Self {
-        Self { weight: Weight::Warning, ..Self::failure(path, line, message) }
+    fn new(path: &str, line: usize, message: impl Into<String>) -> Self {
+        Self { path: path.into(), line, message: message.into() }
     }
 }
 
@@ -62,14 +51,9 @@ pub fn run(root: &Path) -> Result<bool> {
     let project = Project::read(root)?;
     let mut failures = 0;
     for (name, rule) in RULES {
-        for Finding { path, line, message, weight } in rule(&project) {
-            match weight {
-                Weight::Warning => println!("{path}:{line}: note ({name}): {message}"),
-                Weight::Failure => {
-                    failures += 1;
-                    println!("{path}:{line}: error ({name}): {message}");
-                }
-            }
+        for Finding { path, line, message } in rule(&project) {
+            failures += 1;
+            println!("{path}:{line}: error ({name}): {message}");
         }
     }
     println!("tidy: {} rules, {} files, {failures} broken", RULES.len(), project.files.len());

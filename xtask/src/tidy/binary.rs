@@ -11,7 +11,7 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     let binary = project.files.iter().filter(|file| file.bytes.iter().take(HEAD).any(|byte| *byte == 0));
     binary
         .map(|file| {
-            Finding::failure(&file.path, 1, "a binary file: make it when it is needed, or keep it as text")
+            Finding::new(&file.path, 1, "a binary file: make it when it is needed, or keep it as text")
         })
         .collect()
 }

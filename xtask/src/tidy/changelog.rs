@@ -8,7 +8,7 @@ const CHANGELOG: &str = "CHANGELOG.md";
 /// A changelog that is missing, or silent about the version of a crate.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let Some(file) = project.file(CHANGELOG) else {
-        return vec![Finding::failure(CHANGELOG, 1, "this document is missing: write it")];
+        return vec![Finding::new(CHANGELOG, 1, "this document is missing: write it")];
     };
     let text = file.text();
     let mut versions: Vec<&str> = project.crates.iter().map(|krate| krate.version.as_str()).collect();
@@ -16,9 +16,7 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     versions.dedup();
     let unknown = versions.into_iter().filter(|version| !has_section(&text, version));
     unknown
-        .map(|version| {
-            Finding::failure(CHANGELOG, 1, format!("no section `## {version}`: say what is in it"))
-        })
+        .map(|version| Finding::new(CHANGELOG, 1, format!("no section `## {version}`: say what is in it")))
         .collect()
 }
 

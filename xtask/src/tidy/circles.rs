@@ -164,7 +164,7 @@ fn finding(source: &str, siblings: &Siblings, circle: &[String]) -> Finding {
     };
     let first = &steps[0].2[0];
     let message = steps.iter().map(step).collect::<Vec<_>>().join("; ");
-    Finding::warning(&first.file.path, first.line, message)
+    Finding::new(&first.file.path, first.line, message)
 }
 
 #[cfg(test)]

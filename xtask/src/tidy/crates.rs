@@ -34,7 +34,7 @@ fn of_crate(project: &Project, krate: &Crate) -> Vec<Finding> {
             "crate {} is not in the table of xtask/src/tidy/crates.rs: say what it may use",
             krate.name
         );
-        return vec![Finding::failure(&krate.manifest, 1, message)];
+        return vec![Finding::new(&krate.manifest, 1, message)];
     };
     let below = krate.dependencies.iter().filter(|name| place(name).is_some_and(|other| other >= own));
     below
@@ -44,7 +44,7 @@ fn of_crate(project: &Project, krate: &Crate) -> Vec<Finding> {
                 krate.name,
                 ORDER.join(", ")
             );
-            Finding::failure(&krate.manifest, line_of(project, krate, name), message)
+            Finding::new(&krate.manifest, line_of(project, krate, name), message)
         })
         .collect()
 }

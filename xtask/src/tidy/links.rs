@@ -12,7 +12,7 @@ const RUNNABLE: [&str; 2] = ["studies/", "examples/"];
 /// A missing document, a link that leads nowhere, and a study or example that is not there.
 pub fn findings(project: &Project) -> Vec<Finding> {
     let missing = REQUIRED.into_iter().filter(|path| project.file(path).is_none());
-    let missing = missing.map(|path| Finding::failure(path, 1, "this document is missing: write it"));
+    let missing = missing.map(|path| Finding::new(path, 1, "this document is missing: write it"));
     missing
         .chain(
             project.files.iter().filter(|file| is_document(file)).flat_map(|file| of_document(project, file)),
@@ -29,7 +29,7 @@ fn of_document(project: &Project, file: &File) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut in_code = false;
     for (number, line) in text.lines().enumerate() {
-        let mut add = |message: String| found.push(Finding::failure(&file.path, number + 1, message));
+        let mut add = |message: String| found.push(Finding::new(&file.path, number + 1, message));
         for path in runnable(line).filter(|path| !project.has(path)) {
             add(format!("{path} does not exist"));
         }
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn a_missing_document_is_found() {
         let found = findings(&Project::of(&[("README.md", "")]));
-        assert_eq!(found, [Finding::failure("ARCHITECTURE.md", 1, "this document is missing: write it")]);
+        assert_eq!(found, [Finding::new("ARCHITECTURE.md", 1, "this document is missing: write it")]);
     }
 
     #[test]

@@ -22,7 +22,7 @@ fn of_file(file: &File) -> Vec<Finding> {
     let (is_lock, holds_patterns) = (LOCKS.contains(&name), name == ".gitignore");
     let mut found = Vec::new();
     for (number, line) in file.text().lines().enumerate() {
-        let mut add = |message: String| found.push(Finding::failure(&file.path, number + 1, message));
+        let mut add = |message: String| found.push(Finding::new(&file.path, number + 1, message));
         for path in own_paths(line).filter(|_| !holds_patterns) {
             add(format!("/{path}/… is a path of one machine: make it relative, or an argument"));
         }

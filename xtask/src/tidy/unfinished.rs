@@ -26,7 +26,7 @@ fn markers(file: &File, text: &str) -> Vec<Finding> {
     let mut found = Vec::new();
     for (number, line) in text.lines().enumerate() {
         for marker in MARKERS.into_iter().filter(|marker| lacks_reason(line, marker)) {
-            found.push(Finding::failure(
+            found.push(Finding::new(
                 &file.path,
                 number + 1,
                 format!("{marker} without a reason: write {marker} (why)"),

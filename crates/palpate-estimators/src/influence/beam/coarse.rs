@@ -8,6 +8,7 @@
 
 use super::table::InfluenceTable;
 use crate::influence::config::ForceBelief;
+use crate::status::LINE_PLACES;
 use palpate_numerics::simd::{Abreast, Eight, Number};
 
 /// The search looks at every so many nodes; misfits between them are smooth.
@@ -15,6 +16,7 @@ pub(super) const STRIDE: usize = 4;
 
 /// How many nodes it looks at.
 pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
+const _: () = assert!(COARSE == LINE_PLACES, "estimators count the places along a line alike");
 
 /// Nodes are searched eight side by side.
 const BLOCKS: usize = COARSE.div_ceil(8);
