@@ -1,4 +1,4 @@
-//! How many tests ran, read off the closing lines of the test runners.
+//! Number of tests that ran, read off the closing lines of the test runners.
 
 use std::fmt;
 use std::ops::Add;

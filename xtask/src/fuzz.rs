@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail};
 
 use crate::run;
 
-/// What `cargo fuzz` passes: the address sanitizer, coverage counters with comparisons, and checked arithmetic.
+/// Compiler flags that `cargo fuzz` passes: the address sanitizer, coverage counters with comparisons, and checked arithmetic.
 const FLAGS: [&str; 9] = [
     "-Zsanitizer=address",
     "-Cpasses=sancov-module",

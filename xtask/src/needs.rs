@@ -1,4 +1,4 @@
-//! What the tests need beyond Rust: how it is found, how it is installed, and which tests do without it.
+//! Prerequisites of the tests beyond Rust: how each is found and installed, and which tests do without it.
 
 use std::env;
 use std::ffi::OsString;
@@ -12,32 +12,32 @@ use crate::run;
 
 /// One prerequisite.
 pub struct Need {
-    /// What a person calls it.
+    /// Name for people.
     pub name: &'static str,
     /// An environment variable that says where it is, and so that it need not be installed.
     variable: Option<&'static str>,
     /// Whether it is where it usually is, or where the variable says.
     found: fn(&Path, Option<&Path>) -> bool,
     install: Option<Install>,
-    /// What becomes of the tests without it.
+    /// Consequence for the tests without it.
     pub without: Without,
 }
 
-/// What becomes of the tests when a prerequisite is missing.
+/// Consequence for the tests of a missing prerequisite.
 #[derive(Clone, Copy)]
 pub enum Without {
     /// These tests are skipped, until a person does what `remedy` says.
     Skips {
         /// The files that hold the tests.
         tests: &'static [&'static str],
-        /// What a person can do about it.
+        /// Remedy for people.
         remedy: &'static str,
     },
     /// Every test runs all the same, in this other way.
     FallsBack(&'static str),
 }
 
-/// How a prerequisite is installed.
+/// Way of installing a prerequisite.
 #[derive(Clone, Copy)]
 enum Install {
     /// Debian packages, when this runs as root on Debian.
@@ -105,7 +105,7 @@ impl Need {
         self.variable.and_then(env::var_os)
     }
 
-    /// What is missing, what follows and what can be done, for people.
+    /// Description for people: what is missing, what follows and what can be done.
     pub fn describe(&self) -> String {
         match self.without {
             Without::Skips { tests, remedy } => {

@@ -6,7 +6,7 @@ use std::thread;
 
 use anyhow::{Context, Result};
 
-/// What a command that was watched did.
+/// Result of a command that was watched.
 pub struct Watched {
     /// It exited with 0.
     pub succeeded: bool,

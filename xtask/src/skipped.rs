@@ -12,7 +12,7 @@ pub const VARIABLE: &str = "PALPATE_SKIPPED";
 
 /// The file of one run.
 pub struct Skipped {
-    /// Where it is.
+    /// Its path.
     pub file: PathBuf,
 }
 
@@ -25,7 +25,7 @@ impl Skipped {
         Ok(Self { file })
     }
 
-    /// What the tests wrote, a line each, in order of name.
+    /// Lines that the tests wrote, one each, in order of name.
     pub fn lines(&self) -> Result<Vec<String>> {
         let text = match fs::read_to_string(&self.file) {
             Ok(text) => text,

@@ -18,7 +18,7 @@ const STRICT: &str = "PALPATE_STRICT";
 /// All that is checked: every crate, with the features that are off by default.
 const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
 
-/// What a test that is skipped for want of a prerequisite counts as.
+/// Verdict on a test that is skipped for want of a prerequisite.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Skips {
     /// It is named and counted.
@@ -27,7 +27,7 @@ pub enum Skips {
     Fail,
 }
 
-/// What one step did.
+/// Result of one step.
 struct Step {
     name: &'static str,
     succeeded: bool,

@@ -1,4 +1,4 @@
-//! How a command ends when it does not end well: a message with its place, and an exit code.
+//! Failure of a command: a message with its place, and an exit code.
 
 use miette::{
     Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
@@ -9,7 +9,7 @@ use std::io::IsTerminal;
 use std::ops::Range;
 use std::process::ExitCode;
 
-/// Why a command did not simply succeed.
+/// Outcome of a command that did not simply succeed.
 #[derive(Debug)]
 pub enum Failure {
     /// Exit code 1: it ran, but a stated goal was missed.
@@ -30,7 +30,7 @@ impl Failure {
         Self::Interrupted("stopped; nothing was written".to_owned())
     }
 
-    /// Why long work ended early: it was stopped, or its input is bad.
+    /// Failure of long work that ended early: it was stopped, or its input is bad.
     pub fn of(error: &(dyn std::error::Error + 'static)) -> Self {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
@@ -52,7 +52,7 @@ impl Failure {
     }
 }
 
-/// What is wrong, where, and what would help.
+/// Message about bad input, with its place and a remedy.
 #[derive(Debug)]
 pub struct Complaint {
     message: String,

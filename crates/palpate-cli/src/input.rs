@@ -1,4 +1,4 @@
-//! What a command is given: palpate's files, with complaints that point at the place, and quantities.
+//! Input of a command: palpate's files, with complaints that point at the place, and quantities.
 
 use crate::failure::{Complaint, Failure};
 use palpate_estimators::estimator::{Locator, LocatorFileError};

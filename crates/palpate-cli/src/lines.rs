@@ -8,11 +8,11 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal};
 use std::path::Path;
 
-/// Where lines come from.
+/// Lines of a source, as they come.
 pub struct Lines {
-    /// What the source is called: the file, or "stdin".
+    /// Name of the source: the file, or "stdin".
     pub name: String,
-    /// How many lines have been read.
+    /// Number of lines read so far.
     pub count: u64,
     source: Box<dyn BufRead>,
     line: Vec<u8>,

@@ -1,4 +1,4 @@
-//! What a command leaves behind: files that appear whole or not at all, and lines and tables on stdout.
+//! Output of a command: files that appear whole or not at all, and lines and tables on stdout.
 
 use crate::failure::{Complaint, Failure};
 use comfy_table::{CellAlignment, presets};

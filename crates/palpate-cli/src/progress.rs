@@ -37,7 +37,7 @@ pub fn bar(length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// What observes long work: a bar on a terminal, and Ctrl-C.
+/// Observer of long work: shows a bar on a terminal, and stops the work at Ctrl-C.
 pub struct Observer {
     bar: ProgressBar,
     state: Mutex<State>,

@@ -9,9 +9,9 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Beam, BeamSection, BeamSupportKind, SupportedBeam, Surface};
 
-/// Where the drawn load acts, as a share of the length: off the middle, so that the shape is seen to be askew.
+/// Position of the drawn load, as a share of the length: off the middle, so that the shape is seen to be askew.
 const DRAWN_LOAD: f64 = 0.35;
-/// Where it may act on a beam on any supports: there, of these, where it bends the beam most.
+/// Positions of the drawn load on a beam on any supports: of these, the one where it bends the beam most.
 const DRAWN_LOADS: [f64; 5] = [DRAWN_LOAD, 0.2, 0.5, 0.65, 0.8];
 /// Points of the drawn shape.
 const SHAPE_STEPS: u32 = 200;
@@ -32,7 +32,7 @@ const DEFLECTION_ROOM: f64 = 56.0;
 const ROUND: [f64; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
 const SUPPORT_HEIGHT: f64 = 22.0;
 const SUPPORT_HALF_WIDTH: f64 = 12.0;
-/// What springs stand on: beneath the beam at its deepest.
+/// Ground that springs stand on: beneath the beam at its deepest.
 const SPRING_GROUND_Y: f64 = BEAM_Y + DEFLECTION_ROOM + 10.0;
 const PROBE_TOP: f64 = 164.0;
 const PROBE_HEIGHT: f64 = 18.0;
@@ -70,18 +70,19 @@ pub(super) fn supported_beam_drawing(
     (drawing.svg(), load)
 }
 
-/// What a drawing shows. Positions are from the left end of the beam; one that a rounding error puts beyond an end is drawn at the end.
+/// Drawing of a loaded beam. Positions are from the left end of the beam; one that a rounding error puts beyond an end is drawn at
+/// the end.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BeamDrawing {
     pub length_mm: f64,
-    /// Where and how the beam is held.
+    /// Position and kind of each support.
     pub supports: Vec<(f64, BeamSupportKind)>,
     /// End and thickness, in millimetres, of each stretch, from left to right; empty for a beam that has one thickness.
     pub steps: Vec<(f64, f64)>,
     /// Position of each sensor; they are numbered from 1 in this order.
     pub sensors_mm: Vec<f64>,
     pub load_mm: f64,
-    /// What stands above the arrow of the load: "3 N".
+    /// Label above the arrow of the load: "3 N".
     pub load_label: String,
     /// Deflected shape as (position, deflection), both in millimetres and downward negative.
     pub deflection_mm: Vec<(f64, f64)>,

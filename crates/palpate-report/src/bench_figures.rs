@@ -59,7 +59,7 @@ pub(super) fn row_axis(names: &[&str]) -> Axis {
     Axis::default().from_to(0.4, rows as f64 + 0.6).named(named.collect())
 }
 
-/// Where a row lies on such an axis.
+/// Height of a row on such an axis.
 pub(super) fn row_height(rows: usize, row: usize) -> f64 {
     (rows - row) as f64
 }

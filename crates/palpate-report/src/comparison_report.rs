@@ -17,14 +17,14 @@ const STRETCHES: usize = 40;
 /// Maps that fit beside each other; estimators beyond them are in the table alone.
 const MOST_MAPS: usize = 9;
 
-/// What a comparison's report is made from.
+/// Contents of a comparison's report.
 #[derive(Clone, Copy)]
 pub struct ComparisonReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface and its sensors.
     pub setup: &'a Setup,
-    /// What the estimators were tried on, in words.
+    /// Trials that the estimators are compared on, in words.
     pub trials: &'a str,
     /// The estimators, best first.
     pub comparisons: &'a [Comparison],

@@ -23,18 +23,18 @@ use palpate_mechanics::surface::Extent;
 const CELLS: f64 = 1600.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=160;
 
-/// What a sensor design's report is made from.
+/// Contents of a sensor design's report.
 #[derive(Clone, Copy)]
 pub struct SensorDesignReport<'a> {
     /// The page's title.
     pub title: &'a str,
     /// The surface, with the rig's own sensors.
     pub setup: &'a Setup,
-    /// What was designed.
+    /// The problem that was solved.
     pub problem: &'a SensorProblem<'a>,
     /// The layouts.
     pub designed: &'a [Designed],
-    /// What simulated calibrations say of some of them.
+    /// Errors of simulated calibrations, for some of the layouts.
     pub verified: &'a [(Method, Verification)],
     /// Layouts of other numbers of sensors; empty where none were asked for.
     pub counts: &'a [CountPoint],

@@ -13,9 +13,9 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{Digit, ForceDirection};
 
-/// Where the drawn contacts are, as shares of the length.
+/// Positions of the drawn contacts, as shares of the length.
 const DRAWN_CONTACTS: [f64; 3] = [0.5, 0.75, 1.0];
-/// Where the linear theory is judged, as shares of the length: clear of the tip, which an estimate cannot pass.
+/// Positions where the linear theory is judged, as shares of the length: clear of the tip, which an estimate cannot pass.
 const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
 /// Points of a drawn finger.
 const SHAPE_STEPS: u32 = 120;
@@ -74,7 +74,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
     Figure::chart(&chart, caption)
 }
 
-/// What the linear theory makes of clean readings: its errors of position and of force by the force, each against the limit of
+/// Errors of the linear theory on clean readings: of position and of force by the force, each against the limit of
 /// the exact one. Empty where no estimator suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::of(setup, digit) else { return Vec::new() };

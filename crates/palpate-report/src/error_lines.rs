@@ -10,7 +10,7 @@ use palpate_mechanics::sensing::{Layout, NoiseError, Sensor, SensorKind};
 /// The founding paper's readings are clean, and without noise there is no limit. Its errors are drawn against the limit of
 /// the noise that a plain displacement sensor has, as in `examples/paper.toml`.
 const ASSUMED_NOISE_M: f64 = 5e-6;
-/// What the line is called in a legend, at the beginning.
+/// Beginning of the line's name in a legend.
 const LABEL: &str = "limit";
 
 /// A line along the medians of some spreads and, where `with_band`, a band from the 5th to the 95th percentile under it.
@@ -54,7 +54,7 @@ pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, labe
     Some(line(&LimitCurve::over(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 
-/// What to say of the line in the caption of a chart that has it; else nothing.
+/// Remark on the line for the caption of a chart that has it; else empty.
 pub(super) fn limit_in_words(chart: &Chart) -> String {
     let Some(line) = chart.series.iter().find(|series| series.label.starts_with(LABEL)) else {
         return String::new();

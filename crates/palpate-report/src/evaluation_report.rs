@@ -19,12 +19,12 @@ use palpate_rig::Rig;
 /// More positions than this are drawn as a line: markers would hide each other.
 const MOST_MARKERS: usize = 80;
 
-/// What an evaluation's report is made from.
+/// Contents of an evaluation's report.
 #[derive(Clone, Copy, Debug)]
 pub struct EvaluationReport<'a> {
     /// The page's title.
     pub title: &'a str,
-    /// Whose answers are judged.
+    /// The locator, or the locators, whose answers are judged.
     pub judged: Judged<'a>,
     /// The answers.
     pub evaluation: &'a Evaluation,
@@ -36,7 +36,7 @@ pub struct EvaluationReport<'a> {
     pub tolerance_m: f64,
 }
 
-/// Whose answers an evaluation holds.
+/// Origin of an evaluation's answers.
 #[derive(Clone, Copy, Debug)]
 pub enum Judged<'a> {
     /// Those of a locator.
@@ -45,7 +45,7 @@ pub enum Judged<'a> {
     CrossValidated {
         /// The rig.
         rig: &'a Rig,
-        /// How many locators.
+        /// Number of locators.
         folds: usize,
         /// The seed of their fits.
         seed: u64,

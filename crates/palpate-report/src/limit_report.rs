@@ -17,13 +17,13 @@ use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
 use palpate_mechanics::sensing::Sensor;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
-/// Where the surface ends, errors do: limits beyond this many lengths are cut off.
+/// Errors end where the surface does: limits beyond this many lengths are cut off.
 const MOST_LENGTHS: f64 = 10.0;
 /// Cells of a map, about, and the least and the most of them along each side.
 const CELLS: f64 = 2000.0;
 const CELLS_A_SIDE: std::ops::RangeInclusive<usize> = 5..=200;
 
-/// What a limit's report is made from.
+/// Contents of a limit's report.
 #[derive(Clone, Copy)]
 pub struct LimitReport<'a> {
     /// The page's title.
@@ -36,9 +36,9 @@ pub struct LimitReport<'a> {
     pub known: &'a LimitCurve,
     /// The limit all over the surface for an unknown force.
     pub unknown: &'a LimitCurve,
-    /// What is known of the force on this bench, which the warnings are about.
+    /// Knowledge of the force on this bench, which the warnings are about.
     pub force: Force,
-    /// What the limit warns of.
+    /// Warnings of the limit.
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
@@ -202,7 +202,7 @@ impl LimitReport<'_> {
         Figure::map(&map, caption)
     }
 
-    /// What only a digit has: the limit of the force, and how far the linear theory goes.
+    /// Figures of a digit alone: the limit of the force, and how far the linear theory goes.
     fn digit_figures(&self) -> Vec<Figure> {
         let SurfaceSpec::Digit(digit) = &self.setup.surface else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);

@@ -85,7 +85,7 @@ pub(super) fn limits_mm(
     cells.centres().map(|at| bound(at).map_or(f64::NAN, |bound| figure(&bound) * 1e3)).collect()
 }
 
-/// Where the sensors are, in mm; raw channels are nowhere.
+/// Positions of the sensors, in mm; raw channels have none.
 pub(super) fn sensors_mm(layout: &Layout) -> Vec<(f64, f64)> {
     let placed = layout.sensors().iter().filter(|sensor| sensor.kind != SensorKind::Raw);
     placed.map(|sensor| in_mm(sensor.position)).collect()

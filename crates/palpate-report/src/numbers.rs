@@ -5,7 +5,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Quantity, format_count};
 
-/// What stands where there is no number.
+/// Placeholder where there is no number.
 pub(crate) const NOTHING: &str = "–";
 
 /// About three significant digits: "63.5", "2.46", "0.044", "1,250". "–" for what is not finite.

@@ -12,7 +12,7 @@ const STYLE: &str = include_str!("page.css");
 pub struct ReportFile {
     /// Its name in the report's folder: "report.html", "figure-2.svg".
     pub name: String,
-    /// What it holds.
+    /// Its content.
     pub bytes: Vec<u8>,
 }
 
@@ -69,7 +69,7 @@ impl Section {
 
 /// A figure with its caption.
 pub(crate) struct Figure {
-    /// What it shows, in a few words, for readers who cannot see it.
+    /// Alternative text: what it shows, in a few words, for readers who cannot see it.
     alternative: String,
     svg: String,
     caption: Markup,

@@ -12,7 +12,7 @@ const COPY_SCALE: f32 = 2.0;
 /// Longest side of a PNG in pixels.
 const MAX_SIDE_PX: u32 = 16_384;
 
-/// Why an SVG did not become a PNG.
+/// Error of turning an SVG into a PNG.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
     /// The text is not an SVG document.

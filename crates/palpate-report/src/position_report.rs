@@ -13,7 +13,7 @@ use palpate_estimators::estimator::Cells;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::Extent;
 
-/// What a report of training positions is made from.
+/// Contents of a report of training positions.
 #[derive(Clone, Copy)]
 pub struct PositionDesignReport<'a> {
     /// The page's title.
@@ -22,7 +22,7 @@ pub struct PositionDesignReport<'a> {
     pub setup: &'a Setup,
     /// The estimator's kind.
     pub estimator: &'a str,
-    /// What was designed.
+    /// The problem that was solved.
     pub problem: &'a PositionProblem,
     /// The arrangements.
     pub placed: &'a [Placed],

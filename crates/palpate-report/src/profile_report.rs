@@ -16,7 +16,7 @@ const KERNEL_PLACES_ON_A_PLANE: [[f64; 2]; 3] = [[0.5, 0.5], [0.25, 0.25], [0.1,
 /// N/mm in N/m, and kPa in Pa.
 const PER_THOUSAND: f64 = 1e-3;
 
-/// What a profile's report is made from.
+/// Contents of a profile's report.
 #[derive(Clone, Copy)]
 pub struct ProfileReport<'a> {
     /// The page's title.
@@ -29,7 +29,7 @@ pub struct ProfileReport<'a> {
     pub profile: &'a LoadProfile,
     /// The limit of each patch, where the readings tell them all.
     pub limits: Option<&'a [PatchLimit]>,
-    /// What the layout resolves; `None` without load.
+    /// Resolution of the layout; `None` without load.
     pub resolution: Option<&'a Resolution>,
     /// The loads that were simulated; none where the truth is not known.
     pub truth: &'a [UniformLoad],

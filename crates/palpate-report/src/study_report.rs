@@ -20,7 +20,7 @@ const MOST_BANDS: usize = 2;
 /// Markers of an arm stand this far beside each other, in rows.
 const BESIDE: f64 = 0.22;
 
-/// What a study's report is made from.
+/// Contents of a study's report.
 #[derive(Clone, Copy, Debug)]
 pub struct StudyReport<'a> {
     /// The study.
@@ -29,7 +29,7 @@ pub struct StudyReport<'a> {
     pub outcomes: &'a [ArmOutcome],
     /// The figures of those outcomes.
     pub results: &'a StudyResults,
-    /// How the study was run.
+    /// Facts of the run.
     pub run: &'a RunFacts,
 }
 
@@ -178,7 +178,7 @@ fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
     layouts
 }
 
-/// Where the layouts have their sensors.
+/// Figure of the layouts' sensors along the surface.
 fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Figure {
     let row = |arms: &[&str]| match arms {
         [] => String::new(),
@@ -190,7 +190,7 @@ fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Fig
     Figure::chart(&sites_chart(&rows, report.length_m(), Vec::new()), caption)
 }
 
-/// Which arms have which layout.
+/// Table of the layouts, with the arms that have each.
 fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
     Table::of(layouts)
         .wide("arms", |(arms, _)| arms.join(", "))
@@ -283,7 +283,7 @@ impl<'a> StudyReport<'a> {
         self.study.study.arms.iter().find(|arm| arm.name == name)
     }
 
-    /// What is fitted, one and many: networks, or locators where some arm has another estimator.
+    /// Noun for what is fitted, one and many: networks, or locators where some arm has another estimator.
     pub(crate) fn noun(&self) -> [&'static str; 2] {
         let trained = self.results.arms.iter().all(|arm| arm.epochs.is_some());
         if trained { ["network", "networks"] } else { ["locator", "locators"] }
@@ -453,7 +453,7 @@ fn unbroken(text: &str) -> String {
     text.replace(' ', "\u{a0}").replace('–', "\u{2060}–\u{2060}")
 }
 
-/// How the study was run.
+/// Table of the facts of the run.
 pub(crate) fn run_table(report: &StudyReport) -> Table {
     let run = report.run;
     let mut facts = vec![
@@ -490,7 +490,7 @@ pub(crate) fn source(report: &StudyReport) -> Markup {
     }
 }
 
-/// What the words of a study mean.
+/// Glossary of a study's terms.
 pub(crate) fn glossary(report: &StudyReport) -> Markup {
     let tolerance = mm(report.study.judging().tolerance_m);
     html! {

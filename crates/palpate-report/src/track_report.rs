@@ -19,7 +19,7 @@ const MOST_OF_LINE: usize = 2000;
 const PLOT_WIDTH_PX: f64 = 630.0;
 const AROUND_PLOT_PX: f64 = 130.0;
 
-/// What a track's report is made from.
+/// Contents of a track's report.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackReport<'a> {
     /// The page's title.
@@ -28,15 +28,15 @@ pub struct TrackReport<'a> {
     pub source: &'a str,
     /// The surface.
     pub extent: Extent,
-    /// What is shown: of the filter or of the smoother.
+    /// The tracks to show: of the filter or of the smoother.
     pub tracks: &'a [Track],
-    /// Which of the two.
+    /// Name of the method that gave them: "filter" or "smoother".
     pub how: &'a str,
     /// The true contacts of each track, where the source says; a force of 0 of those that did not touch.
     pub truths: &'a [Vec<Contact>],
     /// Errors of the filter and of the smoother, by name, where the truth is known.
     pub errors: &'a [(&'static str, TrackErrors)],
-    /// How the errors go with the speed; may be empty.
+    /// Errors by the contact's speed; may be empty.
     pub sweep: &'a [SpeedErrors],
 }
 
@@ -160,7 +160,7 @@ impl TrackReport<'_> {
         Figure::chart(&chart, html! { (caption) })
     }
 
-    /// What the figure of errors has a line for: each contact, or both coordinates of a plane.
+    /// Coordinates that the figure of errors has a line for: each contact, or both coordinates of a plane.
     fn coordinates(&self) -> Vec<Coordinate> {
         let named = |name, contact, across| Coordinate { name, contact, across };
         match self.extent {
@@ -191,7 +191,7 @@ impl TrackReport<'_> {
         Some([place_m, low_m, high_m].map(|end_m| (end_m - from_m) * 1e3))
     }
 
-    /// How many contacts were followed at most.
+    /// Greatest number of contacts that were followed.
     fn most_contacts(&self) -> usize {
         self.tracks.iter().map(|track| track.contacts.len()).max().unwrap_or(0)
     }
@@ -244,7 +244,7 @@ impl TrackReport<'_> {
     }
 }
 
-/// What an error is of.
+/// Coordinate of a contact whose errors are drawn.
 struct Coordinate {
     /// As it goes on after "track".
     name: &'static str,
@@ -252,12 +252,12 @@ struct Coordinate {
     across: bool,
 }
 
-/// Where a contact is; nothing where it does not touch.
+/// Position of a contact; `None` where it does not touch.
 fn touching(contact: Option<&Contact>) -> Option<Position> {
     contact.filter(|contact| contact.force_n > 0.0).map(|contact| contact.position)
 }
 
-/// Which of two contacts is meant; nothing where there is but one.
+/// Name of one of two contacts; empty where there is but one.
 fn of_two(k: usize, report: &TrackReport) -> &'static str {
     match (report.most_contacts(), k) {
         (2.., 0) => " of the first",

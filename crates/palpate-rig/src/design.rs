@@ -20,21 +20,21 @@ const MOST_SITES: i64 = 1_000_000;
 /// More contact positions than a layout needs to be judged by.
 const MOST_CONTACTS: f64 = 10_000.0;
 
-/// What a sensor design may choose from, and what it must keep to.
+/// Candidates of a sensor design, and its constraints.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DesignKeys {
     /// Sensors to place; as many as the rig has unless said otherwise.
     pub count: Option<Count<1, 1000>>,
-    /// Where sensors may sit.
+    /// Sites for sensors.
     pub sites: Option<At<SitesKeys>>,
     /// The kinds to choose from; those of the rig unless said otherwise.
     pub kinds: Option<At<Vec<At<OfferKeys>>>>,
-    /// Where the surface will be touched; everywhere unless said otherwise.
+    /// Positions at which the surface will be touched; everywhere unless said otherwise.
     pub contacts: Option<At<ContactsKeys>>,
     /// Whether the contact's force will be known; as in `[contact]` unless said otherwise.
     pub force: Option<ForceKeys>,
-    /// What makes a layout good.
+    /// Criterion that scores a layout.
     pub criterion: Option<DesignCriterion>,
     /// A limit up to this is good enough.
     pub tolerance: Option<Positive<Length>>,
@@ -46,7 +46,7 @@ pub(crate) struct DesignKeys {
     /// Sensors that every layout has.
     #[serde(default)]
     pub must_have: Vec<At<MustHaveKeys>>,
-    /// What all sensors together may cost.
+    /// Greatest cost of all sensors together.
     pub budget: Option<NotNegative<Number>>,
     /// Whether layouts are to be their own mirror image.
     pub symmetry: Option<Symmetry>,
@@ -71,17 +71,17 @@ pub(crate) enum SitesKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a kind such as { measure = \"strain\", noise = \"1 ue\" }")]
 pub(crate) struct OfferKeys {
-    /// What it measures.
+    /// Its kind.
     pub measure: At<SensorKind>,
     /// Standard deviation of a reading's noise; that of the rig's own sensors of the kind unless said otherwise.
     pub noise: Option<At<Written>>,
     /// Step to which a reading is rounded; that of the rig's own sensors of the kind unless said otherwise.
     pub resolution: Option<At<Written>>,
-    /// What one costs; 1 unless said otherwise.
+    /// Cost of one; 1 unless said otherwise.
     pub cost: Option<NotNegative<Number>>,
 }
 
-/// Where the surface will be touched.
+/// Positions at which the surface will be touched.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a range such as { from = \"20 mm\", to = \"380 mm\" }")]
 pub(crate) struct ContactsKeys {
@@ -91,7 +91,7 @@ pub(crate) struct ContactsKeys {
     pub to: Option<At<Point>>,
     /// The distance of neighbours.
     pub every: Option<At<Positive<Length>>>,
-    /// How often contacts fall into equal stretches along the length, from left to right.
+    /// Relative frequency of contacts in equal stretches along the length, from left to right.
     pub weights: Option<At<Vec<NotNegative<Number>>>>,
 }
 
@@ -117,9 +117,9 @@ pub(crate) struct ZoneKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a sensor such as { measure = \"deflection\", at = \"200 mm\" }")]
 pub(crate) struct MustHaveKeys {
-    /// What it measures; it can be left out where there is one kind to choose from.
+    /// Its kind; it can be left out where there is one kind to choose from.
     pub measure: Option<At<SensorKind>>,
-    /// Where it sits.
+    /// Its position.
     pub at: At<Point>,
 }
 

@@ -301,7 +301,7 @@ impl<'de> MapAccess<'de> for Entries<'_, '_> {
 /// A variant, and the value that it is read from.
 struct Variant<'a> {
     word: &'a str,
-    /// Where the word stands.
+    /// Place of the word.
     place: Place,
     node: Node<'a>,
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a rig or study file, where, and what would help.
+//! Errors of a rig or study file: the problem, its place, and a remedy.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -17,13 +17,13 @@ use serde::de::{Expected, Unexpected};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{problem}")]
 pub struct RigError {
-    /// What is wrong.
+    /// The problem.
     pub problem: Box<RigProblem>,
     /// The bytes of the document that are meant; `None` when something is not there at all.
     pub span: Option<Range<usize>>,
 }
 
-/// What is wrong with a rig or study file.
+/// Problem of a rig or study file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigProblem {
     /// The text is not TOML.
@@ -50,7 +50,7 @@ pub enum RigProblem {
         key: String,
         /// The keys that can stand there.
         known: Vec<&'static str>,
-        /// What leaves the section with these keys, where it can have others: `kind = "beam"`.
+        /// Key and value that leave the section with these keys, where it can have others: `kind = "beam"`.
         with: Option<String>,
     },
     /// A key that means nothing beside what else is written.
@@ -58,7 +58,7 @@ pub enum RigProblem {
     UnusedKey {
         /// The key.
         key: String,
-        /// What it does not go with.
+        /// The other key or thing, which it does not go with.
         with: String,
     },
     /// A word that the key cannot be.
@@ -66,9 +66,9 @@ pub enum RigProblem {
     UnknownWord {
         /// The key.
         key: String,
-        /// What it is.
+        /// The word that stands there.
         word: String,
-        /// What it can be.
+        /// The words that may stand there.
         known: Vec<&'static str>,
     },
     /// A text that is not what the key wants, such as a quantity in another unit.
@@ -76,7 +76,7 @@ pub enum RigProblem {
     Invalid {
         /// The key.
         key: String,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
     /// A value outside its bound.
@@ -86,7 +86,7 @@ pub enum RigProblem {
         key: String,
         /// Its value, as written.
         value: String,
-        /// What it must be.
+        /// The bound, in words.
         bound: String,
     },
     /// A beam that cannot be computed.
@@ -121,9 +121,9 @@ pub enum RigProblem {
     InsensitiveSensor {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// What it measures.
+        /// Its kind.
         kind: SensorKind,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -139,9 +139,9 @@ pub enum RigProblem {
     NoSupport {
         /// Which sensor of its section, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         position: Position,
-        /// Where supports take up force.
+        /// Positions of the supports that take up force.
         supports: Vec<Position>,
         /// The surface.
         extent: Extent,
@@ -153,7 +153,7 @@ pub enum RigProblem {
     NoForce,
 }
 
-/// Where a value stands, and what is written there.
+/// Place of a value in the document, and the text that is written there.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     /// Its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
@@ -197,7 +197,7 @@ impl Place {
 }
 
 impl RigError {
-    /// What would help, where more can be said than the message does.
+    /// Remedy, where more can be said than the message does.
     pub fn help(&self) -> Option<String> {
         match &*self.problem {
             RigProblem::UnknownKey { key, known, .. } => {
@@ -262,7 +262,7 @@ impl RigProblem {
     }
 }
 
-/// What types refuse; the error that carries them says where.
+/// Refusal by a type; the error that carries it says where.
 impl serde::de::Error for RigError {
     fn custom<T: Display>(reason: T) -> Self {
         RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.nowhere()

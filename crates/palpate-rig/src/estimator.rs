@@ -55,9 +55,9 @@ pub(crate) struct NetworkKeys {
     pub output_activation: Option<Activation>,
     /// Whether every node has a bias.
     pub biases: Option<bool>,
-    /// What the output stands for.
+    /// Coding of the output.
     pub output: Option<OutputCoding>,
-    /// How readings become inputs: `full-scale`, `standardized`, or a reading to divide by.
+    /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by.
     pub input_scale: Option<At<Written>>,
     /// The step along the gradient.
     pub learning_rate: Option<Positive<Number>>,
@@ -73,11 +73,11 @@ pub(crate) struct NetworkKeys {
     pub initial_weights: Option<Positive<Number>>,
 }
 
-/// What each sensor reads as a function of the contact, inverted.
+/// Inversion of the influence functions: what each sensor reads as a function of the contact.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct InfluenceKeys {
-    /// Where the influence functions come from.
+    /// Source of the influence functions.
     pub from: Option<InfluenceSource>,
     /// The most contacts that may touch at once.
     pub contacts: Option<Count<1, 3>>,

@@ -15,19 +15,19 @@ use crate::values::{Positive, Speed, Time};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MotionKeys {
-    /// Where it starts.
+    /// Position of its start.
     pub from: At<Point>,
-    /// Where it turns.
+    /// Position of its turn.
     pub to: At<Point>,
     /// Its speed between turns.
     pub speed: Positive<Speed>,
     /// The way on which it slows down and speeds up again; a fifth of the whole unless said otherwise.
     pub turn: Option<At<Positive<Length>>>,
-    /// How often it goes from one place to the other; once unless said otherwise.
+    /// Passes from one place to the other; 1 unless said otherwise.
     pub passes: Option<Count<1, 100_000>>,
-    /// How long it is lifted off at each turn; not at all unless said otherwise.
+    /// Time for which it is lifted off at each turn; 0 unless said otherwise.
     pub lifted: Option<NotNegative<Time>>,
-    /// How long it takes to touch, and to let go; 0.1 s unless said otherwise.
+    /// Time that it takes to touch, and to let go; 0.1 s unless said otherwise.
     pub touch: Option<At<Positive<Time>>>,
     /// Its force, where that is neither known nor the one of the calibration's presses.
     pub force: Option<At<Positive<Force>>>,
@@ -144,7 +144,7 @@ mod tests {
 
     const RIG: &str = include_str!("../../../examples/moving-load.toml");
 
-    /// What is wrong with a rig, and the line where.
+    /// Problem of a rig, and the line where it is.
     fn complaint(text: &str) -> String {
         let error = Rig::from_toml(text).unwrap_err();
         let place = error.span.clone().map_or("", |span| text[span].lines().next().unwrap_or(""));

@@ -14,7 +14,7 @@ use crate::document::At;
 use crate::error::{RigError, RigProblem};
 use crate::values::{Count, Length, Positive, Quantity};
 
-/// Which column of a CSV file is what; what is not said is as in the recordings that palpate itself writes.
+/// Columns of a CSV file by their roles; what is not said is as in the recordings that palpate itself writes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RecordingKeys {

@@ -28,15 +28,15 @@ use crate::values::OneOrMany;
 pub struct Rig {
     /// Surface, sensors and contact.
     pub setup: Setup,
-    /// Where to press to calibrate.
+    /// Training positions and presses, to calibrate.
     pub training: Option<Training>,
     /// The method that locates.
     pub estimator: Estimator,
     /// Loads for a load profile to be simulated from.
     pub loads: Vec<UniformLoad>,
-    /// How a contact moves, and what moves with it, where the rig says.
+    /// Motion of the contacts, and of the beam beneath them, where the rig says.
     pub motion: Option<MovingContacts>,
-    /// What a sensor design may choose from, where the rig says.
+    /// Candidates and constraints of a sensor design, where the rig says.
     pub design: Option<SensorDesign>,
 }
 
@@ -141,7 +141,7 @@ pub enum RigSimulationError {
     /// The rig does not say how a contact moves.
     #[error("a moving contact needs to be told of; the rig has no [motion]")]
     NoMotion,
-    /// What it describes cannot be simulated.
+    /// A bench that cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
 }
@@ -155,7 +155,7 @@ const MOST_VALUES: usize = 100_000_000;
 pub(crate) struct RigFile {
     /// The elastic body that is touched.
     pub surface: Option<At<SurfaceKeys>>,
-    /// What is measured where.
+    /// Sensors.
     pub sensors: Option<At<OneOrMany<SensorsKeys>>>,
     /// The contacts to be located.
     pub contact: Option<ContactKeys>,
@@ -163,14 +163,14 @@ pub(crate) struct RigFile {
     pub training: Option<At<TrainingKeys>>,
     /// The method that locates; the founding paper's network unless said otherwise.
     pub estimator: Option<EstimatorKeys>,
-    /// Which column of a CSV file is what.
+    /// Columns of a CSV file by their roles.
     pub recording: Option<At<RecordingKeys>>,
-    /// How contacts move.
+    /// Motions of contacts.
     pub motion: Option<At<OneOrMany<MotionKeys>>>,
     /// Forces spread over parts of the surface.
     #[serde(default)]
     pub load: Vec<At<LoadKeys>>,
-    /// What a sensor design may choose from, and what it must keep to.
+    /// Candidates of a sensor design, and its constraints.
     pub design: Option<At<DesignKeys>>,
 }
 

@@ -20,13 +20,13 @@ const MOST: i64 = 10_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorsKeys {
-    /// What they measure.
+    /// Their kind.
     pub measure: At<SensorKind>,
-    /// How many there are, evenly along the length: the i-th at i·l/(count + 1).
+    /// Number of sensors, evenly along the length: the i-th at i·l/(count + 1).
     pub count: Option<At<Count<1, MOST>>>,
     /// Columns and rows, evenly on a plane.
     pub grid: Option<At<Grid<MOST>>>,
-    /// Where they are, one by one.
+    /// Their positions, one by one.
     pub positions: Option<At<Vec<At<Point>>>>,
     /// Standard deviation of a reading's noise.
     pub noise: Option<At<Written>>,
@@ -84,7 +84,7 @@ pub(crate) fn build(
     Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at(&sections.place))
 }
 
-/// What a sensor of `surface` measures.
+/// Kind of a sensor of `surface` that is said to `measure` this.
 pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result<SensorKind, RigError> {
     let place = &measure.place;
     match **measure {
@@ -101,7 +101,7 @@ pub(crate) fn kind_on(surface: &SurfaceSpec, measure: &At<SensorKind>) -> Result
 }
 
 impl At<SensorsKeys> {
-    /// Where they are; `channel_count` is how many channels the recording has where they are all this section's.
+    /// Positions of the sensors; `channel_count` is the recording's number of channels where they are all this section's.
     fn positions(
         &self,
         surface: &SurfaceSpec,

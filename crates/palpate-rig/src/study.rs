@@ -33,7 +33,7 @@ pub struct Study {
     pub seeds: u64,
     /// The arithmetic of training in lanes.
     pub precision: Precision,
-    /// Where and how its locators are judged.
+    /// Positions and tolerance by which its locators are judged.
     pub judging: Judging,
     /// Its arms, at least 1, with names of their own.
     pub arms: Vec<Arm>,
@@ -46,7 +46,7 @@ pub struct Study {
 pub struct Arm {
     /// Its name, unique in the study.
     pub name: String,
-    /// What is fitted; where a layout is asked for, it takes the place of the rig's own when the study is prepared.
+    /// Rig that is fitted; where a layout is asked for, it takes the place of the rig's own when the study is prepared.
     pub rig: Rig,
     /// The layout that it asks for by method.
     pub layout: Option<AskedLayout>,
@@ -63,7 +63,7 @@ pub struct AskedLayout {
     pub place: Range<usize>,
 }
 
-/// Where and how a study's locators are judged.
+/// Positions and tolerance by which a study's locators are judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judging {
     /// Contact positions, evenly spaced.
@@ -83,7 +83,7 @@ pub struct Judging {
 #[serde(deny_unknown_fields)]
 struct StudyFile {
     name: At<String>,
-    /// How many seeds each arm is fitted from; 100 unless said otherwise.
+    /// Seeds that each arm is fitted from; 100 unless said otherwise.
     seeds: Option<Count<1, 1_000_000>>,
     /// The arithmetic of training networks.
     #[serde(default)]
@@ -99,15 +99,15 @@ struct StudyFile {
     /// The estimator; its keys hold for arms that do not say the same keys. Read by [`estimator`].
     #[serde(rename = "estimator")]
     _estimator: Option<IgnoredAny>,
-    /// What layouts that are asked for by method may choose from.
+    /// Candidates for layouts that are asked for by method.
     design: Option<At<DesignKeys>>,
-    /// Where and how locators are judged.
+    /// Positions and tolerance by which locators are judged.
     evaluation: Option<EvaluationKeys>,
     #[serde(default)]
     arm: Vec<ArmKeys>,
 }
 
-/// Where and how locators are judged.
+/// Positions and tolerance by which locators are judged.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EvaluationKeys {

@@ -37,7 +37,7 @@ pub(crate) struct BeamKeys {
     /// Thickness of the section; that of `sections` which have none of their own.
     pub thickness: Option<Positive<Length>>,
     pub youngs_modulus: Positive<Modulus>,
-    /// What holds it.
+    /// The beam's supports.
     pub supports: Option<At<BeamSupportsKeys>>,
     /// Stretches of one section each, from left to right.
     pub sections: Option<At<Vec<At<SectionKeys>>>>,
@@ -53,7 +53,7 @@ pub(crate) enum BeamSupportsKeys {
     List(Vec<BeamSupportKeys>),
 }
 
-/// How both ends are held.
+/// Support of both ends.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum EndsKeys {
@@ -92,7 +92,7 @@ pub(crate) enum BeamSupportKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a section such as { to = \"100 mm\", thickness = \"2 mm\" }")]
 pub(crate) struct SectionKeys {
-    /// Where it ends; the last one ends with the beam unless it says otherwise.
+    /// Its end; the last one ends with the beam unless it says otherwise.
     pub to: Option<At<Positive<Length>>>,
     /// Its width, if not the beam's.
     pub width: Option<Positive<Length>>,
@@ -109,9 +109,9 @@ pub(crate) struct PlateKeys {
     pub thickness: Positive<Length>,
     pub youngs_modulus: Positive<Modulus>,
     pub poissons_ratio: At<Quantity<Number>>,
-    /// How its edges are held; free unless said otherwise.
+    /// Support of its edges; free unless said otherwise.
     pub edges: Option<At<EdgesKeys>>,
-    /// What holds it at points.
+    /// Its supports at points.
     pub supports: Option<At<PointSupportsKeys>>,
     /// Elements along the longer side.
     pub elements: Option<At<Count<1, { i64::MAX }>>>,
@@ -161,7 +161,7 @@ pub(crate) struct DigitKeys {
     pub width: Positive<Length>,
     pub thickness: Positive<Length>,
     pub youngs_modulus: Positive<Modulus>,
-    /// Where a contact's force points.
+    /// Direction of a contact's force.
     pub direction: ForceDirection,
 }
 
@@ -250,7 +250,7 @@ impl BeamKeys {
         Ok(SurfaceSpec::SupportedBeam(Box::new(beam)))
     }
 
-    /// Where the document says what is at fault.
+    /// Place in the document of the part at fault.
     fn place_of(&self, part: BeamPart) -> Option<&Place> {
         match part {
             BeamPart::Whole => None,
@@ -317,7 +317,7 @@ impl PlateKeys {
         }
     }
 
-    /// Where the document says what is at fault.
+    /// Place in the document of the key at fault.
     fn place_of(&self, error: PlateError) -> Option<&Place> {
         match error {
             PlateError::SupportOffPlate { number, .. }

@@ -26,17 +26,17 @@ pub(crate) struct ContactKeys {
 pub(crate) struct TrainingKeys {
     /// The rule that places them; `explicit` or `grid` where there are `positions` or a `grid`, and otherwise `even`.
     pub arrangement: Option<Rule>,
-    /// How many positions there are.
+    /// Number of positions.
     pub count: Option<At<Count<1, MOST>>>,
     /// Columns and rows of a `grid`.
     pub grid: Option<At<Grid<MOST>>>,
-    /// How many positions of `edge-dense` lie in the middle portion.
+    /// Number of positions of `edge-dense` in the middle portion.
     pub middle: Option<At<Count<2, MOST>>>,
     /// Start and end of the middle portion of `edge-dense`, or of what `even` covers, as shares of the length.
     pub portion: Option<At<PortionKeys>>,
     /// The positions of `explicit`.
     pub positions: Option<At<Vec<At<Point>>>>,
-    /// How often each position is pressed; once unless said otherwise.
+    /// Presses at each position; 1 unless said otherwise.
     pub repeats: Option<Count<1, MOST>>,
     /// The force, where it is not that of the contacts to be located.
     pub force: Option<At<Positive<Force>>>,

@@ -24,12 +24,12 @@ pub(crate) type NotNegative<D> = Quantity<D, AtLeastZero>;
 /// A share or a percentage, at least 0 and below 1.
 pub(crate) type Fraction = Quantity<Ratio, BelowOne>;
 
-/// What a quantity measures.
+/// Dimension of a quantity.
 pub(crate) trait Measure {
     const DIMENSION: Dimension;
 }
 
-/// What a quantity must be, in words, and whether a value in SI units is.
+/// Bound of a quantity: in words, and as a test of a value in SI units.
 pub(crate) trait Bound {
     const WORDS: &'static str;
     fn holds(si: f64) -> bool;
@@ -135,7 +135,7 @@ impl<'de, const LEAST: i64, const MOST: i64> Deserialize<'de> for Count<LEAST, M
     }
 }
 
-/// What a number of positions does not go with.
+/// Thing that a number of positions does not go with, and the remedy.
 pub(crate) const ON_A_PLANE: &str =
     "a plane; say `grid = [3, 3]`, columns and rows, or list pairs in `positions`";
 

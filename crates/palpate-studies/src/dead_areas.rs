@@ -30,7 +30,7 @@ const FIXED_SPREAD_M: f64 = 0.01;
 /// Presentations after which a network trained by back-propagation stops.
 const MOST_PRESENTATIONS: usize = 2_000_000;
 
-/// What the study is to do.
+/// Settings of the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeadAreas {
     /// Beam, noise, force and training positions; its sensors' kind and noise, not their count.
@@ -47,7 +47,7 @@ pub struct DeadAreas {
     pub seed: u64,
 }
 
-/// How one estimator did at one sensor count.
+/// Errors of one estimator at one sensor count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaRow {
     /// "distributive", or what the array sensor's point spread is.
@@ -64,7 +64,7 @@ pub struct DeadAreaRow {
     pub folded: FoldedErrors,
 }
 
-/// What the study found.
+/// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeadAreaResults {
     /// A row an estimator and count.
@@ -73,7 +73,7 @@ pub struct DeadAreaResults {
     pub left_out: Vec<(String, &'static str, usize, String)>,
 }
 
-/// Why a study of dead areas does not come to its end.
+/// Error of a study of dead areas that does not come to its end.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeadAreasError {
     /// The rig cannot be simulated.

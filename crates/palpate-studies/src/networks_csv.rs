@@ -11,7 +11,7 @@ pub struct NetworksCsv<'a> {
     study: &'a PreparedStudy,
 }
 
-/// What a `networks.csv` had to give.
+/// Networks that a `networks.csv` holds.
 #[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
     /// The fits of this study that the file holds.
@@ -20,7 +20,7 @@ pub struct Checkpoint {
     pub cut_off: bool,
 }
 
-/// Why a study cannot resume from a `networks.csv`.
+/// Error of resuming a study from a `networks.csv`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
     /// Another study, another file of it, or another palpate.
@@ -36,7 +36,7 @@ pub enum CheckpointError {
     Row {
         /// The line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The problem.
         what: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! What a study found: each arm's figures, with their spread over the seeds.
+//! Results of a study: each arm's figures, with their spread over the seeds.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -14,14 +14,14 @@ use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{Bound, Force};
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 
-/// What a study found.
+/// Results of a study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StudyResults {
     /// Every arm that has at least one fit.
     pub arms: Vec<ArmResults>,
 }
 
-/// How a study was run, as every file that it writes says.
+/// Facts of a study's run, as every file that it writes says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunFacts {
     /// Version of palpate.
@@ -51,7 +51,7 @@ pub struct RunFacts {
 pub struct ArmResults {
     /// The arm.
     pub name: String,
-    /// What is fitted, in a study whose arms differ in it.
+    /// Estimator and bench, in a study whose arms differ in them.
     #[serde(flatten)]
     pub set_up: Option<SetUp>,
     /// Seeds that were fitted.
@@ -74,7 +74,7 @@ pub struct ArmResults {
     /// Errors between the outermost training positions and beyond them, where the study asks for them.
     #[serde(flatten)]
     pub training_span: Option<TrainingSpanResults>,
-    /// What physics allows, where sensors have noise.
+    /// The limit, where sensors have noise.
     #[serde(flatten)]
     pub limit: Option<LimitResults>,
     /// Share of the estimator's 95 % intervals that hold their contact, in %, where it has them.
@@ -82,12 +82,12 @@ pub struct ArmResults {
     pub coverage_percent: Option<Quantiles>,
 }
 
-/// What an arm fits.
+/// Estimator and bench of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetUp {
     /// The kind of its estimator.
     pub estimator: &'static str,
-    /// What the estimator knows of the force.
+    /// Knowledge of the force that the estimator has.
     pub force: Force,
     /// The method that its layout was asked for by.
     pub layout: Option<&'static str>,
@@ -98,9 +98,9 @@ pub struct SetUp {
 /// A sensor in short.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SensorPlace {
-    /// What it measures.
+    /// Its kind.
     pub measure: SensorKind,
-    /// Where it sits along the surface, in millimetres.
+    /// Its position along the surface, in millimetres.
     pub position_mm: f64,
 }
 
@@ -120,7 +120,7 @@ pub struct PortionResults {
 /// Errors between the outermost training positions, and beyond them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainingSpanResults {
-    /// Where the outermost training positions are.
+    /// Portion from one outermost training position to the other.
     pub training_span: Portion,
     /// Average percentage error between them; `None` where nothing is judged there.
     pub error_percent_within_training: Option<Quantiles>,
@@ -128,7 +128,7 @@ pub struct TrainingSpanResults {
     pub error_percent_beyond_training: Option<Quantiles>,
 }
 
-/// What physics allows an arm.
+/// Cramér–Rao limit of an arm, as figures of error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitResults {
     /// Average percentage error of an estimator at the limit, over all positions. Where readings hardly tell the position, it is

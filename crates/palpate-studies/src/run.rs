@@ -16,7 +16,7 @@ use palpate_mechanics::sensing::{ChannelModel, Layout};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Arm, AskedLayout, Judging, RigSimulationError, Study};
 
-/// Why a study cannot be run.
+/// Error of running a study.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyRunError {
     /// The layout that an arm asks for cannot be had.
@@ -58,7 +58,7 @@ pub struct PreparedStudy {
     arms: Vec<PreparedArm>,
 }
 
-/// How an arm is fitted.
+/// Way of fitting an arm.
 #[derive(Clone, Debug)]
 enum PreparedArm {
     /// Networks on perfect sensors: one recording for all seeds, and one to judge by.
@@ -74,7 +74,7 @@ enum PreparedArm {
 /// An arm of networks on perfect sensors.
 #[derive(Clone, Debug)]
 struct InLanes {
-    /// What is fitted: networks.
+    /// Estimator to fit: networks.
     estimator: Estimator,
     setup: Setup,
     trial: Split,
@@ -134,7 +134,7 @@ impl PreparedStudy {
         self.judge(arm, seed, locator.map(Method::Network))
     }
 
-    /// How the study judges.
+    /// Positions and tolerance by which the study judges.
     pub fn judging(&self) -> &Judging {
         &self.study.judging
     }
@@ -192,7 +192,7 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
     Ok(study)
 }
 
-/// What a layout follows from.
+/// Request that a layout follows from.
 #[derive(PartialEq)]
 struct LayoutRequest {
     method: DesignMethod,
@@ -252,7 +252,7 @@ impl ArmOutcome {
     }
 }
 
-/// How a study is run.
+/// Options of a study's run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
     /// Seeds 0 to this less 1.
@@ -350,7 +350,7 @@ struct ArmWork {
     taken: AtomicU64,
 }
 
-/// Where one thread takes the seeds of an arm from, and leaves its fits.
+/// Source of an arm's seeds for one thread, and sink of its fits.
 struct Queue<'a> {
     study: &'a PreparedStudy,
     arm: usize,
@@ -387,7 +387,7 @@ impl Queue<'_> {
     }
 }
 
-/// Why an arm cannot be fitted, or that it was stopped.
+/// Error of an arm that cannot be fitted, or that was stopped.
 fn unfitted(arm: &str, error: EvaluationError<FitError>) -> StudyRunError {
     if Cancelled::caused(&error) {
         return Cancelled.into();

@@ -3,7 +3,7 @@
 use super::Finding;
 use super::project::Project;
 
-/// How much of a file tells whether it is text, in bytes.
+/// Bytes at the head of a file that tell whether it is text.
 const HEAD: usize = 8192;
 
 /// Files with a NUL byte near their head.

@@ -22,7 +22,7 @@ struct Module<'a> {
     uses: Vec<UsedPath>,
 }
 
-/// What one sibling imports from another.
+/// Import of one sibling by another.
 struct Import<'a> {
     file: &'a File,
     line: usize,

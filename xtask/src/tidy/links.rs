@@ -1,4 +1,4 @@
-//! What the documents name exists: relative links, and every study and example file.
+//! Rule of names in the documents: relative links, and every study and example file, exist.
 
 use super::Finding;
 use super::project::{File, Project};

@@ -147,7 +147,7 @@ impl Scanner {
     }
 }
 
-/// Where an item ends that starts at the head of `code`: past its closing brace or its semicolon.
+/// End of an item that starts at the head of `code`: past its closing brace or its semicolon.
 fn end_of_item(code: &str) -> usize {
     let mut depth = 0usize;
     for (at, character) in code.char_indices() {

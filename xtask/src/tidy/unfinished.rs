@@ -1,4 +1,4 @@
-//! What is left undone says why: a marker carries its reason.
+//! Rule of what is left undone: a marker carries its reason.
 
 use super::Finding;
 use super::project::{File, Project};

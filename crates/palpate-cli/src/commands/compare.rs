@@ -104,7 +104,7 @@ fn write_report(
     output::write_report(out, comparison_report(&report))
 }
 
-/// What the estimators are tried on, what it is called, and how it is used.
+/// Splits that the estimators are compared on, the name of their data, and a description of its use.
 struct Trials {
     data: String,
     how: String,

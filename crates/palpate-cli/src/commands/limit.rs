@@ -167,7 +167,7 @@ fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Pat
     output::write_report(out, limit_report(&report))
 }
 
-/// What is printed as JSON. A limit that is not there, because the readings do not tell, is null.
+/// JSON of the limit. A limit that is not there, because the readings do not tell, is null.
 fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize {
     // Limits over the surface; `mean_error_mm` is what an estimator at the limit is off on average.
     let summary = |summary: LimitSummary| {

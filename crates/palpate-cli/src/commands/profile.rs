@@ -148,7 +148,7 @@ impl Printer<'_> {
     }
 }
 
-/// What people read of a profile.
+/// Prints a profile for people.
 fn print(told: &JsonProfile) -> Result<(), Failure> {
     let interval = |value: &Interval, unit: &str| {
         format!("{:.3} {unit} ({:.3} to {:.3})", value.value, value.low, value.high)
@@ -217,7 +217,7 @@ struct Interval {
 struct JsonPatch<T> {
     stretch_mm: [f64; 2],
     centre_x_mm: T,
-    /// What a plane has besides.
+    /// Coordinates across the width, on a plane only.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     across: Option<Across<T>>,
     force_n: T,

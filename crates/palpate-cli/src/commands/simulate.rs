@@ -87,7 +87,7 @@ fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
     output::say(told)
 }
 
-/// Where a recording comes from.
+/// Comment at the head of a recording: its origin.
 fn comment(arguments: &Arguments) -> String {
     format!(
         "palpate {}, simulated from {}, seed {}",

@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// What takes the readings.
+/// Filter, or filter with the smoother behind it, that takes the readings.
 enum Follower<'a> {
     Filter(Tracker<'a>),
     Smoother(SmoothTracker<'a>),
@@ -122,7 +122,7 @@ struct Stream<'a> {
     arguments: &'a Arguments,
     follower: Follower<'a>,
     extent: Extent,
-    /// What a line of CSV has room for.
+    /// Columns of the CSV.
     columns: Columns,
     lines: Lines,
     /// Rows that gave no estimate.
@@ -269,7 +269,7 @@ impl Stream<'_> {
     }
 }
 
-/// What a line of CSV has room for; the cells of a contact that does not touch are empty.
+/// Columns of the CSV; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]
 enum Columns {
     /// One contact on a line.
@@ -348,7 +348,7 @@ struct JsonTrack {
     two_touching: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     second: Option<JsonContact>,
-    /// Where the reading by itself shows the contact; on a plane its x and y.
+    /// Position that the reading alone gives, in mm; on a plane its x and y.
     single_mm: JsonPosition,
     single_status: &'static str,
 }

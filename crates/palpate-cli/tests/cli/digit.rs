@@ -43,7 +43,7 @@ fn the_example_is_located_with_its_shape_and_judged() {
     insta::assert_snapshot!(said_of(&["inspect", "rig.toml"]));
 }
 
-/// Where the tip is when 4 N push at 117.5 mm, by Runge–Kutta steps of the elastica's equation.
+/// Position of the tip in mm when 4 N push at 117.5 mm, by Runge–Kutta steps of the elastica's equation.
 const TIP_MM: (f64, f64) = (74.64, -82.86);
 
 #[test]

@@ -6,7 +6,7 @@ use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fs;
 
-/// What the example lacks for presses at points.
+/// Sections that the example lacks for presses at points.
 const PRESSED: &str = "\n[training]\ncount = 2\nrepeats = 5\nforce = \"3 N\"\n[estimator]\nkind = \"influence\"\nfrom = \"mechanics\"\n";
 
 fn number(value: &Value) -> f64 {

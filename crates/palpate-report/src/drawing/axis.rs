@@ -7,13 +7,13 @@ use super::text;
 /// One axis of a chart.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
-    /// What is measured, with its unit: "load position, mm".
+    /// Quantity along the axis, with its unit: "load position, mm".
     pub label: String,
     /// First and last value shown, in either order. `None`, a span of nothing, and ends that the scale cannot show (not finite, or not
     /// positive on a logarithmic axis): from the data and marks, with padding; a linear axis then ends on round numbers and is not
     /// padded across zero.
     pub range: Option<(f64, f64)>,
-    /// How values map to lengths.
+    /// Mapping of values to lengths.
     pub scale: Scale,
     /// Values with a labelled tick, each with its label, where they lie in the range; one whose label would touch its neighbour's is
     /// left out. `None`: round numbers, as many as are readable.
@@ -47,7 +47,7 @@ impl Axis {
     }
 }
 
-/// How values map to lengths along an axis.
+/// Mapping of values to lengths along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
     /// Equal differences have equal lengths.
@@ -79,7 +79,7 @@ impl AxisScale {
         AxisScale { low, high, scale: axis.scale }
     }
 
-    /// Where a value of the data lies: 0 at the low end, 1 at the high end, outside them beyond (held within
+    /// Position of a value of the data: 0 at the low end, 1 at the high end, outside them beyond (held within
     /// ±1e6). `None` where the scale cannot show it.
     pub fn share(&self, value: f64) -> Option<f64> {
         drawable(self.scale, value).then(|| self.tick_share(value))

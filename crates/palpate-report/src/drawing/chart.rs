@@ -14,7 +14,7 @@ pub struct Chart {
     pub x: Axis,
     /// Vertical axis. Its label stands above the plot, unrotated.
     pub y: Axis,
-    /// What is drawn, later series over earlier ones within each kind: bands lie under lines, lines under points.
+    /// Data to draw, later series over earlier ones within each kind: bands lie under lines, lines under points.
     pub series: Vec<Series>,
     /// Reference lines and shaded ranges behind the data.
     pub marks: Vec<Mark>,
@@ -132,7 +132,7 @@ pub enum SeriesKind {
     },
 }
 
-/// How a line is stroked.
+/// Stroke of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stroke {
     /// Unbroken.
@@ -187,14 +187,14 @@ pub struct ErrorPoint {
 pub enum Mark {
     /// A dashed vertical line, such as a support.
     VerticalLine {
-        /// Where it stands.
+        /// Its position.
         x: f64,
         /// Its name; empty for none.
         label: String,
     },
     /// A dashed horizontal line, such as a tolerance.
     HorizontalLine {
-        /// Where it lies.
+        /// Its position.
         y: f64,
         /// Its name in the legend; empty for none.
         label: String,

@@ -36,9 +36,9 @@ pub struct HeatMap {
     pub cells: Cells,
     /// The maps.
     pub panels: Vec<HeatPanel>,
-    /// Where the dots are, such as sensors, in millimetres.
+    /// Positions of the dots, such as sensors, in millimetres.
     pub dots_mm: Vec<(f64, f64)>,
-    /// What the colours mean, with its unit: "limit, mm".
+    /// Meaning of the colours, with its unit: "limit, mm".
     pub label: String,
     /// Larger values have the colour of this one.
     pub most: f64,
@@ -103,7 +103,7 @@ fn sides_mm(map: &HeatMap) -> [f64; 2] {
     [extent.length_m() * 1e3, extent.width_m().unwrap_or(extent.length_m()) * 1e3]
 }
 
-/// Where everything goes.
+/// Layout of a figure of maps, in pixels.
 struct Layout {
     height: f64,
     plots: Vec<Rect>,

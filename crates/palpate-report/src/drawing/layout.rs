@@ -1,4 +1,4 @@
-//! Where everything of a chart goes, in pixels: settled before anything is drawn, so that it can be tested.
+//! Layout of a chart, in pixels: settled before anything is drawn, so that it can be tested.
 //!
 //! From top to bottom: title, label of the vertical axis, names of vertical marks, plot, tick labels, label of
 //! the horizontal axis, legend. Each has a strip of its own, so no text can lie over data.
@@ -85,12 +85,12 @@ impl<'a> Layout<'a> {
         Layout { width_px, height_px, plot, x, y, x_ticks, y_ticks, labels, legend }
     }
 
-    /// Where a point of the data lies; `None` where an axis cannot show it.
+    /// Point of the drawing for a point of the data; `None` where an axis cannot show it.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.across(self.x.share(x)?), self.up(self.y.share(y)?)))
     }
 
-    /// Where a point of the data lies; `None` outside the plot.
+    /// Point of the drawing for a point of the data; `None` outside the plot.
     pub fn place_inside(&self, x: f64, y: f64) -> Option<Point> {
         self.place(x, y).filter(|&at| self.plot.contains(at))
     }
@@ -198,7 +198,7 @@ fn widest(ticks: &[Tick]) -> f64 {
     ticks.iter().map(|tick| text::width(&tick.label, TICK_SIZE)).fold(0.0, f64::max)
 }
 
-/// How far the label of the last tick reaches beyond the axis.
+/// Length by which the label of the last tick reaches beyond the axis.
 fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     let reach = ticks.last().map_or(0.0, |tick| {
         let half = text::width(&tick.label, TICK_SIZE) / 2.0;
@@ -246,7 +246,7 @@ const SWATCH_WIDTH: f64 = 24.0;
 const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
-/// What an entry names.
+/// Series or mark that an entry names.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Named<'a> {
     Series(&'a Series),
@@ -258,7 +258,7 @@ pub(crate) enum Named<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry<'a> {
     pub named: Named<'a>,
-    /// Where the sample of its drawing goes.
+    /// Box for the sample of its drawing.
     pub swatch: Rect,
     pub label: Label,
     /// All the room it takes.
@@ -314,7 +314,7 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// Where an entry goes.
+/// Place of an entry in the legend.
 struct Place {
     left: f64,
     row: usize,

@@ -1,4 +1,4 @@
-//! How much room a text takes, without looking at a font.
+//! Room that a text takes, without looking at a font.
 //!
 //! An SVG is shown with whatever sans-serif font its reader has. The widths here follow the wider of the common
 //! ones (DejaVu Sans, Verdana), so that a layout made with them holds for the narrower ones (Arial, Noto Sans).

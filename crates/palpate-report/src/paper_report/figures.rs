@@ -14,7 +14,7 @@ use palpate_studies::paper::COUNTS;
 /// A way to train, at each number of training positions.
 #[derive(Clone, Copy)]
 struct Family {
-    /// What its arms' names begin with.
+    /// Beginning of its arms' names.
     name: &'static str,
     label: &'static str,
     colour: usize,

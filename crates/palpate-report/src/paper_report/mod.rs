@@ -145,7 +145,7 @@ impl Paper<'_> {
         self.published.iter().find(|figure| figure.id == id)
     }
 
-    /// What is on the bench, where the surface is a beam. All arms of the paper share it.
+    /// Rig, beam and force in newtons, where the surface is a beam. All arms of the paper share it.
     fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
         let SurfaceSpec::Beam(beam) = rig.setup.surface else { return None };
@@ -197,7 +197,7 @@ fn lead() -> Markup {
     }
 }
 
-/// Where our seeds lie.
+/// Spread of our seeds.
 fn ours(figure: &PublishedFigure) -> Quantiles {
     Quantiles { median: figure.median, p05: figure.p05, p95: figure.p95 }
 }

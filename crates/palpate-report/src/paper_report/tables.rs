@@ -262,7 +262,7 @@ impl Paper<'_> {
     }
 }
 
-/// What the paper prints; a bound with its sign.
+/// Published value as the paper prints it; a bound with its sign.
 fn printed(figure: &PublishedFigure) -> String {
     let sign = if figure.yardstick == Yardstick::Below { "< " } else { "" };
     format!("{sign}{}", as_written(figure.published))
@@ -326,7 +326,7 @@ fn share(share: f64) -> String {
 /// Young's modulus as the paper prints it, in pascals.
 const PRINTED_MODULUS_PA: f64 = 200e6;
 
-/// What the paper says of an estimator's setting, by its key; the keys in the order of the table.
+/// Statement of the paper on each setting of an estimator, by its key; the keys in the order of the table.
 const OF_THE_NETWORK: [(&str, &str); 13] = [
     ("input_scale", "not stated"),
     ("biases", "not stated"),
@@ -372,7 +372,7 @@ impl Paper<'_> {
             .caption(html! { "Settings of this study, beside what the paper says of them." })
     }
 
-    /// What the beam would do with the modulus as printed, unless the study uses it.
+    /// Remark on how far the beam would bend with the modulus as printed, unless the study uses it.
     fn why_not_the_printed_modulus(&self) -> Markup {
         let Some((_, beam, force_n)) = self.setup() else { return Markup::default() };
         if (beam.youngs_modulus_pa() / PRINTED_MODULUS_PA - 1.0).abs() < 1e-6 {

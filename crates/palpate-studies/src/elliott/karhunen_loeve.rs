@@ -58,7 +58,7 @@ impl KarhunenLoeve {
         }
     }
 
-    /// What no unbiased estimator that sees the first `count` components can beat, at a contact whose readings have these
+    /// Cramér–Rao bound for estimators that see the first `count` components, at a contact whose readings have these
     /// derivatives; `None` where they do not tell the place. The force is known.
     pub fn bound(&self, gradients: &[ResponseGradient], count: usize) -> Option<Bound> {
         let by = |k: usize| -> Array1<f64> {

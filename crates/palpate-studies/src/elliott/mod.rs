@@ -37,17 +37,17 @@ pub const PRESENTATIONS: u32 = 3_000_000;
 const HIDDEN: usize = 12;
 /// Step along the gradient: noisy readings want a smaller one than the founding paper's.
 const LEARNING_RATE: f64 = 0.1;
-/// What the moving load's seed is more than that of its calibration, so that it moves under noise of its own.
+/// Offset of the moving load's seed from that of its calibration, so that it moves under noise of its own.
 const OTHER_NOISE: u64 = 1 << 32;
 /// Share of length and width, about the middle, within which contacts are judged.
 pub const INNER: f64 = 0.9;
 
-/// What the study is to do.
+/// Settings of the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Elliott {
     /// Plate, sensors, known force, training positions and motion; the sensors have noise and no other errors.
     pub rig: Rig,
-    /// How many components a network sees, one after the other; at most as many as there are sensors.
+    /// Numbers of components that a network sees, one after the other; at most as many as there are sensors.
     pub components: Vec<usize>,
     /// Presentations after which a network stops.
     pub presentations: u32,
@@ -87,7 +87,7 @@ impl std::fmt::Display for Chain {
     }
 }
 
-/// How one chain did, over the calibrations.
+/// Errors of one chain, over the calibrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainRow {
     /// The chain.
@@ -103,7 +103,7 @@ pub struct ChainRow {
     pub limit_m: Option<f64>,
 }
 
-/// What the study found.
+/// Results of the study.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ElliottResults {
     /// The share of the readings' variance that each component carries, in %, of the first calibration.
@@ -112,7 +112,7 @@ pub struct ElliottResults {
     pub rows: Vec<ChainRow>,
 }
 
-/// Why the study cannot be run.
+/// Error of a study that cannot be run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElliottError {
     /// The rig cannot be simulated.
@@ -212,7 +212,7 @@ impl Elliott {
         network
     }
 
-    /// What one calibration shows of every chain, in the order of [`Elliott::chains`].
+    /// Errors of every chain in one calibration, in the order of [`Elliott::chains`].
     fn judge(&self, setup: &TrialSetup, watch: Watch) -> Result<Vec<ChainErrors>, ElliottError> {
         let whole = &self.rig.setup;
         let network = Estimator::Network(self.network());
@@ -311,7 +311,7 @@ impl Elliott {
     }
 }
 
-/// What the chains of one calibration share.
+/// Setup that the chains of one calibration share.
 #[derive(Clone, Copy)]
 struct TrialSetup<'a> {
     trial: &'a Split,

@@ -1,4 +1,4 @@
-//! What the paper claims in words, and whether the seeds bear it out.
+//! Claims that the paper makes in words, and whether the seeds bear them out.
 //!
 //! A claim is split into parts that a program can check. Each part is asked twice: of the medians over all seeds, and
 //! of every seed by itself (seed k of one arm beside seed k of another: they start from the same random stream).
@@ -20,14 +20,14 @@ pub struct Claim {
     pub holds: bool,
     /// Share of the seeds for which every part holds, 0 to 1.
     pub share_of_seeds: f64,
-    /// What was checked.
+    /// Its parts.
     pub parts: Vec<ClaimPart>,
 }
 
 /// One checkable part of a claim.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClaimPart {
-    /// What was checked, in words.
+    /// Statement that was checked, in words.
     pub what: String,
     /// Whether it holds in the medians.
     pub holds: bool,

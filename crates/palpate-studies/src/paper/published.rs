@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::{ArmResults, StudyResults};
 use palpate_estimators::evaluation::Quantiles;
 
-/// How near our median must come to a published figure to agree with it.
+/// Yardstick of agreement between our median and a published figure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Yardstick {
@@ -27,7 +27,7 @@ impl Yardstick {
     }
 }
 
-/// What a published figure measures.
+/// Quantity that a published figure measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Figure {
     Epochs,
@@ -103,7 +103,7 @@ pub struct PublishedFigure {
     pub arm: &'static str,
     /// The figure in words, with its unit.
     pub what: &'static str,
-    /// What the paper prints.
+    /// Value that the paper prints.
     pub published: f64,
     /// Half of our seeds lie below.
     pub median: f64,
@@ -111,7 +111,7 @@ pub struct PublishedFigure {
     pub p05: f64,
     /// One in twenty of our seeds lies above.
     pub p95: f64,
-    /// What counts as agreement.
+    /// Yardstick of agreement.
     pub yardstick: Yardstick,
     /// Whether our median agrees.
     pub agrees: bool,

@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say_files(arguments.output.as_deref(), arguments.out.as_deref())
 }
 
-/// What the rig and the command line say.
+/// Design settings of the rig and the command line.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
     let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::like);
     let design = rig.design.iter().fold(design, PositionDesign::contacts_of);
@@ -146,7 +146,7 @@ fn complaint(error: &PositionError, rig: &Path) -> Failure {
     Complaint::new(format!("{}: {error}", rig.display())).help(help(error)).into()
 }
 
-/// What would help to place training positions.
+/// Remedy for an error of placing training positions.
 fn help(error: &PositionError) -> &'static str {
     match error {
         PositionError::Cancelled(_) => "start it again",
@@ -237,7 +237,7 @@ fn gain(outcome: &Outcome, best: &Placed) -> String {
     }
 }
 
-/// What is printed as JSON.
+/// JSON of a design of training positions.
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, asked) = (outcome.problem, outcome.problem.design());
     let design = |placed: &Placed| {
@@ -311,7 +311,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
     print_advice(&advice, rig.setup.surface.extent())
 }
 
-/// What is printed as JSON; standard deviations are averaged over the contacts.
+/// JSON of the advice on the next presses; standard deviations are averaged over the contacts.
 fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
     let next = advice.next.iter().map(|press| {
         object! {

@@ -68,7 +68,7 @@ struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
     designed: Vec<Designed>,
-    /// What simulated calibrations say of some of them.
+    /// Errors of simulated calibrations, for some of the layouts.
     verified: Vec<(Method, Verification)>,
     counts: Vec<CountPoint>,
     seed: u64,
@@ -164,7 +164,7 @@ fn outcome<'a>(
     Ok(Outcome { rig: &arguments.rig, problem, designed, verified, counts, seed: arguments.seed })
 }
 
-/// What the design is compared with, and the design; of searches that found the same, one.
+/// Layouts to verify: those that the design is compared with, and the design; of searches that found the same, one.
 fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
     let best = best_design(designed).map(|best| best.method);
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
@@ -205,7 +205,7 @@ fn counts(text: &str) -> Result<RangeInclusive<usize>, String> {
     Ok(from..=to)
 }
 
-/// What would help to place sensors.
+/// Remedy for an error of placing sensors.
 pub fn help(error: &DesignError) -> &'static str {
     match error {
         DesignError::Limit(LimitError::NoModel) => "give a surface with a model, such as `kind = \"beam\"`",
@@ -312,7 +312,7 @@ fn designs(outcome: &Outcome) -> String {
     table.to_string()
 }
 
-/// How much better than the even layout.
+/// Gain over the even layout, in words.
 fn gain(outcome: &Outcome, best: &Designed) -> String {
     let name = best.method.name();
     let even = outcome.designed.iter().find(|designed| designed.method.name() == "even");
@@ -360,7 +360,7 @@ fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
     }
 }
 
-/// What is printed as JSON. A limit that is not there, because the readings do not tell some contact, is null. Scores of limits
+/// JSON of a sensor design. A limit that is not there, because the readings do not tell some contact, is null. Scores of limits
 /// are in mm, of the share beyond the tolerance in %, of D-optimality ½·ln det.
 fn to_json(outcome: &Outcome) -> impl Serialize {
     let (problem, design) = (outcome.problem, outcome.problem.design());

@@ -15,7 +15,7 @@ use std::path::Path;
 /// Calibrations, unless `--seeds` says another number.
 const CALIBRATIONS: u64 = 3;
 
-/// What a study is and what it found: all that `results.json` holds.
+/// Settings and findings of a study: all that `results.json` holds.
 #[derive(serde::Serialize)]
 struct Results<F> {
     palpate: &'static str,

@@ -124,7 +124,7 @@ struct State {
     fitted: u64,
 }
 
-/// What is known of an arm's cost.
+/// Cost of an arm's fits: those that are left and those that are finished.
 #[derive(Clone, Copy, Default)]
 struct ArmTally {
     patterns: f64,

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use palpate_testing::skip::skip;
 
-/// What a page is like once it has loaded. Lists hold the offenders, each by the head of its markup.
+/// Measurements of a page that has loaded. Lists hold the offenders, each by the head of its markup.
 #[derive(Debug, Deserialize)]
 pub struct Measured {
     /// Uncaught errors, unhandled rejections and what scripts report by `console.error`.
@@ -31,7 +31,7 @@ pub struct Measured {
     pub dead_anchors: Vec<String>,
 }
 
-/// How long the browser may take, start included.
+/// Longest time that the browser may take, start included.
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Keeps the browser to this page: no start-up screens, no graphics card, nothing fetched in the background.
@@ -89,7 +89,7 @@ fn frame(html: &str, width: u32) -> String {
     )
 }
 
-/// What the browser makes of the page, as HTML.
+/// HTML of the page once the browser has loaded it.
 fn dump(browser: &Path, page: &Path, width: u32, folder: &Path) -> String {
     let file = |name: &str| File::create(folder.join(name)).expect("the temporary folder can be written");
     let mut child = Command::new(browser)

@@ -27,19 +27,19 @@ pub fn run(folder: &Path, arguments: &[&str]) -> Output {
     palpate(folder).args(arguments).output().expect("the command starts")
 }
 
-/// What it said on stdout, when it was to succeed.
+/// Stdout of a command that was to succeed.
 pub fn said(output: &Output) -> String {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{:?}\n{stderr}", output.status);
     String::from_utf8(output.stdout.clone()).expect("stdout is text")
 }
 
-/// What it said on stdout as JSON, when it was to succeed.
+/// Stdout, as JSON, of a command that was to succeed.
 pub fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&said(&run(folder, &[arguments, &["--json"]].concat()))).expect("stdout is JSON")
 }
 
-/// What it said on stderr, when it was to end with `code`.
+/// Stderr of a command that was to end with `code`.
 pub fn complained(output: &Output, code: i32) -> String {
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(code), "{stderr}");

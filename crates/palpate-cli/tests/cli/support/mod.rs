@@ -1,4 +1,4 @@
-//! What several modules of tests use.
+//! Commands, files and measurements that several modules of tests share.
 
 pub mod browser;
 pub mod command;

@@ -72,7 +72,7 @@ impl Toml {
         })
     }
 
-    /// What holds the last segment of a path, and that segment.
+    /// Item that holds the last segment of a path, and that segment.
     fn place<'p>(&mut self, path: &'p str) -> (&mut Item, &'p str) {
         match path.rsplit_once('.') {
             Some((table, key)) => (self.item(table), key),

@@ -4,7 +4,7 @@ use super::*;
 use crate::{ArmOutcome, PreparedStudy, Study, TrainedSeed};
 use palpate_numerics::watch::Watch;
 
-/// What a made-up arm shows: the error of every estimate in % of the length, and the epochs.
+/// Results of a made-up arm: the error of every estimate in % of the length, and the epochs.
 type MadeUp = fn(&str, u32) -> (f64, u32);
 
 /// The paper's arms with three seeds each, whose locators are off by `made_up`.
