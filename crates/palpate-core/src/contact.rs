@@ -38,7 +38,7 @@ impl Position {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Contact {
-    /// Where the force acts.
+    /// Position at which the force acts.
     pub position: Position,
     /// The force, in newtons, positive downward, into the surface.
     pub force_n: f64,

@@ -7,7 +7,7 @@ use crate::Position;
 pub struct Estimate {
     /// The contact: the only one, or the strongest.
     pub contact: ContactEstimate,
-    /// How far the estimate is to be believed.
+    /// Reliability of the estimate.
     pub status: Status,
     /// Other places that explain the same single contact, most probable first, when the status is
     /// [`Status::Ambiguous`].
@@ -19,11 +19,11 @@ pub struct Estimate {
 /// One estimated contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactEstimate {
-    /// Where it is.
+    /// Estimated position.
     pub position: Position,
     /// Its force in newtons, positive downward, where it is known or estimated.
     pub force_n: Option<f64>,
-    /// How sure the locator is, where its method can tell.
+    /// Uncertainty of position and force, where the method can tell.
     pub uncertainty: Option<Uncertainty>,
 }
 

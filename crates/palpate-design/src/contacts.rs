@@ -17,7 +17,7 @@ pub struct ContactPrior {
     pub to: Position,
     /// The distance of neighbours, in metres; greater than 0.
     pub every_m: f64,
-    /// How often contacts fall into equal stretches along the length, from left to right; empty where they do so evenly.
+    /// Relative frequencies of contacts in equal stretches along the length, from left to right; empty where they are uniform.
     pub weights: Vec<f64>,
 }
 
@@ -127,7 +127,7 @@ impl WeightedContacts {
         Ok(Self { positions, weights: weights.iter().map(|weight| weight / sum).collect() })
     }
 
-    /// How many there are, at least one.
+    /// Number of contacts, at least one.
     pub fn len(&self) -> usize {
         self.positions.len()
     }

@@ -74,9 +74,9 @@ impl fmt::Display for SensorKind {
 /// One sensor: what it measures, where, and how well.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// What it measures.
+    /// Quantity that it measures.
     pub kind: SensorKind,
-    /// Where it sits. A raw channel's position means nothing.
+    /// Position on the surface; without meaning for a raw channel.
     pub position: Position,
     /// Its name, unique in the layout: "deflection_1", or what the recording calls its channel.
     pub name: String,
@@ -265,9 +265,9 @@ pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Posit
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorGroup {
-    /// What they measure.
+    /// Quantity that they measure.
     pub kind: SensorKind,
-    /// Where they sit.
+    /// Their positions.
     pub placement: Placement,
     /// The faults that each of them has.
     pub channel: ChannelModel,
@@ -453,7 +453,7 @@ pub enum NoiseError {
     Singular {
         /// Which sensor, from 1.
         number: usize,
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
         /// Standard deviation of its noise, in its SI unit.
         noise_sd: f64,
@@ -463,7 +463,7 @@ pub enum NoiseError {
     /// Every channel is dead.
     #[error("all {count} sensors are dead; at least 1 must be alive")]
     AllDead {
-        /// How many sensors there are.
+        /// Number of sensors.
         count: usize,
     },
 }

@@ -54,7 +54,7 @@ pub const fn microstrain(strain: f64) -> f64 {
 pub struct Quantity {
     /// The value in SI units (m, N, Pa, rad, m/m, kg/m³, N/m, N·m/rad, m/s, s, Hz; a ratio of 5 % is 0.05).
     pub value: f64,
-    /// What it measures.
+    /// Dimension of the value.
     pub dimension: Dimension,
 }
 
@@ -79,15 +79,15 @@ pub enum UnitError {
     /// No unit has this symbol, whatever it was to measure.
     #[error("unknown unit `{unit}`; known are {}", Symbols(None))]
     UnknownUnit {
-        /// What stands where the unit should.
+        /// Text in the place of the unit.
         unit: String,
     },
     /// The unit is unknown, or measures something else than was wanted.
     #[error("{} `{unit}`; {} is one of {}", complaint(unit), wanted.noun(), Symbols(Some(*wanted)))]
     WrongUnit {
-        /// What stands where the unit should.
+        /// Text in the place of the unit.
         unit: String,
-        /// What was wanted.
+        /// Dimension that was wanted.
         wanted: Dimension,
     },
     /// A plain number stands where a unit is needed.
@@ -95,7 +95,7 @@ pub enum UnitError {
     MissingUnit {
         /// The text.
         text: String,
-        /// What was wanted.
+        /// Dimension that was wanted.
         wanted: Dimension,
     },
     /// A unit stands where a plain number is wanted.
@@ -293,7 +293,7 @@ pub enum Dimension {
     Speed,
     /// Time, in seconds.
     Time,
-    /// How often a second, in hertz.
+    /// Cycles per second, in hertz.
     Frequency,
 }
 
@@ -326,7 +326,7 @@ impl Dimension {
     }
 }
 
-/// How many SI units one unit is.
+/// Factor from a unit to the SI unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scale {
     /// 10 to this power; scaling moves the decimal point, so nothing is lost.

@@ -48,7 +48,7 @@ pub struct SparseCholesky {
 struct Panel {
     columns: Range<usize>,
     below: Vec<usize>,
-    /// Where its numbers start.
+    /// Index of its first number.
     start: usize,
 }
 
@@ -69,7 +69,7 @@ struct Fronts<'a> {
     places: Vec<usize>,
 }
 
-/// What the elimination of a supernode adds to rows and columns further on.
+/// Update of rows and columns further on by the elimination of a supernode.
 struct Update<'a> {
     pattern: &'a [usize],
     /// The lower triangle, row by row.
@@ -114,7 +114,7 @@ impl SparseSymmetric {
         self.column_starts.push(self.rows.len());
     }
 
-    /// How many columns there are.
+    /// Number of columns.
     pub fn size(&self) -> usize {
         self.column_starts.len() - 1
     }
@@ -178,7 +178,7 @@ impl SparseCholesky {
         b.assign(&x.t());
     }
 
-    /// How many numbers L is stored in, some zeros among them.
+    /// Number of stored entries of L, some zeros among them.
     pub fn stored_numbers(&self) -> usize {
         self.values.len()
     }

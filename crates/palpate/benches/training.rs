@@ -23,7 +23,7 @@ fn main() {
     }
 }
 
-/// What drawing a fresh order every epoch costs, against presenting the patterns as they are.
+/// Cost of drawing a fresh order every epoch, against presenting the patterns as they are.
 fn price_of_shuffling(precision: Precision) {
     let patterns = beam_patterns(30);
     let topology = Topology::new(&Network::default(), patterns.inputs, patterns.outputs);

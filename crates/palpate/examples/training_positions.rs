@@ -13,7 +13,7 @@ fn setup() -> Result<Setup, Box<dyn std::error::Error>> {
     Ok(Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?)
 }
 
-/// Where the leftmost of six presses is best, in metres.
+/// Leftmost of the six best training positions, in metres.
 pub fn first_m() -> Result<f64, Box<dyn std::error::Error>> {
     let quick = PositionDesign { trials: 0, calibrations: 2, ..PositionDesign::default() };
     let problem = PositionProblem::new(&setup()?, &quick.count(6).repeats(5))?;
@@ -24,7 +24,7 @@ pub fn first_m() -> Result<f64, Box<dyn std::error::Error>> {
     Ok(best_placed(&placed).ok_or("no arrangement")?.positions[0].x_m)
 }
 
-/// Where a recording of presses in the left half is best continued, in metres.
+/// Best next position for a recording of presses in the left half, in metres.
 pub fn next_m() -> Result<f64, Box<dyn std::error::Error>> {
     let pressed = [20.0, 60.0, 100.0, 140.0, 180.0].map(|x| Position::along(mm(x)));
     let begun = simulate_at(&setup()?, &pressed, 5, 3)?;

@@ -22,7 +22,7 @@ pub struct PositionDesign {
     pub count: usize,
     /// Presses at each; at least 1.
     pub repeats: usize,
-    /// How the surface is pressed now: tells the force of the presses where that is not the contacts', and the positions that are
+    /// Present training of the surface: tells the force of the presses where that is not the contacts', and the positions that are
     /// compared with where they are as many.
     pub existing: Option<Training>,
     /// The contacts that are located after calibrating; all over the surface where `None`.
@@ -166,9 +166,9 @@ pub enum PositionError {
     /// Fewer positions than the estimator needs.
     #[error("{count} training position(s); an estimator of kind `{kind}` needs at least {needed}")]
     TooFew {
-        /// How many there are.
+        /// Number of training positions.
         count: usize,
-        /// How many there must be.
+        /// Least number.
         needed: usize,
         /// The estimator's kind.
         kind: &'static str,
@@ -196,9 +196,9 @@ pub enum PositionError {
     /// Too few places pressed to see how smooth the influence functions are.
     #[error("the recording has {found} distinct positions; at least {needed} tell how smooth the surface is")]
     TooFewPresses {
-        /// How many the recording has.
+        /// Number of distinct positions in the recording.
         found: usize,
-        /// How many there must be.
+        /// Least number.
         needed: usize,
     },
     /// Nothing says how noisy a channel is.

@@ -33,7 +33,7 @@ pub(super) struct ForwardModel {
     force: Force,
 }
 
-/// What regressions see: one row a press.
+/// Samples of the regressions: one row a press.
 struct Whitened {
     coordinates: Array2<f64>,
     readings: Array2<f64>,

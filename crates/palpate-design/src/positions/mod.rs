@@ -48,7 +48,7 @@ use palpate_numerics::mean;
 use palpate_numerics::watch::Watch;
 use search::{PatternSearch, evaluate};
 
-/// What the search is called where its progress is told.
+/// Name of the search in progress messages.
 const SEARCHING: &str = "search by calibrations";
 /// Readings that a calibration is judged by, about: while searching, and when verifying.
 const READINGS_IN_SEARCH: usize = 1000;
@@ -63,11 +63,11 @@ const SEARCH_SEEDS: u64 = 1 << 32;
 /// Training positions and what they are worth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// How they came about.
+    /// Rule or search that placed them.
     pub placement: Placement,
-    /// Where to press; on a line from left to right.
+    /// Training positions; on a line from left to right.
     pub positions: Vec<Position>,
-    /// What calibrations with fresh noise give.
+    /// Result of calibrations with fresh noise.
     pub verification: Verification,
     /// Their mean error at each contact, in metres.
     pub errors_m: Vec<f64>,
@@ -90,7 +90,7 @@ pub struct PositionProblem {
     design: PositionDesign,
     /// The setup with the force of the presses.
     pressed: Setup,
-    /// What is simulated, but for where to press.
+    /// Calibration that is simulated, without its training positions.
     calibration: Calibration,
     extent: Extent,
     force: Force,
@@ -139,7 +139,7 @@ impl PositionProblem {
         &self.contacts
     }
 
-    /// What the locator knows of their force: as the design says, if the setup knows it.
+    /// Knowledge of the force that the locator has: as the design says, if the setup knows it.
     pub fn force(&self) -> Force {
         self.force
     }
@@ -235,7 +235,7 @@ impl PositionProblem {
         matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, layout, force_n)
     }
 
-    /// What calibrations with fresh noise give.
+    /// Result of calibrations with fresh noise.
     fn verified(
         &self,
         placement: Placement,

@@ -14,7 +14,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// Where could be pressed, along a line and along each side of a plane.
+/// Candidate sites along a line, and along each side of a plane.
 const SITES: usize = 200;
 const SITES_ON_A_PLANE: usize = 20;
 /// Contacts that are looked at, at most.

@@ -45,7 +45,7 @@ pub struct Assessment {
     pub within_tolerance_percent: f64,
     /// The worst score when one of the sensors dies; `None` for a single sensor.
     pub score_one_dead: Option<f64>,
-    /// What the sensors cost.
+    /// Cost of the sensors.
     pub cost: f64,
     /// Whether it keeps all constraints.
     pub keeps_constraints: bool,
@@ -221,7 +221,7 @@ impl SensorProblem<'_> {
 /// Layouts of one number of sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CountPoint {
-    /// How many.
+    /// Number of sensors.
     pub count: usize,
     /// The even layout; `None` where there is none.
     pub even: Option<Assessment>,

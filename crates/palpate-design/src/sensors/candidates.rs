@@ -16,7 +16,7 @@ const SAME: f64 = 1e-6;
 pub struct PlacedSensor {
     /// Which of the design's offers.
     pub offer: usize,
-    /// Where it sits.
+    /// Its position.
     pub position: Position,
 }
 
@@ -141,7 +141,7 @@ pub(super) fn reads_something(surface: &dyn Surface, kind: SensorKind, position:
     !still && carried && kind != SensorKind::Raw
 }
 
-/// What every layout has must not exclude each other.
+/// Checks that no two sensors of every layout exclude each other.
 fn check_must_haves(
     candidates: &Candidates,
     design: &SensorDesign,
@@ -183,7 +183,7 @@ pub(super) struct Pool {
     pub design: SensorDesign,
     pub extent: Extent,
     pub sensors: Vec<PlacedSensor>,
-    /// What can be chosen.
+    /// Units that can be chosen.
     pub units: Vec<Unit>,
     /// Units that every layout has.
     pub fixed: Vec<usize>,
@@ -218,12 +218,12 @@ impl Pool {
         selection.iter().flat_map(|unit| self.units[*unit].members()).collect()
     }
 
-    /// How many sensors a selection has.
+    /// Number of sensors of a selection.
     pub fn size(&self, selection: &[usize]) -> usize {
         selection.iter().map(|unit| self.units[*unit].size()).sum()
     }
 
-    /// What a selection costs.
+    /// Cost of a selection.
     pub fn cost(&self, selection: &[usize]) -> f64 {
         selection.iter().map(|unit| self.unit_cost(*unit)).sum()
     }
@@ -302,7 +302,7 @@ fn excludes_nothing(design: &SensorDesign) -> bool {
     design.spacing_m == 0.0 && design.symmetry != Symmetry::Forbidden
 }
 
-/// Why two different sensors cannot both be there, if so.
+/// Reason for which two different sensors cannot both be in a layout, if there is one.
 pub(super) fn exclusion(
     a: &PlacedSensor,
     b: &PlacedSensor,
@@ -327,7 +327,7 @@ pub(super) fn exclusion(
     None
 }
 
-/// How close a sensor may come to the mirror image of another where symmetry is forbidden: the spacing, or more than half
+/// Least distance of a sensor from the mirror image of another where symmetry is forbidden: the spacing, or more than half
 /// the distance of sites, so that sites next to each other are told apart.
 fn mirror_distance(design: &SensorDesign, extent: Extent) -> f64 {
     let pitch_m = design.sites.distance_m(extent.length_m()).unwrap_or(0.0);

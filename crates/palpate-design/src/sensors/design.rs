@@ -25,9 +25,9 @@ pub struct SensorDesign {
     pub count: usize,
     /// The kinds to choose from; at least one.
     pub offers: Vec<SensorOffer>,
-    /// Where sensors may sit.
+    /// Candidate sites of the sensors.
     pub sites: Sites,
-    /// Where the surface will be touched.
+    /// Prior of the contacts.
     pub contacts: ContactPrior,
     /// Whether the locator will know the force of its contacts.
     pub force: Force,
@@ -37,11 +37,11 @@ pub struct SensorDesign {
     pub tolerance_m: f64,
     /// Least distance of two sensors, in metres; at least 0. A reaction sensor is part of its support and takes no room.
     pub spacing_m: f64,
-    /// Where nothing may sit. A reaction sensor is asked for by its kind, and may.
+    /// Zones where no sensor may sit, except reaction sensors, which are asked for by their kind.
     pub keep_out: Vec<KeepOut>,
     /// Sensors that every layout has.
     pub must_have: Vec<MustHave>,
-    /// What all sensors together may cost, in the unit of their costs.
+    /// Largest cost of all sensors together, in the unit of their costs; no bound where `None`.
     pub budget: Option<f64>,
     /// Whether layouts are to be their own mirror image.
     pub symmetry: Symmetry,
@@ -50,11 +50,11 @@ pub struct SensorDesign {
 /// A kind of sensor that can be had.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorOffer {
-    /// What it measures; never raw.
+    /// Quantity that it measures; never raw.
     pub kind: SensorKind,
     /// Its noise and faults.
     pub channel: ChannelModel,
-    /// What one costs; at least 0, in any unit.
+    /// Cost of one; at least 0, in any unit.
     pub cost: f64,
 }
 
@@ -104,11 +104,11 @@ impl KeepOut {
 pub struct MustHave {
     /// Which of the offers.
     pub offer: usize,
-    /// Where it sits.
+    /// Its position.
     pub position: Position,
 }
 
-/// What makes a layout good.
+/// Criterion by which layouts are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DesignCriterion {
@@ -116,7 +116,7 @@ pub enum DesignCriterion {
     MeanLimit,
     /// A small largest limit.
     WorstLimit,
-    /// BoundedList contacts whose limit is above the tolerance.
+    /// Few contacts whose limit is above the tolerance.
     WithinTolerance,
     /// Much information on all that is unknown of a contact: a small mean of ½·ln det of its least covariance.
     DOptimality,
@@ -268,7 +268,7 @@ pub enum DesignError {
         "{kind} sensors have no noise and no resolution; one of them must be greater than 0, or the limit is 0 wherever they sit"
     )]
     SingularNoise {
-        /// What they measure.
+        /// Quantity that they measure.
         kind: SensorKind,
     },
     /// Fewer sites than sensors.
@@ -304,11 +304,11 @@ pub enum DesignError {
     /// The budget does not suffice.
     #[error("the budget is {budget}; the cheapest {count} sensors cost {least}")]
     Budget {
-        /// What there is to spend.
+        /// The budget, in the unit of the costs.
         budget: f64,
         /// Sensors that are wanted.
         count: usize,
-        /// What the cheapest layout costs that was found.
+        /// Cost of the cheapest layout found.
         least: f64,
     },
     /// More sensors that every layout has than the layout is to have.
@@ -324,9 +324,9 @@ pub enum DesignError {
     /// A sensor that every layout has, where it would read nothing.
     #[error("the {kind} sensor of `must_have` at {} would read nothing there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -334,9 +334,9 @@ pub enum DesignError {
     /// A sensor that every layout has, where none may sit.
     #[error("the {kind} sensor of `must_have` at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
     MustHaveKeptOut {
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -344,9 +344,9 @@ pub enum DesignError {
     /// Two sensors that every layout has, and that exclude each other.
     #[error("the sensors of `must_have` at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
     MustHavesExclude {
-        /// Where one is.
+        /// Position of the one.
         first: Position,
-        /// Where the other is.
+        /// Position of the other.
         second: Position,
         /// Why.
         reason: Exclusion,
@@ -356,9 +356,9 @@ pub enum DesignError {
     /// A sensor that every layout has, without a place for its twin.
     #[error("symmetry is wanted, but the mirror image of the {kind} sensor of `must_have` at {} is no place for one", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,

@@ -8,7 +8,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// More layouts than this are not gone through.
 pub(super) const MOST_LAYOUTS: f64 = 300_000.0;
 
-/// How many layouts there are at most: the ways to choose as many units as there are slots.
+/// Largest number of layouts: the ways to choose as many units as there are slots.
 pub(super) fn layouts(pool: &Pool, slots: usize) -> f64 {
     let free = pool.units.len() - pool.fixed.len();
     (0..slots).map(|i| (free as f64 - i as f64) / (i as f64 + 1.0)).product::<f64>().max(0.0)

@@ -12,7 +12,7 @@ use super::exchange::{Found, random_start};
 use super::objective::Objective;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-/// What the search is called where its progress is told.
+/// Name of the search in progress messages.
 pub(super) const STAGE: &str = "genetic search";
 const POPULATION: usize = 60;
 const GENERATIONS: usize = 120;
@@ -20,7 +20,7 @@ const GENERATIONS: usize = 120;
 const ELITE: usize = 4;
 /// Layouts of which the best becomes a parent.
 const TOURNAMENT: usize = 3;
-/// How likely a child loses one of its units for any other.
+/// Probability that a child exchanges one of its units for any other.
 const MUTATION: f64 = 0.4;
 
 /// The best layout after so many generations; `feasible` is one that keeps all constraints.

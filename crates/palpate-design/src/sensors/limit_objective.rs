@@ -26,7 +26,7 @@ use sums::{Contacts, Mean, Shrinking, Sums, Without, Worst, folded};
 /// Information on ln W beforehand: of a standard deviation of 1000 times the force, and of 1 time.
 const VAGUE: f64 = 1e-6;
 const ROUGH: f64 = 1.0;
-/// Where the criterion does not tell two layouts apart, their mean limits do, by this share of its size.
+/// Weight of the mean limit, as a share of the criterion's size, which decides between layouts that the criterion does not tell apart.
 const TIE_BREAK: f64 = 1e-3;
 
 /// Rows of all candidates, and the criterion.
@@ -182,7 +182,7 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
     }
 }
 
-/// Where entry (i, k) of a symmetric matrix stands in its lower triangle, row by row.
+/// Index of entry (i, k) of a symmetric matrix in its lower triangle, row by row.
 const fn packed(i: usize, k: usize) -> usize {
     if i >= k { i * (i + 1) / 2 + k } else { k * (k + 1) / 2 + i }
 }

@@ -65,11 +65,11 @@ impl Method {
 /// A layout and its worth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Designed {
-    /// How it came about.
+    /// Method that placed the sensors.
     pub method: Method,
     /// The sensors, kind by kind as they are offered, from left to right.
     pub layout: Layout,
-    /// How good it is.
+    /// Figures of merit.
     pub assessment: Assessment,
 }
 
@@ -188,7 +188,7 @@ impl SensorProblem<'_> {
         genetic::search(&self.pool, &*self.objective, &self.feasible, seed, watch)
     }
 
-    /// How many units of a layout are free to be chosen.
+    /// Number of units of a layout that are free to be chosen.
     fn free_slots(&self) -> usize {
         self.feasible.len() - self.pool.fixed.len()
     }

@@ -11,11 +11,11 @@ pub(super) type Block = [f64; LANES];
 pub(super) struct State {
     /// The covariance matrices, as the objective lays them out.
     pub values: Vec<Block>,
-    /// What adding a sensor does not change of the score.
+    /// Part of the score that adding a sensor does not change.
     pub constant: f64,
 }
 
-/// How much is believed of the force before any sensor reads.
+/// Prior belief of the force, before any sensor reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ForceBelief {
     /// Next to nothing, as for every layout that is judged.
@@ -30,7 +30,7 @@ pub(super) trait Objective: Sync {
     /// The row of a candidate.
     fn row(&self, candidate: usize) -> &[Block];
 
-    /// What sensors with these rows leave unknown.
+    /// State of knowledge with sensors of these rows.
     fn state(&self, rows: &[&[Block]], belief: ForceBelief) -> State;
 
     /// The score by which layouts are searched.

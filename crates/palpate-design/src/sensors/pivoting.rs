@@ -33,7 +33,7 @@ impl<'a> Pivoting<'a> {
         Self { modes, left, span: Vec::new(), longest }
     }
 
-    /// How far a column reaches, squared; where the span is everything, of the column itself.
+    /// Squared distance of a column from the span; where the span is everything, of the column itself.
     fn reach(&self, column: usize) -> f64 {
         self.left[column]
     }

@@ -33,18 +33,18 @@ pub(super) struct Sensitivity<'a> {
 }
 
 impl Sensitivity<'_> {
-    /// How many unknowns a contact has.
+    /// Number of unknowns of a contact.
     fn unknowns(&self) -> usize {
         usize::from(self.force == Force::Unknown) + self.surface.extent().sides_m().count()
     }
 
-    /// How many blocks the row of a sensor has.
+    /// Number of blocks in the row of a sensor.
     fn row_size(&self) -> usize {
         self.unknowns() * self.contacts.len().div_ceil(LANES)
     }
 
     /// The row of a sensor: derivatives of its whitened reading by ln W where the force is unknown, by x, and by y on a plane.
-    /// Where the sensor is saturated it tells nothing.
+    /// Row of a sensor: its sensitivity to every contact; 0 where it is saturated.
     pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
         let mut row = vec![[0.0; LANES]; self.row_size()];
         self.fill(&mut row, kind, position, channel);

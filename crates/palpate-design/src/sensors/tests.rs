@@ -53,7 +53,7 @@ fn the_papers_beam_gains_at_least_18_percent() {
     assert!(limit <= 0.82 * even && limit <= 2.15e-3, "{limit}: {:?}", places(&designed));
 }
 
-/// What the assessment says is what the limit says, and scores never exceed what the surface's size tells.
+/// The assessment agrees with the limit, and scores never exceed those of the surface's size alone.
 #[test]
 fn scores_agree_with_the_limit() {
     let (setup, mut design) = sensor_design();
@@ -250,7 +250,7 @@ fn many_sites_are_searched_as_few_are() {
     assert!((many / few - 1.0).abs() < 0.005, "{many} {few}");
 }
 
-/// What the samples left out is found all the same: exchanged one by one, no unit of all gains a millionth of the score.
+/// Units that the samples left out are found all the same: exchanged one by one, no unit of all gains a millionth of the score.
 #[test]
 fn no_exchange_for_one_of_very_many_matters() {
     let (setup, mut design) = sensor_design();

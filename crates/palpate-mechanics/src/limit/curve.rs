@@ -40,7 +40,7 @@ pub struct LimitCurve {
     pub extent: Extent,
     /// The contact force, in newtons.
     pub force_n: f64,
-    /// What is known of the force.
+    /// Knowledge of the force.
     pub force: Force,
     /// Positions and bounds; on a line from left to right.
     pub points: Vec<LimitPoint>,

@@ -121,7 +121,7 @@ impl<'a> CramerRaoBound<'a> {
         norm(&self.whitened_reading(contact))
     }
 
-    /// What a sensor reads without noise, held at the ends of its range.
+    /// Reading of a sensor without noise, held at the ends of its range.
     fn clean(channel: &Channel, contact: Contact) -> f64 {
         let value = channel.response.at(contact);
         channel.range.map_or(value, |(low, high)| value.max(low).min(high))
@@ -174,7 +174,7 @@ pub enum LimitError {
     /// Too few or too many positions.
     #[error("the limit is asked for at {count} positions; there must be at least 1 and at most {most}")]
     Positions {
-        /// How many there would be.
+        /// Number that was asked for.
         count: f64,
         /// The most.
         most: usize,

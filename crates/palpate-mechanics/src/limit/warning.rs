@@ -30,9 +30,9 @@ pub enum LimitWarning {
     Blind {
         /// Where.
         zone: Zone,
-        /// What is known of the force.
+        /// Knowledge of the force.
         force: Force,
-        /// Where it is worst.
+        /// Position with the largest limit.
         at: Position,
         /// The limit there, in metres; `None` where the readings do not tell the position.
         sd_m: Option<f64>,
@@ -47,22 +47,22 @@ pub enum LimitWarning {
     Mirror {
         /// Where.
         zone: Zone,
-        /// Where the other contacts are.
+        /// Zone of the other contacts.
         twins: Zone,
-        /// What is known of the force.
+        /// Knowledge of the force.
         force: Force,
         /// The contact whose twin is nearest.
         at: Position,
         /// Its twin.
         twin: Position,
-        /// How far apart the two readings are, in standard deviations.
+        /// Distance of the two readings, in standard deviations.
         distance: f64,
     },
     /// A contact that hardly shows in the readings.
     Faint {
         /// Where.
         zone: Zone,
-        /// Where it is faintest.
+        /// Position of the faintest contact.
         at: Position,
         /// By how many standard deviations it stands out of the noise.
         signal_to_noise: f64,
@@ -364,7 +364,7 @@ const FINEST: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Twin {
     pub position: Position,
-    /// How far apart the readings are, in standard deviations of their noise.
+    /// Distance of the readings, in standard deviations of their noise.
     pub distance: f64,
 }
 
@@ -413,7 +413,7 @@ impl<'a> TwinSearch<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// What is compared of the reading at a position, and the length of the whitened reading: the reading itself for a
+    /// Part of the reading that is compared, and the length of the whitened reading: the reading itself for a
     /// known force, its direction for an unknown one.
     fn shape(&self, position: Position) -> (Vec<f64>, f64) {
         let mut reading = self.limit.whitened_reading(Contact { position, force_n: self.force_n });

@@ -142,7 +142,7 @@ fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Ve
     found
 }
 
-/// Where `holds` ends between a place where it does and one where it does not.
+/// End of the stretch where `holds`, between a position inside and one outside, in metres.
 fn edge(mut inside_m: f64, mut outside_m: f64, holds: &impl Fn(Position) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle_m = inside_m.midpoint(outside_m);

@@ -139,7 +139,7 @@ impl From<Beam> for Strip {
     }
 }
 
-/// Where the sensor is, seen from the support on its side of the force.
+/// Place of the sensor, seen from the support on its side of the force.
 ///
 /// l: length; x: distance of the sensor from that support; b: distance of the force from the other one, all in metres;
 /// direction: 1 seen from the left, −1 seen from the right.

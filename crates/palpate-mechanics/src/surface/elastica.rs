@@ -188,7 +188,7 @@ impl Elastica {
     }
 }
 
-/// How far a vertical force turns the finger where it acts.
+/// Rotation of the finger at the contact of a vertical force.
 #[derive(Clone, Copy)]
 struct Turn {
     /// The Gudermannian argument: sin ψ(s) = tanh w.

@@ -45,7 +45,7 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.influence_function(kind, *sensor)).collect()
     }
 
-    /// What a sensor reads under any force, its influence times the force unless the surface bends too far for that.
+    /// The response function of a sensor: its influence times the force, unless the surface bends too far for that.
     fn response_function(&self, kind: SensorKind, sensor: Position) -> Arc<dyn ResponseFunction + '_> {
         Arc::new(Proportional(self.influence_function(kind, sensor)))
     }
@@ -58,12 +58,12 @@ pub trait Surface: Send + Sync {
     /// Whether a support at `position` takes up force, so that its reaction can be measured.
     fn is_supported_at(&self, position: Position) -> bool;
 
-    /// Where supports take up force at single places, so that a reaction can be measured there, from left to right.
+    /// Positions at which single supports take up force, so that a reaction can be measured there, from left to right.
     fn force_supports(&self) -> Vec<Position> {
         Vec::new()
     }
 
-    /// Why a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
+    /// Reason for which a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
     fn insensitive_sensor(&self, _kind: SensorKind, _sensor: Position) -> Option<InsensitiveSensor> {
         None
     }
@@ -91,7 +91,7 @@ pub trait InfluenceFunction: Send + Sync {
     /// channel, which no model explains. Off the surface the value has no meaning.
     fn at(&self, contact: Position) -> f64;
 
-    /// How fast it changes as the contact moves along x and along y, in its unit per metre; 0 along y on a
+    /// Its derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
 }
@@ -101,7 +101,7 @@ pub trait ResponseFunction: Send + Sync {
     /// The reading at `contact`, in the sensor's SI unit; 0 for a raw channel. Off the surface the value has no meaning.
     fn at(&self, contact: Contact) -> f64;
 
-    /// How the reading changes with the contact. Where it has a kink, some value between those of its two sides.
+    /// Derivatives of the reading by the contact. Where it has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Contact) -> ResponseGradient;
 }
 
@@ -135,7 +135,7 @@ pub enum InsensitiveSensor {
     /// A support of a beam holds what it measures.
     #[error("{} there", held(*kind))]
     Held {
-        /// What the sensor measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
     },
     /// The edge of a plate cannot move so.
@@ -143,9 +143,9 @@ pub enum InsensitiveSensor {
     AtEdge {
         /// Which edge.
         edge: &'static str,
-        /// How it is held.
+        /// Condition along that edge.
         held: &'static str,
-        /// What the sensor measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
     },
     /// The deflection of a plate over a support that does not give.
@@ -156,7 +156,7 @@ pub enum InsensitiveSensor {
     },
 }
 
-/// What keeps a sensor of this kind still.
+/// Reason for which a support leaves a sensor of this kind nothing to read.
 fn held(kind: SensorKind) -> &'static str {
     match kind {
         SensorKind::Deflection => "a support holds the surface",

@@ -187,7 +187,7 @@ impl ModalResponse {
         at_once + (1..=self.modes.len()).map(|k| self.shape(k, kind, sensor.x_m) * late(k)).sum::<f64>()
     }
 
-    /// What a sensor reads per metre of q_k, with the sign conventions of [`Beam`](crate::surface::Beam): of the downward
+    /// Reading of a sensor per metre of q_k, with the sign conventions of [`Beam`](crate::surface::Beam): of the downward
     /// deflection sin(kπx/l), the upward deflection, its derivative, t/2 times its second derivative, and at the supports
     /// E·I times the third, as a force upward.
     fn shape(&self, k: usize, kind: SensorKind, x_m: f64) -> f64 {
@@ -261,7 +261,7 @@ pub struct Oscillator {
     free: [[f64; 2]; 2],
 }
 
-/// Where an oscillator is and how fast it moves.
+/// Displacement and velocity of an oscillator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct State {
     /// q.

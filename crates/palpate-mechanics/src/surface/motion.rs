@@ -105,7 +105,7 @@ impl Motion {
         self.from.distance_m(self.to)
     }
 
-    /// How long a turn takes.
+    /// Duration of a turn, in seconds.
     fn turn_s(&self) -> f64 {
         2.0 * self.turn_m / self.speed_m_per_s
     }
@@ -118,7 +118,7 @@ impl Motion {
         if self.lifted_s > 0.0 { self.lifted_s + 2.0 * self.touch_s } else { 0.0 }
     }
 
-    /// How far a pass has come.
+    /// Distance gone in a pass, in metres, `since_s` seconds after its start.
     fn way_m(&self, since_s: f64) -> f64 {
         let (turn_s, left_s) = (self.turn_s(), self.pass_s() - since_s);
         let turning = |t: f64| 0.5 * self.speed_m_per_s * (t - turn_s / PI * (PI * t / turn_s).sin());

@@ -15,7 +15,7 @@ use crate::{Cholesky, NotPositiveDefinite};
 const TREND_VARIANCE: f64 = 1e8;
 /// Added to the diagonal of C, so that a covariance without noise has a factor despite rounding.
 pub(super) const NUGGET: f64 = 1e-12;
-/// Where that is not enough, what is added grows up to this.
+/// Largest value that is added where that is not enough.
 const LARGEST_NUGGET: f64 = 1e-6;
 
 /// Rows as a covariance needs them.

@@ -40,9 +40,9 @@ pub(super) struct Groups {
     pub rows: Vec<usize>,
     /// Σ ln v_r of each.
     pub log_variance: Vec<f64>,
-    /// What was taken off each output.
+    /// Value subtracted from each output.
     pub offset: Vec<f64>,
-    /// What each output was then divided by; 1 where the noise is given, which is in the outputs' unit.
+    /// Divisor of each output; 1 where the noise is given, which is in the outputs' unit.
     pub scale: Vec<f64>,
     /// Whether the noise of every row was given.
     pub noise_given: bool,
@@ -75,12 +75,12 @@ impl Groups {
         Ok(groups)
     }
 
-    /// How many there are, n.
+    /// Number of groups, n.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// How many rows they stand for, N.
+    /// Number of rows in all groups, N.
     pub fn total_rows(&self) -> usize {
         self.rows.iter().sum()
     }

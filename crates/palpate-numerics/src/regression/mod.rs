@@ -57,7 +57,7 @@ pub enum RegressionError {
     /// Lists of different lengths.
     #[error("there are {found} {what}; {needed} are needed")]
     Count {
-        /// What the list holds.
+        /// Content of the list.
         what: &'static str,
         /// Length that the rest asks for.
         needed: usize,

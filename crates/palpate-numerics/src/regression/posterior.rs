@@ -276,9 +276,9 @@ impl TryFrom<PosteriorData> for GaussianProcess {
 struct PosteriorData {
     kernel: Kernel,
     pub trend: Trend,
-    /// What is taken off each coordinate.
+    /// Value subtracted from each coordinate.
     pub centre: Vec<f64>,
-    /// What the trend then divides it by.
+    /// Divisor of each coordinate in the trend.
     pub spread: Vec<f64>,
     pub hyperparameters: Hyperparameters,
     /// n×d.
@@ -303,7 +303,7 @@ pub enum PosteriorFault {
     /// A list has the wrong length.
     #[error("the Gaussian process has {found} {what}; it must have {needed}")]
     Count {
-        /// What the list holds.
+        /// Content of the list.
         what: &'static str,
         /// Length that the rest asks for.
         needed: usize,
@@ -313,13 +313,13 @@ pub enum PosteriorFault {
     /// A number that is infinite, not a number, or beyond its bound.
     #[error("the Gaussian process's {what} number {number} is {value}; it must be {bound}")]
     BadNumber {
-        /// What the list holds.
+        /// Content of the list.
         what: &'static str,
         /// Which one, from 1.
         number: usize,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Its bound.
         bound: &'static str,
     },
     /// Its covariance does not factor.

@@ -15,7 +15,7 @@ use crate::watch::{Cancelled, Watch};
 pub struct Regression {
     /// The correlation of two points.
     pub kernel: Kernel,
-    /// What lies beneath.
+    /// Basis of the mean.
     pub trend: Trend,
     /// The hyperparameters are found from at most this many distinct points, drawn at random; at least 2. Whatever
     /// their number, the posterior is that of all rows.
@@ -32,7 +32,7 @@ impl Default for Regression {
 
 /// Points on which the starts are tried.
 const TRIAL_POINTS: usize = 160;
-/// How long a start is tried, and how long the best is then followed.
+/// Stopping rules of the trial of a start, and of the search that continues from the best.
 const TRIAL: Stop = Stop { evaluations: 30, decrease: 0.05 };
 const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
 /// Starts: length scales over the coordinates' spread, and the noise ratio.
@@ -129,7 +129,7 @@ impl Regression {
 struct Prior {
     centre: Vec<f64>,
     deviation: Vec<f64>,
-    /// Where the noise is given, ln η of a signal as large as the outputs are: every search starts there.
+    /// ln η of a signal as large as the outputs are, where the noise is given: every search starts there.
     known_start: Option<f64>,
 }
 
@@ -145,7 +145,7 @@ impl Prior {
         Self { centre, deviation: [vec![2.0; d], vec![deviation]].concat(), known_start }
     }
 
-    /// Where a search starts, from length scales over their centre and a noise ratio.
+    /// Start of a search, from length scales over their centre and a noise ratio.
     fn start(&self, (scale, noise): (f64, f64)) -> Vec<f64> {
         let mut start: Vec<f64> = self.centre.iter().map(|centre| centre + f64::ln(scale)).collect();
         if let Some(last) = start.last_mut() {

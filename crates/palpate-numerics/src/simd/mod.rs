@@ -44,7 +44,7 @@ pub use vector::{Abreast, Arithmetic, Eight, LOOK_UP, Number, Real, Vector};
 
 /// Work that is written once for every instruction set.
 pub trait Kernel {
-    /// What it gives.
+    /// Result of the work.
     type Output;
     /// Whether it uses [`Vector::mul_add`] or [`Vector::mul_sub`]. One that does not is compiled once less.
     const FUSED: bool;
@@ -60,7 +60,7 @@ pub trait Simd {
     type F32: Vector<16, Real = f32>;
     /// N numbers in an array, which multiplies and adds as the vectors do.
     type Array<R: Real, const N: usize>: Vector<N, Real = R>;
-    /// How many of the vectors the registers hold.
+    /// Number of vectors that the registers hold.
     const REGISTERS: usize;
 }
 

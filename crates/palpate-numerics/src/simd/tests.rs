@@ -8,7 +8,7 @@ fn numbers<const N: usize>(shift: usize) -> [f64; N] {
     std::array::from_fn(|i| ((i * 7 + shift * 3) as f64 * 1.3).sin() * 10f64.powi((i + shift) as i32 % 5))
 }
 
-/// What every vector can do, in each lane.
+/// Results of every operation of a vector, lane by lane.
 #[inline(always)]
 fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real; N]> {
     let row = |shift: usize| numbers::<N>(shift).map(V::Real::from_f64);
@@ -36,7 +36,7 @@ fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real
     results.into_iter().chain(V::transpose(&rows)).map(V::to_array).collect()
 }
 
-/// What eight f64 can do beside.
+/// Results of the further operations of eight f64.
 #[inline(always)]
 fn eight_operations<V: Eight>(shift: usize) -> (Vec<[f64; 8]>, Vec<u8>, f64) {
     let [a, b] = [shift, shift + 1].map(|shift| V::load(&numbers(shift)));

@@ -201,7 +201,7 @@ impl Number for f64 {
 /// One number each of rows that are worked on side by side, one row or eight, whose own numbers lie in `V`. What is written against this gives
 /// the same bits for one row and for eight.
 pub trait Abreast<V: Copy>: Number {
-    /// How many rows.
+    /// Number of rows.
     const COUNT: usize;
     /// The bits of all of them.
     const ALL: u8 = (u8::MAX as u32 >> (8 - Self::COUNT)) as u8;

@@ -82,7 +82,7 @@ fn sum_up<const P: usize, const FIRST: usize, S: Sums>(contacts: Contacts, sums:
     [S::join(&first), second.iter().sum()]
 }
 
-/// What is summed, block by block. The second sum is the mean standard deviation, where ties are to be broken.
+/// Terms of two sums, block by block. The second sum is the mean standard deviation, where ties are to be broken.
 pub(super) trait Sums {
     fn fold(&self, first: &mut Block, second: &mut Block, weight: &Block, variance: &Block, shrink: &Block);
 

@@ -42,7 +42,7 @@ fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
     }
 }
 
-/// How many pairs of nodes the factor couples when the grid is eliminated in that order, a node with itself included.
+/// Number of pairs of nodes that the factor couples when the grid is eliminated in that order, a node with itself included.
 ///
 /// An upper bound: a block's nodes couple with each other and with all nodes that surround it. In floating point, for it is
 /// asked of grids that are too large to be anything but refused.

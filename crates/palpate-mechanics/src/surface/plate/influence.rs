@@ -55,7 +55,7 @@ impl InfluenceFunction for PlateInfluence {
     }
 }
 
-/// What a plate answers whose equations have no solution.
+/// Influence function of a plate whose equations have no solution: NaN everywhere.
 pub(super) struct NotANumber;
 
 impl InfluenceFunction for NotANumber {

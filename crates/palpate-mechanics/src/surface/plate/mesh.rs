@@ -67,7 +67,7 @@ impl Mesh {
         (self.across + 1, self.up + 1)
     }
 
-    /// How many degrees of freedom all nodes have together.
+    /// Number of degrees of freedom of all nodes together.
     pub fn degrees(&self) -> usize {
         NODE_DEGREES * (self.across + 1) * (self.up + 1)
     }

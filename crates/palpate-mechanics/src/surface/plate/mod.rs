@@ -23,7 +23,7 @@ use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
 ///
-/// What was computed is no part of the plate: it is neither compared nor written to files. It stays in memory as long as a
+/// Computed values are no part of the plate: they are neither compared nor written to files. They stay in memory as long as a
 /// clone lives: some 85 MB for a square plate of the default mesh, 230 MB for 200 × 200 elements.
 ///
 /// ```
@@ -54,7 +54,7 @@ pub struct Plate {
     computed: Arc<Computed>,
 }
 
-/// What has been computed of a plate so far.
+/// Cache of a plate's factored equations and full scales.
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,

@@ -28,7 +28,7 @@ pub(super) struct Solved {
 /// Loads that are solved for in one sweep through the factor: more would cost memory and save little.
 const TOGETHER: usize = 24;
 
-/// What holds the points of the simple supports.
+/// Constraint equations of the simple supports.
 struct SimpleSupports {
     /// Of each support of the plate, which of the simple ones it is.
     numbers: Vec<Option<usize>>,
@@ -55,7 +55,7 @@ impl Solved {
         Ok(Self { mesh, unknowns, factor, simple_supports })
     }
 
-    /// How many numbers the factor is stored in.
+    /// Number of stored entries of the factor.
     pub fn stored_numbers(&self) -> usize {
         self.factor.stored_numbers()
     }
@@ -153,7 +153,7 @@ fn solve(unknowns: &Unknowns, factor: &SparseCholesky, loads: &[&Functional]) ->
     u
 }
 
-/// What `functional` is of the unknowns `u`.
+/// Value of `functional` for the unknowns `u`.
 fn reading(unknowns: &Unknowns, functional: &Functional, u: &[f64]) -> f64 {
     let terms = functional.iter().filter_map(|(degree, value)| Some(value * u[unknowns.place(*degree)?]));
     terms.sum()
@@ -191,12 +191,12 @@ impl Unknowns {
         Self { places, degrees }
     }
 
-    /// How many there are.
+    /// Number of unknowns.
     pub fn count(&self) -> usize {
         self.degrees.len()
     }
 
-    /// Where a degree of freedom stands in the equations; `None` when it is held at zero.
+    /// Number of the equation of a degree of freedom; `None` when it is held at zero.
     pub fn place(&self, degree: usize) -> Option<usize> {
         self.places[degree].map(|place| place as usize)
     }
@@ -316,7 +316,7 @@ impl Column {
     }
 }
 
-/// What the up to four elements around a node add to the column of its `degree`.
+/// Contributions of the up to four elements around a node to the column of its `degree`.
 fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Column {
     let (node, own) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
     let node = (node % (mesh.across + 1), node / (mesh.across + 1));
@@ -338,7 +338,7 @@ fn element_column(mesh: &Mesh, element: &ElementStiffness, degree: usize) -> Col
     column
 }
 
-/// Where a node's degree of freedom stands in an element.
+/// Index of a node's degree of freedom within an element.
 fn local(end_x: usize, end_y: usize, degree: usize) -> usize {
     4 * (2 * end_y + degree / 2) + 2 * end_x + degree % 2
 }

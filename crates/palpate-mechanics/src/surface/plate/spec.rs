@@ -24,9 +24,9 @@ pub struct PlateSpec {
     pub youngs_modulus_pa: f64,
     /// Poisson's ratio ν, greater than −1 and at most 0.5.
     pub poissons_ratio: f64,
-    /// How the edges are held.
+    /// Conditions along the edges.
     pub edges: Edges,
-    /// What holds it at points.
+    /// Supports at points.
     pub supports: Vec<PointSupport>,
     /// Elements along the longer side.
     pub elements: usize,
@@ -63,9 +63,9 @@ pub enum Edge {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointSupport {
-    /// Where it is.
+    /// Its position.
     pub position: Position,
-    /// What it does.
+    /// Its kind.
     pub kind: PointSupportKind,
 }
 
@@ -138,7 +138,7 @@ pub enum PlateError {
     /// Too few or too many elements.
     #[error("a plate has {elements} elements along its longer side; it must have {fewest} to {most}")]
     Elements {
-        /// How many it is to have.
+        /// Number that is wanted.
         elements: usize,
         /// The fewest it can have.
         fewest: usize,
@@ -166,7 +166,7 @@ pub enum PlateError {
     SupportOffPlate {
         /// Which support, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         at: Position,
         /// The corner across from (0, 0).
         corner: Position,
@@ -194,7 +194,7 @@ pub enum PlateError {
         first: usize,
         /// The second one's number, from 1.
         second: usize,
-        /// Where they are.
+        /// Their position.
         at: Position,
     },
     /// Two simple supports that the mesh cannot tell apart.
@@ -415,7 +415,7 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     factor + matrix + solutions
 }
 
-/// Why a sensor of this `kind` at `position` reads nothing, wherever the plate is touched; `None` when it reads something.
+/// Reason for which a sensor of this `kind` at `position` reads nothing, wherever the plate is touched; `None` when it reads something.
 ///
 /// On an edge that is held w = 0, so its derivatives along the edge are zero too; on a clamped one the slope across it is
 /// zero, and on a simple one the bending moment across it, and with it the curvature.

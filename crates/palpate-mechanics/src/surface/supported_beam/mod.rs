@@ -96,7 +96,7 @@ impl SupportedBeam {
         &self.spec
     }
 
-    /// Where a sensor of this kind sits, and the disturbance there whose shape is its influence function; `None` where it
+    /// Disturbance at the place of a sensor of this kind whose shape is its influence function; `None` where it
     /// reads nothing that a model explains.
     fn disturbance(&self, kind: SensorKind, site: Site) -> Option<Disturbance> {
         let (l, stiffness) = (self.spec.length_m, self.stiffness_nm2);

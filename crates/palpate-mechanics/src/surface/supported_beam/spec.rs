@@ -15,7 +15,7 @@ pub struct SupportedBeamSpec {
     pub youngs_modulus_pa: f64,
     /// Stretches of one section each, from left to right, which together are the beam.
     pub sections: Vec<BeamSection>,
-    /// What holds it, in any order.
+    /// Its supports, in any order.
     pub supports: Vec<BeamSupport>,
 }
 
@@ -23,7 +23,7 @@ pub struct SupportedBeamSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSection {
-    /// Where it ends, in metres.
+    /// Its end, in metres.
     pub to_m: f64,
     /// Width of the section, in metres.
     pub width_m: f64,
@@ -35,9 +35,9 @@ pub struct BeamSection {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamSupport {
-    /// Where it is, in metres from the beam's left end.
+    /// Its position, in metres from the beam's left end.
     pub at_m: f64,
-    /// How it holds the beam.
+    /// Its kind.
     pub kind: BeamSupportKind,
 }
 
@@ -267,7 +267,7 @@ pub enum SupportedBeamError {
     /// More sections than are computed.
     #[error("the beam has {found} sections; it can have at most {most}")]
     TooManySections {
-        /// How many there are.
+        /// Number of them.
         found: usize,
         /// The most that there can be.
         most: usize,
@@ -275,7 +275,7 @@ pub enum SupportedBeamError {
     /// More supports than are computed.
     #[error("the beam has {found} supports; it can have at most {most}")]
     TooManySupports {
-        /// How many there are.
+        /// Number of them.
         found: usize,
         /// The most that there can be.
         most: usize,
@@ -290,9 +290,9 @@ pub enum SupportedBeamError {
     SectionsOverlap {
         /// Which section.
         number: usize,
-        /// Where the one before it ends, or 0, in metres.
+        /// End of the section before it, or 0, in metres.
         from_m: f64,
-        /// Where it ends, in metres.
+        /// Its end, in metres.
         to_m: f64,
     },
     /// A section reaches beyond the beam.
@@ -304,7 +304,7 @@ pub enum SupportedBeamError {
     SectionBeyond {
         /// Which section.
         number: usize,
-        /// Where it ends, in metres.
+        /// Its end, in metres.
         to_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -316,7 +316,7 @@ pub enum SupportedBeamError {
         format_length_mm(*length_m)
     )]
     SectionsEnd {
-        /// Where the last one ends, in metres.
+        /// End of the last section, in metres.
         to_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -330,7 +330,7 @@ pub enum SupportedBeamError {
     SupportOffBeam {
         /// Which support.
         number: usize,
-        /// Where it is, in metres.
+        /// Its position, in metres.
         at_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -342,7 +342,7 @@ pub enum SupportedBeamError {
         first: usize,
         /// The other, which comes later.
         second: usize,
-        /// Where they are, in metres.
+        /// Their position, in metres.
         at_m: f64,
     },
     /// A place within the beam that is said to be a free end.
@@ -354,7 +354,7 @@ pub enum SupportedBeamError {
     FreeWithin {
         /// Which support.
         number: usize,
-        /// Where it is, in metres.
+        /// Its position, in metres.
         at_m: f64,
         /// The beam's length, in metres.
         length_m: f64,
@@ -362,7 +362,7 @@ pub enum SupportedBeamError {
     /// The supports let the beam move as a whole.
     #[error("the beam is a mechanism: {motion}")]
     Mechanism {
-        /// How it can move.
+        /// Motion that nothing prevents.
         motion: RigidMotion,
     },
     /// The deflections are not numbers that can be computed with.
@@ -388,7 +388,7 @@ pub enum RigidMotion {
     /// About the only support.
     #[error("only the support at {} takes up force, so it can turn about that freely", format_length_mm(*about_m))]
     Turning {
-        /// Where that support is, in metres.
+        /// Position of that support, in metres.
         about_m: f64,
     },
 }

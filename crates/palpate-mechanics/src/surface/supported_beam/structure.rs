@@ -20,7 +20,7 @@ use palpate_numerics::small::solve_general;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Structure {
     length_m: f64,
-    /// Where the nodes are, as shares of the length: ends, supports and section steps.
+    /// Places of the nodes, as shares of the length: ends, supports and section steps.
     pub nodes: Vec<f64>,
     pub holds: Vec<Hold>,
     /// One fewer than nodes.
@@ -37,7 +37,7 @@ pub(super) struct Site {
     pub offset: f64,
 }
 
-/// What happens at a site.
+/// Disturbance of the beam at a site.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Disturbance {
     /// The state jumps by this much.
@@ -46,7 +46,7 @@ pub(super) enum Disturbance {
     Settlement,
 }
 
-/// What lies to both sides of a site.
+/// States that the beam admits on both sides of a site.
 struct Surroundings {
     /// Admitted by the beam to its left, in the factors of this element, if any.
     left: Pair,
@@ -83,7 +83,7 @@ impl Structure {
         Site { element, offset }
     }
 
-    /// What holds the beam at a site; `None` between nodes.
+    /// Support of the beam at a site; `None` between nodes.
     pub fn hold_at(&self, Site { element, offset }: Site) -> Option<Hold> {
         if offset <= 0.0 {
             Some(self.holds[element])
@@ -204,7 +204,7 @@ impl Surroundings {
     }
 }
 
-/// What a sensor reads per newton, as the shape that a disturbance at the sensor bends the beam into (Betti and Maxwell;
+/// Influence function of a sensor, as the shape that a disturbance at the sensor bends the beam into (Betti and Maxwell;
 /// Müller-Breslau, *Die neueren Methoden der Festigkeitslehre*, 1886).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shape {
@@ -280,7 +280,7 @@ fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
 type Pair = [State; 2];
 type Factors = [f64; 2];
 
-/// What holds a node: how far it gives way to a unit force and turns under a unit couple, in the states' unit. 0 is
+/// Compliances of a node's support: how far it gives way to a unit force and turns under a unit couple, in the states' unit. 0 is
 /// rigid, `None` free.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Hold {

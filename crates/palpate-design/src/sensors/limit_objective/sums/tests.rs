@@ -7,7 +7,7 @@ fn blocks(count: usize, seed: usize) -> Vec<Block> {
     padded(&(0..count * LANES).map(value).collect::<Vec<_>>())
 }
 
-/// What the machine's widest registers give and what plain Rust gives.
+/// Bits of the sums by the machine's widest registers and by plain Rust.
 fn both<const P: usize, const FIRST: usize, S: Sums>(sums: &S, seed: usize) -> [[u64; 2]; 2] {
     let n = 5;
     let (mut covariances, row) = (blocks(packed(P, 0) * n, seed), blocks(P * n, seed + 1));

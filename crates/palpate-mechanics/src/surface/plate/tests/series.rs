@@ -32,7 +32,7 @@ fn navier_point(terms: usize) -> f64 {
     4.0 / PI.powi(4) * odd(terms).map(line).sum::<f64>()
 }
 
-/// What the moments along clamped edges add to the central deflection (art. 44): E_i from as many equations as there are
+/// Contribution of the moments along clamped edges to the central deflection (art. 44): E_i from as many equations as there are
 /// terms, whose right sides are the slopes of the simply supported plate.
 fn clamping(terms: usize, right_side: impl Fn(f64) -> f64) -> f64 {
     let alpha = |m: f64| m * PI / 2.0;
