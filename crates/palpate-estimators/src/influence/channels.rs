@@ -4,7 +4,7 @@ use super::config::ForceBelief;
 use crate::fit::LocatorFault;
 use serde::{Deserialize, Serialize};
 
-/// What is learnt of the channels besides their influence functions.
+/// Offsets, noise and reference force of the channels, learnt besides their influence functions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Channels {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The influence estimator: learn what each sensor reads as a function of the contact, and invert it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Influence {
-    /// Where the influence functions come from.
+    /// Source of the influence functions.
     pub from: InfluenceSource,
     /// The most contacts that may touch at once; 1 to 3.
     pub contacts: usize,
@@ -18,7 +18,7 @@ pub struct Influence {
     pub force_sd_n: Option<f64>,
 }
 
-/// Where influence functions come from.
+/// Source of influence functions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InfluenceSource {
@@ -37,7 +37,7 @@ impl Default for Influence {
 }
 
 impl Influence {
-    /// What the setup and the settings say of the force.
+    /// Knowledge of the force, by the setup and the settings.
     pub(super) fn force_belief(&self, setup: &Setup) -> ForceBelief {
         match (setup.force_n, self.force_sd_n) {
             (None, _) => ForceBelief::Unknown,
@@ -47,7 +47,7 @@ impl Influence {
     }
 }
 
-/// What is known of the force of a contact.
+/// Knowledge of a contact's force before a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ForceBelief {
@@ -101,22 +101,22 @@ impl ForceBelief {
     }
 }
 
-/// Why influence functions cannot be fitted to a recording.
+/// Error of fitting influence functions to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InfluenceFitError {
-    /// What a surface without a model has to say.
+    /// An error of the surface without a model.
     #[error(transparent)]
     Measured(#[from] MeasuredError),
     /// The surface has no model.
     #[error("the surface is `measured`: it has no mechanics that influence functions could start from")]
     NoModel,
-    /// What only influence functions of a surface with a model can do.
+    /// A setting that only influence functions of a surface with a model have.
     #[error("the surface is `measured`: {what} needs a surface with mechanics, such as a beam")]
     NotOnMeasured {
         /// The setting.
         what: &'static str,
     },
-    /// What is not done on a plane.
+    /// A setting that a plane does not have.
     #[error("the surface is a plane: {what} works on a line, such as a beam, only")]
     NotOnPlane {
         /// The setting.
@@ -147,7 +147,7 @@ pub enum InfluenceFitError {
     /// Every sensor is dead.
     #[error("all {sensors} sensors are dead; at least 1 must live")]
     AllDead {
-        /// How many there are.
+        /// Number of sensors.
         sensors: usize,
     },
     /// Presses that contradict each other so exactly that they cannot be weighed.
@@ -155,7 +155,7 @@ pub enum InfluenceFitError {
     Singular {
         /// Which, from 1.
         sensor: usize,
-        /// What failed.
+        /// The factorisation's error.
         problem: NotPositiveDefinite,
     },
     /// The recording's channels are not the setup's.

@@ -48,7 +48,7 @@ pub(super) fn learn(
     let surface = task.setup.surface.model().ok_or(InfluenceFitError::NoModel)?;
     let layout = &task.setup.layout;
     check_sensors(layout)?;
-    let presses = Presses::of(task.recording)?;
+    let presses = Presses::average(task.recording)?;
     let needed = match (from, surface.extent().dimensions()) {
         (InfluenceSource::Recording, 1) => 3,
         // A plane's simplest curved surface has six numbers.
@@ -91,7 +91,7 @@ fn check_sensors(layout: &Layout) -> Result<(), InfluenceFitError> {
     Ok(())
 }
 
-/// What is learnt from, and where.
+/// Task of learning: source, presses, and the places to learn at.
 struct Learning<'a> {
     from: InfluenceSource,
     surface: &'a dyn Surface,
@@ -146,7 +146,7 @@ impl<'a> Learning<'a> {
 struct Press {
     pub position: Position,
     pub force_n: f64,
-    /// How many readings were averaged.
+    /// Number of readings that were averaged.
     pub count: f64,
     /// Their mean, a value a sensor.
     pub mean: Vec<f64>,
@@ -162,7 +162,7 @@ struct Presses {
     freedom: f64,
 }
 
-/// How many readings' worth of belief the rig's stated noise has, beside the repeats.
+/// Weight of the rig's stated noise beside the repeats, in readings.
 const STATED_FREEDOM: f64 = 20.0;
 
 impl Presses {
@@ -170,7 +170,7 @@ impl Presses {
     ///
     /// # Errors
     /// [`InfluenceFitError::NoForce`] for a row whose force nobody knows, or is not greater than 0.
-    pub fn of(recording: &Recording) -> Result<Self, InfluenceFitError> {
+    pub fn average(recording: &Recording) -> Result<Self, InfluenceFitError> {
         let sensors = recording.channels.len();
         let mut rows: Vec<(Position, f64, &[f64])> = Vec::with_capacity(recording.rows.len());
         for (i, row) in recording.rows.iter().enumerate() {
@@ -194,7 +194,7 @@ impl Presses {
         Ok(Self { presses, scatter, freedom })
     }
 
-    /// How many positions there are, whatever the force.
+    /// Number of positions, whatever the force.
     pub fn distinct_positions(&self) -> usize {
         self.presses.chunk_by(|a, b| a.position == b.position).count()
     }
@@ -456,7 +456,7 @@ mod tests {
     #[test]
     fn repeats_are_averaged_and_their_scatter_kept() {
         let rows = [(0.1, 3.0, 1.0), (0.2, 3.0, 5.0), (0.1, 3.0, 3.0), (0.1, 2.0, 9.0)];
-        let presses = Presses::of(&recording(&rows)).unwrap();
+        let presses = Presses::average(&recording(&rows)).unwrap();
         let found: Vec<_> =
             presses.presses.iter().map(|p| (p.position.x_m, p.force_n, p.count, p.mean[0])).collect();
         assert_eq!(found, [(0.1, 2.0, 1.0, 9.0), (0.1, 3.0, 2.0, 2.0), (0.2, 3.0, 1.0, 5.0)]);
@@ -469,13 +469,13 @@ mod tests {
 
     #[test]
     fn a_press_without_force_is_refused() {
-        let error = Presses::of(&recording(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)])).unwrap_err();
+        let error = Presses::average(&recording(&[(0.1, 3.0, 1.0), (0.2, -1.0, 1.0)])).unwrap_err();
         assert_eq!(error, InfluenceFitError::NoForce { row: 2 });
     }
 
     #[test]
     fn nothing_is_known_of_noise_without_repeats() {
-        let presses = Presses::of(&recording(&[(0.1, 3.0, 1.0)])).unwrap();
+        let presses = Presses::average(&recording(&[(0.1, 3.0, 1.0)])).unwrap();
         assert_eq!(presses.noise_variance(&Layout::even(SensorKind::Deflection, 1, 0.4), 0), None);
     }
 }

@@ -1,4 +1,4 @@
-//! What is believed of a sensor's influence function before any press.
+//! Prior of a sensor's influence function, before any press.
 //!
 //! A Gaussian process. Its mean is the mechanics' influence function where the fit starts from mechanics, else 0. Its
 //! covariance is that of a wrong gain, of a sensor that sits beside its place, and of a remainder (see [`Remainders`]).
@@ -13,15 +13,15 @@ use std::sync::Arc;
 /// Standard deviations of what an influence function may deviate by, shared by sensors of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hyperparameters {
-    /// Of the gain, relative; 0 where the mean is 0.
+    /// Deviation of the gain, relative; 0 where the mean is 0.
     pub gain: f64,
-    /// Of the sensor's position, in metres; 0 where the mean is 0.
+    /// Deviation of the sensor's position, in metres; 0 where the mean is 0.
     pub shift_m: f64,
-    /// Of the remainder where it is largest, relative to full scale.
+    /// Deviation of the remainder where it is largest, relative to full scale.
     pub remainder: f64,
-    /// Of the reading's offset, relative to the full-scale reading at the mean force.
+    /// Deviation of the reading's offset, relative to the full-scale reading at the mean force.
     pub offset: f64,
-    /// Of a reading's noise, relative to the full-scale reading at the mean force; unless repeats tell it.
+    /// Deviation of a reading's noise, relative to the full-scale reading at the mean force; unless repeats tell it.
     pub noise: f64,
 }
 
@@ -30,12 +30,12 @@ impl Hyperparameters {
     pub const NONE: Self = Self { gain: 0.0, shift_m: 0.0, remainder: 0.0, offset: 0.0, noise: 0.0 };
 }
 
-/// Where the mean of a prior comes from.
+/// Source of a prior's mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mean {
     /// The mechanics.
     Model,
-    /// Nowhere: it is 0.
+    /// None: it is 0.
     Zero,
 }
 
@@ -46,14 +46,14 @@ pub(super) struct Prior<'a> {
     /// The largest influence, against which remainders are measured.
     pub full_scale: f64,
     function: Arc<dyn InfluenceFunction + 'a>,
-    /// Of a sensor that can sit beside its place, along the surface and, on a plane, across it.
+    /// Functions of a sensor that can sit beside its place, along the surface and, on a plane, across it.
     beside: [Option<Beside<'a>>; 2],
 }
 
 /// The functions of sensors a little before and behind a sensor, and how far apart they are, in metres.
 type Beside<'a> = ([Arc<dyn InfluenceFunction + 'a>; 2], f64);
 
-/// What mechanics says of one sensor and one contact position.
+/// Terms of the mechanics for one sensor and one contact position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts {
     /// The influence.
@@ -114,15 +114,15 @@ impl<'a> Prior<'a> {
 /// Covariances of the remainders of all sensors of one kind, 1 where they are largest.
 ///
 /// A remainder is a random mixture of the influence functions that sensors of the same kind would have elsewhere on
-/// the surface, ∫ I(s, a) dB(s) with B Brownian, on a plane a Brownian sheet: it bends as the surface bends, is held where the supports hold it, and
-/// is as smooth as an influence function is. Its posterior mean is a smoothing spline in the sense of Kimeldorf and
-/// Wahba (J. Math. Anal. Appl. 33, 1971).
+/// the surface, ∫ I(s, a) dB(s) with B Brownian, on a plane a Brownian sheet: it bends as the surface bends, is held where
+/// the supports hold it, and is as smooth as an influence function is. Its posterior mean is a smoothing spline in the sense
+/// of Kimeldorf and Wahba (J. Math. Anal. Appl. 33, 1971).
 pub(super) struct Remainders {
     /// Between presses.
     pub presses: Array2<f64>,
     /// Between places (rows) and presses (columns).
     pub places: Array2<f64>,
-    /// Of each place with itself.
+    /// Variance of each place.
     pub own: Array1<f64>,
 }
 
@@ -135,7 +135,7 @@ const STRETCHES: usize = 64;
 const STRETCHES_OF_A_SIDE: usize = 12;
 
 impl Remainders {
-    /// Of sensors of `kind`, for presses and places on the surface.
+    /// Covariances of sensors of `kind`, for presses and places on the surface.
     pub fn new(surface: &dyn Surface, kind: SensorKind, presses: &[Position], places: &[Position]) -> Self {
         let mixture = Mixture::new(surface, kind);
         let sizes = mixture.rows(&everywhere(surface.extent()));
@@ -154,7 +154,7 @@ impl Remainders {
 struct Mixture<'a> {
     functions: Vec<Arc<dyn InfluenceFunction + 'a>>,
     scale: f64,
-    /// What single supports take up, mixed into reactions.
+    /// Reactions of single supports, mixed into reactions.
     taken: Vec<Arc<dyn InfluenceFunction + 'a>>,
 }
 

@@ -14,7 +14,7 @@ use palpate_numerics::simd::{Abreast, Eight, Number};
 /// The search looks at every so many nodes; misfits between them are smooth.
 pub(super) const STRIDE: usize = 4;
 
-/// How many nodes it looks at.
+/// Number of nodes that it looks at.
 pub(super) const COARSE: usize = (InfluenceTable::NODES - 1) / STRIDE + 1;
 const _: () = assert!(COARSE == LINE_PLACES, "estimators count the places along a line alike");
 
@@ -83,7 +83,7 @@ pub(super) struct Coarse {
     force: ForceBelief,
     /// f, channel by channel, padded with zeros to groups of eight channels.
     influences: Vec<[[f64; 8]; BLOCKS]>,
-    /// What the misfit has beside |d|² and the product, infinite where no node is: |W·f|² where W is known.
+    /// Terms of the misfit beside |d|² and the product: |W·f|² where W is known; infinite where no node is.
     own: [[f64; 8]; BLOCKS],
     /// 1/(|f|² + the force's precision).
     inverse_norms: [[f64; 8]; BLOCKS],
@@ -95,7 +95,7 @@ pub(super) struct Coarse {
     h_m: f64,
 }
 
-/// Between two coarse nodes.
+/// Chord between two coarse nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Chord {
     /// The product of f at the ends.
@@ -103,7 +103,7 @@ struct Chord {
     /// The chord's squared length, and one over twice that.
     square: f64,
     half_inverse: f64,
-    /// How far the curve is from the chord, at most.
+    /// Largest distance of the curve from the chord.
     sag: f64,
     /// The least weight of a channel.
     least_weight: f64,
@@ -112,7 +112,7 @@ struct Chord {
 /// Beyond an end: no way leads there.
 const BEYOND: Chord = Chord { cross: 0.0, square: 0.0, half_inverse: 1.0, sag: 0.0, least_weight: 1.0 };
 
-/// Where to start in a valley of one or eight readings.
+/// Start of the refinement in a valley, of one or eight readings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start<N = f64> {
     pub x_m: N,
@@ -122,7 +122,7 @@ pub(super) struct Start<N = f64> {
 }
 
 impl Coarse {
-    /// Of a whitened table; `weights` of every cell's channels, padded to groups of eight.
+    /// Coarse nodes of a whitened table; `weights` of every cell's channels, padded to groups of eight.
     pub fn new(table: &InfluenceTable, weights: &[[f64; 8]], force: ForceBelief) -> Self {
         let at = |node: usize| table.at_node(STRIDE * node);
         let groups = table.sensors.div_ceil(8);
@@ -179,7 +179,7 @@ impl Coarse {
         }
     }
 
-    /// Where to start in a valley of each reading, `nodes` being their lowest places.
+    /// Start of the refinement in a valley of each reading, `nodes` being their lowest places.
     #[inline(always)]
     pub fn start<V: Eight, N: Abreast<V>>(
         &self,
@@ -207,7 +207,7 @@ impl Coarse {
         Start { x_m, force_n, floor: N::of(&floors) }
     }
 
-    /// How far from `node`, in coarse nodes, a chord comes closest to d, and the least misfit that its curve may have.
+    /// Distance from `node`, in coarse nodes, at which a chord comes closest to d, and the least misfit that its curve may have.
     #[inline(always)]
     fn along_chords(&self, profile: &Profile, node: usize) -> (f64, f64) {
         let here = profile.misfits[node + 1];
@@ -264,7 +264,7 @@ impl Chord {
         }
     }
 
-    /// How far from the end with misfit `here`, no higher than the misfit at the other, the chord comes closest to d,
+    /// Distance from the end with misfit `here`, no higher than the misfit at the other, at which the chord comes closest to d,
     /// and the square of how close.
     #[inline(always)]
     fn closest(&self, here: f64, other: f64) -> (f64, f64) {
@@ -280,7 +280,7 @@ impl Chord {
     }
 }
 
-/// Where |f|² is less than this of the next node's, next to a support, its direction is that of the next node's.
+/// Share of the next node's |f|² below which, next to a support, the direction of f is that of the next node's.
 const END: f64 = 1e-2;
 
 /// A reading between the influences f at its lowest coarse node and g at the node beside it.
@@ -321,7 +321,7 @@ impl Mixture<f64> {
 }
 
 impl<N: Number> Mixture<N> {
-    /// How far from the lowest node, in coarse nodes, the mixture that is closest to d lies, and its best force.
+    /// Distance from the lowest node, in coarse nodes, of the mixture that is closest to d, and its best force.
     #[inline(always)]
     pub fn mix(&self, force: ForceBelief) -> (N, N) {
         let n = N::splat;

@@ -29,11 +29,12 @@ pub(super) struct GaussNewton {
     pub weights: Vec<[f64; 8]>,
     /// Curvature of the influences in every cell.
     curvatures: Vec<Curvature>,
-    /// Where places end: at the surface's ends, or a little before.
+    /// Ends of the places that are searched: the surface's, or a little before.
     pub ends_m: [f64; 2],
     length_m: f64,
     force: ForceBelief,
-    /// One over the calibration's mean force.
+    /// The calibration's mean force, in newtons, and one over it: its offsets are as uncertain as its influences at this force.
+    reference_force_n: f64,
     inverse_reference: f64,
 }
 
@@ -66,16 +67,22 @@ impl GaussNewton {
             ends_m: ends_m(table, force),
             length_m: table.length_m,
             force,
+            reference_force_n,
             inverse_reference: 1.0 / reference_force_n,
         }
     }
 
-    /// How much larger than in calibration the table's variances count for a contact of a force.
+    /// Factor of the table's variances by a contact's force, of a contact that presses harder than the calibration did.
     #[inline(always)]
     pub fn grown<N: Number>(&self, force_n: N) -> N {
         let ratio =
             (force_n * N::splat(self.inverse_reference)).max(N::splat(1.0)).min(N::splat(MOST_GROWTH));
         ratio * ratio
+    }
+
+    /// Factor of the table's variances, which are those per newton, for a contact of a force.
+    pub fn variance_scale(&self, force_n: f64) -> f64 {
+        self.grown(force_n) * self.reference_force_n * self.reference_force_n
     }
 
     /// The minima near `x_m`, by at most so many `steps`, and the bits of those readings that came to theirs.
@@ -141,7 +148,7 @@ impl GaussNewton {
         a.max(b).at_most(N::splat(1.05) * a.min(b))
     }
 
-    /// How much more than in the weights the calibration's variance counts.
+    /// Factor of the calibration's variance over what the weights have of it.
     #[inline(always)]
     fn weights_grown<N: Number>(&self, force_n: N) -> N {
         match self.force {
@@ -153,11 +160,11 @@ impl GaussNewton {
     /// The sums of the normal equations at a place; of those about the force only where it is not known.
     #[inline(always)]
     fn sums<V: Eight, N: Abreast<V>>(&self, whitened: &[[f64; 8]], cell: Cell<N>, force_n: N) -> Sums<N> {
-        let places = Points::new::<V, N>(cell, force_n);
+        let points = Points::new::<V, N>(cell, force_n);
         if let ForceBelief::Known(_) = self.force {
             let mut vectors = N::each([V::splat(0.0); 3]);
             for (reading, of_reading) in vectors.as_mut().iter_mut().enumerate() {
-                let [square, gg, eg, ..] = self.sums_by_channel::<V>(whitened, &places.of(reading), None);
+                let [square, gg, eg, ..] = self.sums_by_channel::<V>(whitened, &points.point(reading), None);
                 *of_reading = [square, gg, eg];
             }
             let [square, gg, eg] = N::sums(&vectors);
@@ -167,13 +174,13 @@ impl GaussNewton {
         let mut vectors = N::each([V::splat(0.0); 6]);
         for (reading, of_reading) in vectors.as_mut().iter_mut().enumerate() {
             let grown = Some(grown.as_ref()[reading]);
-            *of_reading = self.sums_by_channel::<V>(whitened, &places.of(reading), grown);
+            *of_reading = self.sums_by_channel::<V>(whitened, &points.point(reading), grown);
         }
         let [square, gg, eg, ff, fg, ef] = N::sums(&vectors);
         Sums { square, gg, eg, ff, fg, ef }
     }
 
-    /// Of one reading: e², g², eg, f², fg and ef, summed over groups of eight channels. The calibration's variance counts
+    /// Sums of e², g², eg, f², fg and ef of one reading, summed over groups of eight channels. The calibration's variance counts
     /// `grown` times; not given where the force is known, as the weights are then those for that force.
     #[inline(always)]
     fn sums_by_channel<V: Eight>(&self, whitened: &[[f64; 8]], place: &Point, grown: Option<f64>) -> [V; 6] {
@@ -251,7 +258,7 @@ impl<N: Number> Backtracking<N> {
     }
 }
 
-/// Where a reading is looked for, and with which force.
+/// Point at which the normal equations of a reading are taken: its cell and the force.
 struct Point {
     reading: usize,
     cell: Cell<f64>,
@@ -277,7 +284,7 @@ impl<L: AsRef<[f64]>> Points<L> {
     }
 
     #[inline(always)]
-    fn of(&self, reading: usize) -> Point {
+    fn point(&self, reading: usize) -> Point {
         let at = |lanes: &L| lanes.as_ref()[reading];
         let Cell { node, value: [v0, v1, v2, v3], slope: [s0, s1, s2, s3] } = &self.cell;
         let cell = Cell {
@@ -404,7 +411,7 @@ impl<N: Number> Normal<N> {
         self.misfit - step_m * (N::splat(2.0) * self.fall - self.curvature * step_m)
     }
 
-    /// What tells whether a step to `to` may be the last.
+    /// The numbers by which a step to `to` may be the last.
     #[inline(always)]
     fn step(&self, step_m: N, to: &Minimum<N>) -> Step<N> {
         let variance = self.covariance[0];
@@ -499,7 +506,7 @@ fn curvature(table: &InfluenceTable, weights: &[f64], force: ForceBelief, cell: 
     if told { curvature } else { Curvature { kappa_square: f64::INFINITY, lambda_square: f64::INFINITY } }
 }
 
-/// Where places end. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
+/// Ends of the places that are searched. Next to a support a contact of unknown force reads like a stronger one that is nearer, and at the
 /// support like an infinite one, so a tenth of a spacing is kept.
 fn ends_m(table: &InfluenceTable, force: ForceBelief) -> [f64; 2] {
     let last = table.nodes() - 1;

@@ -11,39 +11,32 @@ use super::locator::BeamLocator;
 use super::multi_contact::{contact_fit, first_mode};
 use super::table::InfluenceTable;
 use crate::fit::Locate;
-use crate::influence::channels::Channels;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood};
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::simd::Array;
 use palpate_numerics::small::{Ldl, add_outer, form};
 
 /// The likelihood of a [`BeamLocator`], ready to be asked often.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeamLikelihood {
     locator: BeamLocator,
-    /// The channels in use.
-    live: Vec<usize>,
-    /// Of those: the offset.
-    offsets: Vec<f64>,
-    /// Of those: one over the noise.
-    inverse_sd: Vec<f64>,
-    /// f, f′ and v of those.
-    table: InfluenceTable,
-    /// g of those.
+    /// g of the channels in use.
     first_mode: Vec<f64>,
 }
 
 impl BeamLikelihood {
-    /// Whitens the table of a locator, without the channels that it leaves out.
+    /// The likelihood of the channels that a locator does not leave out.
     pub fn new(locator: &BeamLocator) -> Self {
-        let Channels { offsets, noise_sd, .. } = locator.channels();
-        let live = locator.channels().live();
-        let offsets = live.iter().map(|s| offsets[*s]).collect();
-        let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
-        let table = locator.table().whitened(&live, &inverse_sd);
-        let first_mode = (0..live.len()).map(|s| share_of_first_mode(&table, s)).collect();
-        Self { locator: locator.clone(), live, offsets, inverse_sd, table, first_mode }
+        let table = &locator.search().table;
+        let first_mode = (0..table.sensors).map(|s| share_of_first_mode(table, s)).collect();
+        Self { locator: locator.clone(), first_mode }
+    }
+
+    /// f, f′ and v of the channels in use.
+    fn table(&self) -> &InfluenceTable {
+        &self.locator.search().table
     }
 
     fn fit<const C: usize, const K: usize>(
@@ -53,7 +46,7 @@ impl BeamLikelihood {
         mode_n: Option<f64>,
     ) -> ContactFit<K> {
         let mode = mode_n.map(|mode_n| (mode_n, self.first_mode.as_slice()));
-        contact_fit(&self.table, whitened, contacts, |contact| self.scale(contact), mode)
+        contact_fit(self.table(), whitened, contacts, |contact| self.scale(contact), mode)
     }
 
     /// By what v is multiplied; a force that is hardly there was not calibrated better for that.
@@ -87,7 +80,7 @@ impl LineLikelihood for BeamLikelihood {
     }
 
     fn first_mode(&self, x_m: f64) -> [f64; 2] {
-        first_mode(self.table.length_m, x_m)
+        first_mode(self.table().length_m, x_m)
     }
 }
 
@@ -97,9 +90,10 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>) {
-        whitened.clear();
-        let channels = self.live.iter().zip(self.offsets.iter().zip(&self.inverse_sd));
-        whitened.extend(channels.map(|(s, (offset, inverse))| (reading[*s] - offset) * inverse));
+        let search = self.locator.search();
+        whitened.resize(8 * search.groups(), 0.0);
+        search.whiten::<Array<f64, 8, false>>(reading, whitened.as_chunks_mut().0);
+        whitened.truncate(search.live.len());
     }
 
     fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1> {
@@ -107,24 +101,24 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn signal(&self, contact: Contact) -> f64 {
-        let cell = self.table.cell(contact.position.x_m);
-        let own = |s| contact.force_n * self.table.value_and_slope(&cell, s).0;
-        (0..self.table.sensors).map(|s| own(s).powi(2)).sum()
+        let cell = self.table().cell(contact.position.x_m);
+        let own = |s| contact.force_n * self.table().value_and_slope(&cell, s).0;
+        (0..self.table().sensors).map(|s| own(s).powi(2)).sum()
     }
 
     /// A⁻¹·B·A⁻¹ with A = Σ w·j·jᵀ and B = Σ (w·j)·var·(w·j)ᵀ, j the derivatives by places and unknown forces in balance
     /// and var = Σ W²·v.
     fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2] {
         let force_is_free = self.known_force_n().is_none();
-        let cells: Vec<_> = contacts.iter().map(|contact| self.table.cell(contact.position.x_m)).collect();
+        let cells: Vec<_> = contacts.iter().map(|contact| self.table().cell(contact.position.x_m)).collect();
         let (mut a, mut b) = ([[0.0; 4]; 4], [[0.0; 4]; 4]);
         let mut j = [0.0; 4];
-        for s in 0..self.table.sensors {
+        for s in 0..self.table().sensors {
             let mut variance = 0.0;
             for (k, (contact, cell)) in contacts.iter().zip(&cells).enumerate() {
-                let (f, slope) = self.table.value_and_slope(cell, s);
+                let (f, slope) = self.table().value_and_slope(cell, s);
                 (j[2 * k], j[2 * k + 1]) = (contact.force_n * slope, f);
-                variance += self.scale(*contact) * self.table.variances_near(contact.position.x_m)[s];
+                variance += self.scale(*contact) * self.table().variances_near(contact.position.x_m)[s];
             }
             let weight = 1.0 / (1.0 + variance);
             add_outer(&mut a, weight, &j);
@@ -146,7 +140,7 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.table.length_m }
+        Extent::Line { length_m: self.table().length_m }
     }
 
     fn known_force_n(&self) -> Option<f64> {

@@ -33,7 +33,7 @@ pub struct BeamLocator {
     search: Search,
 }
 
-/// What a locator file holds.
+/// The part of a locator that its file holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
@@ -103,7 +103,7 @@ impl BeamLocator {
         (0..table.sensors).map(move |i| (!dead[i]).then(|| (table.function(i), offsets[i], noise_sd[i])))
     }
 
-    /// What is known of the force.
+    /// Knowledge of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
     }
@@ -121,7 +121,7 @@ impl BeamLocator {
         true
     }
 
-    #[cfg(test)]
+    /// The table that is searched, whitened.
     pub(super) fn search(&self) -> &Search {
         &self.search
     }

@@ -6,10 +6,10 @@
 //! 2008), which also charges for the number of places that a contact could have been at.
 
 use super::coarse::{COARSE, STRIDE};
-use super::search::{Search, penalty};
+use super::search::Search;
 use super::table::InfluenceTable;
 use crate::likelihood::ContactFit;
-use crate::status::misfit_bound;
+use crate::status::{LINE_PLACES, contact_cost, misfit_bound};
 use ndarray::Array2;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
@@ -26,16 +26,17 @@ pub(super) fn locate_several(
     misfit: f64,
 ) -> Option<Estimate> {
     let channels = search.live.len();
-    let mut least = misfit + penalty(search.force.unknowns(), channels);
+    let one_more = contact_cost(2, channels, LINE_PLACES);
+    let mut least = misfit + search.contact_cost;
     let mut best = None;
     for count in 2..=most {
         let Some(together) = explain(search, whitened, count) else { break };
-        let (cost, misfit) = (together.misfit + count as f64 * penalty(2, channels), together.misfit);
+        let (cost, misfit) = (together.misfit + count as f64 * one_more, together.misfit);
         if cost < least {
             (least, best) = (cost, Some(together));
         }
         // One more contact costs this much, and cannot take off more misfit than there is.
-        if penalty(2, channels) > misfit {
+        if one_more > misfit {
             break;
         }
     }
@@ -93,7 +94,7 @@ fn triples() -> impl Iterator<Item = [usize; 3]> {
     pairs().flat_map(|[i, j]| (j + 1..COARSE).map(move |k| [i, j, k]))
 }
 
-/// How much the chosen nodes lower |d|², pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
+/// Reduction of |d|² by the chosen nodes, pᵀG⁻¹p; `None` where a force would be negative or the nodes cannot be told apart.
 #[inline]
 fn gain<const K: usize>(gram: &Array2<f64>, score: &[f64], chosen: [usize; K]) -> Option<f64> {
     let (mut own_gram, mut own_score) = ([[0.0; K]; K], [0.0; K]);
@@ -117,7 +118,13 @@ fn refine<const K: usize, const N: usize>(
     const MOST_STEPS: usize = 40;
     let table = &search.table;
     let fit = |contacts: [Contact; K]| -> ContactFit<N> {
-        contact_fit(table, whitened, contacts, |contact| search.variance_scale(contact.force_n), None)
+        contact_fit(
+            table,
+            whitened,
+            contacts,
+            |contact| search.gauss_newton.variance_scale(contact.force_n),
+            None,
+        )
     };
     let moved = |contacts: [Contact; K], step: [f64; N], share: f64| {
         std::array::from_fn(|k| {
@@ -177,7 +184,7 @@ fn refine<const K: usize, const N: usize>(
     Some(MultiContact { contacts, misfit: here.misfit })
 }
 
-/// How well contacts explain a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
+/// Fit of contacts to a whitened reading, by a whitened table. `scale` is what multiplies v for a contact, and `mode`
 /// is u with each sensor's g. Of the K = 1 + 2C unknowns the first is u, which is told by nothing without `mode`; place and
 /// force of each contact follow.
 #[inline]

@@ -64,7 +64,7 @@ fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE],
 /// `misfit`, by the criterion that also counts several contacts.
 #[inline(always)]
 fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
-    square <= misfit + search.penalty && square <= search.noise_bound
+    square <= misfit + search.contact_cost && square <= search.noise_bound
 }
 
 #[inline(always)]
@@ -97,7 +97,7 @@ fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
     shares.map(|share| share / sum)
 }
 
-/// How much of a normal distribution lies on the surface.
+/// Share of a normal distribution that lies on the surface.
 fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
     normal_distribution((length_m - mean_m) / sd_m) - normal_distribution(-mean_m / sd_m)
 }

@@ -10,12 +10,12 @@
 //! knows when), and valleys that cannot compete are not refined where the force is known. Batches run eight chains side
 //! by side ([`super::locator`]).
 
-use super::coarse::{COARSE, Coarse, MOST_MINIMA, Profile};
+use super::coarse::{Coarse, MOST_MINIMA, Profile};
 use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
 use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
-use crate::status::{contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, contact_cost, misfit_bound};
 use palpate_numerics::simd::Eight;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
@@ -25,17 +25,15 @@ pub(super) struct Search {
     pub live: Vec<usize>,
     /// Whether those are the first channels of a reading.
     from_first: bool,
-    /// Of the channels in use, in groups of eight: offset and one over the noise, padded with zeros.
+    /// Offset and one over the noise of the channels in use, in groups of eight, padded with zeros.
     scaling: Vec<[[f64; 8]; 2]>,
     /// f, f′ and the variance of f, of the channels in use.
     pub table: InfluenceTable,
     pub coarse: Coarse,
     pub gauss_newton: GaussNewton,
     pub force: ForceBelief,
-    /// The calibration's mean force, in newtons: its offsets are as uncertain as its influences at this force.
-    reference_force_n: f64,
-    /// What a contact costs, by the criterion that counts contacts.
-    pub penalty: f64,
+    /// Cost of a contact, by the criterion that counts contacts.
+    pub contact_cost: f64,
     /// The largest misfit of one contact, and the largest |d|² of noise alone, by the rule of [`crate::status`].
     pub misfit_bound: f64,
     pub noise_bound: f64,
@@ -60,13 +58,12 @@ impl Search {
             scaling: paired(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),
             coarse: Coarse::new(&table, &gauss_newton.weights, force),
             gauss_newton,
-            penalty: penalty(force.unknowns(), live.len()),
+            contact_cost: contact_cost(force.unknowns(), live.len(), LINE_PLACES),
             misfit_bound: misfit_bound(live.len().saturating_sub(force.unknowns())),
             noise_bound: misfit_bound(live.len()),
             live,
             table,
             force,
-            reference_force_n: *reference_force_n,
         }
     }
 
@@ -76,12 +73,7 @@ impl Search {
         self.scaling.len()
     }
 
-    /// What the table's variances are multiplied by for a contact of a force.
-    pub fn variance_scale(&self, force_n: f64) -> f64 {
-        self.gauss_newton.grown(force_n) * self.reference_force_n * self.reference_force_n
-    }
-
-    /// Writes d, in groups of eight channels; |d|².
+    /// Writes d, in groups of eight channels, and returns |d|².
     #[inline(always)]
     pub fn whiten<V: Eight>(&self, reading: &[f64], whitened: &mut [[f64; 8]]) -> f64 {
         let mut square = V::splat(0.0);
@@ -154,11 +146,6 @@ fn gather(reading: &[f64], channels: &[usize]) -> [f64; 8] {
     let mut raw = [0.0; 8];
     raw.iter_mut().zip(channels).for_each(|(raw, s)| *raw = reading[*s]);
     raw
-}
-
-/// Cost of a contact with `unknowns`, for `channels` channels and as many places as the search looks at.
-pub(super) fn penalty(unknowns: usize, channels: usize) -> f64 {
-    contact_cost(unknowns, channels, COARSE)
 }
 
 /// Memory for locating readings, to be used again; up to sixteen channels it lies in place, without allocation.

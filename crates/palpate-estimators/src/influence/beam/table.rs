@@ -5,7 +5,7 @@ use palpate_mechanics::surface::InfluenceFunction;
 use palpate_numerics::simd::Number;
 use serde::{Deserialize, Serialize};
 
-/// What every sensor reads per newton, with its uncertainty, as a function of the contact's position along the surface.
+/// Reading of every sensor per newton, with its uncertainty, as a function of the contact's position along the surface.
 ///
 /// Between nodes the functions are cubic Hermite polynomials. Numbers are stored node by node, and within a node
 /// sensor by sensor, so that all sensors of a place lie side by side.
@@ -93,7 +93,7 @@ impl InfluenceTable {
     /// Nodes of a table: eight sensors' influence functions are then interpolated to 10⁻⁷ of full scale.
     pub const NODES: usize = 129;
 
-    /// How many nodes there are.
+    /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.values.len() / self.sensors.max(1)
     }
@@ -103,7 +103,7 @@ impl InfluenceTable {
         self.length_m / (self.nodes() - 1) as f64
     }
 
-    /// Where a node is, in metres.
+    /// Position of a node, in metres.
     pub fn node_m(&self, node: usize) -> f64 {
         node as f64 * self.spacing_m()
     }
@@ -113,7 +113,7 @@ impl InfluenceTable {
         &self.values[node * self.sensors..(node + 1) * self.sensors]
     }
 
-    /// Where the nodes are.
+    /// Spacing of the nodes.
     pub(super) fn spacing(&self) -> Spacing {
         let h_m = self.spacing_m();
         Spacing { h_m, inverse_h: 1.0 / h_m, last: self.nodes() - 1 }

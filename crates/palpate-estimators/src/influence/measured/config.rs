@@ -6,16 +6,16 @@ use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::regression::{Kernel, RegressionError, Trend};
 use palpate_numerics::watch::Cancelled;
 
-/// How readings are to be learnt as a function of position and nuisance coordinate.
+/// Settings by which readings are learnt as a function of position and nuisance coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeasuredInfluence {
     /// On which scale readings are learnt; `None` for logarithms where every reading is greater than 0.
     pub readings: Option<Scale>,
     /// On which scale the nuisance coordinate is held; `None` for logarithms where every value is greater than 0.
     pub nuisance: Option<Scale>,
-    /// How smooth the readings are.
+    /// Kernel: the smoothness of the readings.
     pub kernel: Kernel,
-    /// What the readings return to far from every press.
+    /// Trend: the value that readings return to far from every press.
     pub trend: Trend,
     /// The hyperparameters are found from at most this many distinct presses, drawn at random; at least 2.
     pub search_points: usize,
@@ -33,7 +33,7 @@ impl Default for MeasuredInfluence {
     }
 }
 
-/// Why a surface cannot be learnt from a recording.
+/// Error of learning a surface from a recording.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MeasuredError {
     /// There is nothing between which to interpolate.
@@ -57,7 +57,7 @@ pub enum MeasuredError {
         /// Which row, from 1.
         row: usize,
     },
-    /// What the regression has to say.
+    /// An error of the regression.
     #[error(transparent)]
     Regression(#[from] RegressionError),
     /// The noise of the channels has no whitening.
@@ -88,14 +88,14 @@ impl Scale {
     }
 
     /// `value` on this scale; `None` for the logarithm of what is not greater than 0.
-    pub fn of(self, value: f64) -> Option<f64> {
+    pub fn scaled(self, value: f64) -> Option<f64> {
         match self {
             Self::Linear => Some(value),
             Self::Logarithm => (value > 0.0).then(|| value.ln()),
         }
     }
 
-    /// The value that [`Self::of`] gave `scaled`.
+    /// The value that [`Self::scaled`] gave `scaled`.
     pub fn undo(self, scaled: f64) -> f64 {
         match self {
             Self::Linear => scaled,

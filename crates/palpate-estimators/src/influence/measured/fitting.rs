@@ -34,7 +34,7 @@ impl Fit for MeasuredInfluence {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let (role, nuisance) = nuisance_coordinate(setup, recording)?;
-        let presses = Presses::of(self, setup, recording, nuisance.as_deref())?;
+        let presses = Presses::average(self, setup, recording, nuisance.as_deref())?;
         let samples = Samples {
             coordinates: presses.coordinates.view(),
             outputs: presses.means.view(),
@@ -87,7 +87,7 @@ impl Presses {
             let variances = (0..channels).map(|j| process.noise_variance(j).unwrap_or_default() + floor[j]);
             Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
         };
-        Ok(Whitening::of(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
+        Ok(Whitening::from_covariances(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
     }
 
     /// The process at every node.
@@ -111,12 +111,12 @@ impl Presses {
                 watch.round()?;
             }
             let place = node / nuisance.count;
-            let mut at = vec![x.at((place / y.count) as f64)];
+            let mut at = vec![x.value((place / y.count) as f64)];
             at.extend(
                 (process.coordinates() - usize::from(self.has_nuisance) == 2)
-                    .then(|| y.at((place % y.count) as f64)),
+                    .then(|| y.value((place % y.count) as f64)),
             );
-            at.extend(self.has_nuisance.then(|| nuisance.at((node % nuisance.count) as f64)));
+            at.extend(self.has_nuisance.then(|| nuisance.value((node % nuisance.count) as f64)));
             process.predict_into(&at, &mut mean, &mut variance, &mut scratch);
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
@@ -203,7 +203,7 @@ pub(super) fn misfit(
             continue;
         }
         let at = presses.coordinates.row(*place).to_vec();
-        let prediction = known[*place].get_or_insert_with(|| Prediction::of(&other, &at, whitening));
+        let prediction = known[*place].get_or_insert_with(|| Prediction::new(&other, &at, whitening));
         if let Some(score) = prediction.score(&output.to_vec(), whitening, dimensions) {
             square += score;
             count += dimensions;
@@ -213,7 +213,7 @@ pub(super) fn misfit(
     Ok(factor.is_finite().then(|| factor.clamp(FACTORS.0, FACTORS.1)))
 }
 
-/// Of each press, whether its position is one of those held out: every fifth, sorted.
+/// Whether the position of each press is one of those held out: every fifth, sorted.
 fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
     let places: Vec<Vec<f64>> =
         presses.coordinates.outer_iter().map(|at| at.slice(s![..dimensions]).to_vec()).collect();
@@ -230,7 +230,7 @@ fn held_out(presses: &Presses, dimensions: usize) -> Option<Vec<bool>> {
     Some(places.iter().map(|place| index(place) % 5 == 2).collect())
 }
 
-/// What the process expects somewhere, whitened.
+/// Prediction of the process at a place, whitened.
 #[derive(Clone, Debug)]
 struct Prediction {
     mean: Vec<f64>,
@@ -241,7 +241,7 @@ struct Prediction {
 }
 
 impl Prediction {
-    fn of(process: &GaussianProcess, at: &[f64], whitening: &Whitening) -> Self {
+    fn new(process: &GaussianProcess, at: &[f64], whitening: &Whitening) -> Self {
         let (channels, d) = (process.outputs(), process.coordinates());
         let (raw, variances) = process.predict(at);
         let (mut unused, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);

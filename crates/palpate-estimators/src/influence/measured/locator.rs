@@ -2,7 +2,7 @@
 
 use super::config::Scale;
 use super::noise::Whitening;
-use super::table::{Axis, LineBuffer, Table};
+use super::table::{LineBuffer, Table};
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::moments::Moments;
 use crate::setup::Setup;
@@ -11,7 +11,7 @@ use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncerta
 use palpate_mechanics::contact::Position;
 use palpate_numerics::normal_interval_95;
 
-/// What the nuisance coordinate is.
+/// Role of the nuisance coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NuisanceRole {
@@ -29,11 +29,11 @@ pub enum NuisanceRole {
 pub struct MeasuredLocator {
     /// On which scale readings are compared.
     pub readings: Scale,
-    /// How scaled readings become channels of unit noise.
+    /// Whitening of scaled readings to channels of unit noise.
     pub whitening: Whitening,
     /// The learnt readings.
     pub table: Table,
-    /// What the nuisance coordinate is.
+    /// Role of the nuisance coordinate.
     pub role: NuisanceRole,
     /// On which scale it is held.
     pub nuisance: Scale,
@@ -46,7 +46,7 @@ pub struct MeasuredLocator {
 impl MeasuredLocator {
     /// The least squared residual of a whitened reading, over the variances.
     pub(super) fn residual(&self, whitened: &[f64]) -> f64 {
-        Posterior::of(self, whitened).residual
+        Posterior::new(self, whitened).residual
     }
 
     /// Whether the estimate tells the force.
@@ -56,7 +56,7 @@ impl MeasuredLocator {
 
     /// The nuisance coordinate at `node`, off its scale.
     fn force_at(&self, node: f64) -> f64 {
-        self.nuisance.undo(self.table.nuisance.at(node))
+        self.nuisance.undo(self.table.nuisance.value(node))
     }
 
     /// The variance of the nuisance coordinate, off its scale, when that of `node` is `variance`.
@@ -71,7 +71,8 @@ impl MeasuredLocator {
 
     /// The reading on its scale, whitened; `None` where it is off the scale.
     pub(super) fn whitened(&self, reading: &[f64]) -> Option<Vec<f64>> {
-        let scaled = reading.iter().map(|value| self.readings.of(*value)).collect::<Option<Vec<f64>>>()?;
+        let scaled =
+            reading.iter().map(|value| self.readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
         let mut whitened = vec![0.0; self.whitening.channels()];
         self.whitening.apply(&scaled, &mut whitened);
         Some(whitened)
@@ -81,12 +82,8 @@ impl MeasuredLocator {
 impl Locate for MeasuredLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self.whitened(reading) {
-            Some(whitened) => Posterior::of(self, &whitened).estimate(),
-            None => {
-                let middle = |axis: Axis| axis.at(0.5 * (axis.count - 1) as f64);
-                let middle = Position { x_m: middle(self.table.x), y_m: middle(self.table.y) };
-                Estimate::of_position(middle, Status::OutsideModel)
-            }
+            Some(whitened) => Posterior::new(self, &whitened).estimate(),
+            None => Estimate::of_position(self.table.middle(), Status::OutsideModel),
         }
     }
 
@@ -172,9 +169,9 @@ struct Posterior<'a> {
 }
 
 impl<'a> Posterior<'a> {
-    /// Of a whitened reading: the middles of blocks of places first, then the places of blocks that could matter, and of
+    /// Posterior of a whitened reading: the middles of blocks of places first, then the places of blocks that could matter, and of
     /// those the cells that could, cut finely.
-    fn of(locator: &'a MeasuredLocator, reading: &[f64]) -> Self {
+    fn new(locator: &'a MeasuredLocator, reading: &[f64]) -> Self {
         let (table, noise) = (&locator.table, &locator.whitening);
         let look = |place: usize| Candidate { place, residual: table.line(place).residual(reading, noise) };
         let nearest = |candidate: &mut dyn Iterator<Item = Candidate>| {
@@ -208,7 +205,7 @@ impl<'a> Posterior<'a> {
             let marginal = line.marginal(reading, noise, reference);
             if marginal.weight > 0.0 {
                 self.residual = self.residual.min(line.residual(reading, noise));
-                let part = Part { x_m: table.x.at(x), y_m: table.y.at(y), weight: marginal.weight };
+                let part = Part { x_m: table.x.value(x), y_m: table.y.value(y), weight: marginal.weight };
                 let node = marginal.nuisance / marginal.weight;
                 let spread = (marginal.nuisance_square / marginal.weight - node * node).max(0.0);
                 cell.moments.add(part.weight, [part.x_m, part.y_m, self.locator.force_at(node)]);
@@ -226,11 +223,7 @@ impl<'a> Posterior<'a> {
     fn estimate(mut self) -> Estimate {
         let total = Moments::total(self.cells.iter().map(|cell| cell.moments));
         if !(total.weight > 0.0 && total.weight.is_finite()) {
-            let middle = Position {
-                x_m: self.locator.table.x.at(0.5 * (self.locator.table.x.count - 1) as f64),
-                y_m: self.locator.table.y.at(0.5 * (self.locator.table.y.count - 1) as f64),
-            };
-            return Estimate::of_position(middle, Status::OutsideModel);
+            return Estimate::of_position(self.locator.table.middle(), Status::OutsideModel);
         }
         let (x_95_m, y_95_m) = self.intervals(total.weight);
         let mut contact = self.contact(total);
@@ -314,7 +307,7 @@ impl<'a> Posterior<'a> {
     }
 }
 
-/// Where 2.5 % and 97.5 % of the weight lie below, of parts in rising order whose weight is spread evenly over `half`
+/// Quantiles below which 2.5 % and 97.5 % of the weight lie, of parts in rising order whose weight is spread evenly over `half`
 /// to either side.
 fn quantiles(parts: &[Part], coordinate: impl Fn(&Part) -> f64, total: f64, half: f64) -> (f64, f64) {
     let find = |share: f64| {

@@ -25,7 +25,7 @@ impl Whitening {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`] where C is singular.
-    pub(super) fn of(noise: Noise, signal: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
+    pub(super) fn from_covariances(noise: Noise, signal: &Array2<f64>) -> Result<Self, NotPositiveDefinite> {
         let m = noise.covariance.nrows();
         let factor = Cholesky::factor(noise.covariance)?;
         let inverse = factor.solve_lower_matrix(Array2::eye(m));
@@ -35,7 +35,7 @@ impl Whitening {
         Ok(Self { matrix: matrix.iter().copied().collect(), signal, gain: noise.gain })
     }
 
-    /// Of channels that are white already, and of a process that knows everything.
+    /// Whitening of channels that are white already, and of a process that knows everything.
     pub(super) fn unit(channels: usize) -> Self {
         Self { matrix: Vec::new(), signal: vec![0.0; channels], gain: 0.0 }
     }
@@ -60,7 +60,7 @@ impl Whitening {
     }
 }
 
-/// How a reading scatters about what its place reads on average: e ~ N(0, C) and a factor 1 + N(0, γ²).
+/// Scatter of a reading about the mean of its place: e ~ N(0, C) and a factor 1 + N(0, γ²).
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
     /// C.

@@ -7,7 +7,7 @@ use crate::setup::Setup;
 use ndarray::Array2;
 use std::collections::HashMap;
 
-/// What shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
+/// Coordinate that shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
 pub(super) fn nuisance_coordinate(
     setup: &Setup,
     recording: &Recording,
@@ -53,7 +53,7 @@ pub(super) struct Presses {
 }
 
 impl Presses {
-    pub fn of(
+    pub fn average(
         config: &MeasuredInfluence,
         setup: &Setup,
         recording: &Recording,
@@ -104,5 +104,5 @@ impl Presses {
 }
 
 fn scaled(scale: Scale, what: &'static str, row: usize, value: f64) -> Result<f64, MeasuredError> {
-    scale.of(value).ok_or(MeasuredError::NoLogarithm { what, row: row + 1, value })
+    scale.scaled(value).ok_or(MeasuredError::NoLogarithm { what, row: row + 1, value })
 }

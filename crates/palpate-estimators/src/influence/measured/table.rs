@@ -4,6 +4,7 @@
 //! along a straight line through the space of readings: a density across it times a share along it.
 
 use super::noise::Whitening;
+use palpate_mechanics::contact::Position;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Evenly spaced nodes.
@@ -53,7 +54,7 @@ impl Axis {
     }
 
     /// The coordinate at `place`, in nodes from the first.
-    pub fn at(&self, place: f64) -> f64 {
+    pub fn value(&self, place: f64) -> f64 {
         self.start + self.step * place
     }
 }
@@ -115,6 +116,12 @@ impl Table {
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.means.iter_mut().chain(&mut self.reaches).for_each(|value| *value /= factor);
         self
+    }
+
+    /// The position in the middle.
+    pub(super) fn middle(&self) -> Position {
+        let middle = |axis: Axis| axis.value(0.5 * (axis.count - 1) as f64);
+        Position { x_m: middle(self.x), y_m: middle(self.y) }
     }
 
     /// Places (x, y).
@@ -225,7 +232,7 @@ pub(super) struct Line<'a> {
     pub variances: &'a [f64],
 }
 
-/// How probable a place is: the likelihood integrated over the nuisance coordinate.
+/// Probability of a place: the likelihood integrated over the nuisance coordinate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Marginal {
     /// ∫ exp(−(residual − reference)/2), over the nuisance coordinate in nodes.
@@ -286,7 +293,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// What a stretch adds to the integral.
+/// Contribution of a stretch to the integral.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     weight: f64,

@@ -58,7 +58,7 @@ pub(super) struct Valley {
 }
 
 impl Coarse {
-    /// Of whitened patches with so many channels.
+    /// Coarse cells of whitened patches with so many channels.
     pub fn new(table: &PlaneTable, patches: &Patches, channels: usize, force: ForceBelief) -> Self {
         let (columns, rows) = ((table.columns - 1) / 2, (table.rows - 1) / 2);
         let blocks = (columns * rows).div_ceil(8);
@@ -80,7 +80,7 @@ impl Coarse {
         coarse
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub fn cells(&self) -> usize {
         self.columns * self.rows
     }
@@ -91,7 +91,7 @@ impl Coarse {
         [(column as f64 + 0.5) * self.cell_m[0], (row as f64 + 0.5) * self.cell_m[1]]
     }
 
-    /// How far apart the readings of a newton in two cells are; where nothing is known of the force, of one that is as
+    /// Distance of the readings of a newton in two cells; where nothing is known of the force, of one that is as
     /// strong in the second cell's readings as a newton is in the first's.
     fn distance(&self, first: usize, second: usize, force: ForceBelief) -> f64 {
         let at = |blocks: &[Lanes], cell: usize| blocks.as_flattened()[cell];

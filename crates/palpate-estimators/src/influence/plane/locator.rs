@@ -18,7 +18,7 @@ pub struct PlaneLocator {
     search: Search,
 }
 
-/// What a locator file holds.
+/// The part of a locator that its file holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
@@ -42,7 +42,7 @@ impl PlaneLocator {
         &self.stored.table
     }
 
-    /// What is known of the force.
+    /// Knowledge of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
     }
@@ -55,7 +55,7 @@ impl PlaneLocator {
         true
     }
 
-    /// What is searched, with something else known of the force.
+    /// The search with another knowledge of the force.
     pub(super) fn search_with(&self, force: ForceBelief) -> Search {
         Search::new(&self.stored.table, &self.stored.channels, force)
     }

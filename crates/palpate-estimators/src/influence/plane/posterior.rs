@@ -82,7 +82,7 @@ struct Mode {
     pub covariance: [f64; 6],
 }
 
-/// What the readings tell of a contact.
+/// The posterior of a contact, mode by mode.
 #[derive(Clone, Copy, Debug)]
 struct Surroundings {
     modes: [Mode; MOST_VALLEYS],
@@ -262,7 +262,7 @@ impl Search {
         if self.force.known_n().is_some() || told <= 0.0 { 0.0 } else { 1.0 / told }
     }
 
-    /// Of a reading that no part of the surface explains: its minimum, and no idea how far it is off.
+    /// The posterior of a reading that no part of the surface explains: its minimum, with the variance of the whole surface.
     fn nothing_summed(&self, minimum: &Minimum) -> Surroundings {
         let [xx, yy] = self.size_m.map(|size_m| size_m * size_m / 12.0);
         let region = [xx, 0.0, 0.0, yy, 0.0, self.own_variance(minimum)];
@@ -281,7 +281,7 @@ fn mode_of(moments: &Moments, minimum: &Minimum) -> Mode {
     Mode { weight: moments.weight, mean, covariance }
 }
 
-/// How many times larger a covariance must be for its 95 % ellipse about a place to hold 95 % of the leaves.
+/// Factor by which a covariance must grow for its 95 % ellipse about a place to hold 95 % of the leaves.
 fn growth(leaves: &mut [Leaf], about: [f64; 3], covariance: &[f64; 6]) -> f64 {
     let [xx, xy, _, yy, ..] = *covariance;
     let Some(factors) = Ldl::new(&[[xx, xy], [xy, yy]]) else { return 1.0 };
@@ -312,7 +312,7 @@ struct Leaf {
     weight: f64,
     /// x, y and the force that is best there.
     at: [f64; 3],
-    /// Whose minimum is nearest.
+    /// Index of the nearest minimum.
     mode: usize,
     /// Squared, from the estimate, in standard deviations.
     distance: f64,
@@ -323,7 +323,7 @@ struct Leaf {
 struct Block {
     middle_m: [f64; 2],
     size_m: [f64; 2],
-    /// How far apart the whitened readings of its ends are, along and across.
+    /// Distance of the whitened readings of its ends, along and across.
     length: [f64; 2],
 }
 

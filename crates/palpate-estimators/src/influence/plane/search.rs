@@ -35,7 +35,7 @@ pub(super) struct Search {
     pub force: ForceBelief,
     /// Length and width, in metres.
     pub size_m: [f64; 2],
-    /// What a contact costs, by the criterion that counts contacts (Chen and Chen, Biometrika 95, 2008).
+    /// Cost of a contact, by the criterion that counts contacts.
     pub charge: f64,
     /// The largest misfit of one contact, and the largest |d|² of noise alone, by the rule of [`crate::status`].
     pub misfit_bound: f64,
@@ -178,7 +178,7 @@ impl Search {
     #[inline]
     pub fn profiled(&self, whitened: &[f64], [x_m, y_m]: [f64; 2]) -> (f64, f64) {
         let place = self.patches.place(x_m, y_m);
-        let weights = self.near(&self.weights, [x_m, y_m]);
+        let weights = self.nearest_groups(&self.weights, [x_m, y_m]);
         let mut sums = [[0.0; 8]; 3];
         for (group, (chunk, weights)) in whitened.chunks(8).zip(weights).enumerate() {
             let f = self.patches.value(&place, group);
@@ -213,7 +213,7 @@ impl Search {
 
     /// The groups of the node nearest to a place.
     #[inline]
-    fn near<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
+    fn nearest_groups<'a>(&self, groups: &'a [Lanes], [x_m, y_m]: [f64; 2]) -> &'a [Lanes] {
         &groups[self.patches.nearest(x_m, y_m) * self.patches.groups..][..self.patches.groups]
     }
 
@@ -228,7 +228,7 @@ impl Search {
     pub fn calibration(&self, contact: Contact) -> [Matrix<3>; 2] {
         let Contact { position: Position { x_m, y_m }, force_n } = contact;
         let place = self.patches.place(x_m, y_m);
-        let variances = self.near(&self.variances, [x_m, y_m]);
+        let variances = self.nearest_groups(&self.variances, [x_m, y_m]);
         let scale = force_n.max(self.weights_force_n).powi(2);
         let mut sums = [[[0.0; 3]; 3]; 2];
         for (group, variances) in variances.iter().enumerate() {
@@ -250,7 +250,8 @@ impl Search {
         let [x_m, y_m, force_n] = at;
         let place = self.patches.place(x_m, y_m);
         let near = near.unwrap_or([x_m, y_m]);
-        let (weights, variances) = (self.near(&self.weights, near), self.near(&self.variances, near));
+        let (weights, variances) =
+            (self.nearest_groups(&self.weights, near), self.nearest_groups(&self.variances, near));
         let harder = (force_n > self.weights_force_n).then_some(force_n * force_n);
         let mut sums = [[0.0; 8]; 10];
         for (group, chunk) in whitened.chunks(8).enumerate() {

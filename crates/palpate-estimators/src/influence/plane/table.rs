@@ -9,7 +9,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
-/// What every sensor reads per newton, with its uncertainty, at the nodes of a grid over a rectangle.
+/// Reading of every sensor per newton, with its uncertainty, at the nodes of a grid over a rectangle.
 ///
 /// Between nodes the functions are bicubic (see `Patches`). Node (column, row) is number row·columns + column, and within a
 /// node the numbers are stored sensor by sensor.
@@ -50,7 +50,7 @@ impl PlaneTable {
         Self { sensors, length_m, width_m, columns, rows, values: zeros.clone(), variances: zeros }
     }
 
-    /// How many nodes there are.
+    /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.columns * self.rows
     }
@@ -60,7 +60,7 @@ impl PlaneTable {
         [self.length_m / (self.columns - 1) as f64, self.width_m / (self.rows - 1) as f64]
     }
 
-    /// Where a node is.
+    /// Position of a node.
     pub fn node(&self, node: usize) -> Position {
         let [along_m, across_m] = self.spacing_m();
         let (column, row) = (node % self.columns, node / self.columns);
@@ -106,7 +106,7 @@ pub(super) struct Values {
 }
 
 impl Patches {
-    /// Of the sensors `live` of a table, each multiplied by its factor.
+    /// Patches of the sensors `live` of a table, each multiplied by its factor.
     pub fn new(table: &PlaneTable, live: &[usize], factors: &[f64]) -> Self {
         let groups = live.len().div_ceil(8);
         let mut nodes = vec![[[0.0; 8]; 4]; table.nodes() * groups];

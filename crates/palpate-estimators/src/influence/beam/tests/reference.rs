@@ -48,12 +48,12 @@ fn odd_readings(setup: &Setup, rng: &mut Xoshiro256PlusPlus) -> Vec<Odd> {
 /// −2 ln of a contact's likelihood, but for a constant: χ² with the calibration's variance at its force, and what that
 /// variance costs. Where the force is neither known nor given, the best.
 fn cost(search: &Search, whitened: &[f64], x_m: f64, force_n: Option<f64>) -> f64 {
-    let (table, reference_n) = (&search.table, search.variance_scale(0.0).sqrt());
+    let (table, reference_n) = (&search.table, search.gauss_newton.variance_scale(0.0).sqrt());
     let cell = table.cell(x_m);
     let node = cell.node as usize;
     let at = |force_n: f64| {
         let (mut cost, mut score, mut norm) = (0.0, 0.0, 0.0);
-        let scale = search.variance_scale(force_n);
+        let scale = search.gauss_newton.variance_scale(force_n);
         table.for_each(cell, |s, f, _| {
             let variance = |node: usize| table.variances[node * table.sensors + s];
             let weight = 1.0 / (1.0 + scale * 0.5 * (variance(node) + variance(node + 1)));
