@@ -3,7 +3,7 @@
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 
-/// Where a surface is pressed to calibrate it.
+/// Rule that places the training positions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Arrangement {
     /// Equally spaced: a_i = (i + ½)·l/n for i = 0…n−1 (sets 1 to 3 of the founding paper's Table 1).
@@ -19,7 +19,7 @@ pub enum Arrangement {
     /// The `middle` ones are equally spaced over the portion, its ends included. The other n − `middle` split evenly over
     /// both edges, at pitch d/(k + 1) from the support, where d is the edge's length and k = (n − `middle`)/2.
     EdgeDense {
-        /// How many lie in the middle portion; at least 2.
+        /// Number of positions in the middle portion; at least 2.
         middle: usize,
         /// Start and end of the middle portion as shares of the length; 0 < start < end < 1.
         portion: (f64, f64),
@@ -37,7 +37,7 @@ pub enum Arrangement {
     Explicit(Vec<Position>),
 }
 
-/// Why an arrangement cannot be laid out.
+/// An arrangement that cannot be laid out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArrangementError {
     /// There are no positions.
@@ -46,7 +46,7 @@ pub enum ArrangementError {
     /// The middle portion holds fewer than its two ends.
     #[error("{middle} training positions in the middle portion; at least 2 are needed, its ends")]
     MiddleTooSmall {
-        /// How many were to lie in the middle portion.
+        /// Number of positions in the middle portion.
         middle: usize,
     },
     /// There are fewer positions than the middle portion alone wants.
@@ -54,20 +54,20 @@ pub enum ArrangementError {
         "{count} training positions, but {middle} of them in the middle portion; at least {middle} are needed"
     )]
     FewerThanMiddle {
-        /// How many positions there are.
+        /// Number of positions.
         count: usize,
-        /// How many were to lie in the middle portion.
+        /// Number of positions in the middle portion.
         middle: usize,
     },
-    /// What the middle portion leaves is odd.
+    /// An odd number of positions for the two edges.
     #[error(
         "{count} training positions with {middle} in the middle portion leave {} for two edges; the rest must be even",
         count.saturating_sub(*middle)
     )]
     UnevenEdges {
-        /// How many positions there are.
+        /// Number of positions.
         count: usize,
-        /// How many lie in the middle portion.
+        /// Number of positions in the middle portion.
         middle: usize,
     },
     /// The middle portion is empty or reaches a support.
@@ -89,9 +89,9 @@ pub enum ArrangementError {
     /// The explicit positions are not as many as was said.
     #[error("{listed} training positions are listed, but their count is given as {count}")]
     CountDiffers {
-        /// How many positions are listed.
+        /// Number of positions in the list.
         listed: usize,
-        /// How many there were to be.
+        /// Number of positions asked for.
         count: usize,
     },
     /// A position does not lie on the surface.
@@ -103,7 +103,7 @@ pub enum ArrangementError {
     OffSurface {
         /// Which position, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -113,7 +113,7 @@ pub enum ArrangementError {
         "{count} training positions on a line do not say where they are on a plane; a plane needs a grid"
     )]
     LineOnPlane {
-        /// How many positions there are.
+        /// Number of positions.
         count: usize,
     },
     /// A grid, on a surface without a width.
@@ -239,9 +239,9 @@ fn explicit(positions: &[Position], count: usize, extent: Extent) -> Result<Vec<
 pub struct Training {
     /// The rule that places them.
     pub arrangement: Arrangement,
-    /// How many there are; at least 1.
+    /// Number of positions; at least 1.
     pub count: usize,
-    /// How often each is pressed; at least 1.
+    /// Presses at each position; at least 1.
     pub repeats: usize,
     /// The force of these presses in newtons, where it is not the contact's.
     pub force_n: Option<f64>,
@@ -304,7 +304,7 @@ const ON_A_PLANE: f64 = 400.0;
 pub struct EveryError {
     /// The spacing, in metres.
     pub every_m: f64,
-    /// How many positions it makes.
+    /// Number of positions that it makes.
     pub count: f64,
 }
 
@@ -313,7 +313,7 @@ impl EveryError {
     pub const MOST: f64 = 1e6;
 }
 
-/// Where an estimator is judged, all over a surface: on a line 399 positions, 1/400 of the length apart; on a plane about
+/// Positions at which an estimator is judged, all over a surface: on a line 399, 1/400 of the length apart; on a plane about
 /// 400, in the middles of equal cells that are as square as they can be, so that a share of them is a share of the area.
 pub fn all_over(extent: Extent) -> Vec<Position> {
     let Some(width_m) = extent.width_m() else { return inner_grid(extent, ALONG_A_LINE, 1) };

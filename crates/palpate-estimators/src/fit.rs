@@ -9,7 +9,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 
-/// What an estimator is fitted to.
+/// Task of a fit: setup, recording and seed.
 #[derive(Clone, Copy, Debug)]
 pub struct FitTask<'a> {
     /// Surface, sensors, known force.
@@ -104,9 +104,9 @@ impl<T, U, F: Fn(u64, T) -> U> SeedQueue<T> for Mapped<'_, U, F> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Fit {
-    /// What the method learns.
+    /// The fitted method.
     type Method: Locate;
-    /// Why it cannot be fitted.
+    /// Error of a fit.
     type Error: From<Cancelled> + From<ChannelMismatch> + std::error::Error + Send + Sync + 'static;
 
     /// Fits the method alone, to as many channels as the setup has sensors; see [`Fit::fit`].
@@ -177,7 +177,7 @@ pub trait Fit {
 
 /// A fitted method.
 pub trait Locate {
-    /// Where the surface is touched when the sensors read `reading`: one finite value a channel, in SI units or raw.
+    /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
     /// Checks what a file may have got wrong.
@@ -193,13 +193,13 @@ pub trait Locate {
 pub struct Fitted<M> {
     /// The surface that is touched, and its sensors.
     pub setup: Setup,
-    /// Where it comes from.
+    /// Its provenance.
     pub provenance: LocatorProvenance,
     /// The method and what it learnt.
     pub method: M,
 }
 
-/// Where a locator comes from.
+/// Provenance of a locator.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LocatorProvenance {
@@ -234,7 +234,7 @@ impl<M> Fitted<M> {
 }
 
 impl<M: Locate> Fitted<M> {
-    /// Where the surface is touched when the sensors read `reading`: one value a channel, in SI units or raw.
+    /// Estimates the contact from a reading: one value a channel, in SI units or raw.
     ///
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
@@ -296,7 +296,7 @@ pub enum LocatorFault {
     /// A list has the wrong length.
     #[error("the locator has {found} {what}; it must have {needed}")]
     Count {
-        /// What the list holds.
+        /// Name of the list's elements.
         what: &'static str,
         /// Length that the rest asks for.
         needed: usize,
@@ -306,11 +306,11 @@ pub enum LocatorFault {
     /// A number that is infinite, not a number, or beyond its bound.
     #[error("the locator's {what} number {number} is not {bound}")]
     BadNumber {
-        /// What the list holds.
+        /// Name of the list's elements.
         what: &'static str,
         /// Which one, from 1.
         number: usize,
-        /// What it must be.
+        /// Bound of the number, in words.
         bound: &'static str,
     },
 }

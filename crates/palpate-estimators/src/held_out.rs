@@ -7,7 +7,7 @@ use palpate_core::Uncertainty;
 use palpate_mechanics::contact::Position;
 use palpate_numerics::root_mean_square;
 
-/// How far a method was off at positions that it had not seen: an uncertainty for methods without a noise model.
+/// Errors of a method at positions that it was not fitted to: an uncertainty for methods without a noise model.
 ///
 /// The half-width of the 95 % interval is the conformal one (Vovk, Gammerman and Shafer 2005): of n absolute errors in rising order, number
 /// ⌈0.95·(n + 1)⌉, which covers a further contact like those held out with probability at least 0.95.

@@ -1,4 +1,4 @@
-//! How probable a reading is under contacts: what a filter over time asks of a locator.
+//! Likelihood of a reading under contacts, as a filter over time needs it of a locator.
 
 use palpate_core::Estimate;
 use palpate_mechanics::contact::Contact;
@@ -6,17 +6,17 @@ use palpate_mechanics::surface::Extent;
 
 /// A fitted method that can say how well contacts explain a reading.
 pub trait Likelihood: Send + Sync {
-    /// What contacts on this surface are fitted by.
+    /// The fits of contacts on this surface.
     fn geometry(&self) -> Geometry<'_>;
 
     /// A reading as the fits want it, written over `whitened`.
     fn whiten(&self, reading: &[f64], whitened: &mut Vec<f64>);
 
-    /// How well the surface alone explains a reading that [`Likelihood::whiten`] prepared, by u = `mode_n`; the unknown is u
+    /// Fit of the surface alone to a reading that [`Likelihood::whiten`] prepared, at u = `mode_n`; the unknown is u
     /// (see [`LineLikelihood`]), which a plane does not have.
     fn fit_nothing(&self, whitened: &[f64], mode_n: f64) -> ContactFit<1>;
 
-    /// How far a contact moves the reading in balance: the sum of (W·f)² over the noise's variance, of all channels.
+    /// Signal-to-noise ratio of a contact in balance: the sum of (W·f)² over the noise's variance, of all channels.
     fn signal(&self, contact: Contact) -> f64;
 
     /// Covariance of the position of each contact, xx, xy and yy in m², that calibration leaves and no further reading takes
@@ -26,7 +26,7 @@ pub trait Likelihood: Send + Sync {
     /// The contacts that explain a reading by itself: the best estimate, and its other modes.
     fn locate_alone(&self, reading: &[f64]) -> Estimate;
 
-    /// How far the surface reaches.
+    /// Extent of the surface.
     fn extent(&self) -> Extent;
 
     /// The force of every contact in newtons, where it is known exactly.
@@ -36,7 +36,7 @@ pub trait Likelihood: Send + Sync {
     fn most_contacts(&self) -> usize;
 }
 
-/// Whether contacts lie on a line or on a plane, with the fits that go with that.
+/// Geometry of the contacts, on a line or on a plane, with the fits that go with that.
 #[derive(Clone, Copy)]
 pub enum Geometry<'a> {
     /// Contacts have one coordinate.
@@ -45,23 +45,23 @@ pub enum Geometry<'a> {
     Plane(&'a dyn PlaneLikelihood),
 }
 
-/// How well contacts on a line explain a reading.
+/// Likelihood of contacts on a line.
 ///
 /// A surface that swings is bent by its first mode's force u = m·ω²·q where one in balance is bent by the contacts' share
 /// Σ W·φ(x) of it, φ the mode's shape: it reads Σ W·f(x) + (u − Σ W·φ(x))·g, with g what the sensors read per newton of u. The
 /// faster modes are taken to be in balance.
 pub trait LineLikelihood {
-    /// How well a contact explains it; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
+    /// Fit of one contact; the unknowns are u, place and force. Without `mode_n` the surface is in balance.
     fn fit_one(&self, whitened: &[f64], contact: Contact, mode_n: Option<f64>) -> ContactFit<3>;
 
-    /// How well two contacts explain it; the unknowns are u, place and force of the first, place and force of the second.
+    /// Fit of two contacts; the unknowns are u, place and force of the first, place and force of the second.
     fn fit_two(&self, whitened: &[f64], contacts: [Contact; 2], mode_n: Option<f64>) -> ContactFit<5>;
 
     /// The first mode's shape φ at a place, and its slope per metre.
     fn first_mode(&self, x_m: f64) -> [f64; 2];
 }
 
-/// How well a contact on a plane in balance explains a reading.
+/// Likelihood of a contact on a plane in balance.
 pub trait PlaneLikelihood {
     /// The unknowns are x, y and force.
     fn fit_on_plane(&self, whitened: &[f64], contact: Contact) -> ContactFit<3>;

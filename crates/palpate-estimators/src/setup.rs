@@ -1,4 +1,4 @@
-//! What a reading comes from: surface, sensors, contact, and how its recordings are laid out.
+//! Setups: surface, sensors, known force, and the columns of recordings.
 
 use std::io::Read;
 
@@ -40,7 +40,7 @@ pub enum SetupError {
     OffSurface {
         /// Which sensor of its group, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -50,7 +50,7 @@ pub enum SetupError {
     NoSupport {
         /// Which sensor of its group, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -63,9 +63,9 @@ pub enum SetupError {
     Insensitive {
         /// Which sensor of its group, from 1.
         number: usize,
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -75,7 +75,7 @@ pub enum SetupError {
     /// A sensor on a digit that is no strain gauge.
     #[error("a digit is read by strain gauges, not by {kind} sensors")]
     NotAGauge {
-        /// What it measures.
+        /// Quantity that it measures.
         kind: SensorKind,
     },
     /// A raw channel on a surface with a model.
@@ -87,7 +87,7 @@ pub enum SetupError {
     /// A number of sensors, on a plane, where it does not say where they are.
     #[error("{count} sensors along a length do not say where on a plane they are; place them by a grid")]
     EvenlyOnPlane {
-        /// How many.
+        /// Number of sensors.
         count: usize,
     },
     /// No sensor.
@@ -261,7 +261,7 @@ impl Setup {
         recording::read_pair(readings, contacts, &self.schema(&self.recording_columns()))
     }
 
-    /// What a file must agree with to be a recording of this bench, by columns such as [`Setup::recording_columns`].
+    /// Schema of a recording of this bench, by columns such as [`Setup::recording_columns`].
     pub fn schema<'a>(&'a self, columns: &'a Columns) -> Schema<'a> {
         let extent = self.surface.extent();
         Schema { columns, layout: &self.layout, extent, known_force_n: self.force_n }

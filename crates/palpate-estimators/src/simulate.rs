@@ -17,7 +17,7 @@ use palpate_numerics::OutOfRange;
 
 pub use moving::{MovingContact, MovingContacts, simulate_moving};
 
-/// Why a rig cannot be simulated.
+/// A rig that cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
     /// The surface has no model.
@@ -44,7 +44,7 @@ pub enum SimulateError {
     OffSurface {
         /// Which position, from 1.
         number: usize,
-        /// Where it is.
+        /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
@@ -63,13 +63,13 @@ impl<'a> CleanSensors<'a> {
         Self { functions: layout.sensors().iter().map(function).collect() }
     }
 
-    /// What the sensors would read without any fault at `contact`, in the SI unit of each sensor.
+    /// Faultless reading of the sensors at `contact`, in the SI unit of each sensor.
     pub fn reading(&self, contact: Contact) -> Vec<f64> {
         self.functions.iter().map(|function| function.at(contact)).collect()
     }
 }
 
-/// What the sensors of `layout` would read without any fault when `contact` touches `surface`; for more than one contact
+/// Faultless reading of the sensors of `layout` when `contact` touches `surface`; for more than one contact
 /// of the same surface see [`CleanSensors`].
 pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -> Vec<f64> {
     CleanSensors::new(surface, layout).reading(contact)

@@ -1,4 +1,4 @@
-//! How far a track is off, beside what the readings say one by one; and how that goes with the contact's speed.
+//! Errors of a track, beside those of its readings one by one; and how they grow with the contact's speed.
 
 use crate::estimator::{
     ContactEstimate, Estimate, Locator, NotTrackable, SmoothTracker, Status, Track, TrackError, Tracked,
@@ -86,7 +86,7 @@ impl TrackErrors {
         })
     }
 
-    /// How many times smaller the track's mean error is than that of the readings by themselves.
+    /// Mean error of the readings by themselves over that of the track.
     pub fn ratio(&self) -> f64 {
         self.single_m / self.track_m
     }
@@ -149,7 +149,7 @@ pub struct Followed {
     pub smoothed: Vec<Track>,
 }
 
-/// Why a recording cannot be followed.
+/// A recording that cannot be followed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FollowError {
     /// The locator cannot follow.
@@ -190,7 +190,7 @@ pub struct SpeedErrors {
     pub smoothed: TrackErrors,
 }
 
-/// Why a sweep over speeds cannot be made.
+/// A sweep over speeds that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
     /// The locator cannot follow.

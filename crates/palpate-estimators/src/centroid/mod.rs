@@ -36,7 +36,7 @@ use palpate_numerics::{Cholesky, NotPositiveDefinite};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Centroid;
 
-/// Why a centroid cannot be calibrated.
+/// A recording that the centroid cannot be calibrated by.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CentroidFitError {
     /// One sensor has the same centroid wherever the contact is.
@@ -182,7 +182,7 @@ pub struct CentroidLocator {
     pub map: Vec<Vec<f64>>,
     /// The contact's force in newtons, where the bench knows it.
     pub force_n: Option<f64>,
-    /// How far maps were off at positions that they were not calibrated on.
+    /// Errors of maps at positions that they were not calibrated on.
     pub spread: Option<HeldOutErrors>,
 }
 
@@ -205,7 +205,7 @@ impl CentroidLocator {
         }
     }
 
-    /// What the map multiplies; `None` where every reading is 0 and nothing weighs.
+    /// Terms that the map multiplies; `None` where every reading is 0.
     fn term_values(&self, reading: &[f64]) -> Option<Vec<f64>> {
         let mut weights: Vec<f64> =
             reading.iter().zip(&self.channel_scales).map(|(r, s)| (r * s).abs()).collect();

@@ -43,7 +43,7 @@ use polynomial::Polynomial;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClosedForm;
 
-/// Why the closed form does not suit a bench.
+/// A bench that the closed form does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClosedFormFitError {
     /// A surface without a model.
@@ -57,7 +57,7 @@ pub enum ClosedFormFitError {
         "the closed form needs deflection, slope, strain or reaction sensors; the layout has a {kind} channel"
     )]
     NotModelled {
-        /// What the channel measures.
+        /// Quantity that the channel measures.
         kind: SensorKind,
     },
     /// Too few sensors that see a contact.
@@ -125,7 +125,7 @@ impl ClosedFormLocator {
         (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
     }
 
-    /// What each channel's readings are multiplied by: 1/σ where every noise is known, else 1/full scale.
+    /// Factor of each channel's readings: 1/σ where every noise is known, else 1/full scale.
     fn weights(&self, channels: &[usize]) -> (Vec<f64>, Noise) {
         let sensors = || channels.iter().map(|i| &self.layout.sensors()[*i]);
         let known: Vec<f64> = sensors().map(|s| 1.0 / s.channel.reading_sd()).collect();
@@ -260,7 +260,7 @@ impl Locate for ClosedFormLocator {
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.
 const ROUNDING: f64 = 1e-13;
 
-/// What is asked: a whitened reading, and the force in newtons where it is known.
+/// Posterior of a whitened reading, with the force in newtons where it is known.
 struct Posterior<'a> {
     segments: &'a [Segment],
     reading: &'a [f64],
@@ -443,7 +443,7 @@ struct Segment {
     reduced: Vec<Polynomial>,
     /// Whether `reduced` is in 1 − t.
     mirrored: bool,
-    /// Where `reduced` begins: at 0, or just beside an end where no sensor reads anything and only an infinite force would.
+    /// Start of `reduced`: 0, or just beside an end where no sensor reads anything and only an infinite force would.
     start: f64,
 }
 

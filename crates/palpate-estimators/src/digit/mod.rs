@@ -44,11 +44,11 @@ use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interv
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DigitEstimator {
-    /// What the gauges read.
+    /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
 }
 
-/// How a finger bends.
+/// Theory of bending.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DigitTheory {
@@ -59,7 +59,7 @@ pub enum DigitTheory {
     Linear,
 }
 
-/// Why the digit's estimator does not suit a bench.
+/// A bench that the digit's estimator does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DigitFitError {
     /// Another kind of surface.
@@ -68,7 +68,7 @@ pub enum DigitFitError {
     /// A sensor that is no strain gauge.
     #[error("the digit estimator needs strain gauges; the layout has a {kind} sensor")]
     NotAGauge {
-        /// What the sensor measures.
+        /// Quantity that the sensor measures.
         kind: SensorKind,
     },
     /// A gauge whose noise is not given.
@@ -139,7 +139,7 @@ impl Fit for DigitEstimator {
     }
 }
 
-/// Where one gauge sees a contact alone, an interval wider than this share of the length is no place.
+/// Widest interval, as a share of the length, that is a place where one gauge alone sees the contact.
 const WIDE: f64 = 0.01;
 
 /// A digit's estimator that locates; see [`DigitEstimator`].
@@ -152,7 +152,7 @@ pub struct DigitLocator {
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
-    /// What the gauges read.
+    /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
 }
 
@@ -313,7 +313,7 @@ struct Piece {
     marginal: Marginal,
 }
 
-/// How the position is distributed over a stretch.
+/// Marginal distribution of the position over a stretch.
 #[derive(Clone, Debug)]
 enum Marginal {
     /// Normally, but cut off at the ends of the stretch.
@@ -637,9 +637,9 @@ fn force_step(fit: &ContactFit<2>) -> [f64; 2] {
 /// A guess and its fit.
 type Tried = (Guess, ContactFit<2>);
 
-/// Where on a stretch the search starts, as shares of it.
+/// Starting positions of the search, as shares of the stretch.
 const START_SHARES: [f64; 3] = [0.1, 0.4, 0.8];
-/// What the linear theory's force is multiplied by at a start: a finger that bends far has shorter levers.
+/// Factors of the linear theory's force at a start: a finger that bends far has shorter levers.
 const START_FORCES: [f64; 6] = [1.0, 1.4, 2.0, 3.0, 5.0, 8.0];
 /// Steps that are tried; from a start five to ten reach the last digits.
 const MOST_STEPS: usize = 60;
@@ -741,11 +741,11 @@ pub struct DigitShape {
 /// A point of a centre line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapePoint {
-    /// How far along the finger it is, in metres.
+    /// Arc length from the clamp, in metres.
     pub at_m: f64,
-    /// Where it is along the straight finger, in metres.
+    /// Coordinate along the straight finger, in metres.
     pub x_m: f64,
-    /// Where it is across, positive upward, in metres.
+    /// Coordinate across it, positive upward, in metres.
     pub y_m: f64,
     /// Root mean square distance of the true point from this one, in metres; 0 where the contact's uncertainty is not known.
     pub sd_m: f64,

@@ -37,7 +37,7 @@ fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     clean_reading(setup.surface.model().unwrap(), &setup.layout, contact)
 }
 
-/// How a locator did on contacts between the second gauge and the tip.
+/// Results of a locator on contacts between the second gauge and the tip.
 #[derive(Debug, Default)]
 struct Tally {
     /// Contacts, and those of them that the second gauge reads by five standard deviations of its noise.

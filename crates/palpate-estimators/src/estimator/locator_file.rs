@@ -9,7 +9,7 @@ const FORMAT: &str = "palpate-locator";
 /// The version of the format that this palpate writes and reads.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// Why a locator file cannot be read.
+/// A locator file that cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LocatorFileError {
     /// Not the JSON of a locator; the error names line and column.
@@ -18,7 +18,7 @@ pub enum LocatorFileError {
     /// JSON of another kind.
     #[error("the file's format is `{found}`; a locator's is `{FORMAT}`")]
     Format {
-        /// What the file says.
+        /// Value in the file.
         found: String,
     },
     /// A locator of another format version.
@@ -26,7 +26,7 @@ pub enum LocatorFileError {
         "the locator has format version {found}; this palpate reads version {FORMAT_VERSION}: fit it again, or use the palpate that wrote it"
     )]
     Version {
-        /// What the file says.
+        /// Value in the file.
         found: u32,
     },
     /// Numbers that do not fit together.
@@ -44,7 +44,7 @@ impl LocatorFileError {
     }
 }
 
-/// What every version of the file begins with.
+/// Fields that every version of the file begins with.
 #[derive(serde::Deserialize)]
 struct Heading {
     format: String,

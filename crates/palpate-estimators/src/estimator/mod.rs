@@ -1,4 +1,4 @@
-//! Where methods meet: whoever evaluates, studies, reports or listens treats every estimator alike.
+//! Every estimator as one type: whoever evaluates, studies, reports or listens treats all alike.
 
 mod locator_file;
 mod settings;
@@ -53,7 +53,7 @@ macro_rules! estimators {
             $($(#[doc = $doc])* #[doc = concat!("(`", $kind, "`).")] $variant($method),)*
         }
 
-        /// Why an estimator cannot be fitted to a recording.
+        /// An estimator that cannot be fitted to a recording.
         #[derive(Clone, Debug, PartialEq, thiserror::Error)]
         pub enum FitError {
             /// The recording's channels are not the setup's.
@@ -292,7 +292,7 @@ impl Locator {
         }
     }
 
-    /// How its training ended, where it was trained by epochs.
+    /// Outcome of its training, where it was trained by epochs.
     pub fn training_outcome(&self) -> Option<TrainingOutcome> {
         match &self.method {
             Method::Network(network) => Some(network.parts().outcome),
@@ -328,7 +328,7 @@ pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator>
     contenders
 }
 
-/// What `auto` chose, and the mean error in metres of each estimator in cross-validation, best first.
+/// Choice of `auto`, and the mean error in metres of each estimator in cross-validation, best first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The estimator with the least mean error.
@@ -374,7 +374,7 @@ pub fn choose(task: FitTask) -> Result<Choice, FitError> {
 }
 
 impl Locator {
-    /// What a spread load reads: by the fitted influence functions of an influence locator, with its offsets and noise, and
+    /// Channels that read a spread load: by the fitted influence functions of an influence locator, with its offsets and noise, and
     /// by the mechanics of the bench for any other.
     ///
     /// # Errors
@@ -393,7 +393,7 @@ impl Locator {
     }
 }
 
-/// What a tracker needs of a locator.
+/// Likelihood of a locator, for a tracker.
 pub struct Tracking {
     likelihood: Box<dyn Likelihood>,
 }
@@ -424,7 +424,7 @@ impl Tracking {
 }
 
 impl Locator {
-    /// What a tracker of this configuration needs.
+    /// Likelihood for a tracker of this configuration.
     ///
     /// # Errors
     /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.

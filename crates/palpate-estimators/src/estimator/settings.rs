@@ -13,7 +13,7 @@ use palpate_mechanics::units::format_count;
 pub struct Setting {
     /// Its key in a rig's `[estimator]`, or a name of its own where a rig cannot change it.
     pub key: &'static str,
-    /// What it is, in words.
+    /// Its name, in words.
     pub name: &'static str,
     /// Its value in words, with its unit.
     pub value: String,

@@ -40,9 +40,9 @@ pub struct Calibration {
     touched: Setup,
     /// The setup as the locator knows it.
     known: Setup,
-    /// Where it is pressed; a position as often as it is pressed.
+    /// Positions of the presses, each as often as it is pressed.
     presses: Vec<Position>,
-    /// Where it is touched afterwards; a position as often as it is read.
+    /// Positions of the contacts afterwards, each as often as it is read.
     contacts: Vec<Position>,
 }
 
@@ -100,12 +100,12 @@ impl Calibration {
         self
     }
 
-    /// Where it is pressed; a position as often as it is pressed.
+    /// Positions of the presses, each as often as it is pressed.
     pub fn presses(&self) -> &[Position] {
         &self.presses
     }
 
-    /// What is pressed to fit and touched to judge. Both are read by the same faulty channels: their gains and offsets are the first
+    /// Recordings of the presses to fit and of the contacts to judge. Both are read by the same faulty channels: their gains and offsets are the first
     /// draws of a seed. A reading's noise depends on the seed and on how many come before it alone.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! How far a locator is off: errors by position, by portion of the surface, and how much of it is located well.
+//! Evaluation of a locator: errors by position and by portion of the surface, and the effective length.
 
 mod calibration;
 
@@ -21,11 +21,11 @@ use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
 /// One reading whose contact was known, and where the locator saw it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
-    /// Where the contact was.
+    /// True position of the contact.
     pub truth: Position,
-    /// How hard it was, in newtons, where that is known.
+    /// Its force in newtons, where that is known.
     pub force_n: Option<f64>,
-    /// Where the locator saw it.
+    /// Position that the locator gave.
     pub estimate: Position,
     /// Whether the locator's 95 % region held it, where the locator has one.
     pub covered: Option<bool>,
@@ -50,9 +50,9 @@ pub struct Evaluation {
 /// A part of the surface along its length, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Portion {
-    /// Where it begins, in metres.
+    /// Start, in metres.
     pub from_m: f64,
-    /// Where it ends, in metres.
+    /// End, in metres.
     pub to_m: f64,
 }
 
@@ -204,7 +204,7 @@ fn sorted_errors_m<'a>(located: impl IntoIterator<Item = &'a Located>) -> Vec<f6
 
 /// Share of the length at either end, and of the width, where left and right cannot be told apart at usual noise.
 const ENDS: f64 = 1.0 / 80.0;
-/// Where the limit is larger than this share of the length, an estimator cannot reach it: it is a bound for small errors.
+/// Largest limit that counts, as a share of the length: the limit is a bound for small errors, and no estimator reaches a larger one.
 const LARGE_LIMIT: f64 = 1.0 / 200.0;
 /// The same on a plane, whose two directions share the readings.
 const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
@@ -271,9 +271,9 @@ impl Quantiles {
 /// A recording to fit, and one to judge by, whose contacts the fit has not seen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    /// What is fitted.
+    /// Recording to fit.
     pub training: Recording,
-    /// What is judged by.
+    /// Recording to judge by.
     pub judged: Recording,
 }
 
@@ -334,7 +334,7 @@ pub fn evaluate_splits<E: Fit>(
     })
 }
 
-/// Why an estimator cannot be evaluated.
+/// An estimator that cannot be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EvaluationError<E: std::error::Error + 'static> {
     /// The setup cannot be simulated.

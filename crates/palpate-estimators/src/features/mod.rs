@@ -1,4 +1,4 @@
-//! What an inverse method sees of a reading: its channels, or what of them does not depend on the load.
+//! Features of a reading for inverse methods: its channels, or what of them does not depend on the load.
 
 use crate::fit::LocatorFault;
 use crate::recording::Recording;
@@ -48,7 +48,7 @@ pub struct Features {
     pub features: Vec<Feature>,
 }
 
-/// What a channel is divided by before norms are taken, so that channels of different kinds have comparable numbers.
+/// Divisor of a channel before norms are taken, so that channels of different kinds have comparable numbers.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelScale {
@@ -62,7 +62,7 @@ pub struct ChannelScale {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feature {
-    /// What it is made of.
+    /// Its source.
     pub source: FeatureSource,
     /// Its mean over the recording.
     pub centre: f64,
@@ -70,7 +70,7 @@ pub struct Feature {
     pub spread: f64,
 }
 
-/// What a feature is made of.
+/// Source of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureSource {
@@ -108,7 +108,7 @@ impl Features {
         if features.features.is_empty() { Err(none) } else { Ok(features) }
     }
 
-    /// How many there are.
+    /// Number of features.
     pub fn len(&self) -> usize {
         self.features.len()
     }

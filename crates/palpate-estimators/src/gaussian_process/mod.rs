@@ -18,7 +18,7 @@ use palpate_numerics::normal_interval_95;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Samples, Trend};
 use palpate_numerics::watch::Cancelled;
 
-/// How a Gaussian process is to be fitted to a recording.
+/// Gaussian-process regression of the contact's position.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, fit::Fit, setup::Setup, gaussian_process::GaussianProcessEstimator};
@@ -33,11 +33,11 @@ use palpate_numerics::watch::Cancelled;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// What it sees of a reading; `None` for [`FeatureKind::for_setup`].
+    /// Features of a reading; `None` for [`FeatureKind::for_setup`].
     pub features: Option<FeatureKind>,
-    /// How smooth the position is as a function of the features.
+    /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
-    /// What the position returns to for readings unlike any recorded.
+    /// Trend: what the position returns to for readings unlike any recorded.
     pub trend: Trend,
     /// The hyperparameters are found from at most this many rows, drawn at random; at least 2.
     pub search_points: usize,
@@ -49,7 +49,7 @@ impl Default for GaussianProcessEstimator {
     }
 }
 
-/// Why a Gaussian process cannot be fitted to a recording.
+/// A recording that a Gaussian process cannot be fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GaussianProcessError {
     /// There is nothing between which to interpolate.
@@ -58,7 +58,7 @@ pub enum GaussianProcessError {
     /// No channel varies.
     #[error(transparent)]
     Features(#[from] NoFeatures),
-    /// What the regression has to say.
+    /// A regression that failed.
     #[error(transparent)]
     Regression(#[from] RegressionError),
     /// The recording's channels are not the setup's.
@@ -104,7 +104,7 @@ impl Fit for GaussianProcessEstimator {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GaussianProcessLocator {
-    /// What it sees of a reading.
+    /// Features of a reading.
     pub features: Features,
     /// The posterior of x, and of y where the surface has a width, in metres.
     pub process: GaussianProcess,

@@ -45,7 +45,7 @@ impl Cells {
         Self { extent, columns: side(1.0 / aspect), rows: side(aspect) }
     }
 
-    /// How many there are.
+    /// Number of cells.
     #[expect(clippy::len_without_is_empty, reason = "there is at least one")]
     pub fn len(&self) -> usize {
         self.columns * self.rows

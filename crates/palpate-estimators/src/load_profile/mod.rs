@@ -37,15 +37,15 @@ use smoothness::{Mixture, Problem};
 /// One channel of a reading.
 #[derive(Clone)]
 pub struct LoadChannel<'a> {
-    /// What it reads per newton.
+    /// Influence function: its reading per newton.
     pub influence: Arc<dyn InfluenceFunction + 'a>,
-    /// What it reads without load, in its SI unit.
+    /// Reading without load, in its SI unit.
     pub offset: f64,
     /// Standard deviation of its noise, in its SI unit; greater than 0.
     pub noise_sd: f64,
 }
 
-/// What a reading is made by: a channel each, or `None` for those that are dead.
+/// The channels of a reading, `None` for those that are dead.
 #[derive(Clone)]
 pub struct LoadSensors<'a> {
     /// The surface.
@@ -54,7 +54,7 @@ pub struct LoadSensors<'a> {
     pub channels: Vec<Option<LoadChannel<'a>>>,
 }
 
-/// Why readings cannot become a profile.
+/// A setup whose readings cannot become a profile.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadSensorsError {
     /// The surface has no model, and nothing was fitted.
@@ -115,14 +115,14 @@ pub struct Profiler<'a> {
     sensors: LoadSensors<'a>,
     cells: Cells,
     problem: Problem,
-    /// What the misfit of a reading seldom exceeds by noise.
+    /// Bound of the misfit, exceeded by noise at [`FALSE_ALARM_RATE`].
     worst_misfit: f64,
 }
 
 /// A load, as one reading tells it.
 #[derive(Clone, Debug)]
 pub struct LoadProfile {
-    /// How far it is to be believed: located, no contact, or outside the model, when no load explains the reading within
+    /// Status of the profile: located, no contact, or outside the model, when no load explains the reading within
     /// its noise.
     pub status: Status,
     /// The cells of the surface.
@@ -135,23 +135,23 @@ pub struct LoadProfile {
     pub total_n: f64,
     /// Standard deviation of the sum.
     pub total_sd_n: f64,
-    /// Where the whole force acts; `None` without load.
+    /// Centre of the whole force; `None` without load.
     pub centre: Option<CentreOfPressure>,
     /// The patches that carry load, along x.
     pub patches: Vec<Patch>,
-    /// What each channel would read of this load, in its SI unit; `None` for dead channels.
+    /// Reading of each channel under this load, in its SI unit; `None` for dead channels.
     pub fitted: Vec<Option<f64>>,
     /// Reading less fitted, over the standard deviation of the noise; `None` for dead channels.
     pub residuals: Vec<Option<f64>>,
     /// The least sum of squared residuals that any smoothness leaves.
     pub misfit: f64,
-    /// What it seldom exceeds by noise: in [`FALSE_ALARM_RATE`] of all readings, whatever the load.
+    /// Bound of the misfit, exceeded by noise in [`FALSE_ALARM_RATE`] of all readings, whatever the load.
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
 }
 
-/// Where a spread force acts as a whole: the mean position of the load.
+/// Centre of pressure: the mean position of the load.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CentreOfPressure {
     /// The place.
@@ -241,7 +241,7 @@ impl<'a> Profiler<'a> {
         })
     }
 
-    /// What this layout resolves at the smoothness of a profile; `None` for a profile without load.
+    /// Resolution of this layout at the smoothness of a profile; `None` for a profile without load.
     pub fn resolution(&self, profile: &LoadProfile) -> Option<Resolution> {
         let (problem, cells) = (&self.problem, self.cells);
         let hessian = &problem.gram + &(profile.smoothness? * &problem.roughness);
@@ -253,7 +253,7 @@ impl<'a> Profiler<'a> {
         Some(Resolution { cells, kernels, widths_m })
     }
 
-    /// What the channels would read of the load, and what is left of the reading, channel by channel.
+    /// Fitted reading and residual of each channel.
     fn fitted(&self, y: &Array1<f64>, forces: &Array1<f64>) -> (Vec<Option<f64>>, Vec<Option<f64>>) {
         let explained = self.problem.influence.dot(forces);
         let mut each = explained.iter().zip(y);
@@ -340,7 +340,7 @@ pub struct Patch {
     pub from: Position,
     /// Its right end, or upper right corner.
     pub to: Position,
-    /// Where its force acts as a whole.
+    /// Centre of its force.
     pub centre: CentreOfPressure,
     /// Its force in newtons, its flanks below the share included.
     pub force_n: f64,
@@ -446,7 +446,7 @@ fn grow(cells: &Cells, forces_n: &[f64], cores: Vec<Vec<usize>>) -> Vec<Part> {
     parts
 }
 
-/// Whether no more than a few cells lie between two sets of cells.
+/// Whether at most [`REACH_CELLS`] cells lie between two sets of cells.
 fn touches(cells: &Cells, one: &[usize], other: &[usize]) -> bool {
     let place = |cell: usize| (cell % cells.columns, cell / cells.columns);
     one.iter().any(|a| {

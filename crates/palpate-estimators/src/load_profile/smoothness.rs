@@ -1,4 +1,4 @@
-//! How smooth a load is: every smoothness weighed by its evidence.
+//! Smoothness of a load: every level weighted by its evidence.
 
 use ndarray::{Array1, Array2, Axis};
 use palpate_numerics::Cholesky;
@@ -12,7 +12,7 @@ const FIRST_SHARE: f64 = 1e-4;
 /// A level with a smaller share of the probability changes nothing.
 const SHARE_THAT_MATTERS: f64 = 1e-4;
 
-/// What the readings and the smoothness have to say about the forces of cells.
+/// Least-squares problem of the forces of cells, with its smoothness penalty.
 pub(super) struct Problem {
     /// A: mean influence of each cell (columns) on each live sensor (rows), over the sensor's noise; in 1/N.
     pub influence: Array2<f64>,
@@ -140,7 +140,7 @@ const MOST_EXCHANGES: usize = 20;
 /// A gradient above minus this share of the largest entry of g is rounding.
 const ROUNDING: f64 = 1e-11;
 
-/// Where ½·xᵀH·x − gᵀx is least for x ≥ 0.
+/// Minimum of ½·xᵀH·x − gᵀx over x ≥ 0.
 #[derive(Clone, Debug)]
 pub(super) struct NonNegative {
     /// x.

@@ -46,7 +46,7 @@ fn noisy(sensors: &LoadSensors, clean: &[f64], rng: &mut Xoshiro256PlusPlus) -> 
     each.map(|(sd, value)| value + sd * rng.sample::<f64, _>(StandardNormal)).collect()
 }
 
-/// How two patches of 2 N each, 120 mm apart, were told over many readings.
+/// Counts and errors of two patches of 2 N each, 120 mm apart, as many readings tell them.
 #[derive(Debug, Default)]
 struct Tally {
     two: usize,

@@ -40,7 +40,7 @@ impl Default for Neighbours {
     }
 }
 
-/// Why neighbours cannot be asked.
+/// A recording that the neighbours do not suit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NeighboursFitError {
     /// No position has another one to be judged by.
@@ -114,7 +114,7 @@ pub struct NeighboursLocator {
     pub rows: Vec<Neighbour>,
     /// The contact's force in newtons, where the bench knows it.
     pub force_n: Option<f64>,
-    /// How far the neighbours at other positions were off.
+    /// Errors of the neighbours at other positions.
     pub spread: Option<HeldOutErrors>,
 }
 

@@ -58,11 +58,11 @@ pub struct Network {
     pub output_activation: Activation,
     /// Whether every node has a bias.
     pub biases: bool,
-    /// What the output stands for.
+    /// Coding of the output.
     pub output: OutputCoding,
-    /// How readings become inputs.
+    /// Scaling of readings into inputs.
     pub input_scale: InputScale,
-    /// How the weights are found.
+    /// Training rule.
     pub training: BackPropagation,
     /// The arithmetic of training; estimates are made in 64 bits whatever it is.
     pub precision: Precision,
@@ -83,7 +83,7 @@ impl Default for Network {
     }
 }
 
-/// What the network's output stands for (paper, section 2.3.3).
+/// Coding of the network's output (paper, section 2.3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutputCoding {
@@ -93,7 +93,7 @@ pub enum OutputCoding {
     Normalized,
 }
 
-/// How readings become network inputs. The paper does not say; the choice decides how fast and how well it trains.
+/// Scaling of readings into network inputs. The paper does not say; the choice decides how fast and how well it trains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InputScale {
     /// Each sensor kind divided by the largest reading that the contact force can cause anywhere on the surface; for
@@ -239,7 +239,7 @@ impl TrainingSet {
     }
 }
 
-/// Why a network cannot be fitted to a recording.
+/// A recording that a network cannot be fitted to.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NetworkFitError {
     /// Too many rows for the presentation order.
@@ -260,7 +260,7 @@ pub enum NetworkFitError {
     Unscalable {
         /// The channel's name.
         channel: String,
-        /// What was to divide it.
+        /// Name of its divisor.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -396,7 +396,7 @@ fn channel_scaling(
     (0..recording.channels.len()).map(one).collect()
 }
 
-/// How a training ended.
+/// Status of a training that has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrainingStatus {
@@ -418,10 +418,10 @@ impl std::fmt::Display for TrainingStatus {
     }
 }
 
-/// How a training ended and what it took. Not converging is a status, never an error.
+/// Outcome of a training. Not converging is a status, never an error.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TrainingOutcome {
-    /// How it ended.
+    /// Its status.
     pub status: TrainingStatus,
     /// Passes over all patterns.
     pub epochs: u32,
@@ -459,11 +459,11 @@ pub struct TrainedNetwork {
     pub topology: Topology,
     /// Its weights, in the order that [`Topology`] states.
     pub weights: Vec<f64>,
-    /// How its training ended.
+    /// Outcome of its training.
     pub outcome: TrainingOutcome,
 }
 
-/// How a channel's reading r becomes an input: (r − offset) / divisor.
+/// Scaling of a channel's reading r into an input: (r − offset) / divisor.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelScaling {
@@ -480,7 +480,7 @@ impl ChannelScaling {
     }
 }
 
-/// What training a network gives, and what a locator file holds of it.
+/// Parts of a trained network, as a locator file holds them.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkParts {
@@ -494,7 +494,7 @@ pub struct NetworkParts {
     pub output_scale_m: Vec<f64>,
     /// The surface.
     pub extent: Extent,
-    /// How its training ended.
+    /// Outcome of its training.
     pub outcome: TrainingOutcome,
 }
 
@@ -548,7 +548,7 @@ impl NetworkParts {
 const FEW_CHANNELS: usize = 16;
 
 impl NetworkLocator {
-    /// What it was made from.
+    /// The parts that it was made from.
     pub fn parts(&self) -> &NetworkParts {
         &self.parts
     }

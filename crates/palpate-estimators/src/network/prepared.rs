@@ -1,6 +1,6 @@
 //! The forward pass of one network over one reading, four nodes a register.
 //!
-//! What bounds it: latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its division,
+//! Its bound is latency. A layer waits for the one below through four multiply-adds, the logistic function's dozen steps and its division,
 //! some seventy cycles, and the machine's window holds little of the next reading meanwhile. Hence multiply-adds that round once, a
 //! quotient for 2^r rather than a long polynomial, and registers of four: eight lanes would save work, which is not what is waited for.
 

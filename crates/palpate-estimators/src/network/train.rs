@@ -3,7 +3,7 @@
 //! Symbols: w weights, Δ the last step of the weights, x inputs of a layer, z weighted sums, a outputs, t targets,
 //! δ = −∂E/∂z, η learning rate, α momentum.
 //!
-//! What bounds it: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
+//! Its bound: the fused pass over the first layer reads w and its predecessor, writes the new w, and spends four
 //! multiply-add slots on each; the L1 ports and the two vector units saturate together. Hence three choices. Δ is kept
 //! as w − w_before, so that one store a weight suffices and the two buffers change places. A weight is updated and at
 //! once used for the next pattern's sum, while it is in a register. And patterns are looked up by permuting registers.
@@ -42,14 +42,14 @@ impl Precision {
     }
 }
 
-/// What every network of a group is trained on.
+/// Training task of every network of a group.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingTask<'a> {
     /// Shape of the network; its inputs and outputs are those of the patterns.
     pub topology: &'a Topology,
-    /// What it is shown: between 1 and [`TrainingSet::MOST`] patterns.
+    /// Training patterns, between 1 and [`TrainingSet::MOST`].
     pub patterns: &'a TrainingSet,
-    /// How its weights are found.
+    /// Training rule.
     pub rule: &'a BackPropagation,
 }
 
@@ -418,7 +418,7 @@ fn weighted_sum<V: Vector<N>, const N: usize, const KNOWN: usize>(row: &[V], inp
     sum
 }
 
-/// What one node's weights move by: η δ x + α Δ.
+/// Step of one node's weights: η δ x + α Δ.
 #[derive(Clone, Copy)]
 struct Step<V> {
     delta: V,

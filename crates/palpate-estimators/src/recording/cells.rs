@@ -23,7 +23,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// How many fields there are.
+    /// Number of fields.
     pub fn width(&self) -> usize {
         self.fields.len()
     }
@@ -105,7 +105,7 @@ impl<'a> Cells<'a> {
 pub(super) struct Field<'a> {
     /// The value, without the spaces and quotes around it.
     pub value: Cow<'a, str>,
-    /// Where it stands in the line, spaces around it left out.
+    /// Its place in the line, spaces around it left out.
     pub span: Range<usize>,
 }
 

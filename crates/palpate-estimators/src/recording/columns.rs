@@ -14,23 +14,23 @@ use palpate_mechanics::units::Unit;
 pub struct Columns {
     /// Whether the first line names the columns.
     pub header: Header,
-    /// Where the contact position stands.
+    /// Columns of the contact position.
     pub position: PositionColumns,
     /// The unit of length of the position columns.
     pub position_unit: Unit,
-    /// How the file's coordinates become positions on the surface.
+    /// Conversion of the file's coordinates to positions on the surface.
     #[serde(default)]
     pub frame: Frame,
     /// One column for each sensor, in the layout's order.
     pub channels: Vec<ValueColumn>,
-    /// Where the contact force stands, if anywhere.
+    /// Column of the contact force, if there is one.
     pub force: Option<ForceColumn>,
-    /// Where the nuisance coordinate stands, if anywhere; see [`Row::nuisance`](super::Row::nuisance).
+    /// Column of the nuisance coordinate, if there is one; see [`Row::nuisance`](super::Row::nuisance).
     #[serde(default)]
     pub nuisance: Option<ValueColumn>,
 }
 
-/// How a file's coordinates become positions on the surface: rounded, then less the origin.
+/// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
@@ -42,7 +42,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Where on the surface the file's (x, y), in metres, is.
+    /// Position on the surface of the file's (x, y), in metres.
     pub fn position(&self, x_m: f64, y_m: f64) -> Position {
         let rounded = |value_m: f64| match self.round_m {
             Some(step_m) => (value_m / step_m).round() * step_m,
@@ -122,7 +122,7 @@ pub struct ValueColumn {
 pub struct ForceColumn {
     /// Which column, and its unit of force.
     pub values: ValueColumn,
-    /// What to do with a file that lacks it.
+    /// Treatment of a file that lacks it.
     pub need: Need,
 }
 

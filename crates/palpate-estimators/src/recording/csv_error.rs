@@ -1,4 +1,4 @@
-//! What can be wrong with a CSV file, and where.
+//! Errors of a CSV file, with their places.
 
 use std::fmt;
 use std::ops::Range;
@@ -12,9 +12,9 @@ use palpate_mechanics::surface::Extent;
 pub struct CsvError {
     /// The name of the file, as the caller gave it.
     pub source_name: String,
-    /// Where the problem is; `None` when it concerns the whole file.
+    /// Place of the problem; `None` when it concerns the whole file.
     pub place: Option<Box<Place>>,
-    /// What is wrong.
+    /// The problem.
     #[source]
     pub problem: CsvProblem,
 }
@@ -32,7 +32,7 @@ pub struct Place {
     pub span: Range<usize>,
 }
 
-/// What is wrong with a CSV file.
+/// Problem of a CSV file.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvProblem {
     /// The bytes cannot be had.
@@ -63,7 +63,7 @@ pub enum CsvProblem {
     NoSuchColumn {
         /// The number that was looked for.
         wanted: usize,
-        /// How many columns there are.
+        /// Number of columns.
         count: usize,
     },
     /// A column is meant by name, but the file has no header.
@@ -73,7 +73,7 @@ pub enum CsvProblem {
     NameWithoutHeader {
         /// The name that was looked for.
         wanted: String,
-        /// How many columns there are.
+        /// Number of columns.
         count: usize,
     },
     /// Two columns have the name of one that is needed.
@@ -89,9 +89,9 @@ pub enum CsvProblem {
     /// A row has more or fewer fields than the header (or the first row).
     #[error("the row has {found} fields; it must have {expected}")]
     RowLength {
-        /// How many fields the row has.
+        /// Number of fields in the row.
         found: usize,
-        /// How many it must have.
+        /// Number of fields that it must have.
         expected: usize,
     },
     /// A field that must be a number is empty.
@@ -112,7 +112,7 @@ pub enum CsvProblem {
     /// A contact lies off the surface.
     #[error("the position {} is off the surface; it must be within {}", extent.place_in_words(*position), extent.bounds_in_words())]
     OffSurface {
-        /// Where the contact is said to be.
+        /// Position of the contact in the file.
         position: Position,
         /// The surface.
         extent: Extent,

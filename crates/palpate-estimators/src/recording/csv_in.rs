@@ -11,14 +11,14 @@ use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// What a file must agree with to be a recording of a bench.
+/// Schema of a recording of a bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Schema<'a> {
     /// Which column is what.
     pub columns: &'a Columns,
     /// The sensors; as many as `columns` has channels.
     pub layout: &'a Layout,
-    /// Where contacts can be.
+    /// Extent of the surface, within which contacts lie.
     pub extent: Extent,
     /// The force of every contact, in newtons, where it is known and the file does not say.
     pub known_force_n: Option<f64>,
@@ -191,7 +191,7 @@ impl ContactFields {
 #[derive(Clone, Debug)]
 struct Lines<F> {
     source: String,
-    /// How many have been read.
+    /// Number of lines that have been read.
     count: usize,
     /// The fields, and how many a line has.
     fields: Option<(F, usize)>,
@@ -295,7 +295,7 @@ pub(super) const SECOND: [&str; 2] = ["position_2_mm", "force_2_n"];
 pub struct TimedRecording {
     /// The rows; a force of 0 says that nothing touched.
     pub recording: Recording,
-    /// When each was taken, in seconds.
+    /// Time of each row, in seconds.
     pub times_s: Vec<f64>,
     /// The second contact of each row; nothing where there is but one contact.
     pub second: Vec<Contact>,
@@ -315,7 +315,7 @@ impl TimedRecording {
 /// One line of readings in time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedReading {
-    /// When it was taken, where the file says, in seconds.
+    /// Its time in seconds, where the file has one.
     pub time_s: Option<f64>,
     /// The true contacts, where the file says; the force is 0 of one that did not touch.
     pub truth: Option<Vec<Contact>>,

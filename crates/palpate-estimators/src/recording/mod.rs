@@ -24,18 +24,18 @@ use palpate_mechanics::sensing::SensorKind;
 pub struct Recording {
     /// The name of each channel, in the order of the readings' values.
     pub channels: Vec<String>,
-    /// What each channel measures.
+    /// Quantity that each channel measures.
     pub kinds: Vec<SensorKind>,
     /// The rows, in the order in which they were recorded.
     pub rows: Vec<Row>,
-    /// Where they come from.
+    /// Their provenance.
     pub provenance: Provenance,
 }
 
 /// One reading and its contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Where the contact was.
+    /// True position of the contact.
     pub position: Position,
     /// Its force in newtons, positive downward; `None` where nobody measured it.
     pub force_n: Option<f64>,
@@ -58,12 +58,12 @@ pub fn sha256_hex(content: &[u8]) -> String {
     Sha256::digest(content).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Where a recording comes from, so that whatever is fitted to it can say so.
+/// Provenance of a recording, so that whatever is fitted to it can say so.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The name that the caller gave: usually a file's, or "simulation".
     pub source: String,
-    /// How many rows there are.
+    /// Number of rows.
     pub rows: usize,
     /// The [`sha256_hex`] of each file that was read; empty for a simulation.
     pub digests: Vec<String>,
@@ -84,9 +84,9 @@ pub struct Fold {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the recording has {found} distinct positions; at least {needed} are needed")]
 pub struct TooFewPositions {
-    /// How many it has.
+    /// Number of distinct positions that it has.
     pub found: usize,
-    /// How many are needed.
+    /// Number that is needed.
     pub needed: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What looks wrong with a recording, though it can be used.
+//! Warnings about a recording that can still be used.
 
 use std::fmt;
 
@@ -36,13 +36,13 @@ pub enum Warning {
     RepeatsDisagree {
         /// The channel's name.
         channel: String,
-        /// How many rows lie that far out.
+        /// Number of rows that lie that far out.
         rows: usize,
         /// Rows that have repeats.
         of: usize,
         /// The row that lies furthest out, counted from 1 below the header.
         worst_row: usize,
-        /// How far it lies from the median of its repeats.
+        /// Distance from the median of its repeats.
         deviation: Quantity,
         /// The standard deviation of a repeat.
         spread: Quantity,
@@ -72,7 +72,7 @@ const DRIFT_SHARE: f64 = 0.5;
 const DRIFT_DEVIATIONS: f64 = 4.0;
 
 impl Recording {
-    /// What looks wrong, channel by channel; see [`Warning`] for the rules.
+    /// Warnings, channel by channel; see [`Warning`] for the rules.
     pub fn warnings(&self) -> Vec<Warning> {
         let repeats = self.repeats();
         let channels = (0..self.channels.len()).filter_map(|index| Channel::of(self, index));

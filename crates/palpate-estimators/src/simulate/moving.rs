@@ -31,14 +31,14 @@ pub struct MovingContacts {
 /// One contact that moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingContact {
-    /// Where it goes.
+    /// Its motion.
     pub motion: Motion,
     /// Its force in newtons, where that is not the one of the rig's presses.
     pub force_n: Option<f64>,
 }
 
 impl MovingContacts {
-    /// How long it takes until every contact has arrived, in seconds.
+    /// Time until every contact has arrived, in seconds.
     pub fn duration_s(&self) -> f64 {
         self.moving().map(|contact| contact.motion.duration_s()).fold(0.0, f64::max)
     }
@@ -105,14 +105,14 @@ pub fn simulate_moving(
     Ok(TimedRecording { recording, times_s, second })
 }
 
-/// What is under the contacts.
+/// The surface under the contacts.
 enum Under<'a> {
     Swings(ModalResponse),
     Balances(CleanSensors<'a>),
 }
 
 impl Under<'_> {
-    /// What the sensors would read without any fault, `since_s` seconds after the reading before; 0 for the first one.
+    /// Faultless reading of the sensors, `since_s` seconds after the reading before; 0 for the first one.
     fn reading(&mut self, layout: &Layout, contacts: &[Contact], since_s: f64) -> Vec<f64> {
         match self {
             Self::Swings(response) => {

@@ -12,12 +12,12 @@ use palpate_mechanics::surface::modal::Oscillator;
 use palpate_numerics::small::Matrix;
 use std::f64::consts::PI;
 
-/// What a step of time does to the M members of a bank, states of N numbers.
+/// Dynamics of the M members of a bank, states of N numbers, over a time step.
 pub(super) trait Dynamics<const N: usize, const M: usize> {
     /// The probability that member `from` becomes member `to`.
     fn passes(&self, from: usize, to: usize) -> f64;
 
-    /// What the step does to a belief that moves as member `member` says.
+    /// Transition of a belief under the motion of member `member`.
     fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N>;
 }
 
@@ -88,9 +88,9 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    /// What it was before a step, given that it was `later` after it and its reading.
+    /// Belief before a step, given the belief `later` after it and its reading.
     ///
-    /// What came later says of the state before, whatever motion it was under, L_j = N_j(x | all)/N_j(x | so far), where
+    /// Later readings have the likelihood of the state before, whatever motion it was under, L_j = N_j(x | all)/N_j(x | so far), where
     /// N_j, of motion j in the step, is from Rauch, Tung and Striebel's recursion on the mixture that motion j began with. Each
     /// member is moved and weighed by L_j as by a reading, so that a variance never grows.
     pub fn smoothed(&self, dynamics: &impl Dynamics<N, M>, later: &Self) -> Self {
@@ -160,7 +160,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         }
     }
 
-    /// What is believed of the numbers that a reading sees, held to their bounds.
+    /// Mean of the entries that a reading observes, held to their bounds.
     fn seen<const K: usize>(&self, numbers: &SeenNumbers<K>) -> [f64; K] {
         let mut seen = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
@@ -230,17 +230,17 @@ pub(super) const OF_CONTACT: usize = 4;
 /// Motions of a contact.
 const MOTIONS: usize = 3;
 
-/// Where the numbers of contact `k` begin.
+/// First entry of contact `k`.
 pub(super) const fn contact(k: usize) -> usize {
     2 + OF_CONTACT * k
 }
 
-/// How many contacts a state of N numbers has.
+/// Number of contacts in a state of N numbers.
 pub(super) const fn contacts(numbers: usize) -> usize {
     (numbers - 2) / OF_CONTACT
 }
 
-/// What a reading sees of a state on a line: u, then place and force of each contact, K = 1 + 2·C numbers.
+/// Entries of a state on a line that a reading observes: u, then place and force of each contact, K = 1 + 2·C numbers.
 pub(super) fn seen_on_line<const K: usize>(length_m: f64) -> SeenNumbers<K> {
     SeenNumbers {
         entries: std::array::from_fn(|k| match k {
@@ -274,7 +274,7 @@ pub(super) struct Step {
     swing: Option<FreeSwing>,
 }
 
-/// What free swinging makes of (u, u̇) in the step, and the variance that u̇ gains over the square of all forces.
+/// Free vibration of (u, u̇) over the step, and the variance that u̇ gains over the square of all forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FreeSwing {
     free: [[f64; 2]; 2],
@@ -392,7 +392,7 @@ impl OnLine<'_> {
 /// Nothing presses as evenly as its model: a first mode that is always kept trembling, by this share of the force.
 const TREMOR: f64 = 1e-4;
 
-/// What time does to position, speed and acceleration: F and Q.
+/// Transition of position, speed and acceleration: F and Q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
     forward: Matrix<3>,
@@ -447,12 +447,12 @@ impl Motion {
 /// Numbers of the state of a contact on a plane: (x, v_x, v̇_x, y, v_y, v̇_y, W). Motions along and across have the same law and do not
 /// know of each other; the plane is in balance at every reading.
 pub(super) const PLANE_NUMBERS: usize = 7;
-/// Where position, speed and acceleration along begin, those across, and the force.
+/// First entries of position, speed and acceleration along, of those across, and the entry of the force.
 pub(super) const ALONG: usize = 0;
 pub(super) const ACROSS: usize = 3;
 pub(super) const FORCE: usize = 6;
 
-/// What a reading sees of a contact on a plane: x, y and W.
+/// Entries of a contact on a plane that a reading observes: x, y and W.
 pub(super) fn seen_on_plane(extent: Extent) -> SeenNumbers<3> {
     let [length_m, width_m] = sides_m(extent);
     SeenNumbers {

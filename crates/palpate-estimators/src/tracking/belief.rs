@@ -1,4 +1,4 @@
-//! What is believed of a surface with no, one or two contacts; on a plane there is at most one.
+//! Belief about a surface with no, one or two contacts; on a plane there is at most one.
 
 use super::bank::{
     ACROSS, ALONG, Bank, FORCE, OnLine, OnPlane, PLANE_NUMBERS, Step, V, W, X, contact, contacts,
@@ -102,7 +102,7 @@ impl Belief {
         }
     }
 
-    /// What is left when contact `k` lets go; the surface swings on.
+    /// Belief after contact `k` lets go; the surface swings on.
     pub fn without(&self, k: usize) -> Option<Self> {
         match self {
             Self::Nothing(_) => None,
@@ -122,7 +122,7 @@ impl Belief {
         }
     }
 
-    /// What it was before a step, given what it was `later` after it, if that has as many contacts.
+    /// Belief before a step, given the belief `later` after it, if that has as many contacts.
     pub fn smoothed(&self, step: &Step, geometry: Geometry, later: &Self) -> Option<Self> {
         match (self, later, OnLine::of(step, geometry)) {
             (Self::Nothing(bank), Self::Nothing(later), Some(line)) => {

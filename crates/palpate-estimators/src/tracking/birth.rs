@@ -28,7 +28,7 @@ const FORCES: f64 = 10.0;
 /// The first mode's force is this share, as a standard deviation, off its balance under a contact that has just come.
 const UNREST: f64 = 0.02;
 
-/// What can come in one reading; `L` is the likelihood of a line or of a plane.
+/// Birth model: the contacts that can have come with one reading; `L` is the likelihood of a line or of a plane.
 pub(super) struct Births<'a, L: ?Sized> {
     pub likelihood: &'a L,
     pub seen: Seen<'a>,

@@ -13,7 +13,7 @@ pub(super) struct Gaussian<const N: usize> {
     pub covariance: Matrix<N>,
 }
 
-/// What a step of time does to a state, linear about where the state is believed to be: the mean becomes `mean`, and P
+/// Transition of a state over a time step, linear about the mean of the belief: the mean becomes `mean`, and P
 /// becomes F·P·Fᵀ + Q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change<const N: usize> {
@@ -119,7 +119,7 @@ impl<const N: usize> Gaussian<N> {
         all
     }
 
-    /// What it was before a step, given that it was `later` after it (Rauch, Tung and Striebel 1965):
+    /// Belief before a step, given the belief `later` after it (Rauch, Tung and Striebel 1965):
     /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where what is known exactly is held.
     pub fn smoothed(&self, change: &Change<N>, later: &Self) -> Self {
         let expected = self.predicted(change);
@@ -142,7 +142,7 @@ impl<const N: usize> Gaussian<N> {
         before
     }
 
-    /// What it knows beyond another belief that it grew from, as the fit of the readings that made the difference, and about
+    /// Information beyond another belief that it was updated from, as the fit of the readings that made the difference, and about
     /// where that is expanded: their precision is P⁻¹ less the other's, and at m they pull with the other's P⁻¹·(m − m₀).
     /// What has no variance has no precision either.
     pub fn less(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {

@@ -1,6 +1,6 @@
 //! Moving contacts: a Bayesian filter over position, speed and force, and a smoother over the whole recording.
 //!
-//! What is hidden is how many contacts touch, where, how fast and how hard each does, and how the surface swings. A belief
+//! The hidden state is how many contacts touch, where, how fast and how hard each does, and how the surface swings. A belief
 //! about it is a few hypotheses, each with a weight: no contact, one or two, which came at some time and have moved since. A
 //! hypothesis is a bank of Gaussians in the joint state of surface and contacts, one for each choice of a few motions from
 //! steady to brisk, which mix as motions change (interacting multiple models: H. Blom and Y. Bar-Shalom, IEEE Trans. Autom.
@@ -37,24 +37,24 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
 
-/// How contacts come, move and go, and how the surface swings.
+/// Configuration of a tracker: how contacts come, move and go, and how the surface swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerConfig {
     /// Motions from steady to brisk: standard deviation of the acceleration, in m/s².
     pub accelerations_m_per_s2: [f64; 3],
-    /// How long an acceleration lasts, in seconds: its correlation falls by e in that time.
+    /// Correlation time of the acceleration, in seconds: its correlation falls by e in that time.
     pub acceleration_s: f64,
-    /// How long a contact keeps to one of the motions on average, in seconds.
+    /// Mean time that a contact keeps to one of the motions, in seconds.
     pub motion_s: f64,
     /// Standard deviation of the speed of a contact that has just come, in m/s.
     pub speed_sd_m_per_s: f64,
-    /// How far an unknown force drifts in a second, as a share of it.
+    /// Drift of an unknown force in a second, as a share of it.
     pub force_drift: f64,
-    /// How often a second a contact comes while nothing touches, and goes while something does.
+    /// Rate, a second, at which a contact comes while nothing touches, and goes while something does.
     pub changes_per_s: f64,
-    /// How often a second a contact goes and is at once somewhere else.
+    /// Rate, a second, at which a contact goes and is at once somewhere else.
     pub jumps_per_s: f64,
-    /// How the surface swings, where that is known; else it is taken to be in balance.
+    /// First mode of the surface, where that is known; else it is taken to be in balance.
     pub swing: Option<Swing>,
 }
 
@@ -86,27 +86,27 @@ impl Default for TrackerConfig {
 /// Below this share of the probability, one hypothesis does not speak for all.
 const SURE: f64 = 0.98;
 
-/// What is known at one reading.
+/// State of all contacts at one reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// When the reading was taken, in seconds.
+    /// Time of the reading, in seconds.
     pub time_s: f64,
     /// The probabilities that nothing touches, that one contact does, and that two do.
     pub numbers: [f64; 3],
     /// The contacts, as many as is most probable. Each keeps its place in the list while it is followed.
     pub contacts: Vec<Tracked>,
-    /// What the reading says by itself.
+    /// Estimate of the reading by itself.
     pub alone: Estimate,
 }
 
 /// A contact that is followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
-    /// Where it is along the surface, in metres.
+    /// Position along the surface, in metres.
     pub x_m: f64,
-    /// How fast it moves along the surface, in m/s.
+    /// Speed along the surface, in m/s.
     pub speed_m_per_s: f64,
-    /// How hard it presses, in newtons.
+    /// Force, in newtons.
     pub force_n: f64,
     /// Standard deviations of the three, the position's with what calibration leaves.
     pub sd: [f64; 3],
@@ -116,12 +116,12 @@ pub struct Tracked {
     pub across: Option<Across>,
 }
 
-/// Where a contact that is followed is across a plane.
+/// Position and speed of a tracked contact across a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Across {
-    /// Where it is, in metres.
+    /// Position, in metres.
     pub y_m: f64,
-    /// How fast it moves across, in m/s.
+    /// Speed across, in m/s.
     pub speed_m_per_s: f64,
     /// Standard deviations of the two, the position's with what calibration leaves.
     pub sd: [f64; 2],

@@ -29,7 +29,7 @@ fn likelihood(rig: &Example, force_n: Option<f64>) -> BeamLikelihood {
     BeamLikelihood::new(&Influence::default().fit_beam(task).unwrap())
 }
 
-/// When, the true contact, and the reading.
+/// Time in seconds, true contact, and reading.
 pub(super) type Timed = (f64, Contact, Vec<f64>);
 
 /// Contacts along a motion with a force, and readings in balance.
@@ -46,7 +46,7 @@ pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: 
     (0..(motion.duration_s() * RATE_HZ) as usize).map(at).collect()
 }
 
-/// How many readings a tracker takes for a contact where there is none, or the other way round.
+/// Number of readings that a tracker takes for a contact where there is none, or the other way round.
 pub(super) fn wrongly_touching(likelihood: &dyn Likelihood, readings: &[Timed]) -> usize {
     let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
     let mut wrong = 0;
@@ -190,7 +190,7 @@ fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
     assert!(2.0 * tracked_m < alone_m, "{tracked_m} {alone_m}");
 }
 
-/// How far each of `touching` is from its place among as many `found`; empty where they are not as many.
+/// Distance of each of `touching` from its place among as many `found`; empty where they are not as many.
 fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
     found.sort_by(f64::total_cmp);
     let pairs = touching.iter().zip(&found);

@@ -46,7 +46,7 @@ pub struct Tracker<'a> {
     whitened: Vec<f64>,
 }
 
-/// What may be: a surface with some contacts that came at some time and have moved since.
+/// Hypothesis: a surface with some contacts that came at some time and have moved since.
 #[derive(Clone, Debug, PartialEq)]
 struct Hypothesis {
     /// Tells it from every other one.
@@ -177,7 +177,7 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// What comes with this reading, with its weight.
+    /// Hypotheses of contacts that have come with this reading, with their weights.
     fn births(&self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<(f64, Belief)> {
         let config = &self.config;
         let weighted = |(evidence, belief): (f64, Belief)| {
@@ -306,12 +306,12 @@ impl<'a> SmoothTracker<'a> {
         Ok(())
     }
 
-    /// What the filter knew at each reading.
+    /// Filtered tracks, one a reading.
     pub fn filtered(&self) -> &[Track] {
         &self.tracks
     }
 
-    /// What is known at each reading when all have been seen. How many contacts there are stays what the filter found; of
+    /// Smoothed tracks, one a reading. The number of contacts stays what the filter found; of
     /// the hypotheses it held, the one that lasted is gone back over.
     pub fn smoothed(&self) -> Vec<Track> {
         let mut smoothed = self.tracks.clone();
@@ -330,7 +330,7 @@ impl<'a> SmoothTracker<'a> {
         smoothed
     }
 
-    /// What hypothesis `id` was at reading `k`, given what it was at the next.
+    /// Belief of hypothesis `id` at reading `k`, given its belief at the next.
     fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
         let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);

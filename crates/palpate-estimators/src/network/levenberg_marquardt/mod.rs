@@ -57,7 +57,7 @@ impl Default for LevenbergMarquardt {
 /// ensemble.
 const MOST_PRESSES: usize = 1000;
 
-/// Why networks cannot be fitted to a recording.
+/// A recording that the networks cannot be fitted to.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevenbergMarquardtFitError {
     /// One position has nothing to teach.
@@ -66,7 +66,7 @@ pub enum LevenbergMarquardtFitError {
     /// A layer or an ensemble of nothing.
     #[error("a network with {what} 0 cannot be trained; it must be at least 1")]
     Zero {
-        /// What is 0.
+        /// Name of the number that is 0.
         what: &'static str,
     },
     /// Readings that never change.
@@ -80,7 +80,7 @@ pub enum LevenbergMarquardtFitError {
     /// No training kept to the numbers.
     #[error("none of {trainings} trainings gave a network with finite weights")]
     Diverged {
-        /// How many were tried.
+        /// Number of trainings that were tried.
         trainings: usize,
     },
     /// The recording's channels are not the setup's.
@@ -262,7 +262,7 @@ pub struct LevenbergMarquardtLocator {
     pub inputs: NetworkInputs,
     /// Shape of every member.
     pub topology: Topology,
-    /// What the outputs stand for: x, then y on a two-dimensional surface, then the force where it is an output.
+    /// Scales of the outputs: x, then y on a two-dimensional surface, then the force where it is an output.
     pub scales: Vec<OutputScale>,
     /// The networks, the one with the greatest evidence first.
     pub members: Vec<Member>,

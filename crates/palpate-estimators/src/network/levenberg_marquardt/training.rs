@@ -24,7 +24,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What one network is trained on.
+/// Training data of one network.
 pub(super) struct Training<'a> {
     pub(super) topology: &'a Topology,
     /// A row a press, a column an input.
@@ -265,7 +265,7 @@ pub(super) fn jacobians(
     (outputs, jacobians)
 }
 
-/// What flows through a network: the inputs first, then each layer's outputs.
+/// Values of all layers: the inputs first, then each layer's outputs.
 struct Activations {
     layers: Vec<Vec<f64>>,
     delta: Vec<f64>,
