@@ -31,7 +31,7 @@ impl Failure {
     }
 
     /// Failure of long work that ended early: it was stopped, or its input is bad.
-    pub fn of(error: &(dyn std::error::Error + 'static)) -> Self {
+    pub fn from_error(error: &(dyn std::error::Error + 'static)) -> Self {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 

@@ -111,7 +111,7 @@ pub struct Table<R> {
 }
 
 impl<R> Table<R> {
-    pub fn of(rows: impl IntoIterator<Item = R>) -> Self {
+    pub fn from_rows(rows: impl IntoIterator<Item = R>) -> Self {
         let rows: Vec<R> = rows.into_iter().collect();
         Self { cells: vec![Vec::new(); rows.len()], heading: Vec::new(), rows }
     }
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn columns_line_up() {
-        let table = Table::of([("a", 1), ("long", 100)])
+        let table = Table::from_rows([("a", 1), ("long", 100)])
             .column("arm", |(name, _)| (*name).to_owned())
             .column("epochs", |(_, epochs)| epochs.to_string());
         insta::assert_snapshot!(table.to_string(), @r"

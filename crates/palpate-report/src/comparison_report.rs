@@ -87,7 +87,7 @@ impl ComparisonReport<'_> {
             let evaluation = &comparison.tried.evaluation;
             Some((comparison, evaluation, evaluation.summary(None)?))
         });
-        Table::of(tried)
+        Table::from_rows(tried)
             .short("estimator", |(comparison, ..)| comparison.estimator.kind())
             .mm("mean", |(.., summary)| summary.average_m)
             .number("% of length", |(_, of, summary)| percentage_error(summary.average_m, of.length_m))

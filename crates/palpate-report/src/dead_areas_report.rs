@@ -104,7 +104,7 @@ impl DeadAreasReport<'_> {
     }
 
     fn effective_table(&self) -> Table {
-        let table = Table::of(self.arms()).short("sensing, estimator", |arm| name(*arm));
+        let table = Table::from_rows(self.arms()).short("sensing, estimator", |arm| name(*arm));
         let add = |table: Columns<_>, count: &usize| {
             table.number(format!("{count} sensors"), |arm| Some(self.row(*arm, *count)?.effective_percent))
         };
@@ -117,7 +117,7 @@ impl DeadAreasReport<'_> {
             "Mean errors within a tenth of a pitch from a sensor and from the middle of a gap, their ratio, and the share of the \
              contacts between the outermost sensors that are off by more than the tolerance."
         };
-        Table::of(&self.findings.rows)
+        Table::from_rows(&self.findings.rows)
             .short("sensing, estimator", |row| name((&row.sensing, row.estimator)))
             .numeric("sensors", |row| row.sensors.to_string())
             .mm("over sensors, mm", |row| row.folded.at_sensors_m)

@@ -128,7 +128,7 @@ impl<'a> SensorDesignReport<'a> {
              calibrated with noise and asked. A dash: the readings do not tell some contact, or the layout was not simulated."
             @if broken { " *: breaks a constraint." }
         };
-        let mut table = Table::of(self.designed)
+        let mut table = Table::from_rows(self.designed)
             .short("layout", |designed| {
                 format!(
                     "{}{}",
@@ -160,7 +160,7 @@ impl<'a> SensorDesignReport<'a> {
 
     fn places(&self) -> Table {
         let extent = self.problem.extent();
-        Table::of(self.designed)
+        Table::from_rows(self.designed)
             .short("layout", |designed| designed.method.name())
             .wide("sensors", |designed| designed.layout.places_in_words(extent))
             .caption(html! { "Where their sensors sit." })
@@ -185,7 +185,7 @@ impl<'a> SensorDesignReport<'a> {
         let of_even = even.and_then(|even| Some(Series::dashes(name(even), 6, limits(even)?)));
         let of_best = limits(best).map(|limits| Series::line(name(best), 0, limits));
         let mut series: Vec<Series> = of_even.into_iter().chain(of_best).collect();
-        let extremes = Extremes::of_lines(&series);
+        let extremes = Extremes::from_lines(&series);
         let Extremes { least, greatest } = extremes;
         // Sensors stand in two rows beneath the curves.
         let (from, to, rows) = if extremes.are_far_apart() {
@@ -265,7 +265,7 @@ impl<'a> SensorDesignReport<'a> {
         let dots = [dots(6, &even), dots(0, &designed)];
         let lines = [Series::dashes("even", 6, even), Series::line("designed", 0, designed)];
         let series: Vec<Series> = lines.into_iter().chain(dots).collect();
-        let extremes = Extremes::of_lines(&series);
+        let extremes = Extremes::from_lines(&series);
         let axis = extremes.axis("mean limit, mm");
         let y = if extremes.are_far_apart() { axis } else { axis.from_to(0.0, 1.1 * extremes.greatest) };
         let step = (self.counts.len() / 12 + 1).max(1);

@@ -140,7 +140,7 @@ impl ElliottReport<'_> {
         let shown = |figure: Option<Quantiles>| {
             figure.map_or_else(|| NOTHING.to_owned(), |figure| spread(figure, number))
         };
-        Table::of(&self.findings.rows)
+        Table::from_rows(&self.findings.rows)
             .short("chain", |row| row.chain.to_string())
             .numeric("error, mm", |row| shown(row.error_m.map(|error| error.scaled(1e3))))
             .mm("limit, mm", |row| row.limit_m)

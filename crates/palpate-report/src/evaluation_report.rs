@@ -223,7 +223,7 @@ impl EvaluationReport<'_> {
             "Location errors in mm, and in brackets in % of the surface's length. With contacts evenly over the surface, the \
              share within the tolerance is the effective " (effective) "."
         };
-        Table::of(rows)
+        Table::from_rows(rows)
             .short("portion", |(name, ..)| name.clone())
             .numeric("readings", |(.., summary)| whole(summary.count as f64))
             .numeric("average, mm (%)", |(.., summary)| both(summary.average_m))
@@ -249,7 +249,7 @@ impl EvaluationReport<'_> {
             Judged::Locator(locator) => locator_facts(locator),
             Judged::CrossValidated { rig, folds, seed } => rig_facts(rig, folds, seed),
         });
-        Table::of(facts)
+        Table::from_rows(facts)
             .short("fact", |(name, _)| *name)
             .column("text", "value", |(_, value)| value.clone())
             .caption(html! { "What was judged, and where it comes from." })

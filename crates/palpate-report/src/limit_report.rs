@@ -130,7 +130,7 @@ impl LimitReport<'_> {
         };
         let series =
             vec![line(self.known, "force known", 0), line(self.unknown, "force unknown, estimated along", 1)];
-        let extremes = Extremes::of_lines(&series);
+        let extremes = Extremes::from_lines(&series);
         let chart = Chart::new(
             "The least standard deviation of a located contact",
             Axis::linear("contact position, mm").from_to(0.0, length_mm),
@@ -218,7 +218,7 @@ impl LimitReport<'_> {
             "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: \
              the readings do not tell."
         };
-        Table::of(bounds)
+        Table::from_rows(bounds)
             .short("position, mm", |(position, _)| place(*position, self.known.extent))
             .mm("force known: limit, mm", |(_, [known, _])| known.map(|bound| bound.sd_position_m))
             .mm("mean error, mm", |(_, [known, _])| known.map(|bound| bound.mean_error_m()))
@@ -245,7 +245,7 @@ impl LimitReport<'_> {
     }
 
     fn sensor_table(&self) -> Table {
-        Table::of(self.setup.layout.sensors().iter().zip(1..))
+        Table::from_rows(self.setup.layout.sensors().iter().zip(1..))
             .short("sensor", |(_, number)| number.to_string())
             .words("measures", |(sensor, _)| sensor.kind.name())
             .numeric("position, mm", |(sensor, _)| place(sensor.position, self.known.extent))

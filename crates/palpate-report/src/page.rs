@@ -112,7 +112,7 @@ pub(crate) struct Table {
 
 impl Table {
     /// A table with a row for each of some things; its first column heads the rows.
-    pub fn of<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
+    pub fn from_rows<R>(rows: impl IntoIterator<Item = R>) -> Columns<R> {
         let rows: Vec<R> = rows.into_iter().collect();
         Columns { cells: rows.iter().map(|_| Vec::new()).collect(), columns: Vec::new(), rows }
     }

@@ -87,7 +87,7 @@ impl<'a> PositionDesignReport<'a> {
             "Errors after calibrating, averaged over " (counted(self.problem.contacts().len(), "contact", "contacts"))
             ": the median and the mean of the calibrations, and the standard error of the mean."
         };
-        Table::of(self.placed)
+        Table::from_rows(self.placed)
             .short("positions", |placed| placed.placement.name())
             .mm("median error, mm", |placed| placed.verification.median_error_m)
             .mm("mean error, mm", |placed| placed.verification.mean_error_m)
@@ -100,7 +100,7 @@ impl<'a> PositionDesignReport<'a> {
 
     fn places(&self) -> Table {
         let extent = self.problem.extent();
-        Table::of(self.placed)
+        Table::from_rows(self.placed)
             .short("positions", |placed| placed.placement.name())
             .wide("where", |placed| extent.places_in_words(&placed.positions))
             .caption(html! { "Where to press." })
@@ -136,7 +136,7 @@ impl<'a> PositionDesignReport<'a> {
             }
         };
         let series: Vec<Series> = self.compared().into_iter().enumerate().map(line).collect();
-        let y = Extremes::of_lines(&series).axis("mean error, mm");
+        let y = Extremes::from_lines(&series).axis("mean error, mm");
         let chart = Chart::new("Error by contact position", self.axis("contact position, mm"), y, series);
         Figure::chart(&chart, html! { "The mean error at each contact over all verifying calibrations." })
     }

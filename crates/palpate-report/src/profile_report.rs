@@ -87,7 +87,7 @@ impl<'a> ProfileReport<'a> {
     }
 
     /// The middle of each cell of a line in mm, with a figure of the cell.
-    fn along(&self, figure: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
+    fn by_cell(&self, figure: impl Fn(usize) -> f64) -> Vec<(f64, f64)> {
         let centres = self.profile.cells.centres().enumerate();
         centres.map(|(cell, centre)| (centre.x_m * 1e3, figure(cell))).collect()
     }
@@ -98,7 +98,7 @@ impl<'a> ProfileReport<'a> {
 
     fn load_figure(&self) -> Figure {
         let profile = self.profile;
-        let load = self.along(|cell| profile.density(cell).0 * PER_THOUSAND);
+        let load = self.by_cell(|cell| profile.density(cell).0 * PER_THOUSAND);
         let interval = |(cell, (x, _)): (usize, &(f64, f64))| {
             let (low, high) = profile.density(cell).1;
             BandPoint { x: *x, low: low * PER_THOUSAND, high: high * PER_THOUSAND }
@@ -138,7 +138,7 @@ impl<'a> ProfileReport<'a> {
     }
 
     fn width_figure(&self, resolution: &Resolution) -> Figure {
-        let points = self.along(|cell| resolution.widths_m[cell] * 1e3);
+        let points = self.by_cell(|cell| resolution.widths_m[cell] * 1e3);
         let most = points.iter().fold(0.0, |most: f64, point| most.max(point.1));
         let sensors = self.layout.sensors().iter();
         let sensors = sensors.map(|sensor| (sensor.position.x_m * 1e3, 0.02 * most)).collect();
@@ -155,7 +155,7 @@ impl<'a> ProfileReport<'a> {
         let kernel = |(colour, share): (usize, &f64)| {
             let of = ((share * cells.columns as f64) as usize).min(cells.columns - 1);
             let label = format!("of {} mm", mm(cells.centre(of).x_m));
-            Series::line(label, colour, self.along(|cell| resolution.kernels[[of, cell]]))
+            Series::line(label, colour, self.by_cell(|cell| resolution.kernels[[of, cell]]))
         };
         let series = KERNEL_PLACES.iter().enumerate().map(kernel).collect();
         let (x, y) = (self.axis("position of the load, mm"), Axis::linear("share of a cell's load"));
@@ -271,7 +271,7 @@ impl<'a> ProfileReport<'a> {
         };
         let limit = |i: usize| self.limits.and_then(|limits| limits.get(i));
         let rows = self.profile.patches.iter().enumerate().map(|(i, patch)| (patch, limit(i), i + 1));
-        let table = Table::of(rows).short("patch", |(.., number)| number.to_string());
+        let table = Table::from_rows(rows).short("patch", |(.., number)| number.to_string());
         let table = match self.extent() {
             Extent::Line { .. } => along(table, ["stretch, mm", "centre, mm"]),
             Extent::Plane { .. } => across(along(table, ["along, mm", "centre x, mm"])),
@@ -296,7 +296,7 @@ impl<'a> ProfileReport<'a> {
         let caption = html! {
             "What each sensor read, what it would read of the profile, and the difference in standard deviations of its noise."
         };
-        Table::of(self.layout.sensors().iter().enumerate())
+        Table::from_rows(self.layout.sensors().iter().enumerate())
             .short("sensor", |(i, _)| (i + 1).to_string())
             .words("measures", |(_, sensor)| {
                 format!("{}, {}", sensor.kind.name(), sensor.kind.unit().symbol())

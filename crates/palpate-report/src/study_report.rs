@@ -192,7 +192,7 @@ fn layouts_figure(report: &StudyReport, layouts: &[(Vec<&str>, &Layout)]) -> Fig
 
 /// Table of the layouts, with the arms that have each.
 fn layouts_table(layouts: &[(Vec<&str>, &Layout)], extent: Extent) -> Table {
-    Table::of(layouts)
+    Table::from_rows(layouts)
         .wide("arms", |(arms, _)| arms.join(", "))
         .wide("sensors", |(_, layout)| layout.places_in_words(extent))
         .caption(html! { "Where the sensors of every arm sit." })
@@ -332,14 +332,17 @@ impl<'a> StudyReport<'a> {
 }
 
 /// The spread over an arm's seeds of a figure of each contact: by position in mm.
-pub(crate) fn along(outcome: &ArmOutcome, figure: impl Fn(&Located) -> f64) -> Vec<(f64, Quantiles)> {
+pub(crate) fn spread_by_position(
+    outcome: &ArmOutcome,
+    figure: impl Fn(&Located) -> f64,
+) -> Vec<(f64, Quantiles)> {
     outcome.by_position(figure).into_iter().map(|(x_m, spread)| (x_m * 1e3, spread)).collect()
 }
 
 /// The location error of an arm in mm along the surface, with a band over its seeds where there are several; nothing without a fit.
 pub(crate) fn errors(report: &StudyReport, line: &ArmLine, with_band: bool) -> Vec<Series> {
     let Some(outcome) = report.outcome(line.arm) else { return Vec::new() };
-    let along = along(outcome, |located| located.error_m() * 1e3);
+    let along = spread_by_position(outcome, |located| located.error_m() * 1e3);
     banded(line.label, line.colour, &along, with_band && outcome.fits.len() > 1)
 }
 
@@ -367,7 +370,7 @@ const LEAST_ERROR_MM: f64 = 0.05;
 /// Every arm with its figures; a column only where some arm fills it.
 pub(crate) fn arms_table(report: &StudyReport) -> Table {
     let arms = &report.results.arms;
-    let mut table = Table::of(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());
+    let mut table = Table::from_rows(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());
     for ArmColumn { heading, cells } in arm_columns(report) {
         if cells.iter().any(Option::is_some) {
             let cell = |i: usize| cells[i].clone().unwrap_or_else(|| text(NOTHING));
@@ -469,9 +472,12 @@ pub(crate) fn run_table(report: &StudyReport) -> Table {
         facts.push(("patterns presented in this run", whole(run.presentations as f64)));
         facts.push(("patterns presented per second", whole(run.presentations_per_second)));
     }
-    Table::of(facts).words("fact", |(name, _)| *name).words("value", |(_, value)| value.clone()).caption(
-        html! { "The run. Networks that an earlier run had left are not among the patterns presented." },
-    )
+    Table::from_rows(facts)
+        .words("fact", |(name, _)| *name)
+        .words("value", |(_, value)| value.clone())
+        .caption(
+            html! { "The run. Networks that an earlier run had left are not among the patterns presented." },
+        )
 }
 
 fn counted_seeds(seeds: u64) -> String {

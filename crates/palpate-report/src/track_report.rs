@@ -219,7 +219,7 @@ impl TrackReport<'_> {
             "Errors while something touched; covered: how often the 95 % interval held the contact; number right: how often as \
              many contacts were found as touched."
         };
-        Table::of(self.errors)
+        Table::from_rows(self.errors)
             .short("track", |(name, _)| *name)
             .numeric("contacts", |(_, errors)| whole(errors.tracked as f64))
             .mm("average error, mm", |(_, errors)| errors.track_m)
@@ -232,7 +232,7 @@ impl TrackReport<'_> {
     }
 
     fn sweep_table(&self) -> Table {
-        Table::of(self.sweep)
+        Table::from_rows(self.sweep)
             .numeric("ratio", |speed| stated(speed.ratio))
             .number("speed, m/s", |speed| speed.speed_m_per_s)
             .mm("single, mm", |speed| speed.filtered.single_m)

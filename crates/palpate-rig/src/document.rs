@@ -128,7 +128,7 @@ impl<'a> Node<'a> {
     /// Reads this value; what its type refuses is at its place.
     fn read<'de, S: DeserializeSeed<'de>>(self, seed: S) -> Result<S::Value, RigError> {
         let place = self.place.clone();
-        seed.deserialize(self).map_err(|error| error.within(&place))
+        seed.deserialize(self).map_err(|error| error.with_place(&place))
     }
 
     /// The value of one of this table's keys.
@@ -312,7 +312,7 @@ impl<'de, 'a> EnumAccess<'de> for Variant<'a> {
 
     fn variant_seed<S: DeserializeSeed<'de>>(self, seed: S) -> Result<(S::Value, Node<'a>), RigError> {
         let word: StrDeserializer<RigError> = self.word.into_deserializer();
-        let variant = seed.deserialize(word).map_err(|error| error.within(&self.place))?;
+        let variant = seed.deserialize(word).map_err(|error| error.with_place(&self.place))?;
         Ok((variant, self.node))
     }
 }

@@ -177,22 +177,22 @@ impl Place {
     /// The same, for a value in other words than it is written in.
     pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
         let (value, bound) = (value.to_string(), bound.to_string());
-        RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at(self)
+        RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at_place(self)
     }
 
     /// The error for a value that is not what its key wants, for this reason.
     pub fn invalid(&self, reason: impl Display) -> RigError {
-        RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at(self)
+        RigProblem::Invalid { key: self.key().to_owned(), reason: reason.to_string() }.at_place(self)
     }
 
     /// The error for a table that lacks a key.
     pub fn missing(&self, key: &str) -> RigError {
-        RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at(self)
+        RigProblem::MissingKey { section: self.path.clone(), key: key.to_owned() }.at_place(self)
     }
 
     /// The error for a key that means nothing beside what else is written.
     pub fn unused(&self, with: impl Display) -> RigError {
-        RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at(self)
+        RigProblem::UnusedKey { key: self.key().to_owned(), with: with.to_string() }.at_place(self)
     }
 }
 
@@ -219,7 +219,7 @@ impl RigError {
     }
 
     /// Names the value that a type has refused, unless a value within it has been named already.
-    pub(crate) fn within(mut self, place: &Place) -> Self {
+    pub(crate) fn with_place(mut self, place: &Place) -> Self {
         if self.span.is_some() {
             return self;
         }
@@ -252,12 +252,12 @@ impl RigError {
 
 impl RigProblem {
     /// This problem, at a place of the document.
-    pub(crate) fn at(self, place: &Place) -> RigError {
+    pub(crate) fn at_place(self, place: &Place) -> RigError {
         RigError { problem: Box::new(self), span: Some(place.span.clone()) }
     }
 
     /// This problem, of something that is not there.
-    pub(crate) fn nowhere(self) -> RigError {
+    pub(crate) fn without_place(self) -> RigError {
         RigError { problem: Box::new(self), span: None }
     }
 }
@@ -265,7 +265,7 @@ impl RigProblem {
 /// Refusal by a type; the error that carries it says where.
 impl serde::de::Error for RigError {
     fn custom<T: Display>(reason: T) -> Self {
-        RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.nowhere()
+        RigProblem::Invalid { key: String::new(), reason: reason.to_string() }.without_place()
     }
 
     fn invalid_type(_: Unexpected, expected: &dyn Expected) -> Self {
@@ -278,7 +278,8 @@ impl serde::de::Error for RigError {
             words if words.starts_with("struct ") || words.starts_with("enum ") => "a table",
             words => words,
         };
-        RigProblem::OutOfRange { key: String::new(), value: String::new(), bound: bound.to_owned() }.nowhere()
+        RigProblem::OutOfRange { key: String::new(), value: String::new(), bound: bound.to_owned() }
+            .without_place()
     }
 
     fn invalid_value(unexpected: Unexpected, expected: &dyn Expected) -> Self {
@@ -290,15 +291,16 @@ impl serde::de::Error for RigError {
     }
 
     fn unknown_variant(word: &str, known: &'static [&'static str]) -> Self {
-        RigProblem::UnknownWord { key: String::new(), word: word.to_owned(), known: known.to_vec() }.nowhere()
+        RigProblem::UnknownWord { key: String::new(), word: word.to_owned(), known: known.to_vec() }
+            .without_place()
     }
 
     fn unknown_field(key: &str, known: &'static [&'static str]) -> Self {
-        RigProblem::UnknownKey { key: key.to_owned(), known: known.to_vec(), with: None }.nowhere()
+        RigProblem::UnknownKey { key: key.to_owned(), known: known.to_vec(), with: None }.without_place()
     }
 
     fn missing_field(key: &'static str) -> Self {
-        RigProblem::MissingKey { section: String::new(), key: key.to_owned() }.nowhere()
+        RigProblem::MissingKey { section: String::new(), key: key.to_owned() }.without_place()
     }
 }
 

@@ -155,7 +155,9 @@ fn input_scale(scale: &At<Written>, layout: &Layout) -> Result<InputScale, RigEr
             word if word.trim_start().starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) => {}
             word => {
                 let (key, known) = (scale.place.key().to_owned(), vec!["full-scale", "standardized"]);
-                return Err(RigProblem::UnknownWord { key, word: word.to_owned(), known }.at(&scale.place));
+                return Err(
+                    RigProblem::UnknownWord { key, word: word.to_owned(), known }.at_place(&scale.place)
+                );
             }
         }
     }

@@ -89,10 +89,10 @@ impl At<MotionKeys> {
     /// The beam that swings under this contact; its density is the surface's.
     fn modal_beam(&self, beam: Beam, density: Option<&At<Positive<Density>>>) -> Result<ModalBeam, RigError> {
         let missing = || RigProblem::MissingKey { section: "surface".to_owned(), key: "density".to_owned() };
-        let density = density.ok_or_else(|| missing().at(&self.place))?;
+        let density = density.ok_or_else(|| missing().at_place(&self.place))?;
         let damping_ratio = self.damping.as_ref().map_or(ModalBeam::USUAL_DAMPING_RATIO, |ratio| ratio.si);
         ModalBeam::new(beam, density.si, damping_ratio)
-            .map_err(|error| RigProblem::ModalBeam(error).at(&density.place))
+            .map_err(|error| RigProblem::ModalBeam(error).at_place(&density.place))
     }
 
     /// A contact beside another one, which says what both share.
@@ -132,7 +132,7 @@ impl At<MotionKeys> {
         Motion::new(from, to, self.speed.si, turn_m)
             .and_then(|motion| motion.with_passes(self.passes.map_or(1, Count::get)))
             .and_then(|motion| motion.with_lifts(lifted_s, touch_s))
-            .map_err(|problem| RigProblem::Motion(problem).at(&self.place))
+            .map_err(|problem| RigProblem::Motion(problem).at_place(&self.place))
     }
 }
 

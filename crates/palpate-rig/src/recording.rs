@@ -176,7 +176,7 @@ impl At<RecordingKeys> {
         match (column, symbol) {
             (None, Some(symbol)) => {
                 let (section, key) = (self.place.path.clone(), key.to_owned());
-                Err(RigProblem::MissingKey { section, key }.at(&symbol.place))
+                Err(RigProblem::MissingKey { section, key }.at_place(&symbol.place))
             }
             (column, _) => Ok(column.as_ref().map(|column| ValueColumn { column: column.column(), unit })),
         }

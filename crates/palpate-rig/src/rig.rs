@@ -180,7 +180,7 @@ impl RigFile {
     /// # Errors
     /// [`RigError`] for the first thing that is wrong.
     pub fn build(&self) -> Result<Rig, RigError> {
-        let missing = |section| RigProblem::MissingSection { section }.nowhere();
+        let missing = |section| RigProblem::MissingSection { section }.without_place();
         let surface_keys = self.surface.as_ref().ok_or_else(|| missing("[surface]"))?;
         let sensors = self.sensors.as_ref().ok_or_else(|| missing("[sensors]"))?;
         let contact_force = self.contact.as_ref().and_then(|contact| contact.force.as_ref());
@@ -215,7 +215,7 @@ impl RigFile {
         let training = keys.build(surface.extent())?;
         let simulated = surface.model().is_some() && self.recording.is_none();
         if simulated && training.force_n.or(force_n).is_none() {
-            return Err(RigProblem::NoForce.at(&keys.place));
+            return Err(RigProblem::NoForce.at_place(&keys.place));
         }
         check_force(keys.force.as_ref(), surface)?;
         let values = training.count.saturating_mul(training.repeats).saturating_mul(layout.len());

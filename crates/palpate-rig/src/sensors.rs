@@ -81,7 +81,7 @@ pub(crate) fn build(
             sensor.name.clone_from(name);
         }
     }
-    Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at(&sections.place))
+    Layout::new(sensors).map_err(|problem| RigProblem::Layout(problem).at_place(&sections.place))
 }
 
 /// Kind of a sensor of `surface` that is said to `measure` this.
@@ -140,7 +140,7 @@ impl At<SensorsKeys> {
         for (i, &position) in positions.iter().enumerate() {
             let listed = self.positions.as_ref().and_then(|listed| listed.get(i));
             let place = listed.map_or(place, |point| &point.place);
-            check_sensor(surface, kind, i + 1, position).map_err(|problem| problem.at(place))?;
+            check_sensor(surface, kind, i + 1, position).map_err(|problem| problem.at_place(place))?;
         }
         Ok(positions)
     }

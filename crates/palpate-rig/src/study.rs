@@ -176,7 +176,7 @@ impl Study {
             }
             arms.push(arm);
         }
-        let missing = |section| RigProblem::MissingSection { section }.nowhere();
+        let missing = |section| RigProblem::MissingSection { section }.without_place();
         let first = arms.first().ok_or_else(|| missing("[[arm]]"))?;
         let judging = file.judging(first)?;
         Ok(Self {
@@ -229,7 +229,7 @@ impl ArmKeys {
             return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
         }
         if rig.training.is_none() {
-            return Err(RigProblem::MissingSection { section: "[training]" }.nowhere());
+            return Err(RigProblem::MissingSection { section: "[training]" }.without_place());
         }
         Ok(Arm { name, rig, layout, figure: self.figure.clone() })
     }

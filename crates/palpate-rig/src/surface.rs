@@ -182,7 +182,7 @@ impl At<SurfaceKeys> {
             SurfaceKeys::Digit(keys) => {
                 let (length_m, width_m) = (keys.length.si, keys.width.si);
                 let digit = Digit::new(length_m, width_m, keys.thickness.si, keys.youngs_modulus.si);
-                let digit = digit.map_err(|error| RigProblem::Digit(error).at(&self.place))?;
+                let digit = digit.map_err(|error| RigProblem::Digit(error).at_place(&self.place))?;
                 Ok(SurfaceSpec::Digit(digit.with_direction(keys.direction)))
             }
             SurfaceKeys::Measured(keys) => {
@@ -233,7 +233,7 @@ impl BeamKeys {
             (supports, &self.sections, sections.as_slice())
         {
             let beam = Beam::new(length_m, *width_m, *thickness_m, youngs_modulus_pa);
-            return beam.map(SurfaceSpec::Beam).map_err(|error| RigProblem::Beam(error).at(place));
+            return beam.map(SurfaceSpec::Beam).map_err(|error| RigProblem::Beam(error).at_place(place));
         }
         let supports = match supports {
             Some(listed) => listed.iter().map(|support| support.build().1).collect(),
@@ -245,7 +245,7 @@ impl BeamKeys {
         let spec = SupportedBeamSpec { length_m, youngs_modulus_pa, sections, supports };
         let beam = SupportedBeam::new(spec).map_err(|error| {
             let part = self.place_of(error.part()).unwrap_or(place);
-            RigProblem::SupportedBeam(error).at(part)
+            RigProblem::SupportedBeam(error).at_place(part)
         })?;
         Ok(SurfaceSpec::SupportedBeam(Box::new(beam)))
     }
@@ -307,7 +307,8 @@ impl PlateKeys {
             supports: supports.collect::<Result<_, _>>()?,
             elements: self.elements.as_deref().map_or(PlateSpec::DEFAULT_ELEMENTS, |elements| elements.get()),
         };
-        Plate::new(spec).map_err(|error| RigProblem::Plate(error).at(self.place_of(error).unwrap_or(place)))
+        Plate::new(spec)
+            .map_err(|error| RigProblem::Plate(error).at_place(self.place_of(error).unwrap_or(place)))
     }
 
     fn supports(&self) -> &[At<PointSupportKeys>] {

@@ -121,7 +121,7 @@ impl At<TrainingKeys> {
         };
         training.positions(extent).map_err(|error| {
             let place = self.place_of(&error).unwrap_or(&self.place);
-            RigProblem::Arrangement(error).at(place)
+            RigProblem::Arrangement(error).at_place(place)
         })?;
         Ok(training)
     }

@@ -163,7 +163,7 @@ impl DeadAreas {
                     sensors,
                     effective_percent: evaluation.effective_percent(self.tolerance_m),
                     mean_error_m: evaluation.summary(None).map_or(f64::NAN, |summary| summary.average_m),
-                    folded: FoldedErrors::of(evaluation, &rig.setup.layout, self.tolerance_m),
+                    folded: FoldedErrors::new(evaluation, &rig.setup.layout, self.tolerance_m),
                 });
             }
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
@@ -310,7 +310,7 @@ pub struct Fold {
 
 impl FoldedErrors {
     /// Folds the errors of an evaluation over the gaps of a layout along a line.
-    pub fn of(evaluation: &Evaluation, layout: &Layout, tolerance_m: f64) -> Self {
+    pub fn new(evaluation: &Evaluation, layout: &Layout, tolerance_m: f64) -> Self {
         let mut places: Vec<f64> = layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
         places.sort_by(f64::total_cmp);
         let folded: Vec<(f64, f64)> = evaluation

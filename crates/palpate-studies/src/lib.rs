@@ -45,7 +45,7 @@
 //! let study = PreparedStudy::new(study, Watch::NONE)?;
 //! let options = RunOptions { seeds: 1, threads: 1 };
 //! let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE)?;
-//! let results = StudyResults::of(&outcomes, &study);
+//! let results = StudyResults::new(&outcomes, &study);
 //! assert!(results.arms[1].error_percent.median < results.arms[0].error_percent.median);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

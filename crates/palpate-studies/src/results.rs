@@ -158,8 +158,8 @@ fn portions_as_keys<S: serde::Serializer>(
 
 impl StudyResults {
     /// Sums up the outcomes of a run of `study`, an outcome an arm.
-    pub fn of(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
-        let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::of).collect();
+    pub fn new(outcomes: &[ArmOutcome], study: &PreparedStudy) -> Self {
+        let set_ups: Vec<SetUp> = study.study.arms.iter().map(SetUp::new).collect();
         // What is the same for all arms, the study file says once.
         let same =
             |a: &SetUp, b: &SetUp| (a.estimator, a.force, &a.sensors) == (b.estimator, b.force, &b.sensors);
@@ -167,7 +167,7 @@ impl StudyResults {
         let results = |outcome: &ArmOutcome| {
             let arm = study.study.arms.iter().position(|arm| arm.name == outcome.name)?;
             let set_up = differ.then(|| set_ups[arm].clone());
-            ArmResults::of(outcome, &study.study.arms[arm], set_up, study.judging())
+            ArmResults::new(outcome, &study.study.arms[arm], set_up, study.judging())
         };
         Self { arms: outcomes.iter().filter_map(results).collect() }
     }
@@ -179,7 +179,7 @@ impl StudyResults {
 }
 
 impl SetUp {
-    fn of(arm: &Arm) -> Self {
+    fn new(arm: &Arm) -> Self {
         let place =
             |sensor: &Sensor| SensorPlace { measure: sensor.kind, position_mm: 1e3 * sensor.position.x_m };
         let setup = &arm.rig.setup;
@@ -193,7 +193,7 @@ impl SetUp {
 }
 
 impl ArmResults {
-    fn of(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
+    fn new(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
         let spread = |figure: &dyn Fn(&TrainedSeed) -> Option<f64>| {
             Quantiles::of(outcome.fits.iter().filter_map(figure).collect())
         };

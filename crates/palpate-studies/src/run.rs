@@ -93,7 +93,7 @@ impl PreparedStudy {
     /// [`StudyRunError`], naming the arm, or when `watch` stopped the search for layouts.
     pub fn new(study: Study, watch: Watch) -> Result<Self, StudyRunError> {
         let study = lay_out(study, watch)?;
-        let arms = study.arms.iter().map(|arm| PreparedArm::of(arm, &study));
+        let arms = study.arms.iter().map(|arm| PreparedArm::new(arm, &study));
         let arms = arms.collect::<Result<_, _>>()?;
         Ok(Self { study, arms })
     }
@@ -141,7 +141,7 @@ impl PreparedStudy {
 }
 
 impl PreparedArm {
-    fn of(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
+    fn new(arm: &Arm, study: &Study) -> Result<Self, StudyRunError> {
         let judging = &study.judging;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
         let setup = &arm.rig.setup;

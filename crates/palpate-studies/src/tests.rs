@@ -68,7 +68,7 @@ const THREE: &str = r#"
 #[test]
 fn locators_come_to_their_arms_limit() {
     let prepared = prepare(beam(THREE));
-    let results = StudyResults::of(&run(&prepared, 2, 2), &prepared);
+    let results = StudyResults::new(&run(&prepared, 2, 2), &prepared);
     let [unknown, known, reactions] = &results.arms[..] else { panic!("{results:?}") };
     for arm in [known, unknown, reactions] {
         let limit = arm.limit.as_ref().unwrap();
@@ -176,7 +176,7 @@ fn errors_are_told_apart_between_the_training_positions_and_beyond() {
     let arm = "[[arm]]\nname = \"inner\"\ntraining = { count = 10, portion = [0.25, 0.75] }";
     let prepared = prepare(Study::from_toml(&(head + arm)).unwrap());
     assert!(prepared.is_in_lanes(0));
-    let results = StudyResults::of(&run(&prepared, 1, 1), &prepared);
+    let results = StudyResults::new(&run(&prepared, 1, 1), &prepared);
     let arm = &results.arms[0];
     let span = arm.training_span.as_ref().unwrap();
     let Portion { from_m, to_m } = span.training_span;

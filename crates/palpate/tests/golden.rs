@@ -24,7 +24,7 @@ struct Vector {
 }
 
 impl Vector {
-    fn of(locator: &Locator, reading: &[f64]) -> Self {
+    fn new(locator: &Locator, reading: &[f64]) -> Self {
         let estimate = locator.locate(reading).unwrap();
         let ContactEstimate { position, force_n, uncertainty } = estimate.contact;
         Self {
@@ -107,7 +107,7 @@ fn locators_of_version_1_are_read_and_answer_their_golden_vectors() {
         let vectors: Vec<Vector> = serde_json::from_str(&read(&format!("{name}.vectors.json"))).unwrap();
         assert!(vectors.len() >= 8, "{name}");
         for vector in vectors {
-            let answer = Vector::of(&locator, &vector.reading);
+            let answer = Vector::new(&locator, &vector.reading);
             assert_eq!(answer.status, vector.status, "{name}: {vector:?}");
             for (found, wanted) in answer.numbers().into_iter().zip(vector.numbers()) {
                 assert!(
@@ -131,10 +131,10 @@ fn write() {
         let locator = estimator.fit(&setup, &presses).unwrap();
         fs::write(golden(&format!("{name}.locator.json")), locator.to_json().unwrap()).unwrap();
         let readings = presses.rows.iter().step_by(3).map(|row| row.reading.clone());
-        let mut vectors: Vec<Vector> = readings.map(|reading| Vector::of(&locator, &reading)).collect();
+        let mut vectors: Vec<Vector> = readings.map(|reading| Vector::new(&locator, &reading)).collect();
         for factor in [0.0, 0.3, 0.6, 1.5, -1.0, 1e3] {
             let reading: Vec<f64> = presses.rows[1].reading.iter().map(|value| factor * value).collect();
-            vectors.push(Vector::of(&locator, &reading));
+            vectors.push(Vector::new(&locator, &reading));
         }
         let text = serde_json::to_string_pretty(&vectors).unwrap() + "\n";
         fs::write(golden(&format!("{name}.vectors.json")), text).unwrap();

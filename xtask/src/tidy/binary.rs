@@ -22,7 +22,10 @@ mod tests {
 
     #[test]
     fn a_nul_byte_near_the_head_tells_a_binary_file() {
-        assert_eq!(findings(&Project::of(&[("a.png", "x\0y")])).len(), 1);
-        assert_eq!(findings(&Project::of(&[("a.svg", "<svg/>"), ("b", &("x".repeat(HEAD) + "\0"))])), []);
+        assert_eq!(findings(&Project::from_files(&[("a.png", "x\0y")])).len(), 1);
+        assert_eq!(
+            findings(&Project::from_files(&[("a.svg", "<svg/>"), ("b", &("x".repeat(HEAD) + "\0"))])),
+            []
+        );
     }
 }

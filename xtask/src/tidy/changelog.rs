@@ -34,7 +34,7 @@ mod tests {
     use crate::tidy::project::Crate;
 
     fn messages(changelog: &[(&str, &str)]) -> Vec<String> {
-        let mut project = Project::of(changelog);
+        let mut project = Project::from_files(changelog);
         project.crates.push(Crate {
             name: "palpate".into(),
             version: "0.1.0".into(),

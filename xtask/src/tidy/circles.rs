@@ -51,7 +51,7 @@ fn modules<'a>(project: &'a Project, root: &str) -> Modules<'a> {
     let folder = root.rsplit_once('/').map_or("", |(folder, _)| folder);
     let mut open = Vec::from_iter(project.file(root).map(|file| (Name::new(), folder.to_owned(), file)));
     while let Some((name, folder, file)) = open.pop() {
-        let code = RustText::of(&file.text()).code_without_tests();
+        let code = RustText::parse(&file.text()).code_without_tests();
         for child in declared_modules(&code) {
             let inside = format!("{folder}/{child}");
             let files = [format!("{inside}.rs"), format!("{inside}/mod.rs")];
@@ -175,7 +175,7 @@ mod tests {
     fn messages(files: &[(&str, &str)]) -> Vec<String> {
         let paths: Vec<String> = files.iter().map(|(path, _)| format!("crates/a/src/{path}")).collect();
         let files: Vec<_> = paths.iter().zip(files).map(|(path, (_, text))| (path.as_str(), *text)).collect();
-        let mut project = Project::of(&files);
+        let mut project = Project::from_files(&files);
         project.crates.push(Crate {
             name: "a".into(),
             version: String::new(),

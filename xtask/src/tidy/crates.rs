@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn a_dependency_that_points_back_is_found_at_its_line() {
-        let mut project = Project::of(&[(
+        let mut project = Project::from_files(&[(
             "crates/palpate-core/Cargo.toml",
             "[dependencies]\nlibm = \"0.2\"\npalpate.workspace = true\n",
         )]);
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn the_way_of_the_design_is_clean_and_an_unknown_crate_is_not() {
-        let mut project = Project::of(&[]);
+        let mut project = Project::from_files(&[]);
         project.crates = vec![
             krate("palpate-core", &["libm"]),
             krate("palpate", &["palpate-core", "serde"]),

@@ -108,7 +108,7 @@ mod tests {
         ];
         let mut files: Vec<_> = files.into_iter().filter(|(name, _)| *name != path).collect();
         files.push((path, text));
-        findings(&Project::of(&files))
+        findings(&Project::from_files(&files))
             .into_iter()
             .map(|finding| format!("{}: {}", finding.line, finding.message))
             .collect()
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_missing_document_is_found() {
-        let found = findings(&Project::of(&[("README.md", "")]));
+        let found = findings(&Project::from_files(&[("README.md", "")]));
         assert_eq!(found, [Finding::new("ARCHITECTURE.md", 1, "this document is missing: write it")]);
     }
 

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     fn lines(path: &str, text: &str) -> Vec<usize> {
-        findings(&Project::of(&[(path, text)])).into_iter().map(|finding| finding.line).collect()
+        findings(&Project::from_files(&[(path, text)])).into_iter().map(|finding| finding.line).collect()
     }
 
     #[test]

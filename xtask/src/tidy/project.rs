@@ -125,7 +125,7 @@ fn text(value: &Value) -> String {
 #[cfg(test)]
 impl Project {
     /// A project of these files alone.
-    pub fn of(files: &[(&str, &str)]) -> Self {
+    pub fn from_files(files: &[(&str, &str)]) -> Self {
         let file = |&(path, text): &(&str, &str)| File { path: path.into(), bytes: text.into() };
         Self { files: files.iter().map(file).collect(), crates: Vec::new() }
     }
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_folder_of_a_file_is_there_and_a_beginning_of_a_name_is_not() {
-        let project = Project::of(&[("docs/book/start.md", "")]);
+        let project = Project::from_files(&[("docs/book/start.md", "")]);
         assert!(project.has("docs/book") && project.has("docs/book/start.md") && project.has(""));
         assert!(!project.has("docs/bo") && !project.has("other.md"));
     }

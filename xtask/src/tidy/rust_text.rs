@@ -23,7 +23,7 @@ struct Scanner {
 
 impl RustText {
     /// Takes a file apart. Text that is no Rust comes out as code.
-    pub fn of(text: &str) -> Self {
+    pub fn parse(text: &str) -> Self {
         let parts = Self { code: String::with_capacity(text.len()), comments: String::new() };
         let mut scanner = Scanner { characters: text.chars().collect(), at: 0, parts };
         while scanner.at < scanner.characters.len() {
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn comments_and_literals_leave_the_code() {
-        let text = RustText::of(
+        let text = RustText::parse(
             "let a = \"one // two\"; // three\n/* four /* five */ six */ let b = 'x'; let c: &'static str = r#\"se\"ven\"#;",
         );
         assert_eq!(words(&text.code), words("let a = ; let b = ; let c: &'static str = ;").as_slice());
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn lines_keep_their_numbers() {
         let source = "a\n\"x\ny\"\n// c\nb\n/* d\n e */\nz";
-        let text = RustText::of(source);
+        let text = RustText::parse(source);
         assert_eq!(text.code.lines().count(), source.lines().count());
         assert_eq!(text.code.lines().nth(4), Some("b"));
         assert_eq!(text.comments.lines().nth(3), Some("// c"));
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn quotes_escapes_and_raw_identifiers_do_not_mislead() {
-        let text = RustText::of(
+        let text = RustText::parse(
             r##"let q = '"'; let e = '\''; let s = "\"in\""; let r#type = br"in"; let t: &'a u8 = b"in";"##,
         );
         assert!(!text.code.contains("in"), "{}", text.code);
@@ -201,14 +201,14 @@ mod tests {
     #[test]
     fn an_open_end_is_taken_whole() {
         for source in ["/* open", "\"open", "r#\"open", "'", "r#", "'\\", "\"\\"] {
-            assert_eq!(RustText::of(source).code.chars().count(), source.chars().count(), "{source}");
+            assert_eq!(RustText::parse(source).code.chars().count(), source.chars().count(), "{source}");
         }
     }
 
     #[test]
     fn tests_can_be_left_out() {
         let source = "fn a() {}\n#[cfg(test)]\nmod tests {\n fn b() { if x { y } }\n}\nfn c() {}\n#[cfg(test)]\nuse d;\nfn e() {}";
-        let kept = RustText::of(source).code_without_tests();
+        let kept = RustText::parse(source).code_without_tests();
         assert_eq!(words(&kept), words("fn a() {} fn c() {} fn e() {}"));
         assert_eq!(kept.lines().count(), source.lines().count());
     }

@@ -14,7 +14,7 @@ pub fn findings(project: &Project) -> Vec<Finding> {
     let mut found = Vec::new();
     for file in project.files.iter().filter(|file| !file.is_a_rule()) {
         if file.path.ends_with(".rs") {
-            found.extend(markers(file, &RustText::of(&file.text()).comments));
+            found.extend(markers(file, &RustText::parse(&file.text()).comments));
         } else if TEXT.iter().any(|end| file.path.ends_with(end)) {
             found.extend(markers(file, &file.text()));
         }
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     fn lines(path: &str, text: &str) -> Vec<usize> {
-        findings(&Project::of(&[(path, text)])).into_iter().map(|finding| finding.line).collect()
+        findings(&Project::from_files(&[(path, text)])).into_iter().map(|finding| finding.line).collect()
     }
 
     #[test]

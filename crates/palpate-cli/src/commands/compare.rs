@@ -172,7 +172,7 @@ fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option
     let summary = evaluation.summary(None)?;
     Some(object! {
         "name": comparison.estimator.kind(),
-        "error_mm": ErrorFigures::of(&summary, |error_m| error_m * 1e3),
+        "error_mm": ErrorFigures::new(&summary, |error_m| error_m * 1e3),
         "error_percent": percentage_error(summary.average_m, evaluation.length_m),
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "coverage_95": evaluation.coverage_percent(),
@@ -188,7 +188,7 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
         Some((comparison, evaluation, evaluation.summary(None)?))
     });
     let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".to_owned());
-    Table::of(rows)
+    Table::from_rows(rows)
         .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.kind().to_owned())
         .column("mean", |(_, evaluation, summary)| {
             let percent = percentage_error(summary.average_m, evaluation.length_m);

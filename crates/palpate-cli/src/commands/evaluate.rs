@@ -65,7 +65,7 @@ pub struct ErrorFigures {
 
 impl ErrorFigures {
     /// In the unit to which `unit` takes metres.
-    pub fn of(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
+    pub fn new(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
         Self {
             mean: unit(summary.average_m),
             median: unit(summary.median_m),
@@ -132,7 +132,7 @@ fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Fail
     let task = FitTask::new(&rig.setup, &recording).seed(seed);
     let evaluation = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds())
         .watch(|watch| cross_validate(&rig.estimator, task.watch(watch), folds))
-        .map_err(|error| Failure::of(&error))?;
+        .map_err(|error| Failure::from_error(&error))?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
@@ -187,8 +187,8 @@ fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<Por
         Ok(PortionErrors {
             portion: name,
             count: summary.count,
-            error_mm: ErrorFigures::of(&summary, |error_m| error_m * 1e3),
-            error_percent: ErrorFigures::of(&summary, percent),
+            error_mm: ErrorFigures::new(&summary, |error_m| error_m * 1e3),
+            error_percent: ErrorFigures::new(&summary, percent),
         })
     });
     errors.collect()
@@ -211,7 +211,7 @@ fn print(
         format!("{:.3} ({:.2})", of(&errors.error_mm), of(&errors.error_percent))
     };
     output::say(
-        Table::of(errors)
+        Table::from_rows(errors)
             .column("error, mm (% of length)", |errors| errors.portion.clone())
             .column("contacts", |errors| errors.count.to_string())
             .column("average", |errors| cell(errors, |figures| figures.mean))

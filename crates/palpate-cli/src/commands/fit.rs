@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let task = FitTask::new(&rig.setup, &recording).seed(arguments.seed);
     let locator = Observer::of_rounds(rig.estimator.most_rounds())
         .watch(|watch| rig.estimator.fit_task(task.watch(watch)))
-        .map_err(|error| Failure::of(&error))?;
+        .map_err(|error| Failure::from_error(&error))?;
     let training = locator.training_outcome();
     if let Some(TrainingOutcome { status: TrainingStatus::Diverged, epochs, .. }) = training {
         let epochs = format_count(u64::from(epochs));
@@ -84,7 +84,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     }
     let go_on = |_| !progress::interrupted();
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
-    let choice = choose(task).map_err(|error| Failure::of(&error))?;
+    let choice = choose(task).map_err(|error| Failure::from_error(&error))?;
     let errors: Vec<String> = choice
         .mean_errors_m
         .iter()

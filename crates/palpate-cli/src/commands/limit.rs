@@ -147,7 +147,7 @@ fn a_few(extent: Extent) -> Vec<Position> {
 }
 
 impl Limits<'_> {
-    fn at(&self, position: Position) -> [Option<Bound>; 2] {
+    fn bounds_at(&self, position: Position) -> [Option<Bound>; 2] {
         let contact = Contact { position, force_n: self.force_n };
         [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force))
     }
@@ -183,7 +183,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
         }
     };
     let at = |&position: &Position| {
-        let [known, unknown] = limits.at(position);
+        let [known, unknown] = limits.bounds_at(position);
         object! {
             "x_mm": position.x_m * 1e3,
             "y_mm": position.y_m * 1e3,
@@ -247,8 +247,8 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
 
 fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
     let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
-    let rows = limits.listed.iter().map(|&position| (position, limits.at(position)));
-    let table = Table::of(rows)
+    let rows = limits.listed.iter().map(|&position| (position, limits.bounds_at(position)));
+    let table = Table::from_rows(rows)
         .column("limit, mm", |(position, _)| extent.place_in_words(*position))
         .column("force known", |(_, [known, _])| limit(*known))
         .column("force unknown", |(_, [_, unknown])| limit(*unknown))
@@ -271,7 +271,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
             let bound = limits.limit.at(Contact { position, force_n: limits.force_n }, force);
             figure(bound.map(|bound| bound.sd_position_m * 1e3))
         };
-        let table = Table::of(rows.iter().copied()).column(format!("limit, mm, {name}"), |row| {
+        let table = Table::from_rows(rows.iter().copied()).column(format!("limit, mm, {name}"), |row| {
             row.first().map_or(String::new(), |at| format!("y {}", format_length_mm(at.y_m)))
         });
         let table = columns.iter().enumerate().fold(table, |table, (i, at)| {
@@ -279,7 +279,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
         });
         output::say(format!("{table}\n"))?;
     }
-    let table = Table::of([]).column("limit, mm", |()| String::new());
+    let table = Table::from_rows([]).column("limit, mm", |()| String::new());
     let table = ["force known", "force unknown", ""]
         .into_iter()
         .fold(table, |t, name| t.column(name, |()| String::new()));

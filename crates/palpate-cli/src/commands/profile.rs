@@ -112,7 +112,7 @@ impl Printer<'_> {
         if let (1, Some(path)) = (self.told, &self.arguments.report) {
             self.write_report(reading, &profile, limits.as_deref(), path)?;
         }
-        let told = JsonProfile::of(self.profiler, &profile, limits.as_deref(), self.truth, line);
+        let told = JsonProfile::new(self.profiler, &profile, limits.as_deref(), self.truth, line);
         if self.arguments.json {
             let json = serde_json::to_string(&told).map_err(Complaint::new)?;
             return output::say(json);
@@ -252,7 +252,7 @@ impl Interval {
 }
 
 impl JsonProfile {
-    fn of(
+    fn new(
         profiler: &Profiler,
         profile: &LoadProfile,
         limits: Option<&[PatchLimit]>,
@@ -278,7 +278,7 @@ impl JsonProfile {
             loads: loads
                 .map(|(i, load)| JsonPatch::of_load(load, limit(of_truth.as_deref(), i), extent))
                 .collect(),
-            profile: (0..profile.cells.len()).map(|cell| JsonCell::of(profile, cell)).collect(),
+            profile: (0..profile.cells.len()).map(|cell| JsonCell::new(profile, cell)).collect(),
             residuals: profile.residuals.clone(),
             extent,
         }
@@ -335,7 +335,7 @@ impl<T> JsonPatch<T> {
         let limit = |limit: Option<f64>| limit.map_or_else(|| "–".to_owned(), |limit| format!("{limit:.3}"));
         let across =
             |row: &Self, of: &dyn Fn(&Across<T>) -> String| row.across.as_ref().map_or(String::new(), of);
-        let table = Table::of(rows.iter().zip(1..)).column(what, |(_, number)| number.to_string());
+        let table = Table::from_rows(rows.iter().zip(1..)).column(what, |(_, number)| number.to_string());
         let table = match extent {
             Extent::Line { .. } => table
                 .column("stretch, mm", |(row, _)| stretch(row.stretch_mm))
@@ -357,7 +357,7 @@ impl<T> JsonPatch<T> {
 }
 
 impl JsonCell {
-    fn of(profile: &LoadProfile, cell: usize) -> Self {
+    fn new(profile: &LoadProfile, cell: usize) -> Self {
         let extent = profile.cells.extent;
         let per_mm = match extent {
             Extent::Line { .. } => 1e-3,

@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_err(|error| complaint(&error, &name, &text))?;
     let (outcomes, facts) = train(&prepared, options, &out, arguments)?;
 
-    let results = StudyResults::of(&outcomes, &prepared);
+    let results = StudyResults::new(&outcomes, &prepared);
     let file = ResultsFile {
         run: &facts,
         results: &results,
@@ -191,13 +191,13 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     output::say("Medians over the seeds (5th to 95th percentile)\n")?;
     output::say(arms_table(&file.results.arms))?;
     if let Some(figures) = &file.published {
-        let Agreement { agreeing, of } = Agreement::among(figures);
-        output::say(format!("\nPublished against replicated: {agreeing} of {of} agree\n"))?;
+        let Agreement { agreeing, compared } = Agreement::new(figures);
+        output::say(format!("\nPublished against replicated: {agreeing} of {compared} agree\n"))?;
         let show = |figure: &PublishedFigure, value: f64| {
             if figure.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
         };
         output::say(
-            Table::of(figures)
+            Table::from_rows(figures)
                 .column("figure", |figure| format!("{}: {}", figure.arm, figure.what))
                 .column("published", |figure| show(figure, figure.published))
                 .column("ours", |figure| {
@@ -211,7 +211,7 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     if let Some(claims) = &file.claims {
         output::say("\nThe paper's claims, in the medians and in the share of single seeds\n")?;
         output::say(
-            Table::of(claims)
+            Table::from_rows(claims)
                 .column("claim", |claim| format!("{} {}", claim.id, short(claim.claim)))
                 .column("verdict", |claim| if claim.holds { "holds" } else { "DOES NOT HOLD" }.to_owned())
                 .column("seeds", |claim| format!("{:.0} %", 100.0 * claim.share_of_seeds)),
@@ -230,7 +230,7 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
 
 /// Every arm a row; a column only where some arm fills it.
 fn arms_table(arms: &[ArmResults]) -> String {
-    let mut table = Table::of(arms);
+    let mut table = Table::from_rows(arms);
     for (heading, of) in arm_columns(arms) {
         if arms.iter().any(|arm| of(arm).is_some()) {
             table = table.column(heading, |arm| of(arm).unwrap_or_else(|| "–".to_owned()));

@@ -235,7 +235,7 @@ impl Stream<'_> {
         }
         let mm = |error_m: f64| format!("{:.3}", error_m * 1e3);
         let percent = |share: f64| format!("{:.1}", share * 100.0);
-        let table = Table::of(errors)
+        let table = Table::from_rows(errors)
             .column("average error, mm", |(name, _)| (*name).to_owned())
             .column("contacts", |(_, errors)| errors.tracked.to_string())
             .column("track", |(_, errors)| mm(errors.track_m))

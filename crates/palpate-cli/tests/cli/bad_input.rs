@@ -132,7 +132,7 @@ fn arms_are_refused_at_the_place() {
 fn studies_are_refused_at_the_place() {
     let study = |from: &str, to: &str| replaced(PAPER_STUDY, from, to);
     let cases = [
-        ("no arms", Toml::of(PAPER_STUDY).remove("arm").to_string()),
+        ("no arms", Toml::parse(PAPER_STUDY).remove("arm").to_string()),
         ("two arms of one name", study("position-20", "position-10")),
         ("0 seeds", study("seeds = 100", "seeds = 0")),
         ("a typo in an arm", study("training = {", "trainin = {")),

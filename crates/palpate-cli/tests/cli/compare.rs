@@ -10,13 +10,13 @@ use std::path::Path;
 /// Writes the same rig with another estimator, `other.toml`.
 fn with_estimator(folder: &Path, kind: &str) {
     let rig = fs::read_to_string(folder.join("rig.toml")).unwrap();
-    fs::write(folder.join("other.toml"), Toml::of(&rig).estimator(kind).to_string()).unwrap();
+    fs::write(folder.join("other.toml"), Toml::parse(&rig).estimator(kind).to_string()).unwrap();
 }
 
 #[test]
 fn every_estimator_is_held_against_the_limit() {
     // The paper's network takes its time; a short training will do.
-    let folder = folder(Toml::of(NOISY_BEAM).estimator("network").add("estimator.max_epochs", 5_000));
+    let folder = folder(Toml::parse(NOISY_BEAM).estimator("network").add("estimator.max_epochs", 5_000));
     let arguments = ["compare", "rig.toml", "--json", "--out", "report", "--calibrations", "2"];
     let found: Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
     let estimators = found["estimators"].as_array().unwrap();
@@ -87,7 +87,7 @@ fn every_estimator_is_fitted_inspected_and_locates() {
 #[test]
 fn auto_takes_the_best_and_says_why() {
     // Networks take their time; two presses at each position do.
-    let folder = folder(Toml::of(NOISY_BEAM).set("training.repeats", 2));
+    let folder = folder(Toml::parse(NOISY_BEAM).set("training.repeats", 2));
     with_estimator(folder.path(), "auto");
     let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]);
     let why = String::from_utf8(fitted.stderr.clone()).unwrap();

@@ -16,7 +16,7 @@ fn designs(rig: &str, arguments: &[&str]) -> Value {
 }
 
 /// The example with other keys in its [design].
-fn with(keys: &str) -> String {
+fn rig_with(keys: &str) -> String {
     format!("{SENSOR_DESIGN}\n{keys}\n")
 }
 
@@ -112,7 +112,7 @@ fn a_rig_without_a_design_is_designed_too() {
 
 #[test]
 fn a_plate_has_maps() {
-    let coarse = Toml::of(PLATE).add("surface.elements", 24);
+    let coarse = Toml::parse(PLATE).add("surface.elements", 24);
     let rig =
         format!("{coarse}\n[design]\nsites = \"50 mm\"\ncontacts = {{ every = \"50 mm\" }}\ncount = 4\n");
     let folder = folder(rig);
@@ -129,13 +129,17 @@ fn a_plate_has_maps() {
 #[test]
 fn what_cannot_be_designed_is_refused_in_words() {
     let forceless = replaced(SENSOR_DESIGN, "force = \"3 N\"", "");
-    let clean = Toml::of(SENSOR_DESIGN).set("sensors.noise", "0 um").to_string();
+    let clean = Toml::parse(SENSOR_DESIGN).set("sensors.noise", "0 um").to_string();
     let cases: [(&str, &str, &[&str]); 11] = [
-        ("a spacing that leaves no room", &with("spacing = \"60 mm\""), &[]),
-        ("a budget too small", &with("budget = 7"), &[]),
-        ("a zone that leaves too few sites", &with("keep_out = [{ from = \"0 mm\", to = \"380 mm\" }]"), &[]),
-        ("a misspelled key", &with("spacin = \"60 mm\""), &[]),
-        ("a must-have off the beam", &with("must_have = [{ at = \"401 mm\" }]"), &[]),
+        ("a spacing that leaves no room", &rig_with("spacing = \"60 mm\""), &[]),
+        ("a budget too small", &rig_with("budget = 7"), &[]),
+        (
+            "a zone that leaves too few sites",
+            &rig_with("keep_out = [{ from = \"0 mm\", to = \"380 mm\" }]"),
+            &[],
+        ),
+        ("a misspelled key", &rig_with("spacin = \"60 mm\""), &[]),
+        ("a must-have off the beam", &rig_with("must_have = [{ at = \"401 mm\" }]"), &[]),
         ("no force", &forceless, &[]),
         ("clean sensors", &clean, &[]),
         ("a surface without a model", FSI_WATER, &[]),

@@ -78,7 +78,7 @@ fn the_digit_estimator_is_compared_and_the_shape_is_its_own() {
     let ratio = estimators[0]["limit_ratio"].as_f64().unwrap();
     assert!((0.8..1.2).contains(&ratio), "{ratio}");
 
-    let beam = Toml::of(PAPER).estimator("closed-form").to_string();
+    let beam = Toml::parse(PAPER).estimator("closed-form").to_string();
     fs::write(folder.path().join("paper.toml"), beam).unwrap();
     said(&run(folder.path(), &["fit", "paper.toml", "-o", "beam.json"]));
     let refused =

@@ -30,7 +30,7 @@ fn with_an_unknown_force_the_warnings_are_others() {
     assert!(warnings[0]["value"].as_f64().unwrap() > 8000.0);
     assert!(warnings[0]["help"].as_str().unwrap().contains("reaction sensors"));
     // A rig without a force does not know it.
-    let without = Toml::of(PAPER).remove("contact").remove("training");
+    let without = Toml::parse(PAPER).remove("contact").remove("training");
     assert_eq!(curve(without, &["--force", "3 N"])["warnings"], unknown["warnings"]);
 }
 
@@ -56,7 +56,7 @@ fn the_json_has_the_papers_figures() {
 
 #[test]
 fn what_the_readings_do_not_tell_is_null() {
-    let one = Toml::of(PAPER).set("sensors.count", 1).to_string();
+    let one = Toml::parse(PAPER).set("sensors.count", 1).to_string();
     let found = curve(&one, &[]);
     assert!(
         found["unknown_force"].is_null() && found["positions"][0]["unknown_force_mm"].is_null(),
@@ -67,7 +67,7 @@ fn what_the_readings_do_not_tell_is_null() {
 
 #[test]
 fn a_dead_sensor_is_left_out() {
-    let dead = Toml::of(PAPER).add("sensors.dead", Array::from_iter([4]));
+    let dead = Toml::parse(PAPER).add("sensors.dead", Array::from_iter([4]));
     let (whole, rest) = (curve(PAPER, &[]), curve(dead, &[]));
     assert_eq!((&rest["sensors"], &rest["sensors_alive"]), (&Value::from(8), &Value::from(7)));
     let mean = |found: &Value| found["known_force"]["mean_mm"].as_f64().unwrap();
@@ -88,10 +88,10 @@ fn the_report_and_its_pictures_are_written() {
 
 #[test]
 fn benches_without_a_limit_are_refused_in_words() {
-    let clean = Toml::of(PAPER).set("sensors.noise", "0 um").to_string();
-    let forceless = Toml::of(PAPER).remove("contact").remove("training").to_string();
+    let clean = Toml::parse(PAPER).set("sensors.noise", "0 um").to_string();
+    let forceless = Toml::parse(PAPER).remove("contact").remove("training").to_string();
     let dead =
-        Toml::of(PAPER).set("sensors.count", 2).add("sensors.dead", Array::from_iter([1, 2])).to_string();
+        Toml::parse(PAPER).set("sensors.count", 2).add("sensors.dead", Array::from_iter([1, 2])).to_string();
     let cases: [(&str, &str, &[&str]); 8] = [
         ("clean sensors", &clean, &[]),
         ("a surface without a model", FSI_WATER, &[]),

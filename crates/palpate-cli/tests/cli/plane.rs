@@ -77,7 +77,7 @@ fn a_plate_is_simulated_fitted_located_and_evaluated() {
 
 #[test]
 fn the_papers_network_learns_the_plate_a_little() {
-    let folder = folder(Toml::of(PLATE).estimator("network").add("estimator.max_epochs", 300));
+    let folder = folder(Toml::parse(PLATE).estimator("network").add("estimator.max_epochs", 300));
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "network.locator"]));
     let found = json(folder.path(), &["evaluate", "network.locator"]);
     // Better than the middle of the plate, which is 115 mm off on average.
@@ -86,7 +86,7 @@ fn the_papers_network_learns_the_plate_a_little() {
 
 #[test]
 fn a_count_does_not_say_where_on_a_plane() {
-    let folder = folder(Toml::of(PLATE).remove("sensors.grid").add("sensors.count", 9));
+    let folder = folder(Toml::parse(PLATE).remove("sensors.grid").add("sensors.count", 9));
     let refused = complained(&run(folder.path(), &["inspect", "rig.toml"]), 2);
     assert!(refused.contains("`count` does not go with a plane"), "{refused}");
 }

@@ -47,7 +47,7 @@ fn the_papers_network_gains_by_chebyshevs_nodes_alone() {
 #[test]
 fn a_plate_is_pressed_on_a_grid_or_better() {
     // An estimator that is fitted at once.
-    let folder = folder(Toml::of(PLATE).estimator("neighbours"));
+    let folder = folder(Toml::parse(PLATE).estimator("neighbours"));
     let arguments = ["--count", "9", "--trials", "1", "--calibrations", "1", "--verify", "1", "--json"];
     let found: Value = serde_json::from_str(&said(&design(folder.path(), &arguments))).unwrap();
     let designs = found["designs"].as_array().unwrap();
@@ -87,7 +87,7 @@ fn what_cannot_be_designed_is_refused_in_words() {
         (TRAINING_POSITIONS, &["--data", "few.csv"]),
         (TRAINING_POSITIONS, &["--data", "nowhere.csv"]),
         (TRAINING_POSITIONS, &["-o", "no/such/rig.toml"]),
-        (&Toml::of(TRAINING_POSITIONS).estimator("auto").to_string(), &[]),
+        (&Toml::parse(TRAINING_POSITIONS).estimator("auto").to_string(), &[]),
     ];
     let shown: Vec<String> = cases.iter().map(|(rig, arguments)| refused(rig, arguments)).collect();
     insta::assert_snapshot!(shown.join("\n"));

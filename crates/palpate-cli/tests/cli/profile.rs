@@ -65,7 +65,7 @@ fn people_get_a_table() {
 
 #[test]
 fn readings_are_told_as_they_come_by_rigs_and_locators() {
-    let folder = folder(Toml::of(LOAD_PROFILE).remove("load").to_string() + PRESSED);
+    let folder = folder(Toml::parse(LOAD_PROFILE).remove("load").to_string() + PRESSED);
     let press = ["simulate", "rig.toml", "--every", "150 mm", "-o", "presses.csv", "--seed", "2"];
     said(&run(folder.path(), &press));
     let mut csv = fs::read_to_string(folder.path().join("presses.csv")).unwrap();
@@ -98,8 +98,8 @@ fn readings_are_told_as_they_come_by_rigs_and_locators() {
 
 #[test]
 fn what_cannot_be_told_is_refused_in_words() {
-    let unloaded = Toml::of(LOAD_PROFILE).remove("load").to_string();
-    let clean = Toml::of(LOAD_PROFILE).set("sensors.0.noise", "0 um").to_string();
+    let unloaded = Toml::parse(LOAD_PROFILE).remove("load").to_string();
+    let clean = Toml::parse(LOAD_PROFILE).set("sensors.0.noise", "0 um").to_string();
     let cases: [(&str, &str, &[&str]); 3] = [
         ("nothing to simulate", &unloaded, &[]),
         ("clean sensors", &clean, &[]),

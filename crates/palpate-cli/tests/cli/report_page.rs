@@ -15,12 +15,12 @@ use tempfile::TempDir;
 
 /// The pages of the paper's study, cut down to a few epochs: as the paper's, and as any study's.
 fn pages() -> [Vec<ReportFile>; 2] {
-    let toml = Toml::of(paper::STUDY_TOML).set("estimator.max_epochs", 50).to_string();
+    let toml = Toml::parse(paper::STUDY_TOML).set("estimator.max_epochs", 50).to_string();
     let study = PreparedStudy::new(Study::from_toml(&toml).unwrap(), Watch::NONE).unwrap();
     let seeds = 2;
     let options = RunOptions { seeds, threads: 1 };
     let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
-    let results = StudyResults::of(&outcomes, &study);
+    let results = StudyResults::new(&outcomes, &study);
     let run = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
         study: study.study.name.clone(),

@@ -17,7 +17,7 @@ fn results(folder: &Path, out: &str) -> Value {
 
 /// The paper's study with its arms of ten training positions only: seconds instead of minutes.
 fn arms_of_ten() -> Toml {
-    Toml::of(PAPER_STUDY).set("name", "tens").keep_arms(|name| name.ends_with("-10"))
+    Toml::parse(PAPER_STUDY).set("name", "tens").keep_arms(|name| name.ends_with("-10"))
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn the_papers_study_replicates_what_it_is_known_to() {
 fn without_biases_the_papers_iterations_come_out() {
     let folder = tempfile::tempdir().unwrap();
     let asked = ["as-replicated-10", "as-replicated-30", "no-biases-10", "no-biases-30"];
-    let study = Toml::of(LEFT_OPEN_STUDY).keep_arms(|name| asked.contains(&name)).to_string();
+    let study = Toml::parse(LEFT_OPEN_STUDY).keep_arms(|name| asked.contains(&name)).to_string();
     fs::write(folder.path().join("left-open.toml"), study).unwrap();
     said(&run(folder.path(), &["study", "left-open.toml", "--seeds", "3", "--out", "out"]));
     let results = results(folder.path(), "out");
@@ -95,7 +95,7 @@ fn without_biases_the_papers_iterations_come_out() {
 /// Runs such a study with one seed an arm, and gives a figure's median of each wanted arm.
 fn medians(name: &str, study: &str, wanted: &[&str], figure: &str) -> Vec<f64> {
     let folder = tempfile::tempdir().unwrap();
-    let study = Toml::of(study).keep_arms(|name| wanted.contains(&name)).to_string();
+    let study = Toml::parse(study).keep_arms(|name| wanted.contains(&name)).to_string();
     fs::write(folder.path().join("study.toml"), study).unwrap();
     let json = said(&run(folder.path(), &["study", "study.toml", "--seeds", "1", "--json"]));
     assert!(folder.path().join("palpate-out").join(name).join("report.html").exists());
@@ -135,7 +135,7 @@ fn reactions_cure_the_blind_edges() {
 fn a_study_without_networks_keeps_none_and_gives_the_same_again() {
     let folder = tempfile::tempdir().unwrap();
     let wanted = ["unknown-deflection-8", "known-reaction-2"];
-    let study = Toml::of(SENSOR_KINDS_STUDY).keep_arms(|name| wanted.contains(&name)).to_string();
+    let study = Toml::parse(SENSOR_KINDS_STUDY).keep_arms(|name| wanted.contains(&name)).to_string();
     fs::write(folder.path().join("kinds.toml"), study).unwrap();
     let arguments = ["study", "kinds.toml", "--seeds", "2", "--threads"];
     let table = said(&run(folder.path(), &[&arguments[..], &["1", "--out", "one"]].concat()));

@@ -8,7 +8,7 @@ use std::fs;
 
 /// The rig without its known force: the presses that calibrate keep it.
 fn unknown_force(rig: &str) -> Toml {
-    let mut rig = Toml::of(rig);
+    let mut rig = Toml::parse(rig);
     let force = rig.text_at("contact.force");
     rig.remove("contact").add("training.force", force)
 }
@@ -53,7 +53,7 @@ fn the_continuous_beam_is_located_at_the_limit() {
     assert!((0.9..1.1).contains(&known), "{known}");
     let unknown = limit_ratio(unknown_force(CONTINUOUS_BEAM));
     assert!((0.9..1.1).contains(&unknown), "{unknown}");
-    let from_recording = limit_ratio(Toml::of(CONTINUOUS_BEAM).add("estimator.from", "recording"));
+    let from_recording = limit_ratio(Toml::parse(CONTINUOUS_BEAM).add("estimator.from", "recording"));
     assert!((0.9..1.2).contains(&from_recording), "{from_recording}");
 }
 
@@ -69,7 +69,7 @@ fn the_limit_of_the_cantilever_is_that_of_its_clamp() {
 
 #[test]
 fn a_contact_over_a_rigid_support_is_said_not_to_show() {
-    let folder = folder(Toml::of(CONTINUOUS_BEAM).remove("sensors.1"));
+    let folder = folder(Toml::parse(CONTINUOUS_BEAM).remove("sensors.1"));
     let found = said(&run(folder.path(), &["limit", "rig.toml"]));
     let faint: Vec<&str> = found.lines().filter(|line| line.contains("faint")).collect();
     assert!(faint.iter().any(|line| line.contains("500 mm")), "{found}");
@@ -84,7 +84,7 @@ fn every_estimator_but_the_closed_form_works_on_it() {
     let folder = folder(CONTINUOUS_BEAM);
     said(&run(folder.path(), &["simulate", "rig.toml", "-o", "presses.csv", "--every", "25 mm"]));
     for kind in ["influence", "gaussian-process", "network-lm", "neighbours", "centroid"] {
-        let other = Toml::of(CONTINUOUS_BEAM).estimator(kind).to_string();
+        let other = Toml::parse(CONTINUOUS_BEAM).estimator(kind).to_string();
         fs::write(folder.path().join("other.toml"), other).unwrap();
         said(&run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]));
         let inspected = said(&run(folder.path(), &["inspect", "locator.json"]));
@@ -97,7 +97,7 @@ fn every_estimator_but_the_closed_form_works_on_it() {
         let bound_mm = if kind == "influence" { 1.0 } else { 150.0 };
         assert!(mean_mm < bound_mm, "{kind}: {mean_mm}");
     }
-    let simple = Toml::of(CONTINUOUS_BEAM).estimator("closed-form").to_string();
+    let simple = Toml::parse(CONTINUOUS_BEAM).estimator("closed-form").to_string();
     fs::write(folder.path().join("other.toml"), simple).unwrap();
     let refused = complained(&run(folder.path(), &["fit", "other.toml", "-o", "refused.json"]), 2);
     assert!(refused.contains("two simple supports"), "{refused}");

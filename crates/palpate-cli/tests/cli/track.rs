@@ -72,7 +72,7 @@ fn what_cannot_be_tracked_is_refused_in_words() {
     let without_time = complained(&run(folder.path(), &["track", "locator.json", "presses.csv"]), 2);
     assert!(without_time.contains("--rate"), "{without_time}");
     said(&run(folder.path(), &["track", "locator.json", "presses.csv", "--rate", "100 Hz"]));
-    let neighbours = Toml::of(MOVING_LOAD).estimator("neighbours").to_string();
+    let neighbours = Toml::parse(MOVING_LOAD).estimator("neighbours").to_string();
     fs::write(folder.path().join("other.toml"), neighbours).unwrap();
     said(&run(folder.path(), &["fit", "other.toml", "-o", "other.json"]));
     let other = complained(&run(folder.path(), &["track", "other.json", "moving.csv"]), 2);
@@ -114,7 +114,7 @@ fn inertia_is_refused_where_the_mode_is_not_known() {
 #[test]
 fn a_contact_is_followed_over_a_plate() {
     // A mesh that is solved at once, and a short way.
-    let folder = folder(Toml::of(MOVING_PLATE).add("surface.elements", 24).set("motion.passes", 1));
+    let folder = folder(Toml::parse(MOVING_PLATE).add("surface.elements", 24).set("motion.passes", 1));
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
     let simulate = ["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"];
     let told = said(&run(folder.path(), &simulate));

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 /// A folder with the paper's rig and a locator fitted to it.
 fn paper_bench() -> TempDir {
     // Without its sensors' noise, the figures are the paper's.
-    let folder = folder(Toml::of(PAPER).set("sensors.noise", "0 um"));
+    let folder = folder(Toml::parse(PAPER).set("sensors.noise", "0 um"));
     said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
     folder
 }

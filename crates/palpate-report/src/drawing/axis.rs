@@ -212,7 +212,7 @@ pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
 
 /// Those on the axis that leave each other room.
 fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
-    let on_axis = asked.iter().filter(|(value, _)| within(axis, *value));
+    let on_axis = asked.iter().filter(|(value, _)| is_on_axis(axis, *value));
     let mut asked: Vec<Tick> =
         on_axis.map(|(value, label)| Tick { value: *value, label: label.clone() }).collect();
     asked.sort_by(|a, b| a.value.total_cmp(&b.value));
@@ -276,11 +276,11 @@ fn multiples_of_decades(axis: &AxisScale, multiples: &[f64], stride: i32) -> Vec
     (first..=last)
         .filter(|decade| decade.rem_euclid(stride) == 0)
         .flat_map(|decade| multiples.iter().map(move |multiple| multiple * 10_f64.powi(decade)))
-        .filter(|&value| within(axis, value))
+        .filter(|&value| is_on_axis(axis, value))
         .collect()
 }
 
-fn within(axis: &AxisScale, value: f64) -> bool {
+fn is_on_axis(axis: &AxisScale, value: f64) -> bool {
     (-1e-6..=1.0 + 1e-6).contains(&axis.tick_share(value))
 }
 

@@ -62,22 +62,22 @@ pub struct Series {
 impl Series {
     /// A solid line through `points`.
     pub fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
-        Series::of(label, colour, SeriesKind::Line { points, stroke: Stroke::Solid })
+        Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Solid })
     }
 
     /// A broken line through `points`.
     pub fn dashes(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
-        Series::of(label, colour, SeriesKind::Line { points, stroke: Stroke::Dashed })
+        Series::new(label, colour, SeriesKind::Line { points, stroke: Stroke::Dashed })
     }
 
     /// A translucent area between two curves.
     pub fn band(label: impl Into<String>, colour: usize, points: Vec<BandPoint>) -> Self {
-        Series::of(label, colour, SeriesKind::Band { points })
+        Series::new(label, colour, SeriesKind::Band { points })
     }
 
     /// Unconnected markers.
     pub fn markers(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>, marker: Marker) -> Self {
-        Series::of(label, colour, SeriesKind::Points { points, marker })
+        Series::new(label, colour, SeriesKind::Points { points, marker })
     }
 
     /// Unconnected markers with a vertical bar.
@@ -87,7 +87,7 @@ impl Series {
         points: Vec<ErrorPoint>,
         marker: Marker,
     ) -> Self {
-        Series::of(label, colour, SeriesKind::ErrorBars { points, marker })
+        Series::new(label, colour, SeriesKind::ErrorBars { points, marker })
     }
 
     /// Whether it is an area between two curves.
@@ -95,7 +95,7 @@ impl Series {
         matches!(self.kind, SeriesKind::Band { .. })
     }
 
-    fn of(label: impl Into<String>, colour: usize, kind: SeriesKind) -> Self {
+    fn new(label: impl Into<String>, colour: usize, kind: SeriesKind) -> Self {
         Series { label: label.into(), colour, kind }
     }
 }
@@ -221,7 +221,7 @@ pub(crate) struct Extremes {
 }
 
 impl Extremes {
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+    pub fn from_values(values: impl IntoIterator<Item = f64>) -> Self {
         let finite = values.into_iter().filter(|value| value.is_finite());
         let wider = |extremes: Option<Self>, value: f64| {
             let Self { least, greatest } = extremes.unwrap_or(Self { least: value, greatest: value });
@@ -231,8 +231,8 @@ impl Extremes {
     }
 
     /// Of the heights of all lines.
-    pub fn of_lines(series: &[Series]) -> Self {
-        Self::of(series.iter().flat_map(|series| match &series.kind {
+    pub fn from_lines(series: &[Series]) -> Self {
+        Self::from_values(series.iter().flat_map(|series| match &series.kind {
             SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),
             _ => Vec::new(),
         }))
@@ -255,10 +255,10 @@ mod tests {
 
     #[test]
     fn what_is_no_number_does_not_count() {
-        let extremes = Extremes::of([3.0, f64::NAN, 0.3, f64::INFINITY]);
+        let extremes = Extremes::from_values([3.0, f64::NAN, 0.3, f64::INFINITY]);
         assert_eq!(extremes, Extremes { least: 0.3, greatest: 3.0 });
         assert!(extremes.are_far_apart());
-        assert!(!Extremes::of([0.0, 3.0]).are_far_apart());
-        assert_eq!(Extremes::of([f64::NAN]), Extremes::default());
+        assert!(!Extremes::from_values([0.0, 3.0]).are_far_apart());
+        assert_eq!(Extremes::from_values([f64::NAN]), Extremes::default());
     }
 }

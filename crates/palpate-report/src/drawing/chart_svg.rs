@@ -51,7 +51,7 @@ impl Painter<'_> {
             else {
                 continue;
             };
-            let (left, right) = (self.layout.across(start.max(0.0)), self.layout.across(end.min(1.0)));
+            let (left, right) = (self.layout.x_px(start.max(0.0)), self.layout.x_px(end.min(1.0)));
             if left < right {
                 self.svg.rectangle(Rect { left, right, ..plot }, BLACK.with_opacity(SPAN_OPACITY));
             }
@@ -61,11 +61,11 @@ impl Painter<'_> {
     fn grid(&mut self) {
         let Layout { x, y, x_ticks, y_ticks, plot, .. } = self.layout;
         let column = |value| {
-            let across = self.layout.across(x.tick_share(value));
+            let across = self.layout.x_px(x.tick_share(value));
             [(across, plot.top), (across, plot.bottom)]
         };
         let row = |value| {
-            let up = self.layout.up(y.tick_share(value));
+            let up = self.layout.y_px(y.tick_share(value));
             [(plot.left, up), (plot.right, up)]
         };
         let minor_columns = minor_ticks(x, x_ticks).into_iter().map(column);
@@ -89,13 +89,13 @@ impl Painter<'_> {
                     .layout
                     .x
                     .share(x)
-                    .map(|share| self.layout.across(share))
+                    .map(|share| self.layout.x_px(share))
                     .map(|x| [(x, plot.top), (x, plot.bottom)]),
                 Mark::HorizontalLine { y, .. } => self
                     .layout
                     .y
                     .share(y)
-                    .map(|share| self.layout.up(share))
+                    .map(|share| self.layout.y_px(share))
                     .map(|y| [(plot.left, y), (plot.right, y)]),
                 Mark::Span { .. } => None,
             };

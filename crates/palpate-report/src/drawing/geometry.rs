@@ -74,8 +74,8 @@ impl Rect {
                 (true, false) => leave = leave.min(at_start / (at_start - at_end)),
             }
         }
-        let first = if enter > 0.0 { between(start, end, enter) } else { start };
-        let last = if leave < 1.0 { between(start, end, leave) } else { end };
+        let first = if enter > 0.0 { interpolate(start, end, enter) } else { start };
+        let last = if leave < 1.0 { interpolate(start, end, leave) } else { end };
         (enter <= leave).then_some((first, last))
     }
 
@@ -89,7 +89,7 @@ impl Rect {
             for corner in corners {
                 let (before, here) = (inside(previous), inside(corner));
                 if (before >= 0.0) != (here >= 0.0) {
-                    clipped.push(between(previous, corner, before / (before - here)));
+                    clipped.push(interpolate(previous, corner, before / (before - here)));
                 }
                 if here >= 0.0 {
                     clipped.push(corner);
@@ -101,6 +101,6 @@ impl Rect {
     }
 }
 
-fn between(start: Point, end: Point, share: f64) -> Point {
+fn interpolate(start: Point, end: Point, share: f64) -> Point {
     (start.0 + share * (end.0 - start.0), start.1 + share * (end.1 - start.1))
 }

@@ -208,7 +208,7 @@ impl Layout {
 fn colours(map: &HeatMap) -> AxisScale {
     let all = map.panels.iter().flat_map(|panel| panel.values.iter().copied());
     let finite = all.filter(|value| value.is_finite());
-    let extremes = Extremes::of(finite.map(|value| value.min(map.most)));
+    let extremes = Extremes::from_values(finite.map(|value| value.min(map.most)));
     let Extremes { least, greatest } = extremes;
     let from = if extremes.are_far_apart() { least } else { least.min(0.0) };
     AxisScale::new(&extremes.axis("").from_to(from, greatest), &[least, greatest])

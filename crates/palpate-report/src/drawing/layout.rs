@@ -87,7 +87,7 @@ impl<'a> Layout<'a> {
 
     /// Point of the drawing for a point of the data; `None` where an axis cannot show it.
     pub fn place(&self, x: f64, y: f64) -> Option<Point> {
-        Some((self.across(self.x.share(x)?), self.up(self.y.share(y)?)))
+        Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share(y)?)))
     }
 
     /// Point of the drawing for a point of the data; `None` outside the plot.
@@ -97,16 +97,16 @@ impl<'a> Layout<'a> {
 
     /// As [`Layout::place`], but a y that is not positive lies on the low end of a logarithmic axis.
     pub fn place_edge(&self, x: f64, y: f64) -> Option<Point> {
-        Some((self.across(self.x.share(x)?), self.up(self.y.share_or_low_end(y)?)))
+        Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share_or_low_end(y)?)))
     }
 
     /// From a share of the horizontal axis to pixels.
-    pub fn across(&self, share: f64) -> f64 {
+    pub fn x_px(&self, share: f64) -> f64 {
         self.plot.left + share * self.plot.width()
     }
 
     /// From a share of the vertical axis to pixels.
-    pub fn up(&self, share: f64) -> f64 {
+    pub fn y_px(&self, share: f64) -> f64 {
         self.plot.bottom - share * self.plot.height()
     }
 }

@@ -5,7 +5,7 @@ use maud::html;
 use super::Paper;
 use crate::error_lines::{banded, limit_in_words};
 use crate::page::Figure;
-use crate::study_report::{ArmLine, along, error_chart};
+use crate::study_report::{ArmLine, error_chart, spread_by_position};
 use crate::{Axis, Chart, ErrorPoint, Marker, Series, SeriesKind};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_studies::ArmResults;
@@ -49,7 +49,7 @@ impl Paper<'_> {
     pub(super) fn predicted_against_actual(&self) -> Option<Figure> {
         let outcome = self.report.outcome("position-10")?;
         let length_mm = self.report.length_m() * 1e3;
-        let predicted = along(outcome, |located| located.estimate.x_m * 1e3);
+        let predicted = spread_by_position(outcome, |located| located.estimate.x_m * 1e3);
         let ends = vec![(0.0, 0.0), (length_mm, length_mm)];
         let mut series = vec![Series::dashes("predicted = actual", 6, ends)];
         series.extend(banded("predicted, median of the seeds", 1, &predicted, outcome.fits.len() > 1));

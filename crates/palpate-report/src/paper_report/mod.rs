@@ -103,15 +103,15 @@ impl Paper<'_> {
     }
 
     fn agreement(&self) -> Markup {
-        let Agreement { agreeing, of } = Agreement::among(&self.published);
+        let Agreement { agreeing, compared } = Agreement::new(&self.published);
         html! {
-            @if of == 0 {
+            @if compared == 0 {
                 "No arm with a published figure was run, so nothing is compared."
-            } @else if agreeing == of {
-                "All of the " a href="#published" { (counted(of, "published figure", "published figures")) }
+            } @else if agreeing == compared {
+                "All of the " a href="#published" { (counted(compared, "published figure", "published figures")) }
                 " with an arm here agree with the medians found here."
             } @else {
-                b { (agreeing) " of " (counted(of, "published figure", "published figures")) } " "
+                b { (agreeing) " of " (counted(compared, "published figure", "published figures")) } " "
                 a href="#published" { "agree with the medians found here" } "; "
                 a href="#not-replicated" { "those that do not are listed" } "."
             }

@@ -45,7 +45,7 @@ impl Paper<'_> {
 
     pub(super) fn even_table(&self) -> Table {
         let sets = self.sets(|arrangement| *arrangement == Arrangement::Even);
-        Table::of(sets.iter().zip(1..))
+        Table::from_rows(sets.iter().zip(1..))
             .short("set", |(_, number)| number.to_string())
             .numeric("positions", |(set, _)| set.positions.len().to_string())
             .numeric("first, mm", |(set, _)| end(set.positions.first()))
@@ -63,7 +63,7 @@ impl Paper<'_> {
              rule. The middle portion" (middle_in_words(&sets, length_m)) " begins and ends with a training position; dots \
              part it from the edges."
         };
-        Table::of(sets.iter().filter_map(EdgeDense::of))
+        Table::from_rows(sets.iter().filter_map(EdgeDense::from_set))
             .short("set", |row| paper_name(row.set.positions.len(), row.middle))
             .numeric("positions", |row| row.set.positions.len().to_string())
             .numeric("in the middle", |row| row.middle.to_string())
@@ -97,7 +97,7 @@ impl Paper<'_> {
             "Percentage errors of the plain position output with ten training positions, by portion of the beam: what the \
              paper prints, and the median found here (5–95 % of the seeds)."
         };
-        Table::of(rows)
+        Table::from_rows(rows)
             .short("portion", |(_, portion, ..)| stretch(*portion))
             .short("error", |(kind, ..)| *kind)
             .numeric("published, %", |(_, _, key, _)| published(key).map_or(NOTHING.to_owned(), printed))
@@ -137,7 +137,7 @@ struct EdgeDense<'a> {
 }
 
 impl<'a> EdgeDense<'a> {
-    fn of(set: &'a Set<'a>) -> Option<Self> {
+    fn from_set(set: &'a Set<'a>) -> Option<Self> {
         let Arrangement::EdgeDense { middle, portion } = set.training.arrangement else { return None };
         Some(Self { set, middle, edge: (set.positions.len() - middle) / 2, portion })
     }
@@ -196,7 +196,7 @@ impl Paper<'_> {
             "Every figure that the paper prints and that belongs to an arm here, beside the median found here (5–95 % of \
              the seeds)."
         };
-        Table::of(&self.published)
+        Table::from_rows(&self.published)
             .short("arm", |figure| figure.arm)
             .short("figure", |figure| figure.what)
             .numeric("published", |figure| printed(figure))
@@ -222,7 +222,7 @@ impl Paper<'_> {
         let in_words = |claim: &&Claim| {
             html! { (claim.claim) ul { @for part in &claim.parts { li { (part_in_words(part)) } } } }
         };
-        Table::of(&self.claims)
+        Table::from_rows(&self.claims)
             .short("claim", |claim| claim.id)
             .column("wide", "in words, and its parts", in_words)
             .column("short", "verdict", |claim| verdict(claim.holds, "holds", "does not hold"))
@@ -365,7 +365,7 @@ impl Paper<'_> {
         rows.extend(OF_THE_NETWORK.iter().filter_map(|(key, paper)| self.network_row(key, paper)));
         rows.push(row("iteration", "undefined", "one epoch: every training position shown once"));
         rows.push(row("networks of each kind", "one", self.report.seeds_in_words()));
-        Table::of(rows)
+        Table::from_rows(rows)
             .words("setting", |[setting, ..]| setting.clone())
             .words("the paper", |[_, paper, _]| paper.clone())
             .words("this study", |[.., study]| study.clone())

@@ -69,9 +69,9 @@ fn shape_box(element: roxmltree::Node) -> Rect {
         "rect" => {
             Rect { left: of("x"), top: of("y"), right: of("x") + of("width"), bottom: of("y") + of("height") }
         }
-        "circle" => around(&[(of("cx"), of("cy"))], of("r")),
-        "polygon" => around(&points(element), 0.0),
-        "polyline" => around(&points(element), 0.5 * of("stroke-width")),
+        "circle" => bounding_box(&[(of("cx"), of("cy"))], of("r")),
+        "polygon" => bounding_box(&points(element), 0.0),
+        "polyline" => bounding_box(&points(element), 0.5 * of("stroke-width")),
         other => panic!("no drawing holds a {other}"),
     }
 }
@@ -85,7 +85,7 @@ fn points(element: roxmltree::Node) -> Vec<(f64, f64)> {
 }
 
 /// The box of some points, and `margin` around it.
-fn around(points: &[(f64, f64)], margin: f64) -> Rect {
+fn bounding_box(points: &[(f64, f64)], margin: f64) -> Rect {
     let least = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::INFINITY, f64::min) - margin;
     let most = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).fold(f64::NEG_INFINITY, f64::max) + margin;
     Rect { left: least(|at| at.0), right: most(|at| at.0), top: least(|at| at.1), bottom: most(|at| at.1) }

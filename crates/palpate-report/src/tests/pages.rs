@@ -33,7 +33,7 @@ fn run(toml: &str, seeds: u64) -> Run {
     let study = PreparedStudy::new(Study::from_toml(toml).unwrap(), Watch::NONE).unwrap();
     let options = RunOptions { seeds, threads: 1 };
     let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
-    let results = StudyResults::of(&outcomes, &study);
+    let results = StudyResults::new(&outcomes, &study);
     let facts = RunFacts {
         palpate: env!("CARGO_PKG_VERSION"),
         study: study.study.name.clone(),
@@ -158,9 +158,9 @@ fn untrained_networks_are_told_of() {
     let run = run(&quick_paper(), 1);
     let text = shown_text(page(&paper_report(&run.report())));
     assert!(text.contains("12 of 12 networks did not converge"), "{text}");
-    let agreement = paper::Agreement::among(&paper::published_figures(&run.results));
-    assert!(agreement.agreeing < agreement.of);
-    assert_eq!(text.matches("the median found here is").count(), agreement.of - agreement.agreeing);
+    let agreement = paper::Agreement::new(&paper::published_figures(&run.results));
+    assert!(agreement.agreeing < agreement.compared);
+    assert_eq!(text.matches("the median found here is").count(), agreement.compared - agreement.agreeing);
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_part_of_the_papers_arms_gives_the_figures_that_they_allow() {
 fn a_run_that_was_given_up_at_once_still_has_a_report() {
     let mut run = run(&with_arms(&[("only", "{ arrangement = \"even\", count = 5 }")]), 1);
     run.outcomes.iter_mut().for_each(|outcome| outcome.fits.clear());
-    run.results = StudyResults::of(&run.outcomes, &run.study);
+    run.results = StudyResults::new(&run.outcomes, &run.study);
     assert_sound(&paper_report(&run.report()), &[1]);
     assert_sound(&study_report(&run.report()), &[]);
 }

@@ -25,7 +25,7 @@ pub struct KarhunenLoeve {
 
 impl KarhunenLoeve {
     /// Of a recording with at least one row, whose channels have noise of these standard deviations.
-    pub fn of(recording: &Recording, noise_sd: &[f64]) -> Self {
+    pub fn new(recording: &Recording, noise_sd: &[f64]) -> Self {
         let (rows, channels) = (recording.rows.len(), recording.channels.len());
         let at = |(row, channel): (usize, usize)| recording.rows[row].reading[channel];
         let readings = Array2::from_shape_fn((rows, channels), at);
@@ -47,7 +47,10 @@ impl KarhunenLoeve {
     pub fn reduced(&self, recording: &Recording, count: usize) -> Recording {
         let row = |row: &Row| {
             let reading: Array1<f64> = row.reading.iter().copied().collect();
-            Row { reading: self.along(&((reading - &self.mean) * &self.inverse_sd), count), ..row.clone() }
+            Row {
+                reading: self.first_components(&((reading - &self.mean) * &self.inverse_sd), count),
+                ..row.clone()
+            }
         };
         let layout = raw_layout(count);
         Recording {
@@ -65,10 +68,10 @@ impl KarhunenLoeve {
             let slopes: Array1<f64> = gradients.iter().map(|gradient| gradient.position[k]).collect();
             slopes * &self.inverse_sd
         };
-        Bound::of_columns([self.along(&by(0), count), self.along(&by(1), count)])
+        Bound::of_columns([self.first_components(&by(0), count), self.first_components(&by(1), count)])
     }
 
-    fn along(&self, whitened: &Array1<f64>, count: usize) -> Vec<f64> {
+    fn first_components(&self, whitened: &Array1<f64>, count: usize) -> Vec<f64> {
         let all = self.components.t().dot(whitened);
         all.iter().take(count).copied().collect()
     }

@@ -173,7 +173,7 @@ impl Elliott {
         let mut reductions = Vec::new();
         for (seed, trial) in (self.seed..).zip(&trials) {
             let moving = self.rig.simulate_moving(seed.wrapping_add(OTHER_NOISE))?;
-            let reduction = KarhunenLoeve::of(&trial.training, &noise_sd);
+            let reduction = KarhunenLoeve::new(&trial.training, &noise_sd);
             let setup = TrialSetup { trial, moving: &moving, reduction: &reduction, seed };
             let every = self.judge(&setup, watch)?;
             for (judged, one) in judged.iter_mut().zip(every) {

@@ -23,7 +23,7 @@ fn study(components: &[usize], presentations: u32) -> Elliott {
 fn pressed() -> (Rig, Recording, KarhunenLoeve) {
     let rig = rig();
     let recording = rig.simulate(3).unwrap();
-    let reduction = KarhunenLoeve::of(&recording, &[20e-6; 25]);
+    let reduction = KarhunenLoeve::new(&recording, &[20e-6; 25]);
     (rig, recording, reduction)
 }
 

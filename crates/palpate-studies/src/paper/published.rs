@@ -40,7 +40,7 @@ enum Figure {
 }
 
 impl Figure {
-    fn of(self, arm: &ArmResults) -> Option<Quantiles> {
+    fn spread(self, arm: &ArmResults) -> Option<Quantiles> {
         Some(match self {
             Self::Epochs => arm.epochs?,
             Self::Error => arm.error_percent,
@@ -123,20 +123,20 @@ pub struct Agreement {
     /// Those that agree.
     pub agreeing: usize,
     /// All.
-    pub of: usize,
+    pub compared: usize,
 }
 
 impl Agreement {
     /// Counts.
-    pub fn among(figures: &[PublishedFigure]) -> Self {
-        Self { agreeing: figures.iter().filter(|figure| figure.agrees).count(), of: figures.len() }
+    pub fn new(figures: &[PublishedFigure]) -> Self {
+        Self { agreeing: figures.iter().filter(|figure| figure.agrees).count(), compared: figures.len() }
     }
 }
 
 /// Every published figure whose arm is among the results, beside ours.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
-        let Quantiles { median, p05, p95 } = figure.of(results.arm(arm)?)?;
+        let Quantiles { median, p05, p95 } = figure.spread(results.arm(arm)?)?;
         let (key, what) = figure.name();
         let yardstick = figure.yardstick(published);
         let agrees = yardstick.accepts(published, median);

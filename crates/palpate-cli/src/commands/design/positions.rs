@@ -197,7 +197,7 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
 fn errors(outcome: &Outcome) -> String {
     let tolerance = format!("within {}, %", format_length_mm(outcome.problem.design().tolerance_m));
     let even_m = even(outcome).map(|even| even.verification.median_error_m);
-    Table::of(&outcome.placed)
+    Table::from_rows(&outcome.placed)
         .column("positions", |placed| placed.placement.name().to_owned())
         .column("mean error, mm", |placed| {
             let told = &placed.verification;
@@ -354,7 +354,7 @@ fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
         before_m = press.error_m;
         (press, gain)
     });
-    let table = Table::of(rows)
+    let table = Table::from_rows(rows)
         .column("press next at, mm", |(press, _)| {
             let (x, y) = (press.position.x_m * 1e3, press.position.y_m * 1e3);
             match extent {

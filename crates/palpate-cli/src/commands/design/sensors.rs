@@ -152,7 +152,7 @@ fn outcome<'a>(
                 arguments.seed,
                 watch,
             );
-            let complain = |error: EvaluationError<FitError>| match Failure::of(&error) {
+            let complain = |error: EvaluationError<FitError>| match Failure::from_error(&error) {
                 Failure::BadInput(_) => {
                     Complaint::new(format!("{}: cannot verify: {error}", arguments.rig.display())).into()
                 }
@@ -285,7 +285,7 @@ fn designs(outcome: &Outcome) -> String {
     let tolerance = format!("within {}, %", format_length_mm(design.tolerance_m));
     let unit = design.criterion.score_scale();
     let mm = |limit_m: Option<f64>| figure(limit_m.map(|limit_m| limit_m * 1e3));
-    let mut table = Table::of(&outcome.designed)
+    let mut table = Table::from_rows(&outcome.designed)
         .column("layout", |designed| {
             let star = if designed.assessment.keeps_constraints { "" } else { " *" };
             format!("{}{star}", designed.method.name())
@@ -345,7 +345,7 @@ fn gain(outcome: &Outcome, best: &Designed) -> String {
 fn print_counts(outcome: &Outcome) -> Result<(), Failure> {
     let unit = outcome.problem.design().criterion.score_scale();
     let mm = |limit_m: Option<f64>| figure(limit_m.map(|limit_m| limit_m * 1e3));
-    let table = Table::of(&outcome.counts)
+    let table = Table::from_rows(&outcome.counts)
         .column("sensors", |point| point.count.to_string())
         .column("even: score", |point| figure(point.even.as_ref().map(|even| even.score * unit)))
         .column("mean limit, mm", |point| mm(point.even.as_ref().and_then(|even| even.mean_limit_m)))

@@ -65,7 +65,7 @@ fn fit<F, E>(most_rounds: u64, run: impl FnOnce(Watch) -> Result<F, E>) -> Resul
 where
     E: std::error::Error + 'static,
 {
-    Observer::of_rounds(most_rounds).watch(run).map_err(|error| Failure::of(&error))
+    Observer::of_rounds(most_rounds).watch(run).map_err(|error| Failure::from_error(&error))
 }
 
 /// Writes a study's report and results, and prints them.
@@ -86,7 +86,7 @@ fn write<F: serde::Serialize>(
 }
 
 fn tell_dead_areas(findings: &DeadAreaResults) -> String {
-    let mut told = Table::of(&findings.rows)
+    let mut told = Table::from_rows(&findings.rows)
         .column("sensing", |row| row.sensing.clone())
         .column("estimator", |row| row.estimator.to_owned())
         .column("sensors", |row| row.sensors.to_string())
@@ -103,7 +103,7 @@ fn tell_dead_areas(findings: &DeadAreaResults) -> String {
 
 fn tell_elliott(findings: &ElliottResults) -> String {
     let mm = |spread: Quantiles| format!("{:.3}", spread.median * 1e3);
-    Table::of(&findings.rows)
+    Table::from_rows(&findings.rows)
         .column("chain", |row| row.chain.to_string())
         .column("error, mm", |row| row.error_m.map_or_else(String::new, mm))
         .column("limit, mm", |row| {

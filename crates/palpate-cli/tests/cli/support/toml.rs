@@ -9,7 +9,7 @@ pub struct Toml(DocumentMut);
 
 impl Toml {
     /// Parses a file.
-    pub fn of(text: &str) -> Self {
+    pub fn parse(text: &str) -> Self {
         Self(text.parse().expect("valid TOML"))
     }
 
