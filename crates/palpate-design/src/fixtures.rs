@@ -56,7 +56,10 @@ pub(crate) fn plate(elements: usize) -> Example {
 pub(crate) fn sensor_design() -> (Setup, SensorDesign) {
     let setup = beam(um(5.0));
     let contacts = ContactPrior::along(mm(20.0), mm(380.0), mm(5.0));
-    let design =
-        SensorDesign::of(&setup).unwrap().sites(Sites::Every(mm(5.0))).contacts(contacts).unknown_force();
+    let design = SensorDesign::for_setup(&setup)
+        .unwrap()
+        .sites(Sites::Every(mm(5.0)))
+        .contacts(contacts)
+        .unknown_force();
     (setup, design)
 }

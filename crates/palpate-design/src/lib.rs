@@ -18,7 +18,7 @@
 //! let setup = Setup::new(beam).sensors(Deflection.evenly(4).noise(um(5.0)))?.known_force(newtons(3.0))?;
 //!
 //! // Where the four sensors tell most.
-//! let design = SensorDesign::of(&setup)?.sites(Sites::Every(mm(10.0)));
+//! let design = SensorDesign::for_setup(&setup)?.sites(Sites::Every(mm(10.0)));
 //! let best = SensorProblem::new(&setup, &design, Watch::NONE)?.greedy_exchange(0, Watch::NONE)?;
 //! let setup = Setup { layout: best.layout, ..setup.clone() };
 //!

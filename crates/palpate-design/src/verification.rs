@@ -23,7 +23,11 @@ pub struct Verification {
 
 impl Verification {
     /// Sums up calibrations, at least one, each judged by as many readings of each contact, one contact after the other.
-    pub(crate) fn of(calibrations: &[Evaluation], contacts: &WeightedContacts, tolerance_m: f64) -> Self {
+    pub(crate) fn from_calibrations(
+        calibrations: &[Evaluation],
+        contacts: &WeightedContacts,
+        tolerance_m: f64,
+    ) -> Self {
         let errors: Vec<f64> =
             calibrations.iter().map(|one| contacts.mean(errors_by_contact(one, contacts))).collect();
         let within = calibrations.iter().map(|one| share_within(one, contacts, tolerance_m));

@@ -14,7 +14,7 @@
 
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::chi_squared_bound;
+use palpate_numerics::chi_squared_critical_value;
 
 /// The share of readings that are called `outside_model`, or not called `no_contact`, by noise alone.
 pub const FALSE_ALARM_RATE: f64 = 1e-3;
@@ -26,7 +26,7 @@ pub const OTHER_PLACE: f64 = 0.01;
 /// The χ² of `freedom` channels more than unknowns that noise exceeds at [`FALSE_ALARM_RATE`]; infinite for none, as every reading
 /// is then explained.
 pub fn misfit_bound(freedom: usize) -> f64 {
-    if freedom == 0 { f64::INFINITY } else { chi_squared_bound(FALSE_ALARM_RATE, freedom) }
+    if freedom == 0 { f64::INFINITY } else { chi_squared_critical_value(FALSE_ALARM_RATE, freedom) }
 }
 
 /// Places along a line that readings tell apart.

@@ -21,7 +21,7 @@
 //! let mut layout = Layout::even(SensorKind::Deflection, 8, mm(400.0));
 //! layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = um(5.0)))?;
 //! let contact = Contact { position: Position::along(mm(130.0)), force_n: 3.0 };
-//! let bound = CramerRaoBound::new(&beam, &layout)?.at(contact, Force::Known).unwrap();
+//! let bound = CramerRaoBound::new(&beam, &layout)?.bound_at(contact, Force::Known).unwrap();
 //! assert!((bound.sd_position_m - um(166.0)).abs() < um(1.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -15,7 +15,7 @@ pub fn normal_interval_95(mean: f64, sd: f64) -> (f64, f64) {
 
 /// An interval without what of it is below 0 or above `size`.
 #[inline]
-pub fn held_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
+pub fn clamped_interval((low, high): (f64, f64), size: f64) -> (f64, f64) {
     (low.max(0.0), high.min(size))
 }
 
@@ -30,20 +30,20 @@ pub fn bisect((mut low, mut high): (f64, f64), halvings: usize, is_below: impl F
 }
 
 /// The standard normal distribution Φ(z).
-pub fn normal_distribution(z: f64) -> f64 {
+pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// The z with Φ(z) = `share`, for a share between 0 and 1, by bisection to the last bits.
 pub fn normal_quantile(share: f64) -> f64 {
-    bisect((-39.0, 39.0), 80, |z| normal_distribution(z) < share)
+    bisect((-39.0, 39.0), 80, |z| normal_cdf(z) < share)
 }
 
 /// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0.
 ///
 /// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees, and erfc(√x) plus the
 /// same over j = ½, 3/2, … < freedom/2 for an odd one (Abramowitz and Stegun, 26.4.4 and 26.4.5).
-pub fn chi_squared_exceeds(value: f64, freedom: usize) -> f64 {
+pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     let x = 0.5 * value;
     let odd = freedom % 2 == 1;
     let start = if odd { libm::erfc(x.sqrt()) } else { 0.0 };
@@ -53,12 +53,12 @@ pub fn chi_squared_exceeds(value: f64, freedom: usize) -> f64 {
 
 /// The value that a χ² variable of `freedom` ≥ 1 degrees of freedom exceeds with probability `tail`, between 0 and 1, by
 /// bisection.
-pub fn chi_squared_bound(tail: f64, freedom: usize) -> f64 {
+pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
     let (mut low, mut high) = (0.0, freedom as f64);
-    while chi_squared_exceeds(high, freedom) > tail {
+    while chi_squared_survival(high, freedom) > tail {
         (low, high) = (high, 2.0 * high);
     }
-    bisect((low, high), 60, |value| chi_squared_exceeds(value, freedom) > tail)
+    bisect((low, high), 60, |value| chi_squared_survival(value, freedom) > tail)
 }
 
 #[cfg(test)]
@@ -67,9 +67,9 @@ mod tests {
 
     #[test]
     fn tables_are_met() {
-        assert!((normal_distribution(NORMAL_95) - 0.975).abs() < 1e-15);
+        assert!((normal_cdf(NORMAL_95) - 0.975).abs() < 1e-15);
         assert!((normal_quantile(0.975) - NORMAL_95).abs() < 1e-12);
-        assert!((chi_squared_bound(0.05, 2) - ELLIPSE_95).abs() < 1e-12);
+        assert!((chi_squared_critical_value(0.05, 2) - ELLIPSE_95).abs() < 1e-12);
         // Tables of χ²: 95 %, 99.99 % and one in a million.
         for (tail, freedom, value) in [
             (0.05, 1, 3.841_459),
@@ -79,7 +79,7 @@ mod tests {
             (1e-6, 2, 27.631_021),
             (0.05, 1000, 1_074.679_449),
         ] {
-            let found = chi_squared_bound(tail, freedom);
+            let found = chi_squared_critical_value(tail, freedom);
             assert!((found / value - 1.0).abs() < 1e-6, "{tail} {freedom}: {found}");
         }
     }

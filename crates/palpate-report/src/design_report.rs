@@ -218,7 +218,7 @@ impl<'a> SensorDesignReport<'a> {
         let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };
         let positions = &self.problem.contacts().positions;
         let limit = setup.cramer_rao_bound().ok()?;
-        LimitCurve::at(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
+        LimitCurve::at_positions(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
     }
 
     /// The limit over a plane with the best and with the even layout.

@@ -79,7 +79,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
     let Some(theory) = LinearTheory::of(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {
-        let bound = limit.at(contact, Force::Unknown);
+        let bound = limit.bound_at(contact, Force::Unknown);
         bound.map_or([f64::NAN; 2], |bound| [bound.sd_position_m, bound.sd_force_n.unwrap_or(f64::NAN)])
     };
     let most_n = Digit::MOST_LOAD * digit.characteristic_force_n();

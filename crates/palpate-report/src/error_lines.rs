@@ -51,7 +51,7 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
-    Some(line(&LimitCurve::over(&limit, force_n, force).ok()?, colour, label.to_owned()))
+    Some(line(&LimitCurve::over_surface(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 
 /// Remark on the line for the caption of a chart that has it; else empty.
@@ -74,7 +74,7 @@ fn assumed_label() -> String {
 
 fn curve(setup: &Setup, layout: &Layout) -> Result<LimitCurve, LimitError> {
     let limit = CramerRaoBound::new(setup.surface.model().ok_or(LimitError::NoModel)?, layout)?;
-    LimitCurve::over(&limit, setup.force_n.ok_or(LimitError::NoForce)?, Force::Known)
+    LimitCurve::over_surface(&limit, setup.force_n.ok_or(LimitError::NoForce)?, Force::Known)
 }
 
 fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {

@@ -61,8 +61,8 @@ pub struct LimitReport<'a> {
 ///     title: "What physics allows on the paper's beam",
 ///     setup: &setup,
 ///     limit: &limit,
-///     known: &LimitCurve::over(&limit, 3.0, Force::Known)?,
-///     unknown: &LimitCurve::over(&limit, 3.0, Force::Unknown)?,
+///     known: &LimitCurve::over_surface(&limit, 3.0, Force::Known)?,
+///     unknown: &LimitCurve::over_surface(&limit, 3.0, Force::Unknown)?,
 ///     force: Force::Known,
 ///     warnings: &[],
 ///     listed: &[],
@@ -212,7 +212,7 @@ impl LimitReport<'_> {
     fn limit_table(&self) -> Table {
         let bounds = self.listed.iter().map(|&position| {
             let contact = Contact { position, force_n: self.known.force_n };
-            (position, [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force)))
+            (position, [Force::Known, Force::Unknown].map(|force| self.limit.bound_at(contact, force)))
         });
         let caption = html! {
             "The limit at some positions: least standard deviations, and the mean error that goes with the first. A dash: \

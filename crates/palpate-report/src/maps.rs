@@ -81,7 +81,7 @@ pub(super) fn limits_mm(
     (force_n, force): (f64, Force),
     figure: impl Fn(&Bound) -> f64,
 ) -> Vec<f64> {
-    let bound = |position| limit.at(Contact { position, force_n }, force);
+    let bound = |position| limit.bound_at(Contact { position, force_n }, force);
     cells.centres().map(|at| bound(at).map_or(f64::NAN, |bound| figure(&bound) * 1e3)).collect()
 }
 

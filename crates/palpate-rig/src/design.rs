@@ -126,7 +126,7 @@ pub(crate) struct MustHaveKeys {
 impl At<DesignKeys> {
     pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
         let extent = setup.surface.extent();
-        let Ok(default) = SensorDesign::of(setup) else {
+        let Ok(default) = SensorDesign::for_setup(setup) else {
             let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
             return Err(self.place.unused(with));
         };
@@ -302,7 +302,7 @@ mod tests {
     #[test]
     fn a_silent_section_takes_the_rigs_sensors_all_over_the_surface() {
         let rig = designed("").unwrap();
-        assert_eq!(rig.design, SensorDesign::of(&rig.setup).ok());
+        assert_eq!(rig.design, SensorDesign::for_setup(&rig.setup).ok());
     }
 
     #[test]

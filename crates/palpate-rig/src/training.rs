@@ -176,6 +176,6 @@ impl At<LoadKeys> {
         let extent = surface.extent();
         let (from, to) = (self.from.on_surface(extent)?, self.to.on_surface(extent)?);
         check_order(from, to, extent, &self.to.place)?;
-        Ok(UniformLoad::between(from, to, self.force.si))
+        Ok(UniformLoad::new(from, to, self.force.si))
     }
 }

@@ -296,7 +296,7 @@ fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Opt
     let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
     let length_m = setup.surface.extent().length_m();
     let at = |&position: &Position| {
-        let bound = limit.at(Contact { position, force_n }, force);
+        let bound = limit.bound_at(Contact { position, force_n }, force);
         expected_error_m(bound.as_ref(), length_m)
     };
     Some(positions.iter().map(at).collect())
@@ -320,7 +320,7 @@ mod tests {
         let known = expected_errors_m(&setup, 3.0, &positions).unwrap();
         let limit = setup.cramer_rao_bound().unwrap();
         for (at, expected_m) in positions.into_iter().zip(known) {
-            let bound = limit.at(Contact { position: at, force_n: 3.0 }, Force::Known).unwrap();
+            let bound = limit.bound_at(Contact { position: at, force_n: 3.0 }, Force::Known).unwrap();
             assert!((expected_m / bound.mean_error_m() - 1.0).abs() < 1e-4);
         }
         let mut setup = Setup { force_n: None, ..setup.clone() };

@@ -210,7 +210,7 @@ impl LayoutRequest {
 fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
     let asked = arm.layout.clone()?;
     let setup = arm.rig.pressed_setup();
-    let design = arm.rig.design.clone().or_else(|| SensorDesign::of(&arm.rig.setup).ok())?;
+    let design = arm.rig.design.clone().or_else(|| SensorDesign::for_setup(&arm.rig.setup).ok())?;
     let method = asked.method;
     Some((asked, LayoutRequest { method, setup, design }))
 }

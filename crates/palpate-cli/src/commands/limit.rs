@@ -114,7 +114,7 @@ fn limits<'a>(
     let extent = setup.surface.extent();
     let listed = match arguments.every {
         Some(every_m) => {
-            let curve = LimitCurve::every(limit, force_n, force, every_m)?;
+            let curve = LimitCurve::with_spacing(limit, force_n, force, every_m)?;
             curve.points.iter().map(|point| point.position).collect()
         }
         None => a_few(extent),
@@ -123,8 +123,8 @@ fn limits<'a>(
         limit,
         force_n,
         force,
-        known: LimitCurve::over(limit, force_n, Force::Known)?,
-        unknown: LimitCurve::over(limit, force_n, Force::Unknown)?,
+        known: LimitCurve::over_surface(limit, force_n, Force::Known)?,
+        unknown: LimitCurve::over_surface(limit, force_n, Force::Unknown)?,
         listed,
         warnings: limit_warnings(limit, force_n, force)?,
     })
@@ -149,7 +149,7 @@ fn a_few(extent: Extent) -> Vec<Position> {
 impl Limits<'_> {
     fn bounds_at(&self, position: Position) -> [Option<Bound>; 2] {
         let contact = Contact { position, force_n: self.force_n };
-        [Force::Known, Force::Unknown].map(|force| self.limit.at(contact, force))
+        [Force::Known, Force::Unknown].map(|force| self.limit.bound_at(contact, force))
     }
 }
 
@@ -268,7 +268,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     }
     for (force, name) in [(Force::Known, "force known"), (Force::Unknown, "force unknown")] {
         let cell = |position: Position| {
-            let bound = limits.limit.at(Contact { position, force_n: limits.force_n }, force);
+            let bound = limits.limit.bound_at(Contact { position, force_n: limits.force_n }, force);
             figure(bound.map(|bound| bound.sd_position_m * 1e3))
         };
         let table = Table::from_rows(rows.iter().copied()).column(format!("limit, mm, {name}"), |row| {

@@ -42,7 +42,7 @@ fn limit_page() -> Vec<ReportFile> {
     let setup = Rig::from_toml(PAPER).unwrap().setup;
     let limit = setup.cramer_rao_bound().unwrap();
     let [known, unknown] =
-        [Force::Known, Force::Unknown].map(|force| LimitCurve::over(&limit, 3.0, force).unwrap());
+        [Force::Known, Force::Unknown].map(|force| LimitCurve::over_surface(&limit, 3.0, force).unwrap());
     let report = LimitReport {
         title: "The limit",
         setup: &setup,

@@ -110,8 +110,8 @@ impl PositionDesign {
     /// The contacts with their weights.
     pub(super) fn weighted_contacts(&self, extent: Extent) -> Result<WeightedContacts, OutOfRange> {
         match &self.contacts {
-            Some(contacts) => WeightedContacts::of(contacts, extent),
-            None => WeightedContacts::of(&ContactPrior::all_over(extent), extent),
+            Some(contacts) => WeightedContacts::from_prior(contacts, extent),
+            None => WeightedContacts::from_prior(&ContactPrior::all_over(extent), extent),
         }
     }
 }

@@ -216,7 +216,7 @@ impl PositionProblem {
             watch.stage(SEARCHING, share)?;
             let judged =
                 self.calibrate(positions, READINGS_IN_SEARCH, (first, design.calibrations), watch)?;
-            Ok(Verification::of(&judged, &self.contacts, design.tolerance_m).mean_error_m)
+            Ok(Verification::from_calibrations(&judged, &self.contacts, design.tolerance_m).mean_error_m)
         };
         let scores = evaluate(&score, starts, 0.0)?;
         let best = (0..starts.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
@@ -249,7 +249,7 @@ impl PositionProblem {
         Ok(Placed {
             placement,
             positions,
-            verification: Verification::of(&judged, &self.contacts, self.design.tolerance_m),
+            verification: Verification::from_calibrations(&judged, &self.contacts, self.design.tolerance_m),
             errors_m: (0..self.contacts.len()).map(mean_error_m).collect(),
         })
     }

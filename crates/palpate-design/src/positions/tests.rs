@@ -104,7 +104,7 @@ fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
     for x_m in [0.05, 0.13, 0.25, 0.33] {
         let contact = palpate_mechanics::contact::Contact { position: Position::along(x_m), force_n: 3.0 };
         let (ours, theirs) =
-            (forward.limit_m(contact.position), limit.at(contact, Force::Known).unwrap().sd_position_m);
+            (forward.limit_m(contact.position), limit.bound_at(contact, Force::Known).unwrap().sd_position_m);
         assert!((ours / theirs - 1.0).abs() < 0.02, "{x_m}: {ours} {theirs}");
     }
 }
@@ -114,7 +114,7 @@ fn the_least_variance_is_less_than_the_even_positions() {
     for (setup, count) in [(noisy().setup, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).setup, 9)] {
         let forward = forward(&setup);
         let extent = setup.surface.extent();
-        let contacts = WeightedContacts::of(&ContactPrior::all_over(extent), extent).unwrap();
+        let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(extent), extent).unwrap();
         let found = variance::least(
             &forward,
             &contacts,

@@ -59,7 +59,7 @@ impl SensorProblem<'_> {
     pub fn assess(&self, layout: &Layout) -> Result<Assessment, DesignError> {
         let Sensitivity { surface, contacts, force_n, force } = &self.sensitivity;
         let limit = CramerRaoBound::new(*surface, layout)?;
-        let curve = LimitCurve::at(&limit, *force_n, *force, &contacts.positions)?;
+        let curve = LimitCurve::at_positions(&limit, *force_n, *force, &contacts.positions)?;
         let bounds: Option<Vec<_>> = curve.points.iter().map(|point| point.bound).collect();
         let good = |bound: Option<Bound>| {
             bound.is_some_and(|bound| bound.sd_position_m <= self.pool.design.tolerance_m)
@@ -192,7 +192,7 @@ impl SensorProblem<'_> {
             watch.stage("verifying", k as f64 / calibrations as f64)?;
             judged.push(calibration.run(estimator, seed.wrapping_add(k), watch)?.evaluation);
         }
-        Ok(Verification::of(&judged, contacts, self.pool.design.tolerance_m))
+        Ok(Verification::from_calibrations(&judged, contacts, self.pool.design.tolerance_m))
     }
 
     /// Even and designed layouts for each number of sensors.

@@ -30,7 +30,7 @@ pub(super) struct Candidates {
 
 impl Candidates {
     /// All offers at all sites where they read something and nothing forbids them, and what every layout has.
-    pub fn of(surface: &dyn Surface, design: &SensorDesign) -> Result<Self, DesignError> {
+    pub fn new(surface: &dyn Surface, design: &SensorDesign) -> Result<Self, DesignError> {
         let extent = surface.extent();
         let sites = sites(&design.sites, extent);
         let mut sensors = Vec::new();
@@ -81,14 +81,14 @@ impl Candidates {
 
     /// The candidate of an offer at a place, which becomes one if it is none.
     fn add(&mut self, offer: usize, position: Position, extent: Extent) -> usize {
-        self.at(offer, position, extent).unwrap_or_else(|| {
+        self.find(offer, position, extent).unwrap_or_else(|| {
             self.sensors.push(PlacedSensor { offer, position });
             self.sensors.len() - 1
         })
     }
 
     /// The candidate of an offer at a place.
-    fn at(&self, offer: usize, position: Position, extent: Extent) -> Option<usize> {
+    fn find(&self, offer: usize, position: Position, extent: Extent) -> Option<usize> {
         let same = |other: &PlacedSensor| {
             other.offer == offer && other.position.distance_m(position) <= SAME * extent.length_m()
         };

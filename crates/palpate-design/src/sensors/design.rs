@@ -160,7 +160,7 @@ impl SensorDesign {
     ///
     /// # Errors
     /// [`LimitError::NoModel`] where no model explains the sensors.
-    pub fn of(setup: &Setup) -> Result<Self, DesignError> {
+    pub fn for_setup(setup: &Setup) -> Result<Self, DesignError> {
         let mut offers: Vec<SensorOffer> = Vec::new();
         for sensor in setup.layout.sensors() {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {

@@ -265,7 +265,7 @@ pub(super) fn score_with(pool: &Pool, objective: &dyn Objective, state: &State, 
     match unit.twin {
         None => objective.score_with(state, objective.row(unit.first)),
         Some(twin) => {
-            let with_first = objective.with(state, objective.row(unit.first));
+            let with_first = objective.updated(state, objective.row(unit.first));
             objective.score_with(&with_first, objective.row(twin))
         }
     }

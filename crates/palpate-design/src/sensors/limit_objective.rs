@@ -156,7 +156,7 @@ impl<const P: usize, const FIRST: usize> Objective for LimitObjective<P, FIRST> 
     }
 
     #[expect(clippy::needless_range_loop, reason = "as the formula has its indices")]
-    fn with(&self, state: &State, row: &[Block]) -> State {
+    fn updated(&self, state: &State, row: &[Block]) -> State {
         let n = self.blocks;
         let mut with = state.clone();
         for at in 0..n {

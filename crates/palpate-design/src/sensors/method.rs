@@ -204,7 +204,8 @@ impl SensorProblem<'_> {
             let found = self.exchanged(&*objective, seed, watch)?;
             designed.push(self.designed(Method::DOptimal, &found.selection)?);
         }
-        let components = PrincipalComponents::of(&self.sensitivity.readings(&self.pool.sensors, design));
+        let components =
+            PrincipalComponents::from_readings(&self.sensitivity.readings(&self.pool.sensors, design));
         let found = self.exchanged(&Reconstruction::new(&components), seed, watch)?;
         designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);
         if let Some(selection) = pivoting::search(&self.pool, &components.modes) {

@@ -11,7 +11,7 @@
 //! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 //! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 //! let contacts = ContactPrior::along(mm(20.0), mm(380.0), mm(5.0));
-//! let design = SensorDesign::of(&setup)?.contacts(contacts).sites(Sites::Every(mm(5.0))).unknown_force();
+//! let design = SensorDesign::for_setup(&setup)?.contacts(contacts).sites(Sites::Every(mm(5.0))).unknown_force();
 //! let problem = SensorProblem::new(&setup, &design, Watch::NONE)?;
 //! let (even, best) = (problem.even()?.assessment, problem.greedy_exchange(0, Watch::NONE)?.assessment);
 //! assert!(best.mean_limit_m.unwrap() < 0.82 * even.mean_limit_m.unwrap());
@@ -87,9 +87,9 @@ impl<'a> SensorProblem<'a> {
         if let Some(offer) = noiseless {
             return Err(DesignError::SingularNoise { kind: offer.kind });
         }
-        let contacts = WeightedContacts::of(&design.contacts, surface.extent())?;
+        let contacts = WeightedContacts::from_prior(&design.contacts, surface.extent())?;
         let sensitivity = Sensitivity { surface, contacts, force_n, force: design.force };
-        let candidates = Candidates::of(surface, design)?;
+        let candidates = Candidates::new(surface, design)?;
         let table = Arc::new(sensitivity.table(&candidates.sensors, design, watch)?);
         Self::with_table(setup, sensitivity, candidates, table, design)
     }

@@ -40,7 +40,7 @@ pub(super) trait Objective: Sync {
     fn score_with(&self, state: &State, row: &[Block]) -> f64;
 
     /// The state with one more sensor.
-    fn with(&self, state: &State, row: &[Block]) -> State;
+    fn updated(&self, state: &State, row: &[Block]) -> State;
 
     /// The score that people read: without what only breaks ties in a search.
     fn value(&self, state: &State) -> f64;

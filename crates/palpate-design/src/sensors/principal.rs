@@ -27,7 +27,7 @@ pub(super) struct PrincipalComponents {
 
 impl PrincipalComponents {
     /// Of readings, a contact a row.
-    pub fn of(readings: &Array2<f64>) -> Self {
+    pub fn from_readings(readings: &Array2<f64>) -> Self {
         let (squares, contacts) = symmetric_eigen(&readings.dot(&readings.t()));
         let least = LEAST_SHARE * squares.first().copied().unwrap_or(0.0);
         let kept = squares.iter().take_while(|square| **square > least).count().min(MOST_COMPONENTS);
@@ -86,7 +86,7 @@ impl Objective for Reconstruction {
             values[i * self.blocks + i / LANES][i % LANES] = *variance;
         }
         let start = State { values, constant: 0.0 };
-        rows.iter().fold(start, |state, row| self.with(&state, row))
+        rows.iter().fold(start, |state, row| self.updated(&state, row))
     }
 
     fn score(&self, state: &State) -> f64 {
@@ -99,7 +99,7 @@ impl Objective for Reconstruction {
         (self.trace(state) - gain / shrink) / self.total()
     }
 
-    fn with(&self, state: &State, row: &[Block]) -> State {
+    fn updated(&self, state: &State, row: &[Block]) -> State {
         let (told, shrink) = self.told(state, row);
         let mut with = state.clone();
         for (line, own) in with.values.chunks_exact_mut(self.blocks).zip(&told) {

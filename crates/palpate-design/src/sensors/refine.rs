@@ -115,7 +115,7 @@ fn score(problem: &SensorProblem, state: &State, group: &[PlacedSensor]) -> f64 
     let rows: Vec<Vec<Block>> = group.iter().map(|sensor| problem.row(sensor)).collect();
     match rows.as_slice() {
         [one] => problem.objective.score_with(state, one),
-        [one, twin] => problem.objective.score_with(&problem.objective.with(state, one), twin),
+        [one, twin] => problem.objective.score_with(&problem.objective.updated(state, one), twin),
         _ => f64::INFINITY,
     }
 }

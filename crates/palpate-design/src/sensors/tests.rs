@@ -295,7 +295,7 @@ fn more_sensors_never_tell_less() {
 #[test]
 fn plates_are_designed_too() {
     let setup = plate(24).setup;
-    let mut design = SensorDesign::of(&setup).unwrap();
+    let mut design = SensorDesign::for_setup(&setup).unwrap();
     design.sites = Sites::Every(0.03);
     let corner = |at_m| Position { x_m: at_m, y_m: at_m };
     design.contacts =

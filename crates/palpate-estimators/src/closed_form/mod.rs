@@ -17,7 +17,7 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{NORMAL_95, held_interval, normal_interval_95};
+use palpate_numerics::{NORMAL_95, clamped_interval, normal_interval_95};
 use polynomial::Polynomial;
 
 /// The closed form: it needs a beam and its sensors, and learns nothing from a recording.
@@ -412,7 +412,7 @@ impl Posterior<'_> {
         let half_m = NORMAL_95 * xx.sqrt();
         let uncertainty = Uncertainty {
             covariance: [xx.max((to_m - from_m).powi(2) / 12.0), 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: held_interval((from_m - half_m, to_m + half_m), self.length_m()),
+            x_95_m: clamped_interval((from_m - half_m, to_m + half_m), self.length_m()),
             y_95_m: (0.0, 0.0),
         };
         ContactEstimate {

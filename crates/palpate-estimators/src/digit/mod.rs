@@ -22,7 +22,7 @@ use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Digit, Elastica, Surface, SurfaceSpec};
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::Cancelled;
-use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
+use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95};
 
 /// The flexible digit's estimator: maximum likelihood over position and force. It needs the digit, its gauges and their
 /// noise, and learns nothing from a recording.
@@ -226,7 +226,7 @@ impl DigitLocator {
         let others = posterior.pieces[1..].iter().filter(|piece| are_apart(best, piece));
         for other in others.filter(|other| other.probability >= OTHER_PLACE) {
             let sd_m = other.covariance[0].sqrt();
-            let ends = held_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
+            let ends = clamped_interval(normal_interval_95(other.best.position_m, sd_m), length_m);
             estimate.modes.push(Mode { contact: contact(other, ends), probability: other.probability });
         }
         if !estimate.modes.as_slice().is_empty() || (best.is_curve() && ends.1 - ends.0 > WIDE * length_m) {
@@ -403,11 +403,7 @@ impl Piece {
 
 /// Φ(high) − Φ(low), with its digits also far out in the upper tail.
 fn normal_mass(low: f64, high: f64) -> f64 {
-    if low > 0.0 {
-        normal_distribution(-low) - normal_distribution(-high)
-    } else {
-        normal_distribution(high) - normal_distribution(low)
-    }
+    if low > 0.0 { normal_cdf(-low) - normal_cdf(-high) } else { normal_cdf(high) - normal_cdf(low) }
 }
 
 /// The piece around the most likely contact on a stretch: |r|² is a parabola about the end of the next Gauss–Newton step, which

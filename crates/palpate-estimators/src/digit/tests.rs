@@ -76,7 +76,7 @@ fn tally(setup: &Setup, force_n: f64, from_m: f64, count: usize, seed: u64) -> T
         let shape = method(&locator).shape(&estimate.contact, 40);
         tally.shape_percent = tally.shape_percent.max(100.0 * shape.distance_m(&digit(setup), truth) / l);
         if limit.whitened_reading(truth)[1].abs() >= 5.0 {
-            let bound = limit.at(truth, Force::Unknown).unwrap();
+            let bound = limit.bound_at(truth, Force::Unknown).unwrap();
             tally.counts[1] += 1.0;
             tally.located += f64::from(estimate.status == Status::Located);
             errors = [errors[0] + error_m, errors[1] + error_n];
@@ -295,7 +295,7 @@ fn for_small_forces_influence_functions_are_at_the_limit() {
     for row in &judged.rows {
         error_m += locator.locate(&row.reading).unwrap().contact.position.distance_m(row.position);
         let contact = Contact { position: row.position, force_n: 0.3 };
-        bound_m += limit.at(contact, Force::Unknown).unwrap().mean_error_m();
+        bound_m += limit.bound_at(contact, Force::Unknown).unwrap().mean_error_m();
     }
     println!("influence functions at 0.3 N: {:.3} × limit", error_m / bound_m);
     assert!(error_m < 1.2 * bound_m, "{error_m} {bound_m}");

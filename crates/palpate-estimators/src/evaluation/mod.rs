@@ -228,7 +228,7 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
         let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
-        let bound = limit.at(Contact { position: located.truth, force_n }, force);
+        let bound = limit.bound_at(Contact { position: located.truth, force_n }, force);
         let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m()) else {
             continue;
         };

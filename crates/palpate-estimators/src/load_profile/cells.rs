@@ -211,8 +211,8 @@ mod tests {
     #[test]
     fn the_density_of_a_load_sums_up_to_its_force() {
         let at = |x_m, y_m| Position { x_m, y_m };
-        let on_line = UniformLoad::between(at(0.05, 0.0), at(0.17, 0.0), 3.0);
-        let on_plane = UniformLoad::between(at(0.05, 0.02), at(0.17, 0.09), 3.0);
+        let on_line = UniformLoad::new(at(0.05, 0.0), at(0.17, 0.0), 3.0);
+        let on_plane = UniformLoad::new(at(0.05, 0.02), at(0.17, 0.09), 3.0);
         let plane = Cells::over(Extent::Plane { length_m: 0.3, width_m: 0.15 });
         for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
             let density = cells.mean_density(&[load, load]);

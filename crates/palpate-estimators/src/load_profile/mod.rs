@@ -365,7 +365,7 @@ impl Patch {
         let (left, right) = side(x_m, (self.from.x_m, self.to.x_m), extent.length_m());
         let (low, high) = side(y_m, (self.from.y_m, self.to.y_m), extent.width_m().unwrap_or(0.0));
         let corner = |x_m, y_m| Position { x_m, y_m };
-        UniformLoad::between(corner(left, low), corner(right, high), self.force_n)
+        UniformLoad::new(corner(left, low), corner(right, high), self.force_n)
     }
 }
 

@@ -30,7 +30,7 @@ fn layout(strain: bool) -> Layout {
 
 fn patch(centre_m: f64, force_n: f64) -> UniformLoad {
     let (from, to) = (Position::along(centre_m - 0.01), Position::along(centre_m + 0.01));
-    UniformLoad::between(from, to, force_n)
+    UniformLoad::new(from, to, force_n)
 }
 
 fn clean(sensors: &LoadSensors, loads: &[UniformLoad]) -> Vec<f64> {
@@ -263,7 +263,7 @@ fn on_a_plane_two_squares_are_told_apart() {
     let sensors = LoadSensors::new(&Foam, &layout).unwrap();
     let square = |x_m: f64, y_m: f64, force_n: f64| {
         let corner = |off_m: f64| Position { x_m: x_m + off_m, y_m: y_m + off_m };
-        UniformLoad::between(corner(-0.01), corner(0.01), force_n)
+        UniformLoad::new(corner(-0.01), corner(0.01), force_n)
     };
     let loads = [square(0.05, 0.03, 2.0), square(0.14, 0.07, 1.0)];
     let limits = patch_limits(&sensors, &loads).unwrap();

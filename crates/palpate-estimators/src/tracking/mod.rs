@@ -35,7 +35,7 @@ use belief::Moments;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::{bisect, held_interval, normal_distribution, normal_interval_95};
+use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95};
 
 /// Configuration of a tracker: how contacts come, move and go, and how the surface swings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,11 +202,11 @@ impl Tracked {
                     y_m,
                     speed_m_per_s: speed_across,
                     sd,
-                    y_95_m: held_interval(normal_interval_95(y_m, sd[0]), width_m),
+                    y_95_m: clamped_interval(normal_interval_95(y_m, sd[0]), width_m),
                     covariance_m2: moments.covariance_m2 + xy,
                 }
             };
-            let x_95_m = held_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
+            let x_95_m = clamped_interval(normal_interval_95(x_m, sd[0]), extent.length_m());
             Self { x_m, speed_m_per_s, force_n, sd, x_95_m, across: extent.width_m().map(across) }
         };
         belief.iter().zip(floors_m2).map(tracked).collect()
@@ -229,7 +229,7 @@ fn spread(best: &Moments, beliefs: &[(f64, Vec<Moments>)], sum: f64) -> Moments 
 /// The 95 % interval of a mixture of normal distributions: share, mean and standard deviation of each.
 fn interval(parts: &[(f64, f64, f64)], length_m: f64) -> (f64, f64) {
     let below = |x_m: f64| -> f64 {
-        parts.iter().map(|(share, mean, sd)| share * normal_distribution((x_m - mean) / sd)).sum()
+        parts.iter().map(|(share, mean, sd)| share * normal_cdf((x_m - mean) / sd)).sum()
     };
     let quantile = |share: f64| bisect((0.0, length_m), 24, |x_m| below(x_m) < share);
     (quantile(0.025), quantile(0.975))

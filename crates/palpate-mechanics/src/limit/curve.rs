@@ -26,7 +26,7 @@ pub struct LimitPoint {
 /// let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
 /// layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6))?;
 /// let bound = CramerRaoBound::new(&beam, &layout)?;
-/// let curve = LimitCurve::over(&bound, 3.0, Force::Known)?;
+/// let curve = LimitCurve::over_surface(&bound, 3.0, Force::Known)?;
 /// assert_eq!(curve.points.len(), 399);
 /// let summary = curve.summary().unwrap();
 /// assert!(summary.best.1 < summary.median_m && summary.median_m < summary.worst.1);
@@ -68,28 +68,33 @@ impl LimitCurve {
     ///
     /// # Errors
     /// [`LimitError::Force`] for a force that is not positive and finite.
-    pub fn over(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Self, LimitError> {
-        Self::at(limit, force_n, force, &Grid::over(limit.surface.extent()).positions)
+    pub fn over_surface(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Self, LimitError> {
+        Self::at_positions(limit, force_n, force, &Grid::over_surface(limit.surface.extent()).positions)
     }
 
     /// The limit at positions `every_m` (metres) apart, the first of them `every_m` from the edge.
     ///
     /// # Errors
     /// [`LimitError::Positions`] where those are none or more than 100,000, and [`LimitError::Force`].
-    pub fn every(
+    pub fn with_spacing(
         limit: &CramerRaoBound,
         force_n: f64,
         force: Force,
         every_m: f64,
     ) -> Result<Self, LimitError> {
-        Self::at(limit, force_n, force, &Grid::every(limit.surface.extent(), every_m)?.positions)
+        Self::at_positions(
+            limit,
+            force_n,
+            force,
+            &Grid::with_spacing(limit.surface.extent(), every_m)?.positions,
+        )
     }
 
     /// The limit at the given positions, which must be on the surface.
     ///
     /// # Errors
     /// [`LimitError::Force`] for a force that is not positive and finite.
-    pub fn at(
+    pub fn at_positions(
         limit: &CramerRaoBound,
         force_n: f64,
         force: Force,
@@ -97,7 +102,7 @@ impl LimitCurve {
     ) -> Result<Self, LimitError> {
         check_force(force_n)?;
         let point =
-            |&position| LimitPoint { position, bound: limit.at(Contact { position, force_n }, force) };
+            |&position| LimitPoint { position, bound: limit.bound_at(Contact { position, force_n }, force) };
         Ok(Self {
             extent: limit.surface.extent(),
             force_n,

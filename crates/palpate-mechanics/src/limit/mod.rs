@@ -91,7 +91,7 @@ impl<'a> CramerRaoBound<'a> {
 
     /// The bound at a contact; `None` where the readings do not tell the position at all, which is where the Fisher
     /// information is singular: no force, no sensor that notices, or a change of position that a change of force undoes.
-    pub fn at(&self, contact: Contact, force: Force) -> Option<Bound> {
+    pub fn bound_at(&self, contact: Contact, force: Force) -> Option<Bound> {
         let Columns { force: by_force, along, across } = self.derivatives(contact);
         match (force, across) {
             (Force::Known, None) => {

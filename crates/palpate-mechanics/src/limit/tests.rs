@@ -26,7 +26,7 @@ fn deflections(count: usize) -> Layout {
 
 fn sd_mm(limit: &CramerRaoBound, a_mm: f64, force: Force) -> f64 {
     let contact = Contact { position: Position::along(a_mm * 1e-3), force_n: 3.0 };
-    limit.at(contact, force).unwrap().sd_x_m * 1e3
+    limit.bound_at(contact, force).unwrap().sd_x_m * 1e3
 }
 
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
@@ -52,7 +52,7 @@ fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
             assert!((seen / limit_mm - 1.0).abs() < 0.04, "{a_mm} mm, {force:?}: {seen}, not {limit_mm}");
         }
     }
-    let summary = LimitCurve::over(&limit, 3.0, Force::Known).unwrap().summary().unwrap();
+    let summary = LimitCurve::over_surface(&limit, 3.0, Force::Known).unwrap().summary().unwrap();
     assert_eq!(format!("{:.3}", summary.mean_m * 1e3), "0.195");
     let ratio = summary.mean_error_m / summary.mean_m;
     assert!((ratio - std::f64::consts::FRAC_2_PI.sqrt()).abs() < 1e-9);
@@ -71,10 +71,10 @@ fn two_reactions_give_the_closed_form() {
     let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
     for a_m in [0.0, 0.05, 0.2, 0.4] {
         let contact = Contact { position: Position::along(a_m), force_n: 3.0 };
-        let known = limit.at(contact, Force::Known).unwrap();
+        let known = limit.bound_at(contact, Force::Known).unwrap();
         assert!((known.sd_x_m - 0.01 * 0.4 / (3.0 * 2f64.sqrt())).abs() < 1e-12);
         assert_eq!((known.sd_force_n, known.sd_y_m), (None, 0.0));
-        let unknown = limit.at(contact, Force::Unknown).unwrap();
+        let unknown = limit.bound_at(contact, Force::Unknown).unwrap();
         assert!((unknown.sd_x_m - 0.01 * (0.4 - a_m).hypot(a_m) / 3.0).abs() < 1e-12);
         assert!((unknown.sd_force_n.unwrap() - 0.01 * 2f64.sqrt()).abs() < 1e-12);
     }
@@ -133,7 +133,8 @@ fn a_plane_has_a_bound_in_both_directions() {
     let corners = [(0.01, 0.01), (0.05, 0.01), (0.01, 0.03), (0.05, 0.03)];
     let four = pad_layout(&corners);
     let limit = CramerRaoBound::new(&Pad, &four).unwrap();
-    let at = |x_m, y_m, force| limit.at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
+    let at =
+        |x_m, y_m, force| limit.bound_at(Contact { position: Position { x_m, y_m }, force_n: 2.0 }, force);
     // In the centre of a symmetric layout x, y and force do not disturb each other: 1/√(Σ (∂y_i/∂x)²) each.
     let centre = at(0.03, 0.02, Force::Unknown).unwrap();
     let reading = 2.0 * 1e-4 * (-0.5 * (4e-4 + 1e-4) / 4e-4_f64).exp() / 1e-6;
@@ -149,11 +150,11 @@ fn a_plane_has_a_bound_in_both_directions() {
     let line = pad_layout(&corners.map(|(x_m, _)| (x_m, 0.02)));
     let limit = CramerRaoBound::new(&Pad, &line).unwrap();
     let contact = Contact { position: Position { x_m: 0.03, y_m: 0.02 }, force_n: 2.0 };
-    assert_eq!(limit.at(contact, Force::Known), None);
+    assert_eq!(limit.bound_at(contact, Force::Known), None);
     let found = limit_warnings(&limit, 2.0, Force::Known).unwrap();
     // They cannot tell one side of the line from the other either.
     assert_eq!(found.iter().map(LimitWarning::kind).collect::<Vec<_>>(), ["mirror"], "{}", words(&found));
-    let curve = LimitCurve::every(&limit, 2.0, Force::Known, 5e-3).unwrap();
+    let curve = LimitCurve::with_spacing(&limit, 2.0, Force::Known, 5e-3).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
     assert_eq!(curve.summary().unwrap().without, 11);
     // A figure by x is its mean across; every column has a contact on the line, where there is no bound.
@@ -162,7 +163,7 @@ fn a_plane_has_a_bound_in_both_directions() {
     assert!(by_x.is_sorted_by(|a, b| a.0 < b.0) && by_x.iter().all(|(_, mean)| mean.is_nan()));
     let four = CramerRaoBound::new(&Pad, &four).unwrap();
     let at = [0.018, 0.022].map(|y_m| Position { x_m: 0.03, y_m });
-    let curve = LimitCurve::at(&four, 2.0, Force::Known, &at).unwrap();
+    let curve = LimitCurve::at_positions(&four, 2.0, Force::Known, &at).unwrap();
     let bounds = curve.points.iter().map(|point| point.bound.unwrap().sd_x_m);
     assert_eq!(curve.by_x(|bound| bound.sd_x_m), [(0.03, bounds.sum::<f64>() / 2.0)]);
 }
@@ -202,7 +203,7 @@ fn maximum_likelihood_spreads_as_the_limit_says() {
         (200.0, Force::Unknown),
     ] {
         let contact = Contact { position: Position::along(a_mm * 1e-3), force_n: 3.0 };
-        let bound = limit.at(contact, force).unwrap();
+        let bound = limit.bound_at(contact, force).unwrap();
         let clean = limit.whitened_reading(contact);
         let errors: Vec<f64> = (0..DRAWS)
             .map(|_| {
@@ -225,7 +226,7 @@ proptest! {
     fn less_noise_more_force_and_more_sensors_lower_the_limit(a in 0.002..0.398_f64, factor in 1.5..10.0_f64) {
         let at = |layout: &Layout, force_n, force| {
             let contact = Contact { position: Position::along(a), force_n };
-            CramerRaoBound::new(&*BEAM, layout).unwrap().at(contact, force).unwrap().sd_x_m
+            CramerRaoBound::new(&*BEAM, layout).unwrap().bound_at(contact, force).unwrap().sd_x_m
         };
         let layout = deflections(8);
         for force in [Force::Known, Force::Unknown] {
@@ -235,7 +236,7 @@ proptest! {
             let mut more = layout.clone();
             more.edit(|sensors| sensors.extend(deflections(3).into_sensors())).unwrap();
             prop_assert!(at(&more, 3.0, force) < limit);
-            let mirrored = CramerRaoBound::new(&*BEAM, &layout).unwrap().at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
+            let mirrored = CramerRaoBound::new(&*BEAM, &layout).unwrap().bound_at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
             prop_assert!((mirrored.unwrap().sd_x_m / limit - 1.0).abs() < 1e-4);
         }
         prop_assert!(at(&layout, 3.0, Force::Known) <= at(&layout, 3.0, Force::Unknown) * (1.0 + 1e-9));
@@ -303,8 +304,9 @@ fn what_has_no_limit_says_why() {
     let no_model = LimitError::NoModel.to_string();
     let layout = deflections(8);
     let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
-    let force = |force_n| LimitCurve::over(&limit, force_n, Force::Known).unwrap_err().to_string();
-    let every = |every_m| LimitCurve::every(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
+    let force = |force_n| LimitCurve::over_surface(&limit, force_n, Force::Known).unwrap_err().to_string();
+    let every =
+        |every_m| LimitCurve::with_spacing(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
     insta::assert_snapshot!(
         [
             said(&clean),
@@ -324,7 +326,7 @@ fn what_has_no_limit_says_why() {
 fn no_information_is_none_and_never_infinite() {
     let layout = deflections(8);
     let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
-    let at = |x_m, force_n, force| limit.at(Contact { position: Position::along(x_m), force_n }, force);
+    let at = |x_m, force_n, force| limit.bound_at(Contact { position: Position::along(x_m), force_n }, force);
     assert_eq!(at(0.0, 3.0, Force::Unknown), None);
     assert_eq!(at(0.4, 3.0, Force::Unknown), None);
     assert_eq!(at(0.2, 0.0, Force::Known), None);
@@ -334,9 +336,9 @@ fn no_information_is_none_and_never_infinite() {
     let one = deflections(1);
     let one = CramerRaoBound::new(&*BEAM, &one).unwrap();
     let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
-    assert_eq!(one.at(contact(0.1), Force::Unknown), None);
-    assert_eq!(one.at(contact(0.2), Force::Known), None);
-    assert!(one.at(contact(0.1), Force::Known).is_some());
+    assert_eq!(one.bound_at(contact(0.1), Force::Unknown), None);
+    assert_eq!(one.bound_at(contact(0.2), Force::Known), None);
+    assert!(one.bound_at(contact(0.1), Force::Known).is_some());
 }
 
 #[test]

@@ -85,7 +85,7 @@ pub fn limit_warnings(
 ) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
     // A support that stands between the positions of the grid could be missed: next to it little may be told.
-    let grid = Grid::over(limit.surface.extent()).with(&limit.surface.force_supports());
+    let grid = Grid::over_surface(limit.surface.extent()).including(&limit.surface.force_supports());
     let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
     warnings.extend(survey.mirrors());
@@ -103,7 +103,9 @@ struct Survey<'a> {
 
 impl Survey<'_> {
     fn sd_m(&self, position: Position, force: Force) -> Option<f64> {
-        self.limit.at(Contact { position, force_n: self.force_n }, force).map(|bound| bound.sd_position_m)
+        self.limit
+            .bound_at(Contact { position, force_n: self.force_n }, force)
+            .map(|bound| bound.sd_position_m)
     }
 
     fn signal(&self, position: Position) -> f64 {
@@ -171,7 +173,7 @@ impl Survey<'_> {
             let is_line = zone.from.y_m == 0.0 && zone.to.y_m == 0.0;
             let ends = [zone.from, zone.to].into_iter().filter(|_| is_line).filter_map(twin);
             let twins =
-                Zone::around(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
+                Zone::bounding(pairs.iter().map(|(_, twin)| *twin).chain(ends).map(|twin| twin.position));
             let (Some(&(at, nearest)), Some(twins)) = (nearest, twins) else { continue };
             let said = |warning: &LimitWarning| match warning {
                 LimitWarning::Mirror { zone, twins, .. } => {
@@ -339,7 +341,7 @@ impl fmt::Display for LimitWarning {
 }
 
 fn place(position: Position) -> String {
-    Zone::at(position).to_string()
+    Zone::point(position).to_string()
 }
 
 /// About two significant digits, and no exponent: "0.087", "3.3", "8300".
@@ -387,7 +389,7 @@ struct TwinSearch<'a> {
 
 impl<'a> TwinSearch<'a> {
     pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force, bound: f64) -> Self {
-        let grid = Grid::over(limit.surface.extent());
+        let grid = Grid::over_surface(limit.surface.extent());
         let mut search = Self { limit, force_n, force, bound, grid, shapes: Vec::new(), spreads: Vec::new() };
         search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();
         let spread = |i: usize| {

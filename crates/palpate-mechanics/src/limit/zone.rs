@@ -26,9 +26,9 @@ pub struct Zone {
 
 impl Zone {
     /// The smallest zone that holds all `positions`; `None` of none.
-    pub(super) fn around(positions: impl IntoIterator<Item = Position>) -> Option<Self> {
+    pub(super) fn bounding(positions: impl IntoIterator<Item = Position>) -> Option<Self> {
         positions.into_iter().fold(None, |zone: Option<Self>, position| {
-            let Self { from, to, .. } = zone.unwrap_or(Self::at(position));
+            let Self { from, to, .. } = zone.unwrap_or(Self::point(position));
             Some(Self {
                 from: Position { x_m: from.x_m.min(position.x_m), y_m: from.y_m.min(position.y_m) },
                 to: Position { x_m: to.x_m.max(position.x_m), y_m: to.y_m.max(position.y_m) },
@@ -38,7 +38,7 @@ impl Zone {
     }
 
     /// One position.
-    pub(super) const fn at(position: Position) -> Self {
+    pub(super) const fn point(position: Position) -> Self {
         Self { from: position, to: position, filled: 1.0 }
     }
 
@@ -123,7 +123,7 @@ fn patches(length_m: f64, width_m: f64, grid: &Grid, mut flags: Vec<bool>) -> Ve
             next += 1;
         }
         let inside: Vec<Position> = patch.iter().map(|i| grid.positions[*i]).collect();
-        let Some(around) = Zone::around(inside.iter().copied()) else { continue };
+        let Some(around) = Zone::bounding(inside.iter().copied()) else { continue };
         // From the outermost positions a zone is carried to the edge.
         let lower = |at_m: f64, pitch_m: f64| if at_m < 1.5 * pitch_m { 0.0 } else { at_m - 0.5 * pitch_m };
         let upper = |at_m: f64, pitch_m: f64, size_m: f64| {
@@ -168,14 +168,14 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Fine enough to see what a limit does.
-    pub fn over(extent: Extent) -> Self {
+    pub fn over_surface(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self::new(extent, ALONG_A_LINE, 1) };
         let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().clamp(5.0, ON_A_PLANE / 5.0).round() as usize;
         Self::new(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
     }
 
     /// `every_m` apart, from `every_m` to as far as the surface reaches.
-    pub fn every(extent: Extent, every_m: f64) -> Result<Self, LimitError> {
+    pub fn with_spacing(extent: Extent, every_m: f64) -> Result<Self, LimitError> {
         let inside = |size_m: f64| (size_m / every_m - 1e-6).floor();
         let (columns, rows) = (inside(extent.length_m()), extent.width_m().map_or(1.0, inside));
         let count = columns * rows;
@@ -197,7 +197,7 @@ impl Grid {
     }
 
     /// On a line, with these positions among the others where they lie between its ends; on a plane as it is.
-    pub fn with(mut self, others: &[Position]) -> Self {
+    pub fn including(mut self, others: &[Position]) -> Self {
         let rows = self.positions.len() / self.columns.max(1);
         let slack_m = 1e-6 * self.pitch_m();
         let new = |other: &Position| self.positions.iter().all(|at| (at.x_m - other.x_m).abs() > slack_m);

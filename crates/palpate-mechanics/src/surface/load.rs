@@ -27,11 +27,11 @@ impl UniformLoad {
     /// assert!((load.centre().x_m - 0.19).abs() < 1e-12);
     /// ```
     pub const fn along(from_m: f64, to_m: f64, force_n: f64) -> Self {
-        Self::between(Position::along(from_m), Position::along(to_m), force_n)
+        Self::new(Position::along(from_m), Position::along(to_m), force_n)
     }
 
     /// A force in newtons over the stretch, or the rectangle, between two opposite ends or corners.
-    pub const fn between(one: Position, other: Position, force_n: f64) -> Self {
+    pub const fn new(one: Position, other: Position, force_n: f64) -> Self {
         Self {
             from: Position { x_m: one.x_m.min(other.x_m), y_m: one.y_m.min(other.y_m) },
             to: Position { x_m: one.x_m.max(other.x_m), y_m: one.y_m.max(other.y_m) },

@@ -164,7 +164,7 @@ impl ModalResponse {
         for step in 1..=steps {
             let share = step as f64 / steps as f64;
             let after: Vec<Contact> =
-                start.iter().zip(loads).map(|(from, to)| between(*from, *to, share)).collect();
+                start.iter().zip(loads).map(|(from, to)| interpolated(*from, *to, share)).collect();
             for k in 1..=self.modes.len() {
                 let (from, to) = (self.acceleration(k, &before), self.acceleration(k, &after));
                 self.modes[k - 1] = self.oscillators[k - 1].step(self.modes[k - 1], from, to);
@@ -238,7 +238,7 @@ impl ModalResponse {
 }
 
 /// A load on its way.
-fn between(from: Contact, to: Contact, share: f64) -> Contact {
+fn interpolated(from: Contact, to: Contact, share: f64) -> Contact {
     let mix = |from: f64, to: f64| from + share * (to - from);
     Contact {
         position: Position::along(mix(from.position.x_m, to.position.x_m)),

@@ -53,7 +53,7 @@ const LEAST_VARIANCE: f64 = 1e-14;
 
 impl Groups {
     /// Checks and collapses.
-    pub fn of(samples: Samples) -> Result<Self, RegressionError> {
+    pub fn new(samples: Samples) -> Result<Self, RegressionError> {
         check(samples)?;
         let outputs = samples.outputs;
         let (offset, variance) = moments(&outputs, Axis(1));

@@ -48,7 +48,7 @@ impl Regression {
     /// # Errors
     /// [`RegressionError`], with the row or value that no regression can use; or when `watch` stopped it.
     pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
-        let groups = Groups::of(samples)?;
+        let groups = Groups::new(samples)?;
         let found = self.search(&groups, watch)?;
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found)
     }
@@ -74,13 +74,13 @@ impl Regression {
         samples: Samples,
         hyperparameters: &Hyperparameters,
     ) -> Result<GaussianProcess, RegressionError> {
-        let groups = Groups::of(samples)?;
+        let groups = Groups::new(samples)?;
         hyperparameters.check(groups.coordinates.nrows())?;
         GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters)
     }
 
     fn search(&self, groups: &Groups, watch: Watch) -> Result<Hyperparameters, Cancelled> {
-        let prior = Prior::of(groups);
+        let prior = Prior::new(groups);
         let order = random_order(groups.len(), self.seed);
         let first = |count: usize| {
             let mut chosen = order[..count.min(order.len())].to_vec();
@@ -134,7 +134,7 @@ struct Prior {
 }
 
 impl Prior {
-    fn of(groups: &Groups) -> Self {
+    fn new(groups: &Groups) -> Self {
         let d = groups.spread.len();
         // Points in d dimensions are about √d spreads apart.
         let apart = (d as f64).sqrt();

@@ -49,7 +49,7 @@ struct Dense {
 fn dense(process: &GaussianProcess, regression: Regression, samples: Samples, at: [f64; 2]) -> Dense {
     let (x, y) = (samples.coordinates, samples.outputs);
     let (rows, d) = x.dim();
-    let distinct = Groups::of(samples).unwrap();
+    let distinct = Groups::new(samples).unwrap();
     let h = process.hyperparameters();
     let covariance = |a: &[f64], b: &[f64]| {
         let mut r2 = 0.0;
@@ -126,7 +126,7 @@ fn the_evidences_gradient_is_its_difference() {
     for trend in [Trend::Constant, Trend::Linear] {
         for kernel in [Kernel::Matern52, Kernel::SquaredExponential] {
             for noise in [None, Some(&given[..])] {
-                let groups = Groups::of(samples(&x, &y, noise)).unwrap();
+                let groups = Groups::new(samples(&x, &y, noise)).unwrap();
                 let evidence = Evidence { groups: &groups, kernel, trend };
                 let at = [0.1, 0.7, -2.0];
                 let value = |theta: &[f64], gradient: &mut [f64]| {

@@ -213,7 +213,7 @@ pub trait Abreast<V: Copy>: Number {
     /// The numbers.
     fn lanes(self) -> Self::Each<f64>;
     /// The numbers side by side.
-    fn of(lanes: &Self::Each<f64>) -> Self;
+    fn from_lanes(lanes: &Self::Each<f64>) -> Self;
     /// [`Eight::sum`] of each row's K vectors.
     fn sums<const K: usize>(vectors: &Self::Each<[V; K]>) -> [Self; K];
 }
@@ -231,7 +231,7 @@ impl<V: Eight> Abreast<V> for f64 {
         [self]
     }
     #[inline(always)]
-    fn of(lanes: &[f64; 1]) -> f64 {
+    fn from_lanes(lanes: &[f64; 1]) -> f64 {
         lanes[0]
     }
     #[inline(always)]
@@ -257,7 +257,7 @@ impl<V: Eight> Abreast<V> for V {
         self.to_array()
     }
     #[inline(always)]
-    fn of(lanes: &[f64; 8]) -> Self {
+    fn from_lanes(lanes: &[f64; 8]) -> Self {
         V::load(lanes)
     }
     #[inline(always)]

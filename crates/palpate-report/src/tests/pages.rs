@@ -279,7 +279,7 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
     let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
     let setup = Setup::new(beam).sensors(sensors).unwrap();
     let limit = setup.cramer_rao_bound().unwrap();
-    let curve = |force| LimitCurve::over(&limit, 3.0, force).unwrap();
+    let curve = |force| LimitCurve::over_surface(&limit, 3.0, force).unwrap();
     limit_report(&LimitReport {
         title: "The limit of <paper>",
         setup: &setup,

@@ -56,7 +56,7 @@ fn all_components_have_the_limit_of_the_readings_and_fewer_have_more() {
     let gradients: Vec<ResponseGradient> = functions
         .map(|sensor| surface.response_function(sensor.kind, sensor.position).gradient(contact))
         .collect();
-    let whole = limit.at(contact, palpate_mechanics::limit::Force::Known).unwrap().mean_error_m();
+    let whole = limit.bound_at(contact, palpate_mechanics::limit::Force::Known).unwrap().mean_error_m();
     let of = |count: usize| reduction.bound(&gradients, count).unwrap().mean_error_m();
     assert!((of(25) / whole - 1.0).abs() < 1e-6);
     assert!(of(2) > of(4) && of(4) > of(10) && of(10) >= of(25));

@@ -118,7 +118,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
     let setup = Setup { force_n, ..rig.setup.clone() };
     let mut design = match &rig.design {
         Some(design) => design.clone(),
-        None => SensorDesign::of(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,
+        None => SensorDesign::for_setup(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,
     };
     if arguments.unknown_force {
         design = design.unknown_force();

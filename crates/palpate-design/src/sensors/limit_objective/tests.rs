@@ -30,7 +30,8 @@ fn a_sensor_more_scores_as_the_layout_with_it() {
         let refs: Vec<&[Block]> = rows.iter().map(Vec::as_slice).collect();
         let whole = objective.score(&objective.state(&refs, Vague));
         let rest = objective.state(&refs[..4], Vague);
-        for added in [objective.score_with(&rest, refs[4]), objective.score(&objective.with(&rest, refs[4]))]
+        for added in
+            [objective.score_with(&rest, refs[4]), objective.score(&objective.updated(&rest, refs[4]))]
         {
             assert!((added - whole).abs() < 1e-9 * whole.abs(), "{criterion:?}: {added} {whole}");
         }

@@ -194,7 +194,11 @@ impl Coarse {
                 let (t, least) = self.along_chords(profile, *node);
                 (*place, *floor) = ((*node as f64 + t) * self.h_m, least);
             }
-            return Start { x_m: N::of(&places), force_n: N::splat(force_n), floor: N::of(&floors) };
+            return Start {
+                x_m: N::from_lanes(&places),
+                force_n: N::splat(force_n),
+                floor: N::from_lanes(&floors),
+            };
         }
         let mut mixtures = N::each(Mixture::default());
         for ((mixtures, place), (profile, node)) in
@@ -203,8 +207,8 @@ impl Coarse {
             (*mixtures, *place) = (self.mixture(profile, *node), *node as f64);
         }
         let (t, force_n) = Mixture::abreast::<V, N>(&mixtures).mix(self.force);
-        let x_m = (N::of(&places) + t) * N::splat(self.h_m);
-        Start { x_m, force_n, floor: N::of(&floors) }
+        let x_m = (N::from_lanes(&places) + t) * N::splat(self.h_m);
+        Start { x_m, force_n, floor: N::from_lanes(&floors) }
     }
 
     /// Distance from `node`, in coarse nodes, at which a chord comes closest to d, and the least misfit that its curve may have.
@@ -307,7 +311,7 @@ impl Mixture<f64> {
         let of = |part: fn(&Self) -> f64| {
             let mut lanes = N::each(0.0);
             lanes.as_mut().iter_mut().zip(each.as_ref()).for_each(|(lane, mixtures)| *lane = part(mixtures));
-            N::of(&lanes)
+            N::from_lanes(&lanes)
         };
         Mixture {
             product: of(|mixtures| mixtures.product),

@@ -138,7 +138,7 @@ impl GaussNewton {
             let curvature = &self.curvatures[*node as u32 as usize];
             (*kappa_square, *lambda_square) = (curvature.kappa_square, curvature.lambda_square);
         }
-        Curvature { kappa_square: N::of(&kappa_square), lambda_square: N::of(&lambda_square) }
+        Curvature { kappa_square: N::from_lanes(&kappa_square), lambda_square: N::from_lanes(&lambda_square) }
     }
 
     /// Whether the calibration's variance counts alike, to a twentieth, for two forces.

@@ -14,7 +14,7 @@ use ndarray::Array2;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, dot};
-use palpate_numerics::{held_interval, normal_interval_95};
+use palpate_numerics::{clamped_interval, normal_interval_95};
 use std::f64::consts::PI;
 
 /// The estimate of two to `most` contacts together, where they explain a whitened reading better than one with its `misfit` does; `None`
@@ -174,7 +174,10 @@ fn refine<const K: usize, const N: usize>(
         let (x, w) = (1 + 2 * k, 2 + 2 * k);
         let uncertainty = covariance.map(|covariance| Uncertainty {
             covariance: [covariance[x][x], 0.0, covariance[x][w], 0.0, 0.0, covariance[w][w]],
-            x_95_m: held_interval(normal_interval_95(position.x_m, covariance[x][x].sqrt()), table.length_m),
+            x_95_m: clamped_interval(
+                normal_interval_95(position.x_m, covariance[x][x].sqrt()),
+                table.length_m,
+            ),
             y_95_m: (0.0, 0.0),
         });
         ContactEstimate { position, force_n: Some(force_n), uncertainty }

@@ -6,7 +6,7 @@ use super::search::Search;
 use crate::status::OTHER_PLACE;
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::{bisect, normal_distribution, normal_interval_95};
+use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
 
 /// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
 const MOST_SPACINGS: f64 = 1.5;
@@ -99,7 +99,7 @@ fn shares(minima: &[Minimum], length_m: f64) -> [f64; MOST_MINIMA] {
 
 /// Share of a normal distribution that lies on the surface.
 fn mass(mean_m: f64, sd_m: f64, length_m: f64) -> f64 {
-    normal_distribution((length_m - mean_m) / sd_m) - normal_distribution(-mean_m / sd_m)
+    normal_cdf((length_m - mean_m) / sd_m) - normal_cdf(-mean_m / sd_m)
 }
 
 /// The 95 % interval of the position over all minima.
@@ -116,7 +116,7 @@ fn interval(search: &Search, minima: &[Minimum], shares: &[f64], misfits: &[f64;
     let cumulative = |x_m: f64| {
         let parts = minima.iter().zip(shares).map(|(minimum, share)| {
             let sd_m = minimum.covariance[0].sqrt();
-            let below = |x_m: f64| normal_distribution((x_m - minimum.x_m) / sd_m);
+            let below = |x_m: f64| normal_cdf((x_m - minimum.x_m) / sd_m);
             share * (below(x_m) - below(0.0)) / mass(minimum.x_m, sd_m, length_m).max(f64::MIN_POSITIVE)
         });
         parts.sum::<f64>()
@@ -132,8 +132,8 @@ fn single_interval(minimum: &Minimum, length_m: f64) -> (f64, f64) {
     if left > 4.0 && right > 4.0 {
         return normal_interval_95(minimum.x_m, sd_m);
     }
-    let (low, high) = (normal_distribution(-left), normal_distribution(right));
-    let cumulative = |x_m: f64| (normal_distribution((x_m - minimum.x_m) / sd_m) - low) / (high - low);
+    let (low, high) = (normal_cdf(-left), normal_cdf(right));
+    let cumulative = |x_m: f64| (normal_cdf((x_m - minimum.x_m) / sd_m) - low) / (high - low);
     let quantile = |share: f64| bisect((0.0, length_m), 60, |x_m| cumulative(x_m) < share);
     (quantile(0.025), quantile(0.975))
 }

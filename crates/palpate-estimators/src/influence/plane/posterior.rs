@@ -14,7 +14,7 @@ use crate::status::OTHER_PLACE;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::small::{Ldl, principal_direction, principal_variances};
-use palpate_numerics::{ELLIPSE_95, held_interval, normal_interval_95};
+use palpate_numerics::{ELLIPSE_95, clamped_interval, normal_interval_95};
 
 /// Memory for locating readings.
 #[derive(Clone, Debug, Default)]
@@ -60,7 +60,7 @@ fn position([x_m, y_m, _]: Unknowns) -> Position {
 /// A contact with an uncertainty that is held to the surface.
 fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimate {
     let interval = |k: usize, variance: f64| {
-        held_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
+        clamped_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
     };
     let uncertainty =
         Uncertainty { covariance, x_95_m: interval(0, covariance[0]), y_95_m: interval(1, covariance[3]) };

@@ -90,7 +90,7 @@ fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch>
         for position in inner_positions(rig.setup.surface.extent(), SIDE) {
             let contact = Contact { position, force_n: 5.0 };
             let reading = measure(&rig.setup.layout, &clean.reading(contact), &errors, &mut rng);
-            let Some(bound) = limit.at(contact, force) else { continue };
+            let Some(bound) = limit.bound_at(contact, force) else { continue };
             let found = locator.locate_with(&reading, &mut scratch).contact;
             let (dx, dy) = (found.position.x_m - position.x_m, found.position.y_m - position.y_m);
             let is_covered = found.uncertainty.map(|uncertainty| {
@@ -278,7 +278,8 @@ fn faults_that_a_calibration_shows_are_corrected() {
     let (mut error_m, mut limit_m) = (0.0, 0.0);
     for position in inner_positions(told.surface.extent(), 12) {
         let contact = Contact { position, force_n: 5.0 };
-        let Some(bound) = limit.at(contact, Force::Known).filter(|bound| bound.sd_position_m < 5e-3) else {
+        let Some(bound) = limit.bound_at(contact, Force::Known).filter(|bound| bound.sd_position_m < 5e-3)
+        else {
             continue;
         };
         for _ in 0..5 {

@@ -47,7 +47,14 @@ fn dissect(block: Block, order: &mut Vec<(usize, usize)>) {
 /// An upper bound: a block's nodes couple with each other and with all nodes that surround it. In floating point, for it is
 /// asked of grids that are too large to be anything but refused.
 pub(super) fn coupled_pairs(columns: usize, rows: usize) -> f64 {
-    Couplings::default().of(Surrounded { wide: columns, high: rows, left: 0, right: 0, below: 0, above: 0 })
+    Couplings::default().count(Surrounded {
+        wide: columns,
+        high: rows,
+        left: 0,
+        right: 0,
+        below: 0,
+        above: 0,
+    })
 }
 
 /// A block's size, and on which sides there are nodes beside it: 1 or 0.
@@ -63,7 +70,7 @@ struct Surrounded {
 
 impl Surrounded {
     /// Nodes around the block.
-    fn around(self) -> usize {
+    fn surrounding_nodes(self) -> usize {
         let Self { wide, high, left, right, below, above } = self;
         (wide + left + right) * (high + below + above) - wide * high
     }
@@ -74,23 +81,23 @@ impl Surrounded {
 struct Couplings(HashMap<Surrounded, f64>);
 
 impl Couplings {
-    fn of(&mut self, block: Surrounded) -> f64 {
+    fn count(&mut self, block: Surrounded) -> f64 {
         if let Some(pairs) = self.0.get(&block) {
             return *pairs;
         }
         let Surrounded { wide, high, .. } = block;
         let pairs = if wide * high <= LEAF_NODES {
-            eliminated(wide * high, block.around())
+            eliminated(wide * high, block.surrounding_nodes())
         } else if wide >= high {
             let line = wide / 2;
-            self.of(Surrounded { wide: line, right: 1, ..block })
-                + self.of(Surrounded { wide: wide - line - 1, left: 1, ..block })
-                + eliminated(high, block.around())
+            self.count(Surrounded { wide: line, right: 1, ..block })
+                + self.count(Surrounded { wide: wide - line - 1, left: 1, ..block })
+                + eliminated(high, block.surrounding_nodes())
         } else {
             let line = high / 2;
-            self.of(Surrounded { high: line, above: 1, ..block })
-                + self.of(Surrounded { high: high - line - 1, below: 1, ..block })
-                + eliminated(wide, block.around())
+            self.count(Surrounded { high: line, above: 1, ..block })
+                + self.count(Surrounded { high: high - line - 1, below: 1, ..block })
+                + eliminated(wide, block.surrounding_nodes())
         };
         self.0.insert(block, pairs);
         pairs

@@ -79,8 +79,8 @@ impl Mesh {
 
     /// The point of the mesh at `position`; off the plate, that in the nearest element that its polynomial continues to.
     pub fn locate(&self, position: Position) -> MeshPoint {
-        let (column, xi) = along(position.x_m / self.side_x_m, self.across);
-        let (row, eta) = along(position.y_m / self.side_y_m, self.up);
+        let (column, xi) = element_at(position.x_m / self.side_x_m, self.across);
+        let (row, eta) = element_at(position.y_m / self.side_y_m, self.up);
         MeshPoint { column, row, xi, eta }
     }
 
@@ -132,7 +132,7 @@ impl Mesh {
 
 /// The element of a place that is `steps` elements along, among `count`, and where in it.
 #[inline]
-fn along(steps: f64, count: usize) -> (usize, f64) {
+fn element_at(steps: f64, count: usize) -> (usize, f64) {
     // A float becomes the nearest whole number that fits, so that no position is out of bounds.
     let element = (steps as usize).min(count - 1);
     (element, steps - element as f64)

@@ -61,9 +61,9 @@ struct Surroundings {
 
 impl Structure {
     pub fn new(length_m: f64, nodes: Vec<f64>, holds: Vec<Hold>, elements: Vec<Element>) -> Self {
-        let forth = Sweep::through(holds.iter().copied().zip(elements.iter().copied()));
+        let forth = Sweep::new(holds.iter().copied().zip(elements.iter().copied()));
         let mirrored = holds.iter().rev().copied().zip(elements.iter().rev().copied());
-        let back = Sweep::through(mirrored);
+        let back = Sweep::new(mirrored);
         Self { length_m, nodes, holds, elements, forth, back }
     }
 
@@ -226,7 +226,7 @@ pub(super) struct Piece {
 
 impl Piece {
     /// The state at a place, from the nearer end: beside a support the deflection is then as small as it should be.
-    fn at(&self, place: f64) -> State {
+    fn state_at(&self, place: f64) -> State {
         let (behind, ahead) = (place - self.from, self.to - place);
         if behind <= ahead {
             self.start.advanced(behind, self.stiffness)
@@ -241,7 +241,7 @@ impl Piece {
         let level = roots(shear / 2.0, moment, slope * self.stiffness);
         let within = level.into_iter().filter(|by| (0.0..=self.to - self.from).contains(by));
         within
-            .map(|by| self.at(self.from + by).deflection.abs())
+            .map(|by| self.state_at(self.from + by).deflection.abs())
             .fold(self.start.deflection.abs().max(self.end.deflection.abs()), f64::max)
     }
 }
@@ -255,7 +255,7 @@ impl Shape {
     fn state(&self, contact: Position) -> State {
         let place = contact.x_m / self.length_m;
         let piece = self.pieces.partition_point(|piece| piece.to < place).min(self.pieces.len() - 1);
-        self.pieces[piece].at(place)
+        self.pieces[piece].state_at(place)
     }
 }
 
@@ -320,7 +320,7 @@ const FREE: Pair = [State::DEFLECTION, State::SLOPE];
 
 impl Sweep {
     /// Through `elements`, each with the hold of the node at its beginning.
-    pub fn through(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
+    pub fn new(elements: impl Iterator<Item = (Hold, Element)>) -> Self {
         let mut passages = Vec::new();
         let mut pair = FREE;
         for (hold, element) in elements {
