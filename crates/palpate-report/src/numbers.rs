@@ -8,23 +8,35 @@ use palpate_mechanics::units::{Dimension, Quantity, format_count};
 /// Placeholder where there is no number.
 pub(crate) const NOTHING: &str = "–";
 
-/// About three significant digits: "63.5", "2.46", "0.044", "1,250". "–" for what is not finite.
+/// About three significant digits: "63.5", "2.46", "−0.044", "1,250". "–" for what is not finite.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if !value.is_finite() {
-        NOTHING.to_owned()
-    } else if size >= 99.95 {
-        whole(value)
+        return NOTHING.to_owned();
+    }
+    let text = if size >= 99.95 {
+        format_count(size.round() as u64)
     } else if size >= 9.995 {
-        format!("{value:.1}")
+        format!("{size:.1}")
     } else if size >= 0.0995 || size == 0.0 {
-        format!("{value:.2}")
+        format!("{size:.2}")
     } else if size >= 1e-5 {
         let decimals = (1.0 - size.log10().floor()) as usize;
-        format!("{value:.decimals$}")
+        format!("{size:.decimals$}")
     } else {
-        format!("{value:.1e}")
-    }
+        format!("{size:.1e}")
+    };
+    signed(value, text)
+}
+
+/// The size of a number with a minus sign before it where it is negative.
+fn signed(value: f64, size: String) -> String {
+    if value < 0.0 { format!("−{size}") } else { size }
+}
+
+/// A number with a fixed count of decimals: "−1.3784".
+pub(crate) fn decimals(value: f64, count: usize) -> String {
+    signed(value, format!("{:.count$}", value.abs()))
 }
 
 /// An SI value with its unit, in print: "5 µm" where files and the terminal have "5 um".
@@ -42,8 +54,8 @@ pub(crate) fn whole(value: f64) -> String {
     if !value.is_finite() {
         return NOTHING.to_owned();
     }
-    let text = format_count(value.abs().round() as u64);
-    if value < 0.0 && text != "0" { format!("−{text}") } else { text }
+    let rounded = value.round();
+    signed(rounded, format_count(rounded.abs() as u64))
 }
 
 /// As it was written, with separators of thousands from 1,000 on: "3.6", "26,850".
@@ -103,8 +115,10 @@ mod tests {
 
     #[test]
     fn numbers_have_about_three_digits() {
-        let shown = [26_850.4, 100.0, 63.46, 2.4649, 0.5712, 0.0, 0.04449, 1.2e-7, f64::NAN].map(number);
-        assert_eq!(shown, ["26,850", "100", "63.5", "2.46", "0.57", "0.00", "0.044", "1.2e-7", "–"]);
+        let shown =
+            [26_850.4, 100.0, 63.46, 2.4649, 0.5712, 0.0, 0.04449, 1.2e-7, -0.213, f64::NAN].map(number);
+        assert_eq!(shown, ["26,850", "100", "63.5", "2.46", "0.57", "0.00", "0.044", "1.2e-7", "−0.21", "–"]);
+        assert_eq!([-1.378_42, 0.5].map(|value| decimals(value, 4)), ["−1.3784", "0.5000"]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::maps::sensors_mm;
-use super::numbers::{NOTHING, counted, mm, number, place, stated};
+use super::numbers::{NOTHING, counted, decimals, mm, number, place, stated};
 use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
 use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
@@ -33,6 +33,8 @@ pub struct ProfileReport<'a> {
     pub resolution: Option<&'a Resolution>,
     /// The loads that were simulated; none where the truth is not known.
     pub truth: &'a [UniformLoad],
+    /// Origin of the reading: a file and a line, or a rig and a seed.
+    pub source: &'a str,
 }
 
 /// Reports a load profile: `report.html`, one self-contained page, and its figures as SVG files.
@@ -57,7 +59,9 @@ pub fn profile_report(report: &ProfileReport) -> Vec<ReportFile> {
             .table(report.reading_table()),
         Section::new("meaning", "What the profile means").text(meaning()),
     ];
-    Page::new(report.title, report.summary(), sections).files()
+    Page::new(report.title, report.summary(), sections)
+        .with_source(html! { " from " (report.source) })
+        .files()
 }
 
 impl<'a> ProfileReport<'a> {
@@ -290,7 +294,7 @@ impl<'a> ProfileReport<'a> {
 
     fn reading_table(&self) -> Table {
         let shown = |sensor: &Sensor, value: Option<f64>| match value {
-            Some(value) => format!("{:.4}", value / sensor.kind.unit().factor()),
+            Some(value) => decimals(value / sensor.kind.unit().factor(), 4),
             None => NOTHING.to_owned(),
         };
         let caption = html! {

@@ -110,7 +110,7 @@ impl Printer<'_> {
         let limits = patch_limits(self.profiler.sensors(), &loads);
         self.told += 1;
         if let (1, Some(path)) = (self.told, &self.arguments.report) {
-            self.write_report(reading, &profile, limits.as_deref(), path)?;
+            self.write_report(reading, &profile, limits.as_deref(), line, path)?;
         }
         let told = JsonProfile::new(self.profiler, &profile, limits.as_deref(), self.truth, line);
         if self.arguments.json {
@@ -129,17 +129,24 @@ impl Printer<'_> {
         reading: &[f64],
         profile: &LoadProfile,
         limits: Option<&[PatchLimit]>,
+        line: Option<u64>,
         path: &Path,
     ) -> Result<(), Failure> {
+        let arguments = self.arguments;
+        let source = match (&arguments.readings, line) {
+            (Some(readings), Some(line)) => format!("{}, line {line}", readings.display()),
+            _ => format!("{}, simulated with seed {}", arguments.subject.display(), arguments.seed),
+        };
         let resolution = self.profiler.resolution(profile);
         let report = ProfileReport {
-            title: &format!("The load on {}", self.arguments.subject.display()),
+            title: &format!("The load on {}", arguments.subject.display()),
             layout: &self.subject.setup().layout,
             reading,
             profile,
             limits,
             resolution: resolution.as_ref(),
             truth: self.truth,
+            source: &source,
         };
         // The page holds its figures; the others are copies of them.
         let files = profile_report(&report);

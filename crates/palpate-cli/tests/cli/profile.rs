@@ -35,6 +35,10 @@ fn the_example_tells_both_pads() {
     assert_eq!(found["profile"].as_array().unwrap().len(), 80);
     let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
     assert!(page.contains("figure-4") && page.contains("true load") && !page.contains("http://palpate"));
+    assert!(
+        page.contains("from rig.toml, simulated with seed 1."),
+        "the page does not say what it was made from"
+    );
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn tally(strain: bool, readings: usize) -> Tally {
     tally
 }
 
-/// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. BoundedList readings are far off, and four of them are among the
+/// docs/load-profiles.md has these for 200 readings: PALPATE_READINGS=200. Few readings are far off, and four of them are among the
 /// first forty: a share needs a hundred.
 fn readings() -> usize {
     std::env::var("PALPATE_READINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(100)

@@ -28,7 +28,7 @@ fn dead_areas_are_the_interpretations_and_not_the_counts() {
         })
         .unwrap()
     };
-    // BoundedList sensors under one surface, interpreted well: no dead area; more of them change nothing.
+    // Few sensors under one surface, interpreted well: no dead area; more of them change nothing.
     for sensors in [4, 16] {
         let row = row("distributive", "influence", sensors);
         assert!(row.effective_percent > 97.0 && row.folded.dead_percent < 3.0, "{row:?}");
