@@ -167,10 +167,6 @@ impl Arrangement {
     }
 }
 
-fn at(x_m: f64) -> Position {
-    Position::along(x_m)
-}
-
 fn even_over(
     count: usize,
     (start, end): (f64, f64),
@@ -180,7 +176,7 @@ fn even_over(
         return Err(ArrangementError::EvenPortion { start, end });
     }
     let share = |i: usize| if count == 1 { 0.5 } else { i as f64 / (count - 1) as f64 };
-    Ok((0..count).map(|i| at((start + share(i) * (end - start)) * length_m)).collect())
+    Ok((0..count).map(|i| Position::along((start + share(i) * (end - start)) * length_m)).collect())
 }
 
 fn edge_dense(
@@ -205,9 +201,9 @@ fn edge_dense(
     let left_pitch_m = start * length_m / (edge + 1) as f64;
     let right_pitch_m = (1.0 - end) * length_m / (edge + 1) as f64;
     let middle_pitch_m = (end - start) * length_m / (middle - 1) as f64;
-    let left = (1..=edge).map(|i| at(i as f64 * left_pitch_m));
-    let centre = (0..middle).map(|i| at(start * length_m + i as f64 * middle_pitch_m));
-    let right = (1..=edge).rev().map(|i| at(length_m - i as f64 * right_pitch_m));
+    let left = (1..=edge).map(|i| Position::along(i as f64 * left_pitch_m));
+    let centre = (0..middle).map(|i| Position::along(start * length_m + i as f64 * middle_pitch_m));
+    let right = (1..=edge).rev().map(|i| Position::along(length_m - i as f64 * right_pitch_m));
     Ok(left.chain(centre).chain(right).collect())
 }
 

@@ -25,7 +25,7 @@ impl HeldOutErrors {
     pub const FEWEST: usize = 19;
 
     /// The spread of errors (x, y) in metres; `None` of fewer than [`HeldOutErrors::FEWEST`], which bound no 95 % interval.
-    pub fn of(errors_m: &[[f64; 2]]) -> Option<Self> {
+    pub fn from_errors(errors_m: &[[f64; 2]]) -> Option<Self> {
         if errors_m.len() < Self::FEWEST {
             return None;
         }
@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn the_interval_covers_nineteen_in_twenty() {
         let errors: Vec<[f64; 2]> = (1..=99).map(|i| [f64::from(i) * -1e-3, 0.0]).collect();
-        let spread = HeldOutErrors::of(&errors).unwrap();
+        let spread = HeldOutErrors::from_errors(&errors).unwrap();
         assert_eq!(spread.half_95_m, [95e-3, 0.0]);
         // Σ i² = n·(n + 1)·(2n + 1)/6
         assert!((spread.rms_m[0] - 1e-3 * (100.0 * 199.0 / 6.0_f64).sqrt()).abs() < 1e-12);
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn too_few_errors_bound_nothing() {
-        assert_eq!(HeldOutErrors::of(&[[1.0, 0.0]; 18]), None);
-        assert_eq!(HeldOutErrors::of(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
+        assert_eq!(HeldOutErrors::from_errors(&[[1.0, 0.0]; 18]), None);
+        assert_eq!(HeldOutErrors::from_errors(&[[1.0, 0.0]; 19]).map(|s| s.half_95_m[0]), Some(1.0));
     }
 }

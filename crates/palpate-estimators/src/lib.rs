@@ -13,7 +13,7 @@
 //! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 //! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 //! let locator = Influence::default().fit(&setup, &setup.simulate(&Training::even(10), 0)?)?;
-//! let errors = Evaluation::of(&locator, &setup.simulate(&Training::even(50), 1)?)?;
+//! let errors = Evaluation::new(&locator, &setup.simulate(&Training::even(50), 1)?)?;
 //! assert!(errors.effective_percent(mm(2.0)) > 90.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -23,8 +23,8 @@ pub trait Likelihood: Send + Sync {
     /// away; on a line xx alone.
     fn calibration_m2(&self, contacts: &[Contact]) -> [[f64; 3]; 2];
 
-    /// The contacts that explain a reading by itself: the best estimate, and its other modes.
-    fn locate_alone(&self, reading: &[f64]) -> Estimate;
+    /// Estimate from one reading alone, without those before it: the best contacts, and the other modes.
+    fn single_estimate(&self, reading: &[f64]) -> Estimate;
 
     /// Extent of the surface.
     fn extent(&self) -> Extent;

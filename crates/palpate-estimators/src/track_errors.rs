@@ -63,7 +63,7 @@ impl Sums {
 impl TrackErrors {
     /// Compares tracks with the true contacts of each, whose force is 0 where they do not touch; `None` where nothing ever
     /// did, or nothing was tracked.
-    pub fn of(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
+    pub fn new(tracks: &[Track], truths: &[Vec<Contact>], extent: Extent) -> Option<Self> {
         let (mut readings, mut single, mut track) = (0, Sums::default(), Sums::default());
         for (one, truths) in tracks.iter().zip(truths) {
             let touching = truths.iter().filter(|truth| truth.force_n > 0.0);
@@ -71,7 +71,7 @@ impl TrackErrors {
             readings += usize::from(!truths.is_empty());
             let tracked: Vec<ContactEstimate> = one.contacts.iter().map(Tracked::estimate).collect();
             track.add(&truths, &tracked, extent);
-            single.add(&truths, &alone(&one.alone, !truths.is_empty()), extent);
+            single.add(&truths, &contacts_of_single(&one.single, !truths.is_empty()), extent);
         }
         let all = tracks.len().min(truths.len()) as f64;
         (track.contacts > 0).then(|| Self {
@@ -93,7 +93,7 @@ impl TrackErrors {
 }
 
 /// The contacts of a reading by itself; while something touches, its best guess at least.
-fn alone(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
+fn contacts_of_single(estimate: &Estimate, touched: bool) -> Vec<ContactEstimate> {
     if !touched && estimate.status == Status::NoContact {
         return Vec::new();
     }
@@ -229,7 +229,7 @@ pub fn sweep_speeds(
         let truths = recording.truths();
         let Followed { filtered, smoothed } = follow(locator, config, &recording)?;
         let errors =
-            TrackErrors::of(&filtered, &truths, extent).zip(TrackErrors::of(&smoothed, &truths, extent));
+            TrackErrors::new(&filtered, &truths, extent).zip(TrackErrors::new(&smoothed, &truths, extent));
         sweep.extend(errors.map(|(filtered, smoothed)| SpeedErrors {
             ratio,
             speed_m_per_s,

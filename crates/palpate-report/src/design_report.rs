@@ -223,7 +223,7 @@ impl<'a> SensorDesignReport<'a> {
 
     /// The limit over a plane with the best and with the even layout.
     fn limit_maps(&self) -> Vec<Figure> {
-        let cells = Cells::about(self.setup.surface.extent(), CELLS, CELLS_A_SIDE);
+        let cells = Cells::nearly_square(self.setup.surface.extent(), CELLS, CELLS_A_SIDE);
         let force = (self.problem.force_n(), self.problem.force());
         let limits = |designed: &'a Designed| {
             let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };

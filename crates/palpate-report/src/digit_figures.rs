@@ -77,7 +77,7 @@ pub(super) fn force_limit_figure(unknown: &LimitCurve) -> Figure {
 /// Errors of the linear theory on clean readings: of position and of force by the force, each against the limit of
 /// the exact one. Empty where no estimator suits the bench.
 pub(super) fn linear_theory_figures(setup: &Setup, limit: &CramerRaoBound, digit: &Digit) -> Vec<Figure> {
-    let Some(theory) = LinearTheory::of(setup, digit) else { return Vec::new() };
+    let Some(theory) = LinearTheory::new(setup, digit) else { return Vec::new() };
     let at_limit = |contact: Contact| {
         let bound = limit.bound_at(contact, Force::Unknown);
         bound.map_or([f64::NAN; 2], |bound| [bound.sd_position_m, bound.sd_force_n.unwrap_or(f64::NAN)])

@@ -194,7 +194,7 @@ impl EvaluationReport<'_> {
         if pairs.len() <= MOST_MARKERS {
             return vec![Series::markers(label, colour, pairs, Marker::Circle)];
         }
-        let spread = |place: &[(f64, f64)]| Quantiles::of(place.iter().map(|pair| pair.1).collect());
+        let spread = |place: &[(f64, f64)]| Quantiles::from_values(place.iter().map(|pair| pair.1).collect());
         let places: Vec<(f64, Quantiles)> = pairs
             .chunk_by(|a, b| a.0 == b.0)
             .filter_map(|place| Some((place[0].0, spread(place)?)))

@@ -173,7 +173,7 @@ impl LimitReport<'_> {
     /// The limit over a plane, as two maps.
     fn limit_map(&self) -> Figure {
         let extent = self.known.extent;
-        let cells = Cells::about(extent, CELLS, CELLS_A_SIDE);
+        let cells = Cells::nearly_square(extent, CELLS, CELLS_A_SIDE);
         let panel = |name, force| {
             let limits = limits_mm(self.limit, &cells, (self.known.force_n, force), |b| b.sd_position_m);
             HeatPanel::new(name, limits)

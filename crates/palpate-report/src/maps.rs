@@ -71,7 +71,7 @@ fn error_cells(evaluations: &[(&str, &Evaluation)], extent: Extent) -> Cells {
     if is_grid && columns <= MOST_SIDE && rows <= MOST_SIDE {
         return Cells { extent, columns, rows };
     }
-    Cells::about(extent, 0.5 * places.len() as f64, 2..=MOST_SIDE)
+    Cells::nearly_square(extent, 0.5 * places.len() as f64, 2..=MOST_SIDE)
 }
 
 /// A figure of the bound at the middle of each cell, in mm, for a force and what is known of it; NaN where there is no bound.

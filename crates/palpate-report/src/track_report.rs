@@ -74,8 +74,8 @@ impl TrackReport<'_> {
     }
 
     fn track_figure(&self) -> Figure {
-        let alone = |track: &Track| (track.time_s, track.alone.contact.position.x_m * 1e3);
-        let mut series = vec![self.single_readings(alone)];
+        let position = |track: &Track| (track.time_s, track.single.contact.position.x_m * 1e3);
+        let mut series = vec![self.single_readings(position)];
         for k in 0..self.most_contacts() {
             let place = |track: &Track| {
                 (track.time_s, track.contacts.get(k).map_or(f64::NAN, |tracked| tracked.x_m * 1e3))
@@ -102,7 +102,7 @@ impl TrackReport<'_> {
         let path = |places: &mut dyn Iterator<Item = Option<Position>>| -> Vec<(f64, f64)> {
             places.map(|place| place.map_or((f64::NAN, f64::NAN), in_mm)).collect()
         };
-        let mut series = vec![self.single_readings(|track: &Track| in_mm(track.alone.contact.position))];
+        let mut series = vec![self.single_readings(|track: &Track| in_mm(track.single.contact.position))];
         let mut tracked = self.tracks.iter().map(|track| Some(track.contacts.first()?.estimate().position));
         series.push(Series::line(format!("track, {}", self.how), 0, path(&mut tracked)));
         if !self.truths.is_empty() {
@@ -121,10 +121,10 @@ impl TrackReport<'_> {
     }
 
     /// Some of the estimates by single readings.
-    fn single_readings(&self, alone: impl Fn(&Track) -> (f64, f64)) -> Series {
+    fn single_readings(&self, position: impl Fn(&Track) -> (f64, f64)) -> Series {
         let stride = self.tracks.len().div_ceil(MOST_POINTS).max(1);
         let every = if stride > 1 { format!(", every {stride}th") } else { String::new() };
-        let points = self.tracks.iter().step_by(stride).map(alone).collect();
+        let points = self.tracks.iter().step_by(stride).map(position).collect();
         Series::markers(format!("single readings{every}"), 4, points, Marker::Cross)
     }
 

@@ -92,7 +92,7 @@ impl Rig {
     /// # Errors
     /// [`RigSimulationError`] when the rig has no training positions, or they cannot be laid out.
     pub fn calibration(&self) -> Result<Calibration, RigSimulationError> {
-        Ok(Calibration::of(&self.setup, self.training()?).map_err(SimulateError::from)?)
+        Ok(Calibration::from_training(&self.setup, self.training()?).map_err(SimulateError::from)?)
     }
 
     /// Simulated calibrations with `count` seeds from the first on, each judged by one contact at each position of

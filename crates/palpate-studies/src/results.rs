@@ -195,7 +195,7 @@ impl SetUp {
 impl ArmResults {
     fn new(outcome: &ArmOutcome, arm: &Arm, set_up: Option<SetUp>, judging: &Judging) -> Option<Self> {
         let spread = |figure: &dyn Fn(&TrainedSeed) -> Option<f64>| {
-            Quantiles::of(outcome.fits.iter().filter_map(figure).collect())
+            Quantiles::from_values(outcome.fits.iter().filter_map(figure).collect())
         };
         let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
             spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
@@ -225,7 +225,7 @@ impl ArmResults {
             set_up,
             seeds: outcome.fits.len(),
             converged: outcomes().next().map(|_| converged),
-            epochs: Quantiles::of(outcomes().map(|outcome| f64::from(outcome.epochs)).collect()),
+            epochs: Quantiles::from_values(outcomes().map(|outcome| f64::from(outcome.epochs)).collect()),
             error_percent: error(None, |s| s.average_m)?,
             max_error_percent: error(None, |s| s.largest_m)?,
             effective_length_percent: spread(&|fit| {
@@ -267,7 +267,7 @@ fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults>
             let part = Evaluation { length_m: *length_m, located: located.copied().collect() };
             percent(&part, None, |s| s.average_m)
         };
-        Quantiles::of(outcome.fits.iter().filter_map(part).collect())
+        Quantiles::from_values(outcome.fits.iter().filter_map(part).collect())
     };
     Some(TrainingSpanResults {
         training_span: span,

@@ -114,7 +114,7 @@ impl PreparedStudy {
     /// Judges a network that was trained in lanes as its arm is judged; `None` for another arm or other channels.
     fn judge(&self, arm: usize, seed: u64, locator: Locator) -> Option<Trained> {
         let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
-        let evaluation = Evaluation::of(&locator, &prepared.trial.judged).ok()?;
+        let evaluation = Evaluation::new(&locator, &prepared.trial.judged).ok()?;
         Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
     }
 
@@ -246,7 +246,8 @@ impl ArmOutcome {
             positions.map(|readings| (readings[0].truth.x_m, mean(readings))).collect()
         };
         let seeds: Vec<Vec<(f64, f64)>> = self.fits.iter().map(means).collect();
-        let at = |i: usize| Quantiles::of(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
+        let at =
+            |i: usize| Quantiles::from_values(seeds.iter().filter_map(|seed| Some(seed.get(i)?.1)).collect());
         let first = seeds.first().into_iter().flatten();
         first.enumerate().filter_map(|(i, (x_m, _))| Some((*x_m, at(i)?))).collect()
     }

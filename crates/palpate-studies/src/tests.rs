@@ -111,7 +111,7 @@ fn a_figure_spreads_over_the_seeds_position_by_position() {
         first.iter().map(|located| located.error_m()).sum::<f64>() / readings as f64
     };
     let at_first = outcome.fits.iter().map(mean_at_first).collect();
-    assert_eq!(along[0].1, Quantiles::of(at_first).unwrap());
+    assert_eq!(along[0].1, Quantiles::from_values(at_first).unwrap());
 }
 
 #[test]

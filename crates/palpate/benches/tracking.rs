@@ -59,7 +59,7 @@ fn measure(locator: &Locator, rig: &Rig) {
                 .iter()
                 .zip(&moving)
                 .map(|(followed, timed)| {
-                    TrackErrors::of(tracks(followed), &timed.truths(), rig.setup.surface.extent())
+                    TrackErrors::new(tracks(followed), &timed.truths(), rig.setup.surface.extent())
                         .expect("something was tracked")
                 })
                 .collect();

@@ -16,7 +16,7 @@ pub fn total_n() -> Result<f64, Box<dyn std::error::Error>> {
     let load = UniformLoad::along(mm(150.0), mm(230.0), newtons(3.0));
     let reading = &simulate_loads(&setup, &[load], 1, 3)?[0];
 
-    let profile = Profiler::of(&setup)?.profile(reading)?;
+    let profile = Profiler::from_setup(&setup)?.profile(reading)?;
     for patch in &profile.patches {
         println!("{:.0}–{:.0} mm: {:.2} N", 1e3 * patch.from.x_m, 1e3 * patch.to.x_m, patch.force_n);
     }

@@ -145,7 +145,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
         }
         None => simulated(&locator, arguments.seed)?,
     };
-    let evaluation = Evaluation::of(&locator, &recording).map_err(Complaint::new)?;
+    let evaluation = Evaluation::new(&locator, &recording).map_err(Complaint::new)?;
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Locator(locator) })
 }
 

@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.subject;
     let subject = RigOrLocator::read(path)?;
     let sensors = match &subject {
-        RigOrLocator::Rig(rig) => LoadSensors::of(&rig.setup),
+        RigOrLocator::Rig(rig) => LoadSensors::from_setup(&rig.setup),
         RigOrLocator::Locator(locator) => locator.load_sensors(),
     };
     let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);

@@ -222,7 +222,7 @@ impl Stream<'_> {
         let truths = &self.seen.truths;
         let of = |name, tracks: &[Track]| {
             let known = !tracks.is_empty() && tracks.len() == truths.len();
-            let errors = if known { TrackErrors::of(tracks, truths, self.extent) } else { None };
+            let errors = if known { TrackErrors::new(tracks, truths, self.extent) } else { None };
             errors.map(|errors| (name, errors))
         };
         [of("filter", filtered), of("smoother", smoothed)].into_iter().flatten().collect()
@@ -385,7 +385,7 @@ struct JsonAcross {
 
 /// A line of JSON: all that is known of the reading in line `line` of its source.
 fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
-    let position = track.alone.contact.position;
+    let position = track.single.contact.position;
     let object = JsonTrack {
         line,
         time_s: track.time_s,
@@ -397,7 +397,7 @@ fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
             Extent::Line { .. } => JsonPosition::OnLine(position.x_m * 1e3),
             Extent::Plane { .. } => JsonPosition::OnPlane([position.x_m * 1e3, position.y_m * 1e3]),
         },
-        single_status: track.alone.status.name(),
+        single_status: track.single.status.name(),
     };
     serde_json::to_string(&object).map_err(|error| Complaint::new(error).into())
 }

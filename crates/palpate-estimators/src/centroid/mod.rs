@@ -76,7 +76,7 @@ impl Fit for Centroid {
         let mut locator = uncalibrated(setup, recording)?;
         recording.check_distinct_positions(locator.terms())?;
         locator.map = calibrate(&locator, &recording.rows)?;
-        locator.spread = HeldOutErrors::of(&held_out_errors(&locator, recording, watch)?);
+        locator.spread = HeldOutErrors::from_errors(&held_out_errors(&locator, recording, watch)?);
         Ok(locator)
     }
 }

@@ -458,7 +458,7 @@ impl Segment {
             Polynomial::cubic_through([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|t| influence(channel, at(t))))
         };
         let polynomials: Vec<Polynomial> = (0..channels).map(cubic).collect();
-        let vanish = |t: f64| polynomials.iter().all(|p| p.at(t).abs() <= 1e-12 * p.size());
+        let vanish = |t: f64| polynomials.iter().all(|p| p.value_at(t).abs() <= 1e-12 * p.size());
         let mirrored = vanish(1.0) && !vanish(0.0);
         let mut reduced = polynomials.clone();
         if mirrored {
@@ -494,7 +494,7 @@ impl Segment {
     fn influence_at(&self, position_m: f64) -> Vec<(f64, f64)> {
         let length_m = self.to_m - self.from_m;
         let t = (position_m - self.from_m) / length_m;
-        self.influence.iter().map(|h| (h.at(t), h.derivative().at(t) / length_m)).collect()
+        self.influence.iter().map(|h| (h.value_at(t), h.derivative().value_at(t) / length_m)).collect()
     }
 }
 

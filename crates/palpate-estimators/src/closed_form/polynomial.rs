@@ -19,7 +19,7 @@ impl Polynomial {
         ])
     }
 
-    pub(super) fn at(&self, t: f64) -> f64 {
+    pub(super) fn value_at(&self, t: f64) -> f64 {
         self.0.iter().rev().fold(0.0, |sum, c| sum * t + c)
     }
 
@@ -77,7 +77,7 @@ impl Polynomial {
     }
 
     fn bisect(&self, mut low: f64, mut high: f64) -> Option<f64> {
-        let (at_low, at_high) = (self.at(low), self.at(high));
+        let (at_low, at_high) = (self.value_at(low), self.value_at(high));
         if at_low == 0.0 {
             return Some(low);
         }
@@ -90,7 +90,7 @@ impl Polynomial {
         // Each halving gives a binary digit, and a double has 53.
         for _ in 0..f64::MANTISSA_DIGITS {
             let middle = 0.5 * (low + high);
-            if self.at(middle).is_sign_positive() == at_low.is_sign_positive() {
+            if self.value_at(middle).is_sign_positive() == at_low.is_sign_positive() {
                 low = middle;
             } else {
                 high = middle;
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn a_cubic_is_known_by_four_values() {
         let cubic = Polynomial(vec![0.7, -1.3, 2.0, 4.1]);
-        let through = Polynomial::cubic_through([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|t| cubic.at(t)));
+        let through = Polynomial::cubic_through([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|t| cubic.value_at(t)));
         assert!(cubic.plus(-1.0, &through).size() < 1e-13);
     }
 
@@ -128,10 +128,10 @@ mod tests {
     fn mirroring_and_dividing_do_what_they_say() {
         let p = Polynomial(vec![0.0, -1.3, 2.0, 4.1]);
         for t in [0.0, 0.2, 0.9] {
-            assert!((p.mirrored().at(t) - p.at(1.0 - t)).abs() < 1e-14);
-            assert!((t * p.over_t().at(t) - p.at(t)).abs() < 1e-14);
-            let slope = (p.at(t + 1e-6) - p.at(t - 1e-6)) / 2e-6;
-            assert!((p.derivative().at(t) - slope).abs() < 1e-8);
+            assert!((p.mirrored().value_at(t) - p.value_at(1.0 - t)).abs() < 1e-14);
+            assert!((t * p.over_t().value_at(t) - p.value_at(t)).abs() < 1e-14);
+            let slope = (p.value_at(t + 1e-6) - p.value_at(t - 1e-6)) / 2e-6;
+            assert!((p.derivative().value_at(t) - slope).abs() < 1e-8);
         }
     }
 }

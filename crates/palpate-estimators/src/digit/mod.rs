@@ -576,7 +576,7 @@ impl Likelihood<'_> {
 
     /// The fit of position and force at a guess on a stretch; the misfit is |r|², and the score and information Jᵀ·r and JᵀJ of the
     /// whitened residual r and the model's Jacobian J.
-    fn at(&self, guess: Guess, stretch: Stretch) -> ContactFit<2> {
+    fn fit_at(&self, guess: Guess, stretch: Stretch) -> ContactFit<2> {
         let Guess { position_m, force_n } = guess;
         let bent = match self.theory {
             DigitTheory::Exact => {
@@ -658,8 +658,8 @@ fn search(likelihood: &Likelihood, stretch: Stretch) -> Tried {
 /// The best of a few forces at a position.
 fn start(likelihood: &Likelihood, stretch: Stretch, position_m: f64) -> Guess {
     let linear_n = likelihood.linear_force_n(position_m, stretch);
-    let guess = |factor: f64| within(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
-    let chi_squared = |guess: Guess| likelihood.at(guess, stretch).misfit;
+    let guess = |factor: f64| clamped(likelihood, Guess { position_m, force_n: factor * linear_n }, stretch);
+    let chi_squared = |guess: Guess| likelihood.fit_at(guess, stretch).misfit;
     let better = |best: Guess, next: Guess| if chi_squared(next) < chi_squared(best) { next } else { best };
     START_FORCES.iter().map(|factor| guess(*factor)).fold(guess(1.0), better)
 }
@@ -671,7 +671,7 @@ fn refine(
     start: Guess,
     step: impl Fn(&Tried) -> [f64; 2],
 ) -> Tried {
-    let mut best = (start, likelihood.at(start, stretch));
+    let mut best = (start, likelihood.fit_at(start, stretch));
     for _ in 0..MOST_STEPS {
         let Some(next) = descend(likelihood, stretch, &best, step(&best)) else { break };
         let moved = (next.0.position_m - best.0.position_m).abs() / stretch.to_m
@@ -707,8 +707,8 @@ fn descend(
     let mut share = 1.0;
     for _ in 0..MOST_HALVINGS {
         let (position_m, force_n) = (guess.position_m + share * along_m, guess.force_n + share * harder_n);
-        let next = within(likelihood, Guess { position_m, force_n }, stretch);
-        let there = likelihood.at(next, stretch);
+        let next = clamped(likelihood, Guess { position_m, force_n }, stretch);
+        let there = likelihood.fit_at(next, stretch);
         if there.misfit < fit.misfit {
             return Some((next, there));
         }
@@ -718,7 +718,7 @@ fn descend(
 }
 
 /// The guess, held on the stretch and to forces that push and that the model covers.
-fn within(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
+fn clamped(likelihood: &Likelihood, guess: Guess, stretch: Stretch) -> Guess {
     let position_m = guess.position_m.max(stretch.from_m).min(stretch.to_m);
     let force_n = likelihood.force_n.unwrap_or_else(|| {
         let most_n = likelihood.most_force_n(position_m);
@@ -782,7 +782,7 @@ pub struct LinearTheory<'a> {
 
 impl<'a> LinearTheory<'a> {
     /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
-    pub fn of(setup: &Setup, digit: &'a Digit) -> Option<Self> {
+    pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
         let unknown = Setup { force_n: None, ..setup.clone() };
         let pressed = Setup { force_n: Some(digit.characteristic_force_n()), ..setup.clone() };
         // The estimator learns nothing, but every fit wants a recording.

@@ -388,7 +388,7 @@ impl Locator {
                 });
                 Ok(LoadSensors { extent: self.setup.surface.extent(), channels: channels.collect() })
             }
-            _ => LoadSensors::of(&self.setup),
+            _ => LoadSensors::from_setup(&self.setup),
         }
     }
 }

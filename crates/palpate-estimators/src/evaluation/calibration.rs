@@ -26,7 +26,7 @@ use palpate_numerics::watch::Watch;
 ///
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
-/// let calibration = Calibration::of(&setup, &Training::even(10).repeated(10))?;
+/// let calibration = Calibration::from_training(&setup, &Training::even(10).repeated(10))?;
 /// let judged = calibration.run(&Influence::default(), 0, Watch::NONE)?;
 /// let errors = judged.evaluation.summary(None).expect("399 contacts");
 /// assert!(errors.median_m < mm(1.0));
@@ -76,7 +76,7 @@ impl Calibration {
     ///
     /// # Errors
     /// [`ArrangementError`] when the positions cannot be laid out on the surface.
-    pub fn of(setup: &Setup, training: &Training) -> Result<Self, ArrangementError> {
+    pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, ArrangementError> {
         let positions = training.positions(setup.surface.extent())?;
         Ok(Self::new(setup, training.force_n).pressed_at(&positions, training.repeats))
     }
@@ -136,7 +136,7 @@ impl Calibration {
         let Split { training, judged } = self.simulate(seed)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
-        Ok(Calibrated { seed, evaluation: Evaluation::of(&locator, &judged)?, locator })
+        Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
 
     /// The same for some rising seeds. Without faults all seeds press alike, and the estimator fits them all at once, side by side where it
@@ -160,7 +160,7 @@ impl Calibration {
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
         queue.fitted.sort_by_key(|(seed, _)| *seed);
         let judge = |(seed, locator)| {
-            Ok(Calibrated { seed, evaluation: Evaluation::of(&locator, &judged)?, locator })
+            Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
         };
         queue.fitted.into_iter().map(judge).collect()
     }

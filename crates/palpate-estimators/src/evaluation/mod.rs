@@ -109,7 +109,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// [`ReadingError`] when the recording's channels are not the locator's.
-    pub fn of<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
+    pub fn new<M: Locate>(locator: &Fitted<M>, recording: &Recording) -> Result<Self, ReadingError> {
         let locate = |row: &crate::recording::Row| {
             let contact = locator.locate(&row.reading)?.contact;
             Ok(Located {
@@ -258,7 +258,7 @@ impl Quantiles {
     }
 
     /// The quantiles of some values, in any order; `None` of nothing.
-    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+    pub fn from_values(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         Some(Self {
             median: percentile(&values, 50.0)?,
@@ -322,7 +322,7 @@ pub fn evaluate_splits<E: Fit>(
         let task = FitTask { setup, recording: &split.training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
-        let part = Evaluation::of(&locator, &split.judged)?;
+        let part = Evaluation::new(&locator, &split.judged)?;
         (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
         evaluation.located.extend(part.located);
     }

@@ -77,7 +77,7 @@ fn errors_are_summed_up_by_cells_stretches_and_shares() {
 
 #[test]
 fn a_spread_does_not_mind_the_order() {
-    let spread = Quantiles::of((0..=100).rev().map(f64::from).collect()).unwrap();
+    let spread = Quantiles::from_values((0..=100).rev().map(f64::from).collect()).unwrap();
     assert_eq!(spread, Quantiles { median: 50.0, p05: 5.0, p95: 95.0 });
-    assert_eq!(Quantiles::of(vec![]), None);
+    assert_eq!(Quantiles::from_values(vec![]), None);
 }

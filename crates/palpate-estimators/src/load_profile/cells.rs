@@ -28,7 +28,7 @@ pub struct Cells {
 
 impl Cells {
     /// 80 cells on a line; on a plane 20 along the longer side, as square as they come.
-    pub fn over(extent: Extent) -> Self {
+    pub fn new(extent: Extent) -> Self {
         let Some(width_m) = extent.width_m() else { return Self { extent, columns: ON_A_LINE, rows: 1 } };
         let most = ON_A_PLANE as f64;
         let count = |side_m: f64| {
@@ -39,7 +39,7 @@ impl Cells {
     }
 
     /// About `count` cells of a plane, as square as they come, with a number along each side within `sides`.
-    pub fn about(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
+    pub fn nearly_square(extent: Extent, count: f64, sides: RangeInclusive<usize>) -> Self {
         let aspect = extent.width_m().unwrap_or(extent.length_m()) / extent.length_m();
         let side = |ratio: f64| ((count * ratio).sqrt().round() as usize).clamp(*sides.start(), *sides.end());
         Self { extent, columns: side(1.0 / aspect), rows: side(aspect) }
@@ -201,7 +201,7 @@ mod tests {
     #[test]
     fn every_cell_holds_its_middle() {
         let plane = Extent::Plane { length_m: 0.3, width_m: 0.15 };
-        let cells = Cells::about(plane, 200.0, 5..=60);
+        let cells = Cells::nearly_square(plane, 200.0, 5..=60);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         assert!(cells.centres().enumerate().all(|(cell, centre)| cells.cell_of(centre) == cell));
         assert_eq!(cells.cell_of(Position { x_m: 9.0, y_m: -9.0 }), 19);
@@ -213,7 +213,7 @@ mod tests {
         let at = |x_m, y_m| Position { x_m, y_m };
         let on_line = UniformLoad::new(at(0.05, 0.0), at(0.17, 0.0), 3.0);
         let on_plane = UniformLoad::new(at(0.05, 0.02), at(0.17, 0.09), 3.0);
-        let plane = Cells::over(Extent::Plane { length_m: 0.3, width_m: 0.15 });
+        let plane = Cells::new(Extent::Plane { length_m: 0.3, width_m: 0.15 });
         for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
             let density = cells.mean_density(&[load, load]);
             assert!((density.iter().sum::<f64>() * cells.measure() - 6.0).abs() < 1e-12);
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn on_a_plane_a_tilt_costs_nothing_inside() {
         let extent = Extent::Plane { length_m: 0.3, width_m: 0.15 };
-        let cells = Cells::over(extent);
+        let cells = Cells::new(extent);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         let tilt = Array1::from_shape_fn(cells.len(), |cell| {
             let Position { x_m, y_m } = cells.centre(cell);

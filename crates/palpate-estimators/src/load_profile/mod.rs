@@ -86,7 +86,7 @@ impl<'a> LoadSensors<'a> {
     ///
     /// # Errors
     /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
-    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+    pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
         Self::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
     }
 
@@ -107,7 +107,7 @@ impl<'a> LoadSensors<'a> {
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let load = UniformLoad::along(mm(120.0), mm(160.0), 2.0);
 /// let readings = simulate_loads(&setup, &[load], 1, 0)?;
-/// let profile = Profiler::of(&setup)?.profile(&readings[0])?;
+/// let profile = Profiler::from_setup(&setup)?.profile(&readings[0])?;
 /// assert!((profile.total_n - 2.0).abs() < 0.2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -166,14 +166,14 @@ impl<'a> Profiler<'a> {
     /// For readings of a setup, by mechanics.
     ///
     /// # Errors
-    /// [`LoadSensorsError`] as for [`LoadSensors::of`].
-    pub fn of(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
-        Ok(Self::new(LoadSensors::of(setup)?))
+    /// [`LoadSensorsError`] as for [`LoadSensors::from_setup`].
+    pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
+        Ok(Self::new(LoadSensors::from_setup(setup)?))
     }
 
     /// For readings of these sensors.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
-        let cells = Cells::over(sensors.extent);
+        let cells = Cells::new(sensors.extent);
         let alive: Vec<&LoadChannel> = sensors.alive().collect();
         let influence = Array2::from_shape_fn((alive.len(), cells.len()), |(i, cell)| {
             let points = cells.points(cell);

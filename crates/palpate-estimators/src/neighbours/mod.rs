@@ -78,7 +78,7 @@ impl Fit for Neighbours {
             count: best + 1,
             rows,
             force_n: task.setup.force_n,
-            spread: errors.get(best).and_then(|errors| HeldOutErrors::of(errors)),
+            spread: errors.get(best).and_then(|errors| HeldOutErrors::from_errors(errors)),
         })
     }
 }

@@ -19,7 +19,7 @@ impl<'a> Cells<'a> {
     pub fn parse(source: &'a str, line: usize, text: &'a str) -> Result<Self, CsvError> {
         match split(text) {
             Ok(fields) => Ok(Self { source, line, text, fields }),
-            Err(open) => Err(CsvProblem::OpenQuote.at(source, line, text.to_owned(), open)),
+            Err(open) => Err(CsvProblem::OpenQuote.in_line(source, line, text.to_owned(), open)),
         }
     }
 
@@ -96,7 +96,7 @@ impl<'a> Cells<'a> {
 
     /// A problem with the whole line.
     fn line_error(&self, problem: CsvProblem) -> CsvError {
-        problem.at(self.source, self.line, self.text.to_owned(), 0..self.text.len())
+        problem.in_line(self.source, self.line, self.text.to_owned(), 0..self.text.len())
     }
 }
 

@@ -151,7 +151,7 @@ impl Columns {
         position: impl Into<Column>,
         channels: impl IntoIterator<Item = C>,
     ) -> Self {
-        Self::of(PositionColumns::Along(position.into()), channels)
+        Self::raw(PositionColumns::Along(position.into()), channels)
     }
 
     /// The same with positions in two columns, along and across.
@@ -160,10 +160,11 @@ impl Columns {
         y: impl Into<Column>,
         channels: impl IntoIterator<Item = C>,
     ) -> Self {
-        Self::of(PositionColumns::Plane { x: x.into(), y: y.into() }, channels)
+        Self::raw(PositionColumns::Plane { x: x.into(), y: y.into() }, channels)
     }
 
-    fn of<C: Into<Column>>(position: PositionColumns, channels: impl IntoIterator<Item = C>) -> Self {
+    /// Raw channels in these columns, without a force.
+    fn raw<C: Into<Column>>(position: PositionColumns, channels: impl IntoIterator<Item = C>) -> Self {
         let channels: Vec<ValueColumn> = channels
             .into_iter()
             .map(|column| ValueColumn { column: column.into(), unit: Unit::NONE })

@@ -137,13 +137,13 @@ pub enum CsvProblem {
 
 impl CsvProblem {
     /// This problem with the bytes `span` of `text`, a line of the file `source`.
-    pub(super) fn at(self, source: &str, line: usize, text: String, span: Range<usize>) -> CsvError {
+    pub(super) fn in_line(self, source: &str, line: usize, text: String, span: Range<usize>) -> CsvError {
         let place = Some(Box::new(Place { line, column: None, text, span }));
         CsvError { source_name: source.to_owned(), place, problem: self }
     }
 
     /// This problem, which concerns the whole file `source`.
-    pub(super) fn of_file(self, source: &str) -> CsvError {
+    pub(super) fn in_file(self, source: &str) -> CsvError {
         CsvError { source_name: source.to_owned(), place: None, problem: self }
     }
 }

@@ -70,7 +70,7 @@ pub fn read_pair(
     )?;
     if reading_rows.len() != contact_rows.len() {
         let problem = CsvProblem::RowsDiffer { readings: reading_rows.len(), contacts: contact_rows.len() };
-        return Err(problem.of_file(contacts.source));
+        return Err(problem.in_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
     let rows = rows.map(|(reading, contact)| Row { reading, ..contact }).collect();
@@ -83,7 +83,7 @@ impl Schema<'_> {
         if columns == sensors {
             Ok(())
         } else {
-            Err(CsvProblem::ChannelCount { columns, sensors }.of_file(source))
+            Err(CsvProblem::ChannelCount { columns, sensors }.in_file(source))
         }
     }
 
@@ -103,7 +103,7 @@ struct File<'s> {
 impl<'s> File<'s> {
     fn read(source: &'s str, mut bytes: impl Read) -> Result<Self, CsvError> {
         let mut content = Vec::new();
-        bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).of_file(source))?;
+        bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).in_file(source))?;
         let digest = sha256_hex(&content);
         let text = String::from_utf8(content).map_err(|error| not_utf8(source, &error))?;
         Ok(Self { source, text, digest })
@@ -123,8 +123,8 @@ impl<'s> File<'s> {
             }
         }
         match lines.fields {
-            None => Err(CsvProblem::Empty.of_file(self.source)),
-            Some(_) if rows.is_empty() => Err(CsvProblem::NoRows.of_file(self.source)),
+            None => Err(CsvProblem::Empty.in_file(self.source)),
+            Some(_) if rows.is_empty() => Err(CsvProblem::NoRows.in_file(self.source)),
             Some(_) => Ok(rows),
         }
     }
@@ -138,7 +138,7 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
     let after =
         String::from_utf8_lossy(rest.split(|byte| *byte == b'\n').next().unwrap_or(rest)).into_owned();
     let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-    CsvProblem::NotUtf8.at(source, line, before + &after, mark)
+    CsvProblem::NotUtf8.in_line(source, line, before + &after, mark)
 }
 
 /// Which fields of a row say where and how hard the contact was.
@@ -405,7 +405,7 @@ fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvEr
         Err(_) => {
             let text = String::from_utf8_lossy(bytes).trim_end_matches(['\r', '\n']).to_owned();
             let span = 0..text.len();
-            Err(CsvProblem::NotUtf8.at(source, line, text, span))
+            Err(CsvProblem::NotUtf8.in_line(source, line, text, span))
         }
     }
 }

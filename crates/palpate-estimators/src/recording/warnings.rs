@@ -75,7 +75,7 @@ impl Recording {
     /// Warnings, channel by channel; see [`Warning`] for the rules.
     pub fn warnings(&self) -> Vec<Warning> {
         let repeats = self.repeats();
-        let channels = (0..self.channels.len()).filter_map(|index| Channel::of(self, index));
+        let channels = (0..self.channels.len()).filter_map(|index| Channel::new(self, index));
         channels.flat_map(|channel| channel.warnings(&repeats)).collect()
     }
 
@@ -103,7 +103,7 @@ struct Channel<'a> {
 
 impl<'a> Channel<'a> {
     /// `None` where some row has no value for it, or there are no rows.
-    fn of(recording: &'a Recording, index: usize) -> Option<Self> {
+    fn new(recording: &'a Recording, index: usize) -> Option<Self> {
         let values: Option<Vec<f64>> =
             recording.rows.iter().map(|row| row.reading.get(index).copied()).collect();
         let values = values.filter(|values| !values.is_empty())?;

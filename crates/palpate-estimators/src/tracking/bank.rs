@@ -5,7 +5,7 @@
 //! ü + 2ζω·u̇ + ω²·u = ω²·p. A surface in balance has u = 0 without variance, and its likelihood does not look at it.
 
 use super::TrackerConfig;
-use super::gaussian::{Change, Gaussian};
+use super::gaussian::{Gaussian, Transition};
 use crate::likelihood::{ContactFit, Geometry, LineLikelihood};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::Oscillator;
@@ -14,17 +14,17 @@ use std::f64::consts::PI;
 
 /// Dynamics of the M members of a bank, states of N numbers, over a time step.
 pub(super) trait Dynamics<const N: usize, const M: usize> {
-    /// The probability that member `from` becomes member `to`.
-    fn passes(&self, from: usize, to: usize) -> f64;
+    /// Probability that member `from` becomes member `to`.
+    fn transition_probability(&self, from: usize, to: usize) -> f64;
 
     /// Transition of a belief under the motion of member `member`.
-    fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N>;
+    fn transition(&self, belief: &Gaussian<N>, member: usize) -> Transition<N>;
 }
 
-/// The K numbers of a state that a reading sees.
+/// Entries of a state, K of them, that a reading observes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SeenNumbers<const K: usize> {
-    /// Which entries of the state they are.
+pub(super) struct ObservedEntries<const K: usize> {
+    /// Their indices in the state.
     pub entries: [usize; K],
     /// The least and the greatest that each can be: places lie on the surface, forces press.
     pub bounds: [(f64, f64); K],
@@ -41,8 +41,8 @@ pub(super) struct Bank<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Bank<N, M> {
-    /// The same for every motion.
-    pub fn of(belief: Gaussian<N>) -> Self {
+    /// The same Gaussian for every choice of motions, with equal shares.
+    pub fn uniform(belief: Gaussian<N>) -> Self {
         Self { shares: [1.0 / M as f64; M], members: [belief; M] }
     }
 
@@ -55,11 +55,12 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     pub fn predicted(&self, dynamics: &impl Dynamics<N, M>) -> Self {
         let mut shares = [0.0; M];
         let members = std::array::from_fn(|to| {
-            let joint: [f64; M] = std::array::from_fn(|from| dynamics.passes(from, to) * self.shares[from]);
+            let joint: [f64; M] =
+                std::array::from_fn(|from| dynamics.transition_probability(from, to) * self.shares[from]);
             shares[to] = joint.iter().sum();
             let parts = joint.iter().map(|joint| joint / shares[to]).zip(self.members);
             let belief = Gaussian::mixed(parts);
-            belief.predicted(&dynamics.change(&belief, to))
+            belief.predicted(&dynamics.transition(&belief, to))
         });
         Self { shares, members }
     }
@@ -68,21 +69,21 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     /// and again about where that leads if it leads farther than the reading itself can tell.
     pub fn updated<const K: usize>(
         &self,
-        numbers: &SeenNumbers<K>,
+        observed: &ObservedEntries<K>,
         expand: impl Fn(&[f64; K]) -> ContactFit<K>,
         start: Option<[f64; K]>,
     ) -> Option<(Self, f64)> {
         const MOST_ROUNDS: usize = 3;
-        let mut about = start.unwrap_or_else(|| self.seen(numbers));
+        let mut about = start.unwrap_or_else(|| self.observed_mean(observed));
         let mut round = 1;
         loop {
             let fit = expand(&about);
-            let (after, evidence) = self.updated_about(numbers, &fit, &about)?;
-            let next = after.seen(numbers);
-            let places = (0..K).filter(|k| numbers.is_place[*k]);
+            let (after, evidence) = self.updated_about(observed, &fit, &about)?;
+            let next = after.observed_mean(observed);
+            let places = (0..K).filter(|k| observed.is_place[*k]);
             let moved = places.map(|k| fit.information[k][k] * (next[k] - about[k]).powi(2));
             if moved.sum::<f64>() < 0.1 || round == MOST_ROUNDS {
-                return Some((after.held(numbers), evidence));
+                return Some((after.held(observed), evidence));
             }
             (about, round) = (next, round + 1);
         }
@@ -97,11 +98,12 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         let mut weights = [[0.0; M]; M];
         let mut before = [[Gaussian::default(); M]; M];
         for to in 0..M {
-            let joint: [f64; M] = std::array::from_fn(|from| dynamics.passes(from, to) * self.shares[from]);
+            let joint: [f64; M] =
+                std::array::from_fn(|from| dynamics.transition_probability(from, to) * self.shares[from]);
             let sum: f64 = joint.iter().sum();
             let began = Gaussian::mixed(joint.iter().map(|joint| joint / sum).zip(self.members));
-            let whole = began.smoothed(&dynamics.change(&began, to), &later.members[to]);
-            let (fit, about) = whole.less(&began);
+            let whole = began.smoothed(&dynamics.transition(&began, to), &later.members[to]);
+            let (fit, about) = whole.information_beyond(&began);
             let results: [(Gaussian<N>, f64); M] =
                 self.members.map(|member| member.updated(&fit, &about, &std::array::from_fn(|i| i)));
             let (_, shares) = reweighted(&joint, &results);
@@ -126,7 +128,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 
     /// Without contact `k`: the bank of those that stay.
-    pub fn without<const N2: usize, const M2: usize>(&self, k: usize) -> Bank<N2, M2> {
+    pub fn without_contact<const N2: usize, const M2: usize>(&self, k: usize) -> Bank<N2, M2> {
         let below = MOTIONS.pow(k as u32);
         let stay = |i: usize| if i < contact(k) { i } else { i + OF_CONTACT };
         let mut shares = [0.0; M2];
@@ -150,7 +152,7 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 
     /// With one contact more, the last; the surface then swings as `joined` makes of it.
-    pub fn with<const N2: usize, const M2: usize>(
+    pub fn with_contact<const N2: usize, const M2: usize>(
         &self,
         joined: impl Fn(&Gaussian<N>) -> Gaussian<N2>,
     ) -> Bank<N2, M2> {
@@ -161,25 +163,25 @@ impl<const N: usize, const M: usize> Bank<N, M> {
     }
 
     /// Mean of the entries that a reading observes, held to their bounds.
-    fn seen<const K: usize>(&self, numbers: &SeenNumbers<K>) -> [f64; K] {
-        let mut seen = [0.0; K];
+    fn observed_mean<const K: usize>(&self, observed: &ObservedEntries<K>) -> [f64; K] {
+        let mut mean = [0.0; K];
         for (share, member) in self.shares.iter().zip(&self.members) {
-            seen.iter_mut()
-                .zip(numbers.entries)
-                .for_each(|(seen, entry)| *seen += share * member.mean[entry]);
+            mean.iter_mut()
+                .zip(observed.entries)
+                .for_each(|(mean, entry)| *mean += share * member.mean[entry]);
         }
-        std::array::from_fn(|k| numbers.held(k, seen[k]))
+        std::array::from_fn(|k| observed.held(k, mean[k]))
     }
 
     /// `None` where the reading is too improbable for numbers.
     fn updated_about<const K: usize>(
         &self,
-        numbers: &SeenNumbers<K>,
+        observed: &ObservedEntries<K>,
         fit: &ContactFit<K>,
         about: &[f64; K],
     ) -> Option<(Self, f64)> {
         let results: [(Gaussian<N>, f64); M] =
-            self.members.map(|member| member.updated(fit, about, &numbers.entries));
+            self.members.map(|member| member.updated(fit, about, &observed.entries));
         let (best, weights) = reweighted(&self.shares, &results);
         let sum: f64 = weights.iter().sum();
         let after =
@@ -187,11 +189,11 @@ impl<const N: usize, const M: usize> Bank<N, M> {
         (best.is_finite() && sum > 0.0).then(|| (after, best + sum.ln()))
     }
 
-    /// With all that a reading sees within its bounds.
-    fn held<const K: usize>(mut self, numbers: &SeenNumbers<K>) -> Self {
+    /// With the observed entries held to their bounds.
+    fn held<const K: usize>(mut self, observed: &ObservedEntries<K>) -> Self {
         for member in &mut self.members {
-            for (k, entry) in numbers.entries.into_iter().enumerate() {
-                member.mean[entry] = numbers.held(k, member.mean[entry]);
+            for (k, entry) in observed.entries.into_iter().enumerate() {
+                member.mean[entry] = observed.held(k, member.mean[entry]);
             }
         }
         self
@@ -207,7 +209,7 @@ fn reweighted<const N: usize, const M: usize>(
     (best, std::array::from_fn(|i| shares[i] * (results[i].1 - best).exp()))
 }
 
-impl<const K: usize> SeenNumbers<K> {
+impl<const K: usize> ObservedEntries<K> {
     fn held(&self, k: usize, value: f64) -> f64 {
         let (least, most) = self.bounds[k];
         value.max(least).min(most)
@@ -241,8 +243,8 @@ pub(super) const fn contacts(numbers: usize) -> usize {
 }
 
 /// Entries of a state on a line that a reading observes: u, then place and force of each contact, K = 1 + 2·C numbers.
-pub(super) fn seen_on_line<const K: usize>(length_m: f64) -> SeenNumbers<K> {
-    SeenNumbers {
+pub(super) fn observed_on_line<const K: usize>(length_m: f64) -> ObservedEntries<K> {
+    ObservedEntries {
         entries: std::array::from_fn(|k| match k {
             0 => U,
             k if k % 2 == 1 => contact(k / 2) + X,
@@ -294,15 +296,15 @@ impl Step {
                 let omega = 2.0 * PI * swing.frequency_hz;
                 FreeSwing {
                     free: Oscillator::new(omega, swing.damping_ratio, duration_s).free(),
-                    // White noise that keeps a damped oscillator at the standard deviation TREMOR.
-                    noise: 4.0 * swing.damping_ratio * omega.powi(3) * TREMOR * TREMOR * duration_s,
+                    // White noise that keeps a damped oscillator at the standard deviation EXCITATION.
+                    noise: 4.0 * swing.damping_ratio * omega.powi(3) * EXCITATION * EXCITATION * duration_s,
                 }
             }),
         }
     }
 
     /// The probability that member `from` of a bank for `contacts` contacts becomes member `to`.
-    pub fn passes(&self, contacts: usize, from: usize, to: usize) -> f64 {
+    pub fn transition_probability(&self, contacts: usize, from: usize, to: usize) -> f64 {
         let passes = |k: usize| {
             let stays = motion_of(from, k) == motion_of(to, k);
             if stays { self.lasts } else { (1.0 - self.lasts) / (MOTIONS - 1) as f64 }
@@ -323,14 +325,14 @@ impl Step {
 
 /// A step of contacts on a line.
 #[derive(Clone, Copy)]
-pub(super) struct OnLine<'a> {
+pub(super) struct LineDynamics<'a> {
     step: &'a Step,
     likelihood: &'a dyn LineLikelihood,
 }
 
-impl<'a> OnLine<'a> {
+impl<'a> LineDynamics<'a> {
     /// A step on a line; nothing on a plane.
-    pub fn of(step: &'a Step, geometry: Geometry<'a>) -> Option<Self> {
+    pub fn new(step: &'a Step, geometry: Geometry<'a>) -> Option<Self> {
         match geometry {
             Geometry::Line(likelihood) => Some(Self { step, likelihood }),
             Geometry::Plane(_) => None,
@@ -338,28 +340,28 @@ impl<'a> OnLine<'a> {
     }
 }
 
-impl<const N: usize, const M: usize> Dynamics<N, M> for OnLine<'_> {
-    fn passes(&self, from: usize, to: usize) -> f64 {
-        self.step.passes(contacts(N), from, to)
+impl<const N: usize, const M: usize> Dynamics<N, M> for LineDynamics<'_> {
+    fn transition_probability(&self, from: usize, to: usize) -> f64 {
+        self.step.transition_probability(contacts(N), from, to)
     }
 
-    fn change(&self, belief: &Gaussian<N>, member: usize) -> Change<N> {
-        let mut change = Change::nothing(belief);
+    fn transition(&self, belief: &Gaussian<N>, member: usize) -> Transition<N> {
+        let mut transition = Transition::identity(belief);
         for k in 0..contacts(N) {
             let at = contact(k);
-            self.step.motion(motion_of(member, k)).move_along(at, belief, &mut change);
-            change.noise[at + W][at + W] = self.step.drift_n2(belief.mean[at + W]);
+            self.step.motion(motion_of(member, k)).move_along(at, belief, &mut transition);
+            transition.noise[at + W][at + W] = self.step.drift_n2(belief.mean[at + W]);
         }
         if let Some(swing) = &self.step.swing {
-            self.swing(swing, belief, &mut change);
+            self.swing(swing, belief, &mut transition);
         }
-        change
+        transition
     }
 }
 
-impl OnLine<'_> {
+impl LineDynamics<'_> {
     /// The first mode swings under the force that it has halfway: (u − p, u̇) swings freely.
-    fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, change: &mut Change<N>) {
+    fn swing<const N: usize>(&self, swing: &FreeSwing, belief: &Gaussian<N>, transition: &mut Transition<N>) {
         let half_s = 0.5 * self.step.duration_s;
         let ([[uu, us], [su, ss]], mean) = (swing.free, &belief.mean);
         let follows = [(U, 1.0 - uu), (U_RATE, -su)];
@@ -372,25 +374,26 @@ impl OnLine<'_> {
             force_n += own_n;
             for (row, share) in follows {
                 let along = share * own_n * slope;
-                change.forward[row][at + X] = along;
-                change.forward[row][at + V] = along * half_s;
-                change.forward[row][at + A] = 0.5 * along * half_s * half_s;
-                change.forward[row][at + W] = share * shape;
+                transition.forward[row][at + X] = along;
+                transition.forward[row][at + V] = along * half_s;
+                transition.forward[row][at + A] = 0.5 * along * half_s * half_s;
+                transition.forward[row][at + W] = share * shape;
             }
         }
         let (away_n, rate) = (mean[U] - balance_n, mean[U_RATE]);
-        change.mean[U] = balance_n + uu * away_n + us * rate;
-        change.mean[U_RATE] = su * away_n + ss * rate;
-        change.forward[U][U] = uu;
-        change.forward[U][U_RATE] = us;
-        change.forward[U_RATE][U] = su;
-        change.forward[U_RATE][U_RATE] = ss;
-        change.noise[U_RATE][U_RATE] = swing.noise * force_n * force_n;
+        transition.mean[U] = balance_n + uu * away_n + us * rate;
+        transition.mean[U_RATE] = su * away_n + ss * rate;
+        transition.forward[U][U] = uu;
+        transition.forward[U][U_RATE] = us;
+        transition.forward[U_RATE][U] = su;
+        transition.forward[U_RATE][U_RATE] = ss;
+        transition.noise[U_RATE][U_RATE] = swing.noise * force_n * force_n;
     }
 }
 
-/// Nothing presses as evenly as its model: a first mode that is always kept trembling, by this share of the force.
-const TREMOR: f64 = 1e-4;
+/// Standard deviation of the first mode's force that white noise sustains, as a share of the contacts' force: nothing presses as
+/// evenly as its model.
+const EXCITATION: f64 = 1e-4;
 
 /// Transition of position, speed and acceleration: F and Q.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -401,13 +404,18 @@ pub(super) struct Motion {
 
 impl Motion {
     /// Writes into `change` what it does to the position, speed and acceleration that begin at entry `at` of a state.
-    pub fn move_along<const N: usize>(&self, at: usize, belief: &Gaussian<N>, change: &mut Change<N>) {
+    pub fn move_along<const N: usize>(
+        &self,
+        at: usize,
+        belief: &Gaussian<N>,
+        transition: &mut Transition<N>,
+    ) {
         for i in 0..OF_MOTION {
             for j in 0..OF_MOTION {
-                change.forward[at + i][at + j] = self.forward[i][j];
-                change.noise[at + i][at + j] = self.noise[i][j];
+                transition.forward[at + i][at + j] = self.forward[i][j];
+                transition.noise[at + i][at + j] = self.noise[i][j];
             }
-            change.mean[at + i] = (0..OF_MOTION).map(|j| self.forward[i][j] * belief.mean[at + j]).sum();
+            transition.mean[at + i] = (0..OF_MOTION).map(|j| self.forward[i][j] * belief.mean[at + j]).sum();
         }
     }
 
@@ -453,9 +461,9 @@ pub(super) const ACROSS: usize = 3;
 pub(super) const FORCE: usize = 6;
 
 /// Entries of a contact on a plane that a reading observes: x, y and W.
-pub(super) fn seen_on_plane(extent: Extent) -> SeenNumbers<3> {
+pub(super) fn observed_on_plane(extent: Extent) -> ObservedEntries<3> {
     let [length_m, width_m] = sides_m(extent);
-    SeenNumbers {
+    ObservedEntries {
         entries: [ALONG, ACROSS, FORCE],
         bounds: [(0.0, length_m), (0.0, width_m), (0.0, f64::INFINITY)],
         is_place: [true, true, false],
@@ -464,20 +472,20 @@ pub(super) fn seen_on_plane(extent: Extent) -> SeenNumbers<3> {
 
 /// A step of a contact on a plane.
 #[derive(Clone, Copy)]
-pub(super) struct OnPlane<'a>(pub &'a Step);
+pub(super) struct PlaneDynamics<'a>(pub &'a Step);
 
-impl Dynamics<PLANE_NUMBERS, MOTIONS> for OnPlane<'_> {
-    fn passes(&self, from: usize, to: usize) -> f64 {
-        self.0.passes(1, from, to)
+impl Dynamics<PLANE_NUMBERS, MOTIONS> for PlaneDynamics<'_> {
+    fn transition_probability(&self, from: usize, to: usize) -> f64 {
+        self.0.transition_probability(1, from, to)
     }
 
-    fn change(&self, belief: &Gaussian<PLANE_NUMBERS>, member: usize) -> Change<PLANE_NUMBERS> {
-        let mut change = Change::nothing(belief);
+    fn transition(&self, belief: &Gaussian<PLANE_NUMBERS>, member: usize) -> Transition<PLANE_NUMBERS> {
+        let mut transition = Transition::identity(belief);
         let motion = self.0.motion(motion_of(member, 0));
-        motion.move_along(ALONG, belief, &mut change);
-        motion.move_along(ACROSS, belief, &mut change);
-        change.noise[FORCE][FORCE] = self.0.drift_n2(belief.mean[FORCE]);
-        change
+        motion.move_along(ALONG, belief, &mut transition);
+        motion.move_along(ACROSS, belief, &mut transition);
+        transition.noise[FORCE][FORCE] = self.0.drift_n2(belief.mean[FORCE]);
+        transition
     }
 }
 
@@ -501,7 +509,7 @@ mod tests {
             let moved = |belief: &Gaussian<3>, share: f64| {
                 let Motion { forward, noise } = Motion::new(share * duration_s, 0.1, 2.0);
                 let mean = std::array::from_fn(|i| (0..3).map(|j| forward[i][j] * belief.mean[j]).sum());
-                belief.predicted(&Change { mean, forward, noise })
+                belief.predicted(&Transition { mean, forward, noise })
             };
             let halves = moved(&moved(&belief, 0.5), 0.5);
             let whole = moved(&belief, 1.0);

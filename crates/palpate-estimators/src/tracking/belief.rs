@@ -1,8 +1,8 @@
 //! Belief about a surface with no, one or two contacts; on a plane there is at most one.
 
 use super::bank::{
-    ACROSS, ALONG, Bank, FORCE, OnLine, OnPlane, PLANE_NUMBERS, Step, V, W, X, contact, contacts,
-    seen_on_line, seen_on_plane,
+    ACROSS, ALONG, Bank, FORCE, LineDynamics, PLANE_NUMBERS, PlaneDynamics, Step, V, W, X, contact, contacts,
+    observed_on_line, observed_on_plane,
 };
 use super::gaussian::Gaussian;
 use crate::likelihood::{ContactFit, Geometry, Likelihood, LineLikelihood, PlaneLikelihood};
@@ -23,7 +23,7 @@ pub(super) enum Belief {
 
 /// A reading, and what the surface says about it.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(super) struct Observation<'a> {
     pub likelihood: &'a dyn Likelihood,
     pub whitened: &'a [f64],
     /// Whether the surface swings.
@@ -43,14 +43,14 @@ pub(super) struct Moments {
 impl Belief {
     /// A surface at rest that nothing touches.
     pub fn nothing() -> Self {
-        Self::Nothing(Bank::of(Gaussian::default()))
+        Self::Nothing(Bank::uniform(Gaussian::default()))
     }
 
     /// Becomes the mixture with another belief that nothing touches, whose share is `share`.
     pub fn absorb(&mut self, other: &Self, share: f64) {
         if let (Self::Nothing(own), Self::Nothing(other)) = (self, other) {
             let parts = [(1.0 - share, own.mixed()), (share, other.mixed())];
-            *own = Bank::of(Gaussian::mixed(parts.into_iter()));
+            *own = Bank::uniform(Gaussian::mixed(parts.into_iter()));
         }
     }
 
@@ -64,37 +64,40 @@ impl Belief {
 
     /// After a step and before its reading.
     pub fn predicted(&self, step: &Step, geometry: Geometry) -> Self {
-        match (self, OnLine::of(step, geometry)) {
+        match (self, LineDynamics::new(step, geometry)) {
             (Self::Nothing(bank), Some(line)) => Self::Nothing(bank.predicted(&line)),
             (Self::One(bank), Some(line)) => Self::One(bank.predicted(&line)),
             (Self::Two(bank), Some(line)) => Self::Two(Box::new(bank.predicted(&line))),
-            (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&OnPlane(step)))),
+            (Self::OnPlane(bank), _) => Self::OnPlane(Box::new(bank.predicted(&PlaneDynamics(step)))),
             // A plane in balance that nothing touches stays as it is.
             (belief, None) => belief.clone(),
         }
     }
 
     /// After a reading, and the logarithm of how probable it was; `None` where that is too little for numbers.
-    pub fn updated(&self, seen: Seen) -> Option<(Self, f64)> {
-        let extent = seen.likelihood.extent();
+    pub fn updated(&self, observation: Observation) -> Option<(Self, f64)> {
+        let extent = observation.likelihood.extent();
         let length_m = extent.length_m();
-        match (self, seen.likelihood.geometry()) {
+        match (self, observation.likelihood.geometry()) {
             (Self::Nothing(bank), _) => {
-                let expand = |about: &[f64; 1]| seen.likelihood.fit_nothing(seen.whitened, about[0]);
-                let updated = bank.updated(&seen_on_line(length_m), expand, None);
+                let expand =
+                    |about: &[f64; 1]| observation.likelihood.fit_nothing(observation.whitened, about[0]);
+                let updated = bank.updated(&observed_on_line(length_m), expand, None);
                 updated.map(|(bank, evidence)| (Self::Nothing(bank), evidence))
             }
             (Self::One(bank), Geometry::Line(line)) => {
-                let updated = bank.updated(&seen_on_line(length_m), |about| seen.fit_one(line, about), None);
+                let updated =
+                    bank.updated(&observed_on_line(length_m), |about| observation.fit_one(line, about), None);
                 updated.map(|(bank, evidence)| (Self::One(bank), evidence))
             }
             (Self::Two(bank), Geometry::Line(line)) => {
-                let updated = bank.updated(&seen_on_line(length_m), |about| seen.fit_two(line, about), None);
+                let updated =
+                    bank.updated(&observed_on_line(length_m), |about| observation.fit_two(line, about), None);
                 updated.map(|(bank, evidence)| (Self::Two(Box::new(bank)), evidence))
             }
             (Self::OnPlane(bank), Geometry::Plane(plane)) => {
-                let expand = |about: &[f64; 3]| seen.fit_on_plane(plane, about);
-                let updated = bank.updated(&seen_on_plane(extent), expand, None);
+                let expand = |about: &[f64; 3]| observation.fit_on_plane(plane, about);
+                let updated = bank.updated(&observed_on_plane(extent), expand, None);
                 updated.map(|(bank, evidence)| (Self::OnPlane(Box::new(bank)), evidence))
             }
             // Contacts of a line are not believed in on a plane, nor the other way round.
@@ -103,11 +106,11 @@ impl Belief {
     }
 
     /// Belief after contact `k` lets go; the surface swings on.
-    pub fn without(&self, k: usize) -> Option<Self> {
+    pub fn without_contact(&self, k: usize) -> Option<Self> {
         match self {
             Self::Nothing(_) => None,
-            Self::One(bank) => Some(Self::Nothing(bank.without(k))),
-            Self::Two(bank) => Some(Self::One(bank.without(k))),
+            Self::One(bank) => Some(Self::Nothing(bank.without_contact(k))),
+            Self::Two(bank) => Some(Self::One(bank.without_contact(k))),
             Self::OnPlane(_) => Some(Self::nothing()),
         }
     }
@@ -124,7 +127,7 @@ impl Belief {
 
     /// Belief before a step, given the belief `later` after it, if that has as many contacts.
     pub fn smoothed(&self, step: &Step, geometry: Geometry, later: &Self) -> Option<Self> {
-        match (self, later, OnLine::of(step, geometry)) {
+        match (self, later, LineDynamics::new(step, geometry)) {
             (Self::Nothing(bank), Self::Nothing(later), Some(line)) => {
                 Some(Self::Nothing(bank.smoothed(&line, later)))
             }
@@ -133,7 +136,7 @@ impl Belief {
                 Some(Self::Two(Box::new(bank.smoothed(&line, later))))
             }
             (Self::OnPlane(bank), Self::OnPlane(later), _) => {
-                Some(Self::OnPlane(Box::new(bank.smoothed(&OnPlane(step), later))))
+                Some(Self::OnPlane(Box::new(bank.smoothed(&PlaneDynamics(step), later))))
             }
             _ => None,
         }
@@ -148,7 +151,7 @@ impl Moments {
     }
 
     /// Whether two are of one contact: closer than their own doubt in place, speed and force.
-    pub fn is_one_with(&self, other: &Self) -> bool {
+    pub fn is_same_contact(&self, other: &Self) -> bool {
         const CLOSE: f64 = 2.0;
         (0..self.mean.len()).all(|i| {
             let doubt = self.variance[i] + other.variance[i];
@@ -157,15 +160,15 @@ impl Moments {
     }
 }
 
-impl Seen<'_> {
+impl Observation<'_> {
     pub fn fit_one(&self, line: &dyn LineLikelihood, about: &[f64; 3]) -> ContactFit<3> {
         let [mode_n, x_m, force_n] = *about;
-        line.fit_one(self.whitened, at(x_m, force_n), self.swings.then_some(mode_n))
+        line.fit_one(self.whitened, contact_at(x_m, force_n), self.swings.then_some(mode_n))
     }
 
     pub fn fit_two(&self, line: &dyn LineLikelihood, about: &[f64; 5]) -> ContactFit<5> {
         let [mode_n, x_m, force_n, other_m, other_n] = *about;
-        let contacts = [at(x_m, force_n), at(other_m, other_n)];
+        let contacts = [contact_at(x_m, force_n), contact_at(other_m, other_n)];
         line.fit_two(self.whitened, contacts, self.swings.then_some(mode_n))
     }
 
@@ -175,7 +178,7 @@ impl Seen<'_> {
     }
 }
 
-fn at(x_m: f64, force_n: f64) -> Contact {
+fn contact_at(x_m: f64, force_n: f64) -> Contact {
     Contact { position: Position::along(x_m), force_n }
 }
 

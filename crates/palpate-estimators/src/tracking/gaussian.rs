@@ -16,7 +16,7 @@ pub(super) struct Gaussian<const N: usize> {
 /// Transition of a state over a time step, linear about the mean of the belief: the mean becomes `mean`, and P
 /// becomes F·P·Fᵀ + Q.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Change<const N: usize> {
+pub(super) struct Transition<const N: usize> {
     pub mean: [f64; N],
     /// F.
     pub forward: Matrix<N>,
@@ -24,12 +24,12 @@ pub(super) struct Change<const N: usize> {
     pub noise: Matrix<N>,
 }
 
-impl<const N: usize> Change<N> {
-    /// A step that leaves a belief as it is.
-    pub fn nothing(belief: &Gaussian<N>) -> Self {
-        let mut change = Self { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
-        (0..N).for_each(|i| change.forward[i][i] = 1.0);
-        change
+impl<const N: usize> Transition<N> {
+    /// The transition that leaves a belief as it is.
+    pub fn identity(belief: &Gaussian<N>) -> Self {
+        let mut transition = Self { mean: belief.mean, forward: [[0.0; N]; N], noise: [[0.0; N]; N] };
+        (0..N).for_each(|i| transition.forward[i][i] = 1.0);
+        transition
     }
 
     /// F·P.
@@ -52,18 +52,18 @@ impl<const N: usize> Default for Gaussian<N> {
 
 impl<const N: usize> Gaussian<N> {
     /// After a step of time.
-    pub fn predicted(&self, change: &Change<N>) -> Self {
-        let carried = change.carried(&self.covariance);
-        let mut covariance = change.noise;
+    pub fn predicted(&self, transition: &Transition<N>) -> Self {
+        let carried = transition.carried(&self.covariance);
+        let mut covariance = transition.noise;
         for (row, carried) in covariance.iter_mut().zip(&carried) {
-            for (value, forward) in row.iter_mut().zip(&change.forward) {
+            for (value, forward) in row.iter_mut().zip(&transition.forward) {
                 *value += dot(carried, forward);
             }
         }
-        Self { mean: change.mean, covariance }
+        Self { mean: transition.mean, covariance }
     }
 
-    /// After a reading whose misfit in the entries `seen` is expanded about `about`; and the logarithm of how probable the
+    /// After a reading whose misfit in the entries `entries` is expanded about `about`; and the logarithm of how probable the
     /// reading was.
     ///
     /// P⁺ = P − Y·G⁻¹·Yᵀ with Y = P_s·R, A = R·Rᵀ and G = 1 + Rᵀ·P_ss·R; m⁺ = m + P⁺_s·(g − A·δ), δ the distance of what
@@ -72,17 +72,17 @@ impl<const N: usize> Gaussian<N> {
         &self,
         fit: &ContactFit<K>,
         about: &[f64; K],
-        seen: &[usize; K],
+        entries: &[usize; K],
     ) -> (Self, f64) {
-        let delta: [f64; K] = std::array::from_fn(|k| self.mean[seen[k]] - about[k]);
+        let delta: [f64; K] = std::array::from_fn(|k| self.mean[entries[k]] - about[k]);
         let score: [f64; K] = std::array::from_fn(|k| fit.score[k] - dot(&fit.information[k], &delta));
         let misfit = fit.misfit - (0..K).map(|k| delta[k] * (fit.score[k] + score[k])).sum::<f64>();
         let root = Ldl::semidefinite(&fit.information).root();
         let mut y: [[f64; K]; N] = std::array::from_fn(|i| {
-            std::array::from_fn(|c| (c..K).map(|k| self.covariance[i][seen[k]] * root[k][c]).sum())
+            std::array::from_fn(|c| (c..K).map(|k| self.covariance[i][entries[k]] * root[k][c]).sum())
         });
         let mut grown: Matrix<K> = std::array::from_fn(|r| {
-            std::array::from_fn(|c| (r..K).map(|k| root[k][r] * y[seen[k]][c]).sum())
+            std::array::from_fn(|c| (r..K).map(|k| root[k][r] * y[entries[k]][c]).sum())
         });
         (0..K).for_each(|k| grown[k][k] += 1.0);
         let grown = Ldl::semidefinite(&grown);
@@ -96,9 +96,9 @@ impl<const N: usize> Gaussian<N> {
             }
         }
         let moved: [f64; N] =
-            std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][seen[k]] * score[k]).sum());
+            std::array::from_fn(|i| (0..K).map(|k| after.covariance[i][entries[k]] * score[k]).sum());
         after.mean.iter_mut().zip(&moved).for_each(|(mean, moved)| *mean += moved);
-        let explained: f64 = (0..K).map(|k| score[k] * moved[seen[k]]).sum();
+        let explained: f64 = (0..K).map(|k| score[k] * moved[entries[k]]).sum();
         (after, -0.5 * (grown.log_determinant() + misfit - explained))
     }
 
@@ -121,9 +121,9 @@ impl<const N: usize> Gaussian<N> {
 
     /// Belief before a step, given the belief `later` after it (Rauch, Tung and Striebel 1965):
     /// m + C·(m′ − m⁻) and P + C·(P′ − P⁻)·Cᵀ with C = P·Fᵀ·(P⁻)⁻¹, where what is known exactly is held.
-    pub fn smoothed(&self, change: &Change<N>, later: &Self) -> Self {
-        let expected = self.predicted(change);
-        let carried = change.carried(&self.covariance);
+    pub fn smoothed(&self, transition: &Transition<N>, later: &Self) -> Self {
+        let expected = self.predicted(transition);
+        let carried = transition.carried(&self.covariance);
         let factors = Ldl::semidefinite(&expected.covariance);
         let gain: Matrix<N> = std::array::from_fn(|i| factors.solve(std::array::from_fn(|j| carried[j][i])));
         let mut before = *self;
@@ -145,7 +145,7 @@ impl<const N: usize> Gaussian<N> {
     /// Information beyond another belief that it was updated from, as the fit of the readings that made the difference, and about
     /// where that is expanded: their precision is P⁻¹ less the other's, and at m they pull with the other's P⁻¹·(m − m₀).
     /// What has no variance has no precision either.
-    pub fn less(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
+    pub fn information_beyond(&self, other: &Self) -> (ContactFit<N>, [f64; N]) {
         let [own, before] = [self, other].map(|belief| Ldl::semidefinite(&belief.covariance).inverse());
         let moved: [f64; N] = std::array::from_fn(|i| self.mean[i] - other.mean[i]);
         let information = std::array::from_fn(|i| std::array::from_fn(|j| own[i][j] - before[i][j]));
@@ -206,8 +206,8 @@ mod tests {
                 noise[2][2] = 0.0;
             }
             let forward = [[1.0, 0.01, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            let change = Change { mean: [0.205, 0.5, 3.0], forward, noise };
-            let back = belief.smoothed(&change, &belief.predicted(&change));
+            let transition = Transition { mean: [0.205, 0.5, 3.0], forward, noise };
+            let back = belief.smoothed(&transition, &belief.predicted(&transition));
             for i in 0..3 {
                 assert!((back.mean[i] - belief.mean[i]).abs() < 1e-12);
                 assert!((back.covariance[i][i] - belief.covariance[i][i]).abs() < 1e-12);

@@ -95,8 +95,8 @@ pub struct Track {
     pub numbers: [f64; 3],
     /// The contacts, as many as is most probable. Each keeps its place in the list while it is followed.
     pub contacts: Vec<Tracked>,
-    /// Estimate of the reading by itself.
-    pub alone: Estimate,
+    /// Estimate from this reading only.
+    pub single: Estimate,
 }
 
 /// A contact that is followed.
@@ -167,16 +167,16 @@ impl Tracked {
     }
 
     /// The contacts of beliefs with as many of them, each with its weight, the most probable first.
-    fn all(beliefs: &[(f64, Vec<Moments>)], likelihood: &dyn Likelihood) -> Vec<Self> {
+    fn from_mixture(beliefs: &[(f64, Vec<Moments>)], likelihood: &dyn Likelihood) -> Vec<Self> {
         let Some((weight, best)) = beliefs.first() else { return Vec::new() };
         let sum: f64 = beliefs.iter().map(|(weight, _)| weight).sum();
         let (true, [first]) = (*weight < SURE * sum, best.as_slice()) else {
-            return Self::of(best, likelihood);
+            return Self::from_belief(best, likelihood);
         };
         let Extent::Line { length_m } = likelihood.extent() else {
-            return Self::of(&[spread(first, beliefs, sum)], likelihood);
+            return Self::from_belief(&[spread(first, beliefs, sum)], likelihood);
         };
-        let mut all = Self::of(best, likelihood);
+        let mut all = Self::from_belief(best, likelihood);
         if let [one] = all.as_mut_slice() {
             let floor_m2 = one.sd[0].powi(2) - first.variance[0];
             let parts = beliefs.iter().map(|(weight, contacts)| {
@@ -188,7 +188,7 @@ impl Tracked {
     }
 
     /// The contacts of one belief.
-    fn of(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
+    fn from_belief(belief: &[Moments], likelihood: &dyn Likelihood) -> Vec<Self> {
         let contacts: Vec<_> = belief.iter().map(Moments::contact).collect();
         let floors_m2 = likelihood.calibration_m2(&contacts);
         let extent = likelihood.extent();

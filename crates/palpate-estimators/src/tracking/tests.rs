@@ -9,9 +9,10 @@ use super::*;
 use crate::fit::FitTask;
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, Influence};
-use crate::likelihood::{Likelihood, LineLikelihood};
+use crate::likelihood::{ContactFit, Likelihood, LineLikelihood};
 use crate::setup::Setup;
 use crate::simulate::{CleanSensors, clean_reading};
+use crate::track_errors::TrackErrors;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{ChannelErrors, measure};
 use palpate_mechanics::surface::Motion;
@@ -63,24 +64,24 @@ fn readings(rig: &Example, motion: Motion, seed: u64) -> Vec<Timed> {
     timed_readings(rig, motion, 3.0, seed)
 }
 
-/// Mean errors of single readings, of the filter and of the smoother, and the shares that the latter two cover.
-fn errors(likelihood: &BeamLikelihood, readings: &[Timed]) -> ([f64; 3], [f64; 2]) {
+/// Asserts that the mean error of the readings, one by one, is `filter` times that of the filter and `smoother` times that of the
+/// smoother at least, and that the filter's 95 % regions hold the contact about as often as they say.
+pub(super) fn assert_closer_than_readings(
+    likelihood: &dyn Likelihood,
+    readings: &[Timed],
+    [filter, smoother]: [f64; 2],
+) {
     let mut tracker = SmoothTracker::new(likelihood, TrackerConfig::default());
     for (time_s, _, reading) in readings {
         tracker.follow(*time_s, reading).unwrap();
     }
-    let (mut errors, mut covered) = ([0.0; 3], [0.0; 2]);
-    let smoothed = tracker.smoothed();
-    for ((track, smooth), (_, truth, _)) in tracker.filtered().iter().zip(&smoothed).zip(readings) {
-        let x_m = truth.position.x_m;
-        errors[0] += (track.alone.contact.position.x_m - x_m).abs();
-        for (i, tracked) in [track.contacts[0], smooth.contacts[0]].into_iter().enumerate() {
-            errors[i + 1] += (tracked.x_m - x_m).abs();
-            covered[i] += f64::from(u8::from((tracked.x_95_m.0..=tracked.x_95_m.1).contains(&x_m)));
-        }
-    }
-    let count = readings.len() as f64;
-    (errors.map(|sum| sum / count), covered.map(|sum| sum / count))
+    let truths: Vec<Vec<Contact>> = readings.iter().map(|(_, truth, _)| vec![*truth]).collect();
+    let errors = |tracks: &[Track]| TrackErrors::new(tracks, &truths, likelihood.extent()).unwrap();
+    let (filtered, smoothed) = (errors(tracker.filtered()), errors(&tracker.smoothed()));
+    assert_eq!((filtered.tracked, smoothed.tracked), (readings.len(), readings.len()));
+    assert!(filtered.ratio() > filter, "{filtered:?}");
+    assert!(smoothed.ratio() > smoother, "{smoothed:?}");
+    assert!((0.88..1.0).contains(&filtered.track_covered), "{filtered:?}");
 }
 
 #[test]
@@ -88,11 +89,8 @@ fn a_track_is_several_times_closer_than_its_readings() {
     let rig = rig();
     let motion = along_the_beam().with_speed(0.2).unwrap().with_passes(2).unwrap();
     let readings = readings(&rig, motion, 2);
-    for (force_n, filter, smoother) in [(Some(3.0), 3.0, 5.0), (None, 4.0, 6.0)] {
-        let ([single, filtered, smoothed], [covered, _]) = errors(&likelihood(&rig, force_n), &readings);
-        assert!(single / filtered > filter, "{force_n:?}: {single} {filtered}");
-        assert!(single / smoothed > smoother, "{force_n:?}: {single} {smoothed}");
-        assert!((0.88..1.0).contains(&covered), "{force_n:?}: {covered}");
+    for (force_n, factors) in [(Some(3.0), [3.0, 5.0]), (None, [4.0, 6.0])] {
+        assert_closer_than_readings(&likelihood(&rig, force_n), &readings, factors);
     }
 }
 
@@ -135,7 +133,16 @@ fn the_scores_of_a_fit_are_the_slopes_of_its_misfit() {
             .map(|(x_m, force_n)| Contact { position: Position::along(x_m), force_n });
         likelihood.fit_two(&whitened, contacts, Some(mode_n))
     };
-    for (k, step) in [1e-4, 1e-7, 1e-4, 1e-7, 1e-4].into_iter().enumerate() {
+    assert_scores_are_slopes(fit, unknowns, [1e-4, 1e-7, 1e-4, 1e-7, 1e-4]);
+}
+
+/// Asserts that each score is −½ of the misfit's slope, by central differences.
+pub(super) fn assert_scores_are_slopes<const K: usize>(
+    fit: impl Fn([f64; K]) -> ContactFit<K>,
+    unknowns: [f64; K],
+    steps: [f64; K],
+) {
+    for (k, step) in steps.into_iter().enumerate() {
         let moved = |by: f64| {
             let mut unknowns = unknowns;
             unknowns[k] += by;
@@ -180,7 +187,7 @@ fn two_contacts_are_followed_while_one_lets_go_and_comes_down_again() {
         all += 1;
         wrong += usize::from(touching.len() != track.contacts.len());
         tracked.extend(off_m(&touching, track.contacts.iter().map(|tracked| tracked.x_m).collect()));
-        let single = std::iter::once(&track.alone.contact).chain(track.alone.further.as_slice());
+        let single = std::iter::once(&track.single.contact).chain(track.single.further.as_slice());
         alone.extend(off_m(&touching, single.map(|contact| contact.position.x_m).collect()));
     }
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
@@ -223,13 +230,23 @@ fn readings_out_of_order_are_refused_and_change_nothing() {
 fn absurd_readings_and_gaps_leave_numbers_behind() {
     let rig = rig();
     let likelihood = likelihood(&rig, None);
-    let mut tracker = Tracker::new(&likelihood, TrackerConfig::default());
-    let absurd = [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]];
+    assert_numbers_after_absurd_readings(
+        &likelihood,
+        [[0.0; 8], [1e9; 8], [-1e150; 8], [1e-3; 8], [-3e-3; 8]],
+    );
+}
+
+/// Asserts that readings far beyond any contact, ever longer apart, leave finite contacts on the surface.
+pub(super) fn assert_numbers_after_absurd_readings<const C: usize>(
+    likelihood: &dyn Likelihood,
+    absurd: [[f64; C]; 5],
+) {
+    let mut tracker = Tracker::new(likelihood, TrackerConfig::default());
     for (i, reading) in absurd.iter().chain(&absurd).enumerate() {
         let track = tracker.follow(10f64.powi(i as i32), reading).unwrap();
         assert!(track.touching().is_finite());
         for tracked in track.contacts {
-            assert!(tracked.x_m.is_finite() && (0.0..=0.4).contains(&tracked.x_m), "{tracked:?}");
+            assert!(likelihood.extent().contains(tracked.estimate().position), "{tracked:?}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The filter: each reading as it comes.
 
 use super::bank::Step;
-use super::belief::{Belief, Moments, Seen};
-use super::birth::Births;
+use super::belief::{Belief, Moments, Observation};
+use super::birth::BirthModel;
 use super::{Track, TrackError, Tracked, TrackerConfig};
 use crate::likelihood::{Geometry, Likelihood};
 use palpate_core::Estimate;
@@ -58,9 +58,9 @@ struct Hypothesis {
     unseen: [bool; MOST_CONTACTS],
 }
 
-/// ln of the probabilities with which contacts have just come.
+/// Logarithms of the probabilities with which contacts have just come.
 #[derive(Clone, Copy, Debug)]
-struct Newborn {
+struct LogBirthProbabilities {
     /// One, where nothing was or something else is no more.
     one: f64,
     /// Two, likewise.
@@ -87,17 +87,20 @@ impl<'a> Tracker<'a> {
         };
         let mut whitened = std::mem::take(&mut self.whitened);
         self.likelihood.whiten(reading, &mut whitened);
-        let alone = self.likelihood.locate_alone(reading);
-        let newborn = self.predict(duration_s);
-        let seen =
-            Seen { likelihood: self.likelihood, whitened: &whitened, swings: self.config.swing.is_some() };
-        let born = self.births(newborn, seen, &alone);
-        self.update(seen);
+        let single = self.likelihood.single_estimate(reading);
+        let log_births = self.predict(duration_s);
+        let observation = Observation {
+            likelihood: self.likelihood,
+            whitened: &whitened,
+            swings: self.config.swing.is_some(),
+        };
+        let born = self.births(log_births, observation, &single);
+        self.update(observation);
         born.into_iter().for_each(|(weight, belief)| self.add(weight, belief));
         let moments = self.prune();
         self.whitened = whitened;
         self.time_s = Some(time_s);
-        Ok(self.track(time_s, alone, moments))
+        Ok(self.track(time_s, single, moments))
     }
 
     fn step(&self, duration_s: f64) -> Step {
@@ -109,13 +112,13 @@ impl<'a> Tracker<'a> {
     }
 
     /// Moves every hypothesis, and lets contacts come and go.
-    fn predict(&mut self, duration_s: Option<f64>) -> Newborn {
+    fn predict(&mut self, duration_s: Option<f64>) -> LogBirthProbabilities {
         // Before the first reading, any number of contacts is as probable.
         let Some(duration_s) = duration_s else {
             let each = -((1 + self.most_contacts()) as f64).ln();
             let belief = Belief::nothing();
             self.add(each, belief);
-            return Newborn { one: each, two: each, beside: f64::NEG_INFINITY };
+            return LogBirthProbabilities { one: each, two: each, beside: f64::NEG_INFINITY };
         };
         let changes = 0.5 * (1.0 - (-2.0 * self.config.changes_per_s * duration_s).exp());
         let jumps = 1.0 - (-self.config.jumps_per_s * duration_s).exp();
@@ -129,23 +132,23 @@ impl<'a> Tracker<'a> {
             hypothesis.belief = hypothesis.belief.predicted(&step, self.likelihood.geometry());
             let ends = hypothesis.unseen.map(|unseen| if unseen { 0.5f64 } else { changes });
             for (k, ends) in ends.into_iter().enumerate().take(contacts) {
-                let rest = hypothesis.belief.without(k);
+                let rest = hypothesis.belief.without_contact(k);
                 left.extend(rest.map(|belief| (hypothesis.weight + ends.ln(), belief)));
             }
             let comes = if contacts < most { changes } else { 0.0 };
             let stays: f64 = ends.iter().take(contacts).map(|ends| (-ends).ln_1p()).sum();
             hypothesis.weight += stays + (-comes).ln_1p() + (-jumps).ln_1p();
         }
-        self.let_go(left);
-        Newborn {
+        self.add_remaining(left);
+        LogBirthProbabilities {
             one: (with[0] * changes + with[1] * jumps + with[2] * changes * jumps).ln(),
             two: (with[0] * changes * changes + with[1] * changes * jumps + with[2] * jumps).ln(),
             beside: changes.ln(),
         }
     }
 
-    /// Adds what contacts leave behind when they let go. There is one hypothesis of nothing, which stands for all.
-    fn let_go(&mut self, left: Vec<(f64, Belief)>) {
+    /// Adds the beliefs that remain when contacts let go. There is one hypothesis of nothing, which stands for all.
+    fn add_remaining(&mut self, left: Vec<(f64, Belief)>) {
         for (weight, belief) in left {
             let same = self.hypotheses.iter_mut().find(|hypothesis| hypothesis.belief.contacts() == 0);
             match (same, belief.contacts()) {
@@ -165,9 +168,9 @@ impl<'a> Tracker<'a> {
     }
 
     /// Updates every hypothesis and its weight by the reading.
-    fn update(&mut self, seen: Seen) {
+    fn update(&mut self, observation: Observation) {
         for hypothesis in &mut self.hypotheses {
-            match hypothesis.belief.updated(seen) {
+            match hypothesis.belief.updated(observation) {
                 Some((belief, evidence)) => {
                     hypothesis.belief = belief;
                     hypothesis.weight += evidence;
@@ -178,28 +181,33 @@ impl<'a> Tracker<'a> {
     }
 
     /// Hypotheses of contacts that have come with this reading, with their weights.
-    fn births(&self, newborn: Newborn, seen: Seen, alone: &Estimate) -> Vec<(f64, Belief)> {
+    fn births(
+        &self,
+        log_births: LogBirthProbabilities,
+        observation: Observation,
+        single: &Estimate,
+    ) -> Vec<(f64, Belief)> {
         let config = &self.config;
         let weighted = |(evidence, belief): (f64, Belief)| {
-            (if belief.contacts() == 1 { newborn.one } else { newborn.two } + evidence, belief)
+            (if belief.contacts() == 1 { log_births.one } else { log_births.two } + evidence, belief)
         };
         match self.likelihood.geometry() {
             Geometry::Line(likelihood) => {
-                let births = Births { likelihood, seen, config, alone };
-                let mut born: Vec<_> = births.where_nothing_touched().into_iter().map(weighted).collect();
+                let births = BirthModel { likelihood, observation, config, single };
+                let mut born: Vec<_> = births.first_contacts().into_iter().map(weighted).collect();
                 for hypothesis in &self.hypotheses {
                     if let Belief::One(bank) = &hypothesis.belief {
-                        let weight = hypothesis.weight + newborn.beside;
+                        let weight = hypothesis.weight + log_births.beside;
                         born.extend(
-                            births.beside(bank).map(|(evidence, belief)| (weight + evidence, belief)),
+                            births.second_contact(bank).map(|(evidence, belief)| (weight + evidence, belief)),
                         );
                     }
                 }
                 born
             }
             Geometry::Plane(likelihood) => {
-                let births = Births { likelihood, seen, config, alone };
-                births.where_nothing_touched().into_iter().map(weighted).collect()
+                let births = BirthModel { likelihood, observation, config, single };
+                births.first_contacts().into_iter().map(weighted).collect()
             }
         }
     }
@@ -225,7 +233,7 @@ impl<'a> Tracker<'a> {
                 continue;
             }
             let contacts = hypothesis.belief.moments();
-            match moments.iter().position(|other| are_one(other, &contacts)) {
+            match moments.iter().position(|other| are_same_contacts(other, &contacts)) {
                 Some(same) => {
                     let other: &mut Hypothesis = &mut kept[same];
                     other.weight += (hypothesis.weight - other.weight).exp().ln_1p();
@@ -248,7 +256,7 @@ impl<'a> Tracker<'a> {
         moments
     }
 
-    fn track(&self, time_s: f64, alone: Estimate, moments: Vec<Vec<Moments>>) -> Track {
+    fn track(&self, time_s: f64, single: Estimate, moments: Vec<Vec<Moments>>) -> Track {
         let mut numbers = [0.0; 1 + MOST_CONTACTS];
         for hypothesis in &self.hypotheses {
             numbers[hypothesis.belief.contacts()] += hypothesis.weight.exp();
@@ -258,14 +266,14 @@ impl<'a> Tracker<'a> {
             self.hypotheses.iter().zip(moments).filter(|(one, _)| one.belief.contacts() == number);
         let beliefs: Vec<(f64, Vec<Moments>)> =
             of_number.map(|(hypothesis, contacts)| (hypothesis.weight.exp(), contacts)).collect();
-        let contacts = Tracked::all(&beliefs, self.likelihood);
-        Track { time_s, numbers, contacts, alone }
+        let contacts = Tracked::from_mixture(&beliefs, self.likelihood);
+        Track { time_s, numbers, contacts, single }
     }
 }
 
 /// Whether two sets of contacts are the same, in either order; so are two beliefs that nothing touches.
-fn are_one(a: &[Moments], b: &[Moments]) -> bool {
-    let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_one_with(b));
+fn are_same_contacts(a: &[Moments], b: &[Moments]) -> bool {
+    let same = |b: &mut dyn Iterator<Item = &Moments>| a.iter().zip(b).all(|(a, b)| a.is_same_contact(b));
     a.len() == b.len() && (same(&mut b.iter()) || same(&mut b.iter().rev()))
 }
 
@@ -319,19 +327,19 @@ impl<'a> SmoothTracker<'a> {
         let mut later: Option<(u64, Belief)> = None;
         for k in (0..smoothed.len()).rev() {
             let number = self.tracks[k].contacts.len();
-            let lasting = later.and_then(|(id, belief)| self.gone_back(k, id, &belief));
+            let lasting = later.and_then(|(id, belief)| self.smoothed_belief(k, id, &belief));
             let lasting = lasting.filter(|(_, belief)| belief.contacts() == number);
             let last = || self.past[k].first().cloned();
             later = if number > 0 { lasting.or_else(last) } else { None };
             let moments = later.as_ref().map(|(_, belief)| belief.moments());
-            smoothed[k].contacts =
-                moments.map_or_else(Vec::new, |moments| Tracked::of(&moments, self.tracker.likelihood));
+            smoothed[k].contacts = moments
+                .map_or_else(Vec::new, |moments| Tracked::from_belief(&moments, self.tracker.likelihood));
         }
         smoothed
     }
 
     /// Belief of hypothesis `id` at reading `k`, given its belief at the next.
-    fn gone_back(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
+    fn smoothed_belief(&self, k: usize, id: u64, later: &Belief) -> Option<(u64, Belief)> {
         let (_, belief) = self.past[k].iter().find(|(remembered, _)| *remembered == id)?;
         let step = self.tracker.step(self.tracks[k + 1].time_s - self.tracks[k].time_s);
         belief.smoothed(&step, self.tracker.likelihood.geometry(), later).map(|belief| (id, belief))

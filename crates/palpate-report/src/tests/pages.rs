@@ -242,7 +242,7 @@ fn an_evaluation_says_whose_answers_it_holds() {
     ] {
         let files = evaluation_report(&EvaluationReport {
             title: "Evaluation of <paper>",
-            evaluation: &Evaluation::of(&locator, recording).unwrap(),
+            evaluation: &Evaluation::new(&locator, recording).unwrap(),
             recording: &recording.provenance,
             judged,
             portions: &portions,

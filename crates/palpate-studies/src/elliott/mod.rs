@@ -243,10 +243,10 @@ impl Elliott {
 
     /// A locator's errors, reading by reading.
     fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
-        let mut pressed = Evaluation::of(locator, &setup.trial.judged)?;
+        let mut pressed = Evaluation::new(locator, &setup.trial.judged)?;
         let extent = self.rig.setup.surface.extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
-        let moving = Evaluation::of(locator, &setup.moving.recording)?;
+        let moving = Evaluation::new(locator, &setup.moving.recording)?;
         let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
         Ok(ChainErrors {
             pressed: Some((mean_m(&pressed), pressed.effective_percent(self.tolerance_m))),
@@ -259,7 +259,7 @@ impl Elliott {
         let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
         let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface.extent());
         let judge = |tracks: &[Track]| -> Result<ChainErrors, ElliottError> {
-            let errors = TrackErrors::of(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
+            let errors = TrackErrors::new(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
             Ok(ChainErrors { pressed: None, moving_error_m: errors.track_m })
         };
         Ok([judge(&followed.filtered)?, judge(&followed.smoothed)?])
@@ -289,7 +289,7 @@ impl Elliott {
         contacts: &[Vec<ResponseGradient>],
     ) -> Option<ChainRow> {
         let pressed = |pick: fn((f64, f64)) -> f64| {
-            Quantiles::of(judged.iter().filter_map(|one| one.pressed.map(pick)).collect())
+            Quantiles::from_values(judged.iter().filter_map(|one| one.pressed.map(pick)).collect())
         };
         let seen = match chain {
             Chain::Components(count) => count,
@@ -305,7 +305,7 @@ impl Elliott {
             chain,
             error_m: pressed(|(error_m, _)| error_m),
             effective_percent: pressed(|(_, percent)| percent),
-            moving_error_m: Quantiles::of(judged.iter().map(|one| one.moving_error_m).collect())?,
+            moving_error_m: Quantiles::from_values(judged.iter().map(|one| one.moving_error_m).collect())?,
             limit_m: bounds.filter(|_| is_single).map(mean_m),
         })
     }

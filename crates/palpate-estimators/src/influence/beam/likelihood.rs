@@ -135,7 +135,7 @@ impl Likelihood for BeamLikelihood {
         left
     }
 
-    fn locate_alone(&self, reading: &[f64]) -> Estimate {
+    fn single_estimate(&self, reading: &[f64]) -> Estimate {
         self.locator.locate(reading)
     }
 

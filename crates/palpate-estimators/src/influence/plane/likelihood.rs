@@ -67,7 +67,7 @@ impl Likelihood for PlateLikelihood {
         left
     }
 
-    fn locate_alone(&self, reading: &[f64]) -> Estimate {
+    fn single_estimate(&self, reading: &[f64]) -> Estimate {
         self.locator.locate(reading)
     }
 

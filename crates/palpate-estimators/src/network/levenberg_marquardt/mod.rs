@@ -107,12 +107,12 @@ impl Fit for LevenbergMarquardt {
             return zero("networks in its ensemble");
         }
         recording.check_distinct_positions(2)?;
-        let inputs = NetworkInputs::of(&setup.layout, recording)?;
+        let inputs = NetworkInputs::fit(&setup.layout, recording)?;
         if inputs.axes.is_empty() {
             return Err(LevenbergMarquardtFitError::Alike);
         }
         let outputs = outputs(setup, recording);
-        let scales: Vec<OutputScale> = outputs.iter().map(|output| OutputScale::of(output)).collect();
+        let scales: Vec<OutputScale> = outputs.iter().map(|output| OutputScale::fit(output)).collect();
         let (rows, extent, force_n) = (recording.rows.len(), setup.surface.extent(), setup.force_n);
         let sizes =
             std::iter::once(inputs.axes.len()).chain(self.hidden.iter().copied()).chain([scales.len()]);
@@ -149,7 +149,7 @@ impl LevenbergMarquardt {
         let mut trained: Vec<Member> = Vec::new();
         for i in 0..trainings as u64 {
             let seed = seed.wrapping_mul(trainings as u64).wrapping_add(i);
-            trained.extend(training.of_some(MOST_PRESSES, seed).run(seed, watch)?);
+            trained.extend(training.subsampled(MOST_PRESSES, seed).run(seed, watch)?);
         }
         if trained.is_empty() {
             return Err(LevenbergMarquardtFitError::Diverged { trainings });
@@ -192,7 +192,7 @@ pub struct NetworkInputs {
 
 impl NetworkInputs {
     /// The inputs for a recording; none where its readings differ by no more than noise.
-    fn of(layout: &Layout, recording: &Recording) -> Result<Self, NoFeatures> {
+    fn fit(layout: &Layout, recording: &Recording) -> Result<Self, NoFeatures> {
         let features = Features::fit(FeatureKind::LoadInvariant, recording)?;
         let mut inputs = Self { features, axes: Vec::new() };
         let noise = inputs.feature_noise(layout, recording);
@@ -279,7 +279,7 @@ pub struct OutputScale {
 }
 
 impl OutputScale {
-    fn of(output: &[f64]) -> Self {
+    fn fit(output: &[f64]) -> Self {
         let (mean, variance) = mean_and_variance(output.iter().copied());
         Self { mean, sd: if variance > 0.0 { variance.sqrt() } else { 1.0 } }
     }

@@ -52,7 +52,7 @@ const SETTLED: f64 = 0.01;
 
 impl Training<'_> {
     /// The same of at most `most` presses, drawn at random.
-    pub(super) fn of_some(&self, most: usize, seed: u64) -> Self {
+    pub(super) fn subsampled(&self, most: usize, seed: u64) -> Self {
         let mut rows = random_order(self.inputs.nrows(), seed);
         rows.truncate(most);
         rows.sort_unstable();
