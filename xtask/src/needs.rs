@@ -18,7 +18,8 @@ pub struct Need {
     variable: Option<&'static str>,
     /// Whether it is where it usually is, or where the variable says.
     found: fn(&Path, Option<&Path>) -> bool,
-    install: Option<Install>,
+    /// Debian packages that bring it, which are installed when this runs as root on Debian.
+    packages: &'static [&'static str],
     /// Consequence for the tests without it.
     pub without: Without,
 }
@@ -37,25 +38,12 @@ pub enum Without {
     FallsBack(&'static str),
 }
 
-/// Way of installing a prerequisite.
-#[derive(Clone, Copy)]
-enum Install {
-    /// Debian packages, when this runs as root on Debian.
-    Apt(&'static [&'static str]),
-    /// The packages that a folder's package-lock.json names.
-    #[cfg_attr(not(test), expect(dead_code, reason = "no row of the table is an npm package yet"))]
-    Npm(&'static str),
-    /// Python packages, in a virtual environment under target/.
-    #[cfg_attr(not(test), expect(dead_code, reason = "no row of the table is a Python package yet"))]
-    Pip(&'static [&'static str]),
-}
-
 /// Runs the tests in parallel, a process each.
 pub const NEXTEST: Need = Need {
     name: "cargo-nextest",
     variable: None,
     found: |_, _| run::answers("cargo", &["nextest", "--version"]),
-    install: None,
+    packages: &[],
     without: Without::FallsBack("cargo test runs the tests instead"),
 };
 
@@ -65,7 +53,7 @@ const NEEDS: [Need; 3] = [
         name: "the folder of real recordings",
         variable: Some("PALPATE_DATA"),
         found: |root, named| named.map_or_else(|| root.join("../shared/data").is_dir(), Path::is_dir),
-        install: None,
+        packages: &[],
         without: Without::Skips {
             tests: &["crates/palpate-cli/tests/cli/recordings.rs", "every test that reads a real recording"],
             remedy: "put it at ../shared/data beside the workspace, or name it in PALPATE_DATA",
@@ -75,7 +63,7 @@ const NEEDS: [Need; 3] = [
         name: "Chromium",
         variable: Some("PALPATE_CHROMIUM"),
         found: |_, named| named.unwrap_or(Path::new("/usr/bin/chromium")).is_file(),
-        install: Some(Install::Apt(&["chromium", "fonts-dejavu-core"])),
+        packages: &["chromium", "fonts-dejavu-core"],
         without: Without::Skips {
             tests: &["crates/palpate-cli/tests/cli/browser.rs"],
             remedy: "install Debian's chromium, or name the program in PALPATE_CHROMIUM",
@@ -87,7 +75,7 @@ const NEEDS: [Need; 3] = [
 pub fn missing(root: &Path) -> Result<Vec<Need>> {
     let mut missing = Vec::new();
     for need in NEEDS {
-        let there = need.is_there(root) || (need.installed(root)? && need.is_there(root));
+        let there = need.is_there(root) || (need.installed()? && need.is_there(root));
         if !there {
             missing.push(need);
         }
@@ -115,60 +103,31 @@ impl Need {
         }
     }
 
-    fn installed(&self, root: &Path) -> Result<bool> {
-        let install = self.install.filter(|install| self.named().is_none() && install.may_run());
-        let Some(install) = install else { return Ok(false) };
+    fn installed(&self) -> Result<bool> {
+        if self.packages.is_empty() || self.named().is_some() || !may_install() {
+            return Ok(false);
+        }
         println!("installing {}", self.name);
-        for mut command in install.commands(root) {
+        for mut command in self.installation() {
             if !run::shown(&mut command)? {
                 return Ok(false);
             }
         }
         Ok(true)
     }
+
+    fn installation(&self) -> [Command; 2] {
+        let apt = |arguments: &[&str]| {
+            let mut command = Command::new("apt-get");
+            command.env("DEBIAN_FRONTEND", "noninteractive").args(["-y", "-qq"]).args(arguments);
+            command
+        };
+        [apt(&["update"]), apt(&[&["install", "--no-install-recommends"], self.packages].concat())]
+    }
 }
 
-impl Install {
-    fn may_run(self) -> bool {
-        match self {
-            Self::Apt(_) => {
-                Path::new("/etc/debian_version").exists()
-                    && run::answers("apt-get", &["--version"])
-                    && is_root()
-            }
-            Self::Npm(_) => run::answers("npm", &["--version"]),
-            Self::Pip(_) => run::answers("python3", &["--version"]),
-        }
-    }
-
-    fn commands(self, root: &Path) -> Vec<Command> {
-        match self {
-            Self::Apt(packages) => {
-                let apt = |arguments: &[&str]| {
-                    let mut command = Command::new("apt-get");
-                    command.env("DEBIAN_FRONTEND", "noninteractive").args(["-y", "-qq"]).args(arguments);
-                    command
-                };
-                let install = [&["install", "--no-install-recommends"], packages].concat();
-                vec![apt(&["update"]), apt(&install)]
-            }
-            Self::Npm(folder) => {
-                let mut command = Command::new("npm");
-                command.args(["ci", "--no-audit", "--no-fund"]).current_dir(root.join(folder));
-                vec![command]
-            }
-            Self::Pip(packages) => {
-                let environment = root.join("target/xtask/venv");
-                let mut make = Command::new("python3");
-                make.args(["-m", "venv"]).arg(&environment);
-                let mut install = Command::new(environment.join("bin/python"));
-                install
-                    .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
-                    .args(packages);
-                vec![make, install]
-            }
-        }
-    }
+fn may_install() -> bool {
+    Path::new("/etc/debian_version").exists() && run::answers("apt-get", &["--version"]) && is_root()
 }
 
 /// The effective user of this process is root (`Uid:` real, effective, …).
@@ -182,29 +141,22 @@ fn is_root() -> bool {
 mod tests {
     use super::*;
 
-    fn shown(install: Install) -> Vec<String> {
-        install
-            .commands(Path::new("/usr/w"))
-            .iter()
-            .map(|command| format!("{command:?}").replace('"', ""))
-            .collect()
+    fn need(name: &str) -> &'static Need {
+        const { &NEEDS }.iter().find(|need| need.name == name).unwrap()
     }
 
     #[test]
-    fn each_kind_of_package_is_installed_without_questions() {
-        let apt = shown(Install::Apt(&["a", "b"]));
-        assert!(apt[0].ends_with("apt-get -y -qq update"), "{apt:?}");
-        assert!(apt[1].ends_with("apt-get -y -qq install --no-install-recommends a b"), "{apt:?}");
-        assert!(apt.iter().all(|command| command.contains("DEBIAN_FRONTEND=noninteractive")), "{apt:?}");
-        assert!(shown(Install::Npm("web"))[0].ends_with("npm ci --no-audit --no-fund"));
-        let pip = shown(Install::Pip(&["onnx"]));
-        assert!(pip[1].starts_with("/usr/w/target/xtask/venv/bin/python -m pip install"), "{pip:?}");
+    fn packages_are_installed_without_questions() {
+        let commands = need("Chromium").installation().map(|command| format!("{command:?}").replace('"', ""));
+        assert!(commands[0].ends_with("apt-get -y -qq update"), "{commands:?}");
+        let install = "apt-get -y -qq install --no-install-recommends chromium fonts-dejavu-core";
+        assert!(commands[1].ends_with(install), "{commands:?}");
+        assert!(commands.iter().all(|command| command.contains("DEBIAN_FRONTEND=noninteractive")));
     }
 
     #[test]
     fn a_missing_prerequisite_names_the_tests_it_skips_and_the_remedy() {
-        let chromium = NEEDS.iter().find(|need| need.name == "Chromium").unwrap();
-        let text = chromium.describe();
+        let text = need("Chromium").describe();
         assert!(text.contains("tests/cli/browser.rs") && text.contains("PALPATE_CHROMIUM"), "{text}");
     }
 

@@ -2,7 +2,8 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// A JSON object of these keys and values. `"key"?: value` leaves the key out of a `None`; `..fields` takes in another's keys.
+/// A JSON object of these keys and values. `"key"?: value` leaves the key out of a `None`; `..fields` takes in another's keys,
+/// and of a `None` no key.
 macro_rules! object {
     ($($fields:tt)*) => { $crate::json::Object($crate::json::fields!($($fields)*)) };
 }
@@ -55,6 +56,12 @@ impl<F: Fields, R: Fields> Fields for Joined<F, R> {
     fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
         self.0.write(map)?;
         self.1.write(map)
+    }
+}
+
+impl<F: Fields> Fields for Option<F> {
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        self.as_ref().map_or(Ok(()), |fields| fields.write(map))
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct DesignKeys {
     /// Positions at which the surface will be touched; everywhere unless said otherwise.
     pub contacts: Option<At<ContactsKeys>>,
     /// Whether the contact's force will be known; as in `[contact]` unless said otherwise.
-    pub force: Option<ForceKeys>,
+    pub force: Option<Force>,
     /// Criterion that scores a layout.
     pub criterion: Option<DesignCriterion>,
     /// A limit up to this is good enough.
@@ -95,14 +95,6 @@ pub(crate) struct ContactsKeys {
     pub weights: Option<At<Vec<NotNegative<Number>>>>,
 }
 
-/// Whether the contact's force will be known.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum ForceKeys {
-    Known,
-    Unknown,
-}
-
 /// Part of the surface where no sensor may sit.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a zone such as { from = \"100 mm\", to = \"120 mm\" }")]
@@ -142,11 +134,7 @@ impl At<DesignKeys> {
                 .contacts
                 .as_ref()
                 .map_or(Ok(default.contacts), |contacts| contacts.build(extent))?,
-            force: match self.force {
-                Some(ForceKeys::Known) => Force::Known,
-                Some(ForceKeys::Unknown) => Force::Unknown,
-                None => default.force,
-            },
+            force: self.force.unwrap_or(default.force),
             criterion: self.criterion.unwrap_or(default.criterion),
             tolerance_m: self.tolerance.map_or(default.tolerance_m, |tolerance| tolerance.si),
             spacing_m: self.spacing.map_or(default.spacing_m, |spacing| spacing.si),

@@ -60,7 +60,7 @@ pub struct AskedLayout {
     /// The method.
     pub method: Method,
     /// The bytes of the study file that ask for it.
-    pub place: Range<usize>,
+    pub span: Range<usize>,
 }
 
 /// Positions and tolerance by which a study's locators are judged.
@@ -242,7 +242,7 @@ impl ArmKeys {
                 return Err(key.unused("`layout`"));
             }
         }
-        Ok(Some(AskedLayout { method: **layout, place: layout.place.span.clone() }))
+        Ok(Some(AskedLayout { method: **layout, span: layout.place.span.clone() }))
     }
 }
 

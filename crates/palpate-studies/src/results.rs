@@ -261,12 +261,7 @@ fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults>
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at.x_m), high.max(at.x_m)));
     let span = Portion { from_m: low, to_m: high };
     let error = |inside: bool| {
-        let part = |fit: &TrainedSeed| {
-            let Evaluation { length_m, located } = &fit.evaluation;
-            let located = located.iter().filter(|located| span.contains(located.truth) == inside);
-            let part = Evaluation { length_m: *length_m, located: located.copied().collect() };
-            percent(&part, None, |s| s.average_m)
-        };
+        let part = |fit: &TrainedSeed| average_percent(&fit.evaluation, |at| span.contains(at) == inside);
         Quantiles::from_values(outcome.fits.iter().filter_map(part).collect())
     };
     Some(TrainingSpanResults {
@@ -283,6 +278,12 @@ pub(super) fn percent(
     pick: fn(ErrorSummary) -> f64,
 ) -> Option<f64> {
     evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.length_m))
+}
+
+/// Average error of the contacts at the positions that `keep` wants, in % of the length.
+pub(super) fn average_percent(evaluation: &Evaluation, keep: impl Fn(Position) -> bool) -> Option<f64> {
+    let located = evaluation.located.iter().filter(|located| keep(located.truth)).copied().collect();
+    percent(&Evaluation { located, ..*evaluation }, None, |summary| summary.average_m)
 }
 
 /// Mean error, in metres, of an estimator at the limit at each of `positions`, for contacts of `force_n` newtons; `None` where the

@@ -25,7 +25,7 @@ pub enum StudyRunError {
         /// The arm.
         arm: String,
         /// The bytes of the study file that ask for it.
-        place: Range<usize>,
+        span: Range<usize>,
         /// Why.
         error: DesignError,
     },
@@ -181,7 +181,7 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
             None => {
                 let layout = request.layout(watch).map_err(|error| match error {
                     DesignError::Cancelled(cancelled) => StudyRunError::Cancelled(cancelled),
-                    error => StudyRunError::Design { arm: arm.name.clone(), place: asked.place, error },
+                    error => StudyRunError::Design { arm: arm.name.clone(), span: asked.span, error },
                 })?;
                 found.push((request, layout.clone()));
                 layout

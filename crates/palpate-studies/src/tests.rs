@@ -148,12 +148,11 @@ fn layouts_are_found_once_for_arms_that_ask_alike() {
 fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
     let mut study = beam("[[arm]]\nname = \"tight\"\nlayout = \"genetic\"");
     study.arms[0].rig.design.as_mut().unwrap().spacing_m = 0.06;
-    let place = study.arms[0].layout.as_ref().unwrap().place.clone();
-    let Err(StudyRunError::Design { arm, place: said, error }) = PreparedStudy::new(study, Watch::NONE)
-    else {
+    let span = study.arms[0].layout.as_ref().unwrap().span.clone();
+    let Err(StudyRunError::Design { arm, span: said, error }) = PreparedStudy::new(study, Watch::NONE) else {
         panic!()
     };
-    assert_eq!((arm.as_str(), said), ("tight", place));
+    assert_eq!((arm.as_str(), said), ("tight", span));
     assert!(matches!(error, DesignError::Spacing { count: 8, .. }), "{error}");
 }
 

@@ -35,13 +35,7 @@ mod tests {
 
     fn messages(changelog: &[(&str, &str)]) -> Vec<String> {
         let mut project = Project::from_files(changelog);
-        project.crates.push(Crate {
-            name: "palpate".into(),
-            version: "0.1.0".into(),
-            manifest: String::new(),
-            roots: Vec::new(),
-            dependencies: Vec::new(),
-        });
+        project.crates.push(Crate { version: "0.1.0".into(), ..Crate::default() });
         findings(&project).into_iter().map(|finding| finding.message).collect()
     }
 

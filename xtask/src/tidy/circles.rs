@@ -176,13 +176,7 @@ mod tests {
         let paths: Vec<String> = files.iter().map(|(path, _)| format!("crates/a/src/{path}")).collect();
         let files: Vec<_> = paths.iter().zip(files).map(|(path, (_, text))| (path.as_str(), *text)).collect();
         let mut project = Project::from_files(&files);
-        project.crates.push(Crate {
-            name: "a".into(),
-            version: String::new(),
-            manifest: String::new(),
-            roots: vec!["crates/a/src/lib.rs".into()],
-            dependencies: Vec::new(),
-        });
+        project.crates.push(Crate { roots: vec!["crates/a/src/lib.rs".into()], ..Crate::default() });
         findings(&project).into_iter().map(|found| format!("{}: {}", found.line, found.message)).collect()
     }
 

@@ -63,10 +63,9 @@ mod tests {
     fn krate(name: &str, dependencies: &[&str]) -> Crate {
         Crate {
             name: name.into(),
-            version: "0.1.0".into(),
             manifest: format!("crates/{name}/Cargo.toml"),
-            roots: Vec::new(),
             dependencies: dependencies.iter().map(|&name| name.into()).collect(),
+            ..Crate::default()
         }
     }
 

@@ -25,6 +25,7 @@ pub struct File {
 }
 
 /// A crate of the workspace.
+#[derive(Default)]
 pub struct Crate {
     /// Its package name.
     pub name: String,

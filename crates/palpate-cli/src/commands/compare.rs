@@ -45,12 +45,8 @@ pub struct Arguments {
     json: bool,
 }
 
-/// An estimator that does not suit the rig or the recording.
-#[derive(serde::Serialize)]
-struct LeftOut {
-    name: &'static str,
-    why: String,
-}
+/// Kind of an estimator that does not suit the rig or the recording, and why.
+type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
@@ -72,12 +68,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "length_mm": rig.setup.surface.extent().length_m() * 1e3,
             "tolerance_mm": arguments.tolerance * 1e3,
             "estimators": estimators.collect::<Vec<_>>(),
-            "left_out": &left_out,
+            "left_out": left_out.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),
         });
     }
     output::say(format!("{}: {how}; {readings} readings\n", arguments.rig.display()))?;
     output::say(table(&rig, &comparisons, arguments))?;
-    for LeftOut { name, why } in &left_out {
+    for (name, why) in &left_out {
         output::say(format!("\n{name} is left out: {why}"))?;
     }
     output::say_report("\n", arguments.out.as_deref())
@@ -91,13 +87,12 @@ fn write_report(
     left_out: &[LeftOut],
     out: &Path,
 ) -> Result<(), Failure> {
-    let left_out: Vec<_> = left_out.iter().map(|left_out| (left_out.name, left_out.why.clone())).collect();
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
         setup: &rig.setup,
         trials: how,
         comparisons,
-        left_out: &left_out,
+        left_out,
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
@@ -154,7 +149,7 @@ fn compare(
         match evaluate_splits(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {
             Ok(tried) => comparisons.push(Comparison { estimator: contender, tried }),
             Err(error) if Cancelled::caused(&error) => return Err(Failure::stopped()),
-            Err(error) => left_out.push(LeftOut { name: contender.kind(), why: error.to_string() }),
+            Err(error) => left_out.push((contender.kind(), error.to_string())),
         }
         bar.inc(1);
     }

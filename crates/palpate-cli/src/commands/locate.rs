@@ -1,12 +1,14 @@
 //! `palpate locate`: readings in, estimates out, line by line.
 
 use crate::failure::{Complaint, Failure};
+use crate::json::{Fields, Object, fields, object};
 use crate::lines::Readings;
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
 use palpate_estimators::estimator::{ContactEstimate, Estimate, Mode, Uncertainty};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
+use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -98,54 +100,6 @@ fn csv(estimate: &Estimate, extent: Extent) -> String {
     csv_row(cells)
 }
 
-/// An estimate as JSON.
-#[derive(serde::Serialize)]
-struct JsonEstimate {
-    line: u64,
-    #[serde(flatten)]
-    contact: JsonContact,
-    status: &'static str,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    modes: Vec<JsonMode>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    further: Vec<JsonContact>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shape: Option<Vec<JsonShapePoint>>,
-}
-
-/// A point of the bent finger's centre line: how far along it, where, and how sure.
-#[derive(serde::Serialize)]
-struct JsonShapePoint {
-    at_mm: f64,
-    x_mm: f64,
-    y_mm: f64,
-    sd_mm: f64,
-}
-
-#[derive(serde::Serialize)]
-struct JsonMode {
-    #[serde(flatten)]
-    contact: JsonContact,
-    probability: f64,
-}
-
-#[derive(serde::Serialize)]
-struct JsonContact {
-    x_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    y_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    force_n: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    x_95_mm: Option<[f64; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    y_95_mm: Option<[f64; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sd_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sd_force_n: Option<f64>,
-}
-
 /// A line of JSON: all that the locator says of the reading in line `line` of its source, and the shape where it is asked for.
 fn json(
     estimate: &Estimate,
@@ -153,43 +107,45 @@ fn json(
     extent: Extent,
     shape: Option<&DigitShape>,
 ) -> Result<String, Failure> {
-    let mode = |mode: &Mode| JsonMode {
-        contact: json_contact(&mode.contact, extent),
-        probability: mode.probability,
+    let mode = |mode: &Mode| {
+        object! { ..contact_fields(&mode.contact, extent), "probability": mode.probability }
     };
-    let object = JsonEstimate {
-        line,
-        contact: json_contact(&estimate.contact, extent),
-        status: estimate.status.name(),
-        modes: estimate.modes.as_slice().iter().map(mode).collect(),
-        further: estimate.further.as_slice().iter().map(|further| json_contact(further, extent)).collect(),
-        shape: shape.map(json_shape),
+    let modes: Vec<_> = estimate.modes.as_slice().iter().map(mode).collect();
+    let further = estimate.further.as_slice().iter();
+    let further: Vec<_> = further.map(|contact| Object(contact_fields(contact, extent))).collect();
+    let object = object! {
+        "line": line,
+        ..contact_fields(&estimate.contact, extent),
+        "status": estimate.status.name(),
+        "modes"?: Some(modes).filter(|modes| !modes.is_empty()),
+        "further"?: Some(further).filter(|further| !further.is_empty()),
+        "shape"?: shape.map(|shape| shape.points.iter().map(shape_point).collect::<Vec<_>>()),
     };
     serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
 }
 
-fn json_shape(shape: &DigitShape) -> Vec<JsonShapePoint> {
-    let point = |point: &ShapePoint| JsonShapePoint {
-        at_mm: point.at_m * 1e3,
-        x_mm: point.x_m * 1e3,
-        y_mm: point.y_m * 1e3,
-        sd_mm: point.sd_m * 1e3,
-    };
-    shape.points.iter().map(point).collect()
+/// A point of the bent finger's centre line: how far along it, where, and how sure.
+fn shape_point(point: &ShapePoint) -> impl Serialize {
+    object! {
+        "at_mm": point.at_m * 1e3,
+        "x_mm": point.x_m * 1e3,
+        "y_mm": point.y_m * 1e3,
+        "sd_mm": point.sd_m * 1e3,
+    }
 }
 
-fn json_contact(contact: &ContactEstimate, extent: Extent) -> JsonContact {
+fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + use<> {
     let uncertainty = contact.uncertainty.as_ref();
     let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
     // JSON has no infinity: what is not known at all is left out.
     let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
-    JsonContact {
-        x_mm: contact.position.x_m * 1e3,
-        y_mm: extent.across(contact.position.y_m * 1e3),
-        force_n: contact.force_n,
-        x_95_mm: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
-        y_95_mm: uncertainty.and_then(|uncertainty| extent.across(mm(uncertainty.y_95_m))),
-        sd_mm: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
-        sd_force_n: uncertainty.and_then(|u| sd(u.covariance[5])),
+    fields! {
+        "x_mm": contact.position.x_m * 1e3,
+        "y_mm"?: extent.across(contact.position.y_m * 1e3),
+        "force_n"?: contact.force_n,
+        "x_95_mm"?: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
+        "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.across(mm(uncertainty.y_95_m))),
+        "sd_mm"?: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
+        "sd_force_n"?: uncertainty.and_then(|u| sd(u.covariance[5])),
     }
 }

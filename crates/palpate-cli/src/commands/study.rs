@@ -103,8 +103,8 @@ fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     let complaint = Complaint::new(error);
     match error {
         StudyRunError::Cancelled(_) => Failure::stopped(),
-        StudyRunError::Design { place, error, .. } => {
-            complaint.help(super::design::help(error)).at_span(name, text, place.clone()).into()
+        StudyRunError::Design { span, error, .. } => {
+            complaint.help(super::design::help(error)).at_span(name, text, span.clone()).into()
         }
         _ => complaint.into(),
     }
@@ -194,17 +194,13 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
         let Agreement { agreeing, compared } = Agreement::new(figures);
         output::say(format!("\nPublished against replicated: {agreeing} of {compared} agree\n"))?;
         let show = |figure: &PublishedFigure, value: f64| {
-            if figure.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
+            if figure.found.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
         };
         output::say(
             Table::from_rows(figures)
                 .column("figure", |figure| format!("{}: {}", figure.arm, figure.what))
                 .column("published", |figure| show(figure, figure.published))
-                .column("ours", |figure| {
-                    let [median, low, high] =
-                        [figure.median, figure.p05, figure.p95].map(|value| show(figure, value));
-                    format!("{median} ({low}–{high})")
-                })
+                .column("ours", |figure| in_words(figure.found, |value| show(figure, value)))
                 .column("agrees", |figure| if figure.agrees { "yes" } else { "NO" }.to_owned()),
         )?;
     }
@@ -246,17 +242,11 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     fn column(heading: &str, of: impl Fn(&ArmResults) -> Option<String> + 'static) -> ArmColumn {
         (heading.to_owned(), Box::new(of))
     }
-    let spread = |s: &Quantiles, digits: usize| {
-        format!("{:.digits$} ({:.digits$}–{:.digits$})", s.median, s.p05, s.p95)
-    };
+    let spread = |spread: &Quantiles, digits: usize| in_words(*spread, |value| format!("{value:.digits$}"));
     let mut columns = vec![
         column("arm", |arm| Some(arm.name.clone())),
         column("converged", |arm| Some(format!("{}/{}", arm.converged?, arm.seeds))),
-        column("epochs", |arm| {
-            let epochs = arm.epochs?;
-            let [median, low, high] = [epochs.median, epochs.p05, epochs.p95].map(whole);
-            Some(format!("{median} ({low}–{high})"))
-        }),
+        column("epochs", |arm| Some(in_words(arm.epochs?, whole))),
         column("average error, %", move |arm| Some(spread(&arm.error_percent, 2))),
         column("between training, %", move |arm| {
             Some(spread(&arm.training_span.as_ref()?.error_percent_within_training?, 2))
@@ -284,7 +274,13 @@ fn arm_columns(arms: &[ArmResults]) -> Vec<ArmColumn> {
     columns
 }
 
-/// A count, or a spread of counts, rounded.
+/// "2.38 (2.26–2.73)": the median, and the 5th and the 95th percentile.
+fn in_words(spread: Quantiles, shown: impl Fn(f64) -> String) -> String {
+    let [median, low, high] = [spread.median, spread.p05, spread.p95].map(shown);
+    format!("{median} ({low}–{high})")
+}
+
+/// A count, or a percentile of counts, rounded.
 fn whole(count: f64) -> String {
     format_count(count.round() as u64)
 }

@@ -1,6 +1,7 @@
 //! `palpate track`: moving contacts, line by line or smoothed.
 
 use crate::failure::{Complaint, Failure};
+use crate::json::{Fields, Object, fields, object};
 use crate::lines::Lines;
 use crate::output::Table;
 use crate::{input, output};
@@ -9,10 +10,11 @@ use palpate_estimators::estimator::{
 };
 use palpate_estimators::recording::{TimedParser, TimedReading, csv_row};
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
-use palpate_mechanics::contact::Contact;
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_report::{TrackReport, track_report};
+use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -83,7 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         lost: 0,
         times: 0,
         numbers: Vec::new(),
-        seen: Seen::default(),
+        truths: Vec::new(),
+        filtered: Vec::new(),
     };
     stream.run(&locator)?;
     let (filtered, smoothed) = stream.finish()?;
@@ -110,14 +113,6 @@ enum Follower<'a> {
     Smoother(SmoothTracker<'a>),
 }
 
-/// The true contacts so far.
-#[derive(Default)]
-struct Seen {
-    truths: Vec<Vec<Contact>>,
-    /// Of the filter, where it is not the smoother that keeps them and there is a truth to compare them with.
-    tracks: Vec<Track>,
-}
-
 struct Stream<'a> {
     arguments: &'a Arguments,
     follower: Follower<'a>,
@@ -131,7 +126,10 @@ struct Stream<'a> {
     times: u64,
     /// The line of each track.
     numbers: Vec<u64>,
-    seen: Seen,
+    /// The true contacts so far.
+    truths: Vec<Vec<Contact>>,
+    /// Tracks of the filter, where it is not the smoother that keeps them and there is a truth to compare them with.
+    filtered: Vec<Track>,
 }
 
 impl Stream<'_> {
@@ -180,14 +178,14 @@ impl Stream<'_> {
                 return Ok(());
             }
         };
-        self.seen.truths.extend(reading.truth.clone());
+        self.truths.extend(reading.truth.clone());
         let Some(track) = track else {
             self.numbers.push(self.lines.count);
             return Ok(());
         };
         self.print(&track, self.lines.count, out)?;
         if reading.truth.is_some() {
-            self.seen.tracks.push(track);
+            self.filtered.push(track);
         }
         // A reader at the other end of a pipe wants each estimate now.
         out.flush().map_err(|_| Failure::NobodyReads)
@@ -196,7 +194,7 @@ impl Stream<'_> {
     /// The filter's tracks and the smoother's, and prints those that were kept back.
     fn finish(&mut self) -> Result<(Vec<Track>, Vec<Track>), Failure> {
         let Follower::Smoother(tracker) = &self.follower else {
-            return Ok((std::mem::take(&mut self.seen.tracks), Vec::new()));
+            return Ok((std::mem::take(&mut self.filtered), Vec::new()));
         };
         let filtered = tracker.filtered().to_vec();
         let smoothed = if self.arguments.smooth { tracker.smoothed() } else { Vec::new() };
@@ -219,7 +217,7 @@ impl Stream<'_> {
 
     /// The errors of both, where the truth is known.
     fn errors(&self, filtered: &[Track], smoothed: &[Track]) -> Vec<(&'static str, TrackErrors)> {
-        let truths = &self.seen.truths;
+        let truths = &self.truths;
         let of = |name, tracks: &[Track]| {
             let known = !tracks.is_empty() && tracks.len() == truths.len();
             let errors = if known { TrackErrors::new(tracks, truths, self.extent) } else { None };
@@ -254,14 +252,14 @@ impl Stream<'_> {
         sweep: &[SpeedErrors],
     ) -> Result<(), Failure> {
         let (tracks, how) = if smoothed.is_empty() { (filtered, "filter") } else { (smoothed, "smoother") };
-        let known = self.seen.truths.len() == tracks.len();
+        let known = self.truths.len() == tracks.len();
         let report = TrackReport {
             title: &format!("A contact followed through {}", self.lines.name),
             source: &self.lines.name,
             extent: self.extent,
             tracks,
             how,
-            truths: if known { &self.seen.truths } else { &[] },
+            truths: if known { &self.truths } else { &[] },
             errors: &self.errors(filtered, smoothed),
             sweep,
         };
@@ -336,91 +334,47 @@ fn cell(number: f64) -> String {
     format!("{number:.4}")
 }
 
-/// A track as JSON.
-#[derive(serde::Serialize)]
-struct JsonTrack {
-    line: u64,
-    time_s: f64,
-    touching: f64,
-    /// The first contact, or the only one.
-    #[serde(flatten)]
-    contact: Option<JsonContact>,
-    two_touching: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    second: Option<JsonContact>,
-    /// Position that the reading alone gives, in mm; on a plane its x and y.
-    single_mm: JsonPosition,
-    single_status: &'static str,
-}
-
-#[derive(serde::Serialize)]
-#[serde(untagged)]
-enum JsonPosition {
-    OnLine(f64),
-    OnPlane([f64; 2]),
-}
-
-#[derive(serde::Serialize)]
-struct JsonContact {
-    x_mm: f64,
-    speed_m_per_s: f64,
-    force_n: f64,
-    x_95_mm: [f64; 2],
-    sd_mm: f64,
-    sd_speed_m_per_s: f64,
-    sd_force_n: f64,
-    #[serde(flatten)]
-    across: Option<JsonAcross>,
-}
-
-#[derive(serde::Serialize)]
-struct JsonAcross {
-    y_mm: f64,
-    speed_y_m_per_s: f64,
-    y_95_mm: [f64; 2],
-    sd_y_mm: f64,
-    sd_speed_y_m_per_s: f64,
-    covariance_mm2: f64,
-}
-
 /// A line of JSON: all that is known of the reading in line `line` of its source.
 fn json(track: &Track, line: u64, extent: Extent) -> Result<String, Failure> {
-    let position = track.single.contact.position;
-    let object = JsonTrack {
-        line,
-        time_s: track.time_s,
-        touching: track.touching(),
-        contact: track.contacts.first().map(json_contact),
-        two_touching: track.numbers[2],
-        second: track.contacts.get(1).map(json_contact),
-        single_mm: match extent {
-            Extent::Line { .. } => JsonPosition::OnLine(position.x_m * 1e3),
-            Extent::Plane { .. } => JsonPosition::OnPlane([position.x_m * 1e3, position.y_m * 1e3]),
+    let Position { x_m, y_m } = track.single.contact.position;
+    let object = object! {
+        "line": line,
+        "time_s": track.time_s,
+        "touching": track.touching(),
+        ..track.contacts.first().map(contact_fields),
+        "two_touching": track.numbers[2],
+        "second"?: track.contacts.get(1).map(|second| Object(contact_fields(second))),
+        // Position that the reading alone gives; on a plane its x and y.
+        "single_mm": match extent {
+            Extent::Line { .. } => json!(x_m * 1e3),
+            Extent::Plane { .. } => json!([x_m * 1e3, y_m * 1e3]),
         },
-        single_status: track.single.status.name(),
+        "single_status": track.single.status.name(),
     };
     serde_json::to_string(&object).map_err(|error| Complaint::new(error).into())
 }
 
-fn json_contact(tracked: &Tracked) -> JsonContact {
+fn contact_fields(tracked: &Tracked) -> impl Fields {
     let mm = |(low_m, high_m): (f64, f64)| [low_m * 1e3, high_m * 1e3];
     let [sd_m, sd_speed_m_per_s, sd_force_n] = tracked.sd;
-    let across = |across: Across| JsonAcross {
-        y_mm: across.y_m * 1e3,
-        speed_y_m_per_s: across.speed_m_per_s,
-        y_95_mm: mm(across.y_95_m),
-        sd_y_mm: across.sd[0] * 1e3,
-        sd_speed_y_m_per_s: across.sd[1],
-        covariance_mm2: across.covariance_m2 * 1e6,
+    let across = |across: Across| {
+        fields! {
+            "y_mm": across.y_m * 1e3,
+            "speed_y_m_per_s": across.speed_m_per_s,
+            "y_95_mm": mm(across.y_95_m),
+            "sd_y_mm": across.sd[0] * 1e3,
+            "sd_speed_y_m_per_s": across.sd[1],
+            "covariance_mm2": across.covariance_m2 * 1e6,
+        }
     };
-    JsonContact {
-        x_mm: tracked.x_m * 1e3,
-        speed_m_per_s: tracked.speed_m_per_s,
-        force_n: tracked.force_n,
-        x_95_mm: mm(tracked.x_95_m),
-        sd_mm: sd_m * 1e3,
-        sd_speed_m_per_s,
-        sd_force_n,
-        across: tracked.across.map(across),
+    fields! {
+        "x_mm": tracked.x_m * 1e3,
+        "speed_m_per_s": tracked.speed_m_per_s,
+        "force_n": tracked.force_n,
+        "x_95_mm": mm(tracked.x_95_m),
+        "sd_mm": sd_m * 1e3,
+        "sd_speed_m_per_s": sd_speed_m_per_s,
+        "sd_force_n": sd_force_n,
+        ..tracked.across.map(across),
     }
 }

@@ -28,7 +28,7 @@ use crate::surface::{ResponseFunction, ResponseGradient, Surface};
 use bound::{inverse_information, norm};
 
 /// Knowledge of the contact force: given, or estimated along.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Force {
     /// Its value.

@@ -10,7 +10,6 @@ use super::bench_figures::bench_figure;
 use super::numbers::{counted, listed, mm, number, stated};
 use super::page::{Page, ReportFile, Section};
 use super::study_report::{arms_table, glossary, least_error, longest, run_table, source};
-use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Surface, SurfaceSpec};
 use palpate_rig::Rig;
@@ -195,11 +194,6 @@ fn lead() -> Markup {
             ", International Journal of Advanced Robotic Systems, " a href=(DOI) { "doi:10.5772/53567" } "."
         }
     }
-}
-
-/// Spread of our seeds.
-fn ours(figure: &PublishedFigure) -> Quantiles {
-    Quantiles { median: figure.median, p05: figure.p05, p95: figure.p95 }
 }
 
 fn training() -> Markup {

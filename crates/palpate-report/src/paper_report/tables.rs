@@ -3,7 +3,7 @@
 
 use maud::{Markup, html};
 
-use super::{Paper, ours};
+use super::Paper;
 use crate::numbers::{NOTHING, as_written, listed, mm, number, spread, stated, stretch, whole};
 use crate::page::{Table, verdict};
 use palpate_estimators::arrangement::{Arrangement, Training};
@@ -101,7 +101,9 @@ impl Paper<'_> {
             .short("portion", |(_, portion, ..)| stretch(*portion))
             .short("error", |(kind, ..)| *kind)
             .numeric("published, %", |(_, _, key, _)| published(key).map_or(NOTHING.to_owned(), printed))
-            .numeric("found, %", |(_, _, key, found)| spread(published(key).map_or(*found, ours), number))
+            .numeric("found, %", |(_, _, key, found)| {
+                spread(published(key).map_or(*found, |figure| figure.found), number)
+            })
             .numeric("found, mm", |(.., found)| spread(found.scaled(mm_per_percent), number))
             .caption(caption)
     }
@@ -200,7 +202,7 @@ impl Paper<'_> {
             .short("arm", |figure| figure.arm)
             .short("figure", |figure| figure.what)
             .numeric("published", |figure| printed(figure))
-            .numeric("found", |figure| spread(ours(figure), shown(figure)))
+            .numeric("found", |figure| spread(figure.found, shown(figure)))
             .short("agrees if within", |figure| yardstick(figure))
             .column("short", "verdict", |figure| verdict(figure.agrees, "agrees", "differs"))
             .caption(caption)
@@ -281,12 +283,12 @@ fn yardstick(figure: &PublishedFigure) -> String {
 }
 
 fn difference(figure: &PublishedFigure) -> Markup {
-    let inside = (figure.p05..=figure.p95).contains(&figure.published);
+    let inside = (figure.found.p05..=figure.found.p95).contains(&figure.published);
     html! {
         b { (figure.arm) } ", " (figure.what) ": the paper prints " (printed(figure)) ", the median found here is "
-        (shown(figure)(figure.median)) ", not " @if figure.yardstick != Yardstick::Below { "within " } (yardstick(figure)) ". "
+        (shown(figure)(figure.found.median)) ", not " @if figure.yardstick != Yardstick::Below { "within " } (yardstick(figure)) ". "
         @if figure.yardstick == Yardstick::Below {
-            @if figure.p05 < figure.published { "Some seeds do stay below it." }
+            @if figure.found.p05 < figure.published { "Some seeds do stay below it." }
             @else { "Hardly any seed stays below it." }
         } @else if inside {
             "The published figure is within the range of the seeds."

@@ -1,6 +1,6 @@
 //! Properties of the drawing of a beam.
 
-use super::{Seen, see};
+use super::{Drawing, see};
 use crate::beam_drawing::BeamDrawing;
 use palpate_mechanics::surface::BeamSupportKind;
 
@@ -26,7 +26,7 @@ fn beam(sensors: usize, load_mm: f64, width_px: u32) -> BeamDrawing {
     }
 }
 
-fn seen(drawing: &BeamDrawing) -> Seen {
+fn seen(drawing: &BeamDrawing) -> Drawing {
     see(&drawing.svg())
 }
 

@@ -1,6 +1,6 @@
 //! Properties that hold for every chart, however awkward its data.
 
-use super::{Seen, overlap, see};
+use super::{Drawing, overlap, see};
 use crate::drawing::layout::Layout;
 use crate::*;
 use proptest::prelude::*;
@@ -127,7 +127,7 @@ pub(super) fn awkward() -> Vec<(&'static str, Chart)> {
     ]
 }
 
-fn seen_all() -> impl Iterator<Item = (&'static str, Seen)> {
+fn seen_all() -> impl Iterator<Item = (&'static str, Drawing)> {
     awkward().into_iter().map(|(case, chart)| (case, see(&chart_to_svg(&chart))))
 }
 

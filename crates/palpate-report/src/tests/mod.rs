@@ -14,7 +14,7 @@ use crate::drawing::geometry::Rect;
 use crate::drawing::text;
 
 /// A drawing read back.
-struct Seen {
+struct Drawing {
     image: Rect,
     /// Every text and the box of its line, as wide as it is estimated to be.
     texts: Vec<(String, Rect)>,
@@ -29,11 +29,11 @@ struct Paint {
     fill: Option<String>,
 }
 
-fn see(svg: &str) -> Seen {
+fn see(svg: &str) -> Drawing {
     let document = roxmltree::Document::parse(svg).expect("well-formed SVG");
     let root = document.root_element();
     let image = Rect { left: 0.0, top: 0.0, right: number(root, "width"), bottom: number(root, "height") };
-    let mut seen = Seen { image, texts: Vec::new(), shapes: Vec::new() };
+    let mut seen = Drawing { image, texts: Vec::new(), shapes: Vec::new() };
     for element in root.children().filter(roxmltree::Node::is_element) {
         if element.tag_name().name() == "text" {
             seen.texts.push((element.text().unwrap_or_default().trim().to_owned(), text_box(element)));
@@ -102,7 +102,7 @@ fn inside(inner: &Rect, outer: &Rect) -> bool {
     outer.contains((inner.left, inner.top)) && outer.contains((inner.right, inner.bottom))
 }
 
-impl Seen {
+impl Drawing {
     fn assert_texts_inside(&self, case: &str) {
         for (text, area) in &self.texts {
             assert!(inside(area, &self.image), "{case}: {text:?} at {area:?} leaves {:?}", self.image);

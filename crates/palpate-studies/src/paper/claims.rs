@@ -6,8 +6,10 @@
 use serde::Serialize;
 
 use super::COUNTS;
+use crate::results::average_percent;
 use crate::{ArmOutcome, Judging, TrainedSeed};
 use palpate_estimators::evaluation::Portion;
+use palpate_mechanics::contact::Position;
 
 /// A claim and its verdict.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -266,15 +268,11 @@ impl Table<'_> {
 
     fn figure(&self, fit: &TrainedSeed, figure: Figure) -> f64 {
         let evaluation = &fit.evaluation;
-        let error = |keep: &dyn Fn(bool) -> bool| {
-            let mut part = evaluation.clone();
-            part.located.retain(|located| keep(GOOD.contains(located.truth)));
-            part.summary(None).map_or(f64::NAN, |s| s.average_m / part.length_m * 100.0)
-        };
+        let error = |keep: &dyn Fn(Position) -> bool| average_percent(evaluation, keep).unwrap_or(f64::NAN);
         match figure {
             Figure::Error => error(&|_| true),
-            Figure::GoodError => error(&|good| good),
-            Figure::EdgeError => error(&|good| !good),
+            Figure::GoodError => error(&|at| GOOD.contains(at)),
+            Figure::EdgeError => error(&|at| !GOOD.contains(at)),
             Figure::LargestPosition => {
                 let positions = evaluation.located.iter().map(|located| located.estimate.x_m);
                 positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.length_m * 100.0

@@ -105,12 +105,9 @@ pub struct PublishedFigure {
     pub what: &'static str,
     /// Value that the paper prints.
     pub published: f64,
-    /// Half of our seeds lie below.
-    pub median: f64,
-    /// One in twenty of our seeds lies below.
-    pub p05: f64,
-    /// One in twenty of our seeds lies above.
-    pub p95: f64,
+    /// Spread of our seeds.
+    #[serde(flatten)]
+    pub found: Quantiles,
     /// Yardstick of agreement.
     pub yardstick: Yardstick,
     /// Whether our median agrees.
@@ -136,12 +133,12 @@ impl Agreement {
 /// Every published figure whose arm is among the results, beside ours.
 pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
     let beside = |&(arm, figure, published): &(&'static str, Figure, f64)| {
-        let Quantiles { median, p05, p95 } = figure.spread(results.arm(arm)?)?;
+        let found = figure.spread(results.arm(arm)?)?;
         let (key, what) = figure.name();
         let yardstick = figure.yardstick(published);
-        let agrees = yardstick.accepts(published, median);
+        let agrees = yardstick.accepts(published, found.median);
         let id = format!("{arm}.{key}");
-        Some(PublishedFigure { id, arm, what, published, median, p05, p95, yardstick, agrees })
+        Some(PublishedFigure { id, arm, what, published, found, yardstick, agrees })
     };
     PUBLISHED.iter().filter_map(beside).collect()
 }
