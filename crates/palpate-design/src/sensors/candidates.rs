@@ -223,6 +223,16 @@ impl Pool {
         selection.iter().map(|unit| self.units[*unit].size()).sum()
     }
 
+    /// Whether a selection has as many sensors as are wanted.
+    pub fn is_whole(&self, selection: &[usize]) -> bool {
+        self.size(selection) == self.design.count
+    }
+
+    /// All units.
+    pub fn all(&self) -> Vec<usize> {
+        (0..self.units.len()).collect()
+    }
+
     /// Cost of a selection.
     pub fn cost(&self, selection: &[usize]) -> f64 {
         selection.iter().map(|unit| self.unit_cost(*unit)).sum()
@@ -249,10 +259,7 @@ impl Pool {
 
     /// Whether a unit may join a selection that is to become a whole layout.
     pub fn may_join(&self, selection: &[usize], unit: usize) -> bool {
-        let room = self.design.count - self.size(selection);
-        self.leaves_pairs(room, unit)
-            && self.is_affordable(self.cost(selection), room, unit)
-            && selection.iter().all(|other| self.go_together(*other, unit))
+        !self.joinable(selection, &[unit], None).is_empty()
     }
 
     /// The same of many units at once; `selection` lacks sensors of `size` only, or of any.

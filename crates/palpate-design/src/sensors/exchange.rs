@@ -11,7 +11,7 @@
 
 use super::candidates::Pool;
 use super::design::{DesignError, Symmetry};
-use super::objective::{ForceBelief, Objective, State, score_of, state_of};
+use super::objective::{Block, ForceBelief, Objective, State};
 use palpate_numerics::random_order;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -38,113 +38,190 @@ pub(super) struct Found {
 }
 
 impl Found {
-    pub fn of(pool: &Pool, objective: &dyn Objective, selection: Vec<usize>) -> Self {
-        let score = score_of(objective, &pool.candidates(&selection));
-        Self { selection, score }
-    }
-
     /// The better of the two.
-    pub fn or_better(self, other: Option<Self>) -> Self {
-        match other {
-            Some(other) if other.score < self.score => other,
-            _ => self,
+    pub fn or_better(self, other: Self) -> Self {
+        if other.score < self.score { other } else { self }
+    }
+}
+
+/// A search for layouts: the units to choose from, the criterion, and who watches.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
+    pub pool: &'a Pool,
+    pub objective: &'a dyn Objective,
+    pub watch: Watch<'a>,
+}
+
+/// A layout but for one unit.
+struct Without {
+    leaving: usize,
+    others: Vec<usize>,
+    state: State,
+}
+
+impl Search<'_> {
+    /// A layout with its score.
+    pub fn scored(&self, selection: Vec<usize>) -> Found {
+        let state = self.state(&selection, ForceBelief::Vague);
+        Found { score: self.objective.score(&state), selection }
+    }
+
+    /// The state of knowledge with the sensors of a selection.
+    pub fn state(&self, selection: &[usize], belief: ForceBelief) -> State {
+        let candidates = self.pool.candidates(selection);
+        let rows: Vec<&[Block]> = candidates.iter().map(|candidate| self.objective.row(*candidate)).collect();
+        self.objective.state(&rows, belief)
+    }
+
+    /// The best layout of several starts; `feasible` is one that keeps all constraints.
+    pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+        if self.pool.units.len() <= SAMPLE {
+            return self.from_starts(&self.pool.all(), feasible, seed);
         }
+        let coarse = sample(self.pool, COARSE_SAMPLE, feasible);
+        let found = self.from_starts(&coarse, feasible, seed)?;
+        let fine = sample(self.pool, SAMPLE, &found.selection);
+        let found = self.exchange(&fine, found.selection)?;
+        self.exchange_among_many(found)
     }
-}
 
-/// The best layout of several starts; `feasible` is one that keeps all constraints.
-pub(super) fn search(
-    pool: &Pool,
-    objective: &dyn Objective,
-    feasible: &[usize],
-    seed: u64,
-    watch: Watch,
-) -> Result<Found, Cancelled> {
-    if pool.units.len() <= SAMPLE {
-        let all: Vec<usize> = (0..pool.units.len()).collect();
-        return from_starts(pool, objective, &all, feasible, seed, watch);
+    /// The best layout of several starts.
+    fn from_starts(&self, among: &[usize], feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+        let starts = [self.greedy(among), even_start(self.pool, among), Some(feasible.to_vec())];
+        let random = (0..RANDOM_STARTS).map(|k| random_start(self.pool, among, seed.wrapping_add(k)));
+        let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
+        let mut best = self.scored(feasible.to_vec());
+        for (done, start) in starts.iter().enumerate() {
+            self.watch.stage("greedy choice and exchange", done as f64 / starts.len() as f64)?;
+            let found = self.exchange(among, start.clone())?;
+            best = found.or_better(best);
+        }
+        Ok(best)
     }
-    let coarse = sample(pool, COARSE_SAMPLE, feasible);
-    let found = from_starts(pool, objective, &coarse, feasible, seed, watch)?;
-    let fine = sample(pool, SAMPLE, &found.selection);
-    let found = exchange(pool, objective, &fine, found.selection, watch)?;
-    exchange_among_many(pool, objective, found, watch)
-}
 
-/// The best layout of several starts.
-fn from_starts(
-    pool: &Pool,
-    objective: &dyn Objective,
-    among: &[usize],
-    feasible: &[usize],
-    seed: u64,
-    watch: Watch,
-) -> Result<Found, Cancelled> {
-    let starts = [greedy(pool, objective, among), even_start(pool, among), Some(feasible.to_vec())];
-    let random = (0..RANDOM_STARTS).map(|k| random_start(pool, among, seed.wrapping_add(k)));
-    let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();
-    let mut best = Found::of(pool, objective, feasible.to_vec());
-    for (done, start) in starts.iter().enumerate() {
-        watch.stage("greedy choice and exchange", done as f64 / starts.len() as f64)?;
-        let found = exchange(pool, objective, among, start.clone(), watch)?;
-        best = found.or_better(Some(best));
-    }
-    Ok(best)
-}
-
-/// Exchanges units for neighbours until nothing improves and then for any others, until none of these gains enough.
-fn exchange_among_many(
-    pool: &Pool,
-    objective: &dyn Objective,
-    mut found: Found,
-    watch: Watch,
-) -> Result<Found, Cancelled> {
-    for _ in 0..MOST_ROUNDS {
+    /// Exchanges units for neighbours until nothing improves and then for any others, until none of these gains enough.
+    fn exchange_among_many(&self, mut found: Found) -> Result<Found, Cancelled> {
         for _ in 0..MOST_ROUNDS {
-            let before = found.score;
-            found = exchange(pool, objective, &nearby(pool, &found.selection), found.selection, watch)?;
-            if found.score == before {
+            for _ in 0..MOST_ROUNDS {
+                let before = found.score;
+                found = self.exchange(&nearby(self.pool, &found.selection), found.selection)?;
+                if found.score == before {
+                    break;
+                }
+            }
+            let bests = self.best_of_each_slot(&found)?;
+            let mut improved = false;
+            for (slot, unit) in bests {
+                improved |= self.exchange_one(&[unit], &mut found, slot, LEAST_GAIN_OF_MANY);
+            }
+            if !improved {
                 break;
             }
         }
-        let bests = best_of_each_slot(pool, objective, &found, watch)?;
-        let mut improved = false;
-        for (slot, unit) in bests {
-            improved |= exchange_one(pool, objective, &[unit], &mut found, slot, LEAST_GAIN_OF_MANY);
-        }
-        if !improved {
-            break;
-        }
+        Ok(found)
     }
-    Ok(found)
-}
 
-/// For each slot that may change the unit that it is best exchanged for, the slot that gains most first. One pass over all
-/// units serves all slots, since fetching so many rows takes about as long as judging one.
-fn best_of_each_slot(
-    pool: &Pool,
-    objective: &dyn Objective,
-    found: &Found,
-    watch: Watch,
-) -> Result<Vec<(usize, usize)>, Cancelled> {
-    let slots: Vec<usize> = (pool.fixed.len()..found.selection.len()).collect();
-    let without: Vec<Without> =
-        slots.iter().map(|slot| Without::slot(pool, objective, found, *slot)).collect();
-    let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
-    let all: Vec<usize> = (0..pool.units.len()).collect();
-    for chunk in all.chunks(CHUNK) {
-        watch.round()?;
-        for (best, without) in bests.iter_mut().zip(&without) {
-            let better = without.best(pool, objective, chunk);
-            if better.is_some_and(|(_, score)| best.is_none_or(|(_, least)| score < least)) {
-                *best = better;
+    /// For each slot that may change the unit that it is best exchanged for, the slot that gains most first. One pass over all
+    /// units serves all slots, since fetching so many rows takes about as long as judging one.
+    fn best_of_each_slot(&self, found: &Found) -> Result<Vec<(usize, usize)>, Cancelled> {
+        let slots: Vec<usize> = (self.pool.fixed.len()..found.selection.len()).collect();
+        let without: Vec<Without> = slots.iter().map(|slot| self.without(found, *slot)).collect();
+        let mut bests: Vec<Option<(usize, f64)>> = vec![None; slots.len()];
+        for chunk in self.pool.all().chunks(CHUNK) {
+            self.watch.round()?;
+            for (best, without) in bests.iter_mut().zip(&without) {
+                let better = self.best_to_fill(without, chunk);
+                if better.is_some_and(|(_, score)| best.is_none_or(|(_, least)| score < least)) {
+                    *best = better;
+                }
+            }
+        }
+        let mut bests: Vec<(usize, (usize, f64))> =
+            slots.into_iter().zip(bests).filter_map(|(slot, best)| Some((slot, best?))).collect();
+        bests.sort_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b));
+        Ok(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
+    }
+
+    /// The layout that grows by the best unit at a time; `None` where it gets stuck.
+    pub fn greedy(&self, among: &[usize]) -> Option<Vec<usize>> {
+        let mut selection = self.pool.fixed.clone();
+        while !self.pool.is_whole(&selection) {
+            // Two sensors are the least that tell a position and a force.
+            let early = self.pool.size(&selection) < 3;
+            let belief = if early { ForceBelief::Rough } else { ForceBelief::Vague };
+            let state = self.state(&selection, belief);
+            let joinable = self.pool.joinable(&selection, among, None);
+            selection.push(self.best_of(&state, &joinable)?.0);
+        }
+        Some(selection)
+    }
+
+    /// Exchanges one unit after the other for the best, until nothing improves.
+    pub fn exchange(&self, among: &[usize], selection: Vec<usize>) -> Result<Found, Cancelled> {
+        let mut found = self.scored(selection);
+        let fixed = self.pool.fixed.len();
+        let mut unchanged = 0;
+        let slots = found.selection.len() - fixed;
+        for step in 0..MOST_ROUNDS * slots {
+            if unchanged == slots {
+                break;
+            }
+            self.watch.round()?;
+            let slot = fixed + step % slots;
+            let improved = self.exchange_one(among, &mut found, slot, LEAST_GAIN);
+            unchanged = if improved { 0 } else { unchanged + 1 };
+        }
+        Ok(found)
+    }
+
+    /// Exchanges the unit in one slot for the best of its size, if that improves the score by more than this share of it.
+    fn exchange_one(&self, among: &[usize], found: &mut Found, slot: usize, least_gain: f64) -> bool {
+        let without = self.without(found, slot);
+        let Some((unit, score)) = self.best_to_fill(&without, among) else { return false };
+        let improves = unit != without.leaving && score < found.score - least_gain * found.score.abs();
+        if improves {
+            found.selection[slot] = unit;
+            found.score = score;
+        }
+        improves
+    }
+
+    /// The layout but for the unit in one slot.
+    fn without(&self, found: &Found, slot: usize) -> Without {
+        let mut others = found.selection.clone();
+        let leaving = others.remove(slot);
+        Without { leaving, state: self.state(&others, ForceBelief::Vague), others }
+    }
+
+    /// The best unit to fill the gap, of the size of the one that left.
+    fn best_to_fill(&self, without: &Without, among: &[usize]) -> Option<(usize, f64)> {
+        let size = self.pool.units[without.leaving].size();
+        self.best_of(&without.state, &self.pool.joinable(&without.others, among, Some(size)))
+    }
+
+    /// The unit whose addition scores best, the first of equals.
+    fn best_of(&self, state: &State, units: &[usize]) -> Option<(usize, f64)> {
+        let mut best: Option<(usize, f64)> = None;
+        for unit in units {
+            let score = self.score_with(state, *unit);
+            if best.is_none_or(|(_, least)| score < least) {
+                best = Some((*unit, score));
+            }
+        }
+        best
+    }
+
+    /// The score with one more unit.
+    pub fn score_with(&self, state: &State, unit: usize) -> f64 {
+        let unit = self.pool.units[unit];
+        match unit.twin {
+            None => self.objective.score_with(state, self.objective.row(unit.first)),
+            Some(twin) => {
+                let with_first = self.objective.updated(state, self.objective.row(unit.first));
+                self.objective.score_with(&with_first, self.objective.row(twin))
             }
         }
     }
-    let mut bests: Vec<(usize, (usize, f64))> =
-        slots.into_iter().zip(bests).filter_map(|(slot, best)| Some((slot, best?))).collect();
-    bests.sort_by(|(_, (_, a)), (_, (_, b))| a.total_cmp(b));
-    Ok(bests.into_iter().map(|(slot, (unit, _))| (slot, unit)).collect())
 }
 
 /// The units between a layout's own and the next ones of the sample.
@@ -168,131 +245,24 @@ fn sample(pool: &Pool, size: usize, layout: &[usize]) -> Vec<usize> {
     sample
 }
 
-/// The layout that grows by the best unit at a time; `None` where it gets stuck.
-pub(super) fn greedy(pool: &Pool, objective: &dyn Objective, among: &[usize]) -> Option<Vec<usize>> {
-    let mut selection = pool.fixed.clone();
-    while pool.size(&selection) < pool.design.count {
-        // Two sensors are the least that tell a position and a force.
-        let early = pool.size(&selection) < 3;
-        let belief = if early { ForceBelief::Rough } else { ForceBelief::Vague };
-        let state = state_of(objective, &pool.candidates(&selection), belief);
-        let joinable = pool.joinable(&selection, among, None);
-        selection.push(best_of(pool, objective, &state, &joinable)?.0);
-    }
-    Some(selection)
-}
-
-/// Exchanges one unit after the other for the best, until nothing improves.
-pub(super) fn exchange(
-    pool: &Pool,
-    objective: &dyn Objective,
-    among: &[usize],
-    selection: Vec<usize>,
-    watch: Watch,
-) -> Result<Found, Cancelled> {
-    let mut found = Found::of(pool, objective, selection);
-    let fixed = pool.fixed.len();
-    let mut unchanged = 0;
-    let slots = found.selection.len() - fixed;
-    for step in 0..MOST_ROUNDS * slots {
-        if unchanged == slots {
-            break;
-        }
-        watch.round()?;
-        let slot = fixed + step % slots;
-        let improved = exchange_one(pool, objective, among, &mut found, slot, LEAST_GAIN);
-        unchanged = if improved { 0 } else { unchanged + 1 };
-    }
-    Ok(found)
-}
-
-/// Exchanges the unit in one slot for the best of its size, if that improves the score by more than this share of it.
-fn exchange_one(
-    pool: &Pool,
-    objective: &dyn Objective,
-    among: &[usize],
-    found: &mut Found,
-    slot: usize,
-    least_gain: f64,
-) -> bool {
-    let without = Without::slot(pool, objective, found, slot);
-    let Some((unit, score)) = without.best(pool, objective, among) else { return false };
-    let improves = unit != without.leaving && score < found.score - least_gain * found.score.abs();
-    if improves {
-        found.selection[slot] = unit;
-        found.score = score;
-    }
-    improves
-}
-
-/// A layout but for one unit.
-struct Without {
-    leaving: usize,
-    others: Vec<usize>,
-    state: State,
-}
-
-impl Without {
-    fn slot(pool: &Pool, objective: &dyn Objective, found: &Found, slot: usize) -> Self {
-        let mut others = found.selection.clone();
-        let leaving = others.remove(slot);
-        let state = state_of(objective, &pool.candidates(&others), ForceBelief::Vague);
-        Self { leaving, others, state }
-    }
-
-    /// The best unit to fill the gap, of the size of the one that left.
-    fn best(&self, pool: &Pool, objective: &dyn Objective, among: &[usize]) -> Option<(usize, f64)> {
-        let joinable = pool.joinable(&self.others, among, Some(pool.units[self.leaving].size()));
-        best_of(pool, objective, &self.state, &joinable)
-    }
-}
-
-/// The unit whose addition scores best, the first of equals.
-fn best_of(pool: &Pool, objective: &dyn Objective, state: &State, units: &[usize]) -> Option<(usize, f64)> {
-    let mut best: Option<(usize, f64)> = None;
-    for unit in units {
-        let score = score_with(pool, objective, state, *unit);
-        if best.is_none_or(|(_, least)| score < least) {
-            best = Some((*unit, score));
-        }
-    }
-    best
-}
-
-/// The score with one more unit.
-pub(super) fn score_with(pool: &Pool, objective: &dyn Objective, state: &State, unit: usize) -> f64 {
-    let unit = pool.units[unit];
-    match unit.twin {
-        None => objective.score_with(state, objective.row(unit.first)),
-        Some(twin) => {
-            let with_first = objective.updated(state, objective.row(unit.first));
-            objective.score_with(&with_first, objective.row(twin))
-        }
-    }
-}
-
 /// A layout that is filled from the left, the cheapest kinds first.
 ///
 /// # Errors
 /// The constraint that leaves no room for as many sensors as are wanted.
-pub(super) fn feasible(pool: &Pool, among: &[usize]) -> Result<Vec<usize>, DesignError> {
-    let mut order = among.to_vec();
+pub(super) fn feasible(pool: &Pool) -> Result<Vec<usize>, DesignError> {
+    let mut order = pool.all();
     let cost = |unit: &usize| pool.cost(&[*unit]) / pool.units[*unit].size() as f64;
     let place = |unit: &usize| pool.sensors[pool.units[*unit].first].position;
     order.sort_by(|a, b| cost(a).total_cmp(&cost(b)).then(place(a).cmp_by_x_then_y(&place(b))));
     let selection = joined(pool, &order);
-    let (most, count) = (pool.size(&selection), pool.design.count);
-    if most == count {
-        return Ok(selection);
-    }
-    Err(why_not(pool, &order, count))
+    if pool.is_whole(&selection) { Ok(selection) } else { Err(why_not(pool, &order)) }
 }
 
 /// Adds units in this order, each that may join.
 fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
     let mut selection = pool.fixed.clone();
     for unit in order {
-        if pool.size(&selection) == pool.design.count {
+        if pool.is_whole(&selection) {
             break;
         }
         if pool.may_join(&selection, *unit) {
@@ -303,7 +273,8 @@ fn joined(pool: &Pool, order: &[usize]) -> Vec<usize> {
 }
 
 /// The constraint that such a layout fails by: the budget, when without it there is one.
-fn why_not(pool: &Pool, order: &[usize], count: usize) -> DesignError {
+fn why_not(pool: &Pool, order: &[usize]) -> DesignError {
+    let count = pool.design.count;
     let mut most = pool.fixed.clone();
     for unit in order {
         let fits = pool.size(&most) + pool.units[*unit].size() <= count;
@@ -339,16 +310,16 @@ fn even_start(pool: &Pool, among: &[usize]) -> Option<Vec<usize>> {
         };
         let joinable = pool.joinable(&selection, among, None);
         selection.push(joinable.into_iter().min_by(|a, b| off_m(*a).total_cmp(&off_m(*b)))?);
-        if pool.size(&selection) == pool.design.count {
+        if pool.is_whole(&selection) {
             break;
         }
     }
-    (pool.size(&selection) == pool.design.count).then_some(selection)
+    pool.is_whole(&selection).then_some(selection)
 }
 
 /// A random layout; `None` where it gets stuck.
 pub(super) fn random_start(pool: &Pool, among: &[usize], seed: u64) -> Option<Vec<usize>> {
     let order: Vec<usize> = random_order(among.len(), seed).into_iter().map(|i| among[i]).collect();
     let selection = joined(pool, &order);
-    (pool.size(&selection) == pool.design.count).then_some(selection)
+    pool.is_whole(&selection).then_some(selection)
 }

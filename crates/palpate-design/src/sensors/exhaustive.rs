@@ -1,9 +1,9 @@
 //! Every layout there is, where they are few.
 
 use super::candidates::Pool;
-use super::exchange::{Found, score_with};
-use super::objective::{ForceBelief, Objective, state_of};
-use palpate_numerics::watch::{Cancelled, Watch};
+use super::exchange::{Found, Search};
+use super::objective::ForceBelief;
+use palpate_numerics::watch::Cancelled;
 
 /// More layouts than this are not gone through.
 pub(super) const MOST_LAYOUTS: f64 = 300_000.0;
@@ -15,45 +15,41 @@ pub(super) fn layouts(pool: &Pool, slots: usize) -> f64 {
 }
 
 /// The best of all layouts of so many free units; `None` when there is none.
-pub(super) fn search(
-    pool: &Pool,
-    objective: &dyn Objective,
-    slots: usize,
-    watch: Watch,
-) -> Result<Option<Found>, Cancelled> {
-    let mut search = Search { pool, objective, slots, selection: pool.fixed.clone(), best: None };
+pub(super) fn search(search: &Search, slots: usize) -> Result<Option<Found>, Cancelled> {
+    let selection = search.pool.fixed.clone();
     if slots == 0 {
-        return Ok(Some(Found::of(pool, objective, pool.fixed.clone())));
+        return Ok(Some(search.scored(selection)));
     }
-    search.from(0, watch)?;
-    Ok(search.best)
+    let mut enumeration = Enumeration { search, slots, selection, best: None };
+    enumeration.fill_slot(0)?;
+    Ok(enumeration.best)
 }
 
-struct Search<'a> {
-    pool: &'a Pool,
-    objective: &'a dyn Objective,
+/// Layouts as far as they are gone through.
+struct Enumeration<'a> {
+    search: &'a Search<'a>,
     slots: usize,
     selection: Vec<usize>,
     best: Option<Found>,
 }
 
-impl Search<'_> {
+impl Enumeration<'_> {
     /// Goes through the units from `first` on for the next slot.
-    fn from(&mut self, first: usize, watch: Watch) -> Result<(), Cancelled> {
-        let chosen = self.selection.len() - self.pool.fixed.len();
-        let count = self.pool.units.len();
+    fn fill_slot(&mut self, first: usize) -> Result<(), Cancelled> {
+        let chosen = self.selection.len() - self.search.pool.fixed.len();
+        let count = self.search.pool.units.len();
         let among: Vec<usize> = (first..count).collect();
-        let joinable = self.pool.joinable(&self.selection, &among, None);
+        let joinable = self.search.pool.joinable(&self.selection, &among, None);
         if chosen + 1 == self.slots {
             self.judge(&joinable);
             return Ok(());
         }
         for unit in joinable {
             if chosen == 0 {
-                watch.stage("all layouts", unit as f64 / count as f64)?;
+                self.search.watch.stage("all layouts", unit as f64 / count as f64)?;
             }
             self.selection.push(unit);
-            self.from(unit + 1, watch)?;
+            self.fill_slot(unit + 1)?;
             self.selection.pop();
         }
         Ok(())
@@ -61,10 +57,10 @@ impl Search<'_> {
 
     /// The last slot: every unit that fills the layout.
     fn judge(&mut self, units: &[usize]) {
-        let room = self.pool.design.count - self.pool.size(&self.selection);
-        let state = state_of(self.objective, &self.pool.candidates(&self.selection), ForceBelief::Vague);
-        for unit in units.iter().filter(|unit| self.pool.units[**unit].size() == room) {
-            let score = score_with(self.pool, self.objective, &state, *unit);
+        let room = self.search.pool.design.count - self.search.pool.size(&self.selection);
+        let state = self.search.state(&self.selection, ForceBelief::Vague);
+        for unit in units.iter().filter(|unit| self.search.pool.units[**unit].size() == room) {
+            let score = self.search.score_with(&state, *unit);
             if self.best.as_ref().is_none_or(|best| score < best.score) {
                 let selection = self.selection.iter().copied().chain([*unit]).collect();
                 self.best = Some(Found { selection, score });

@@ -8,9 +8,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::candidates::Pool;
-use super::exchange::{Found, random_start};
-use super::objective::Objective;
-use palpate_numerics::watch::{Cancelled, Watch};
+use super::exchange::{Found, Search, random_start};
+use palpate_numerics::watch::Cancelled;
 
 /// Name of the search in progress messages.
 pub(super) const STAGE: &str = "genetic search";
@@ -24,30 +23,24 @@ const TOURNAMENT: usize = 3;
 const MUTATION: f64 = 0.4;
 
 /// The best layout after so many generations; `feasible` is one that keeps all constraints.
-pub(super) fn search(
-    pool: &Pool,
-    objective: &dyn Objective,
-    feasible: &[usize],
-    seed: u64,
-    watch: Watch,
-) -> Result<Found, Cancelled> {
+pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let all: Vec<usize> = (0..pool.units.len()).collect();
+    let (pool, all) = (search.pool, search.pool.all());
     let mut population: Vec<Found> = (0..POPULATION)
         .map(|_| {
             let layout = random_start(pool, &all, rng.random()).unwrap_or_else(|| feasible.to_vec());
-            Found::of(pool, objective, layout)
+            search.scored(layout)
         })
         .collect();
     for generation in 0..GENERATIONS {
-        watch.stage(STAGE, generation as f64 / GENERATIONS as f64)?;
+        search.watch.stage(STAGE, generation as f64 / GENERATIONS as f64)?;
         population.sort_by(|a, b| a.score.total_cmp(&b.score));
         let mut next: Vec<Found> = population[..ELITE].to_vec();
         while next.len() < POPULATION {
             let [one, other] = [parent(&population, &mut rng), parent(&population, &mut rng)];
             // Children that find no way to be whole are not born.
             let layout = child(pool, one, other, &mut rng).unwrap_or_else(|| one.selection.clone());
-            next.push(Found::of(pool, objective, layout));
+            next.push(search.scored(layout));
         }
         population = next;
     }
@@ -72,13 +65,13 @@ fn child(pool: &Pool, one: &Found, other: &Found, rng: &mut impl Rng) -> Option<
     }
     let mut layout = pool.fixed.clone();
     for unit in inherited {
-        if pool.size(&layout) < pool.design.count && pool.may_join(&layout, unit) {
+        if !pool.is_whole(&layout) && pool.may_join(&layout, unit) {
             layout.push(unit);
         }
     }
     // What the parents do not fill, chance does.
     for _ in 0..20 * pool.design.count {
-        if pool.size(&layout) == pool.design.count {
+        if pool.is_whole(&layout) {
             return Some(layout);
         }
         let unit = rng.random_range(0..pool.units.len());
@@ -86,5 +79,5 @@ fn child(pool: &Pool, one: &Found, other: &Found, rng: &mut impl Rng) -> Option<
             layout.push(unit);
         }
     }
-    (pool.size(&layout) == pool.design.count).then_some(layout)
+    pool.is_whole(&layout).then_some(layout)
 }

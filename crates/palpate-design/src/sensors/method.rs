@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use super::design::DesignCriterion;
 use super::design::DesignError;
-use super::exchange::Found;
-use super::objective::Objective;
+use super::exchange::{Found, Search};
 use super::principal::{PrincipalComponents, Reconstruction};
-use super::{Assessment, PlacedSensor, SensorProblem, exchange, exhaustive, genetic, pivoting, refine};
+use super::{Assessment, PlacedSensor, SensorProblem, exhaustive, genetic, pivoting, refine};
 use palpate_estimators::arrangement::{inner_grid, squarest};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{self, ChannelModel, Layout, Sensor, SensorKind};
@@ -94,17 +93,17 @@ impl SensorProblem<'_> {
         };
         let existing = Some(self.existing()?).filter(|existing| !is_even(existing));
         let mut designed: Vec<Designed> = even.into_iter().chain(existing).collect();
-        let mut best = self.exchanged(&*self.objective, seed, watch)?;
+        let mut best = self.search(watch).greedy_exchange(&self.feasible, seed)?;
         designed.push(self.designed(Method::GreedyExchange, &best.selection)?);
         if exhaustive::layouts(&self.pool, self.free_slots()) <= exhaustive::MOST_LAYOUTS
-            && let Some(found) = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)?
+            && let Some(found) = exhaustive::search(&self.search(watch), self.free_slots())?
         {
             designed.push(self.designed(Method::Exhaustive, &found.selection)?);
-            best = best.or_better(Some(found));
+            best = best.or_better(found);
         }
         let found = self.genetic(seed, watch)?;
         designed.push(self.designed(Method::Genetic, &found.selection)?);
-        best = best.or_better(Some(found));
+        best = best.or_better(found);
         designed.push(self.judged(Method::Refined, refine::refine(self, &best.selection, watch)?)?);
         designed.extend(self.historical(seed, watch)?);
         Ok(designed)
@@ -120,23 +119,23 @@ impl SensorProblem<'_> {
         let found = match method {
             Method::Even => return self.even(),
             Method::Existing => return self.existing(),
-            Method::GreedyExchange => self.exchanged(&*self.objective, seed, watch)?,
+            Method::GreedyExchange => self.search(watch).greedy_exchange(&self.feasible, seed)?,
             // Then it is what the criterion asks for.
             Method::DOptimal if self.pool.design.criterion == DesignCriterion::DOptimality => {
-                self.exchanged(&*self.objective, seed, watch)?
+                self.search(watch).greedy_exchange(&self.feasible, seed)?
             }
             Method::DOptimal | Method::PrincipalComponents | Method::QrPivoting => {
                 let others = self.historical(seed, watch)?;
                 return others.into_iter().find(|designed| designed.method == method).ok_or_else(none);
             }
             Method::Exhaustive => {
-                let found = exhaustive::search(&self.pool, &*self.objective, self.free_slots(), watch)?;
+                let found = exhaustive::search(&self.search(watch), self.free_slots())?;
                 found.ok_or_else(none)?
             }
             Method::Genetic => self.genetic(seed, watch)?,
             Method::Refined => {
-                let exchanged = self.exchanged(&*self.objective, seed, watch)?;
-                let best = exchanged.or_better(Some(self.genetic(seed, watch)?));
+                let exchanged = self.search(watch).greedy_exchange(&self.feasible, seed)?;
+                let best = exchanged.or_better(self.genetic(seed, watch)?);
                 return self.judged(method, refine::refine(self, &best.selection, watch)?);
             }
         };
@@ -180,12 +179,13 @@ impl SensorProblem<'_> {
         Ok(Designed { method: Method::Existing, layout, assessment })
     }
 
-    fn exchanged(&self, objective: &dyn Objective, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
-        exchange::search(&self.pool, objective, &self.feasible, seed, watch)
+    /// The search by the design's criterion.
+    pub(super) fn search<'s>(&'s self, watch: Watch<'s>) -> Search<'s> {
+        Search { pool: &self.pool, objective: &*self.objective, watch }
     }
 
     fn genetic(&self, seed: u64, watch: Watch) -> Result<Found, Cancelled> {
-        genetic::search(&self.pool, &*self.objective, &self.feasible, seed, watch)
+        genetic::search(&self.search(watch), &self.feasible, seed)
     }
 
     /// Number of units of a layout that are free to be chosen.
@@ -201,12 +201,14 @@ impl SensorProblem<'_> {
             let table = Arc::clone(&self.table);
             let objective =
                 self.sensitivity.objective(table, DesignCriterion::DOptimality, design.tolerance_m);
-            let found = self.exchanged(&*objective, seed, watch)?;
+            let search = Search { objective: &*objective, ..self.search(watch) };
+            let found = search.greedy_exchange(&self.feasible, seed)?;
             designed.push(self.designed(Method::DOptimal, &found.selection)?);
         }
         let components =
             PrincipalComponents::from_readings(&self.sensitivity.readings(&self.pool.sensors, design));
-        let found = self.exchanged(&Reconstruction::new(&components), seed, watch)?;
+        let search = Search { objective: &Reconstruction::new(&components), ..self.search(watch) };
+        let found = search.greedy_exchange(&self.feasible, seed)?;
         designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);
         if let Some(selection) = pivoting::search(&self.pool, &components.modes) {
             designed.push(self.designed(Method::QrPivoting, &selection)?);

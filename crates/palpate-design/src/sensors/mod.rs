@@ -112,8 +112,7 @@ impl<'a> SensorProblem<'a> {
         design: &SensorDesign,
     ) -> Result<Self, DesignError> {
         let pool = Pool::new(candidates.clone(), design, sensitivity.surface.extent())?;
-        let all: Vec<usize> = (0..pool.units.len()).collect();
-        let feasible = exchange::feasible(&pool, &all)?;
+        let feasible = exchange::feasible(&pool)?;
         let objective = sensitivity.objective(Arc::clone(&table), design.criterion, design.tolerance_m);
         Ok(Self { setup, sensitivity, candidates, table, pool, objective, feasible })
     }

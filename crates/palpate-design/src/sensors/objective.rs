@@ -45,14 +45,3 @@ pub(super) trait Objective: Sync {
     /// The score that people read: without what only breaks ties in a search.
     fn value(&self, state: &State) -> f64;
 }
-
-/// The score of a layout of candidates.
-pub(super) fn score_of(objective: &dyn Objective, candidates: &[usize]) -> f64 {
-    objective.score(&state_of(objective, candidates, ForceBelief::Vague))
-}
-
-/// The state of a layout of candidates.
-pub(super) fn state_of(objective: &dyn Objective, candidates: &[usize], belief: ForceBelief) -> State {
-    let rows: Vec<&[Block]> = candidates.iter().map(|candidate| objective.row(*candidate)).collect();
-    objective.state(&rows, belief)
-}

@@ -121,9 +121,9 @@ pub(super) fn search(pool: &Pool, modes: &[Vec<f64>]) -> Option<Vec<usize>> {
     for candidate in pool.candidates(&pool.fixed) {
         pivoting.choose(candidate);
     }
-    let all: Vec<usize> = (0..pool.units.len()).collect();
+    let all = pool.all();
     let mut selection = pool.fixed.clone();
-    while pool.size(&selection) < pool.design.count {
+    while !pool.is_whole(&selection) {
         if pivoting.is_exhausted() {
             pivoting.restart();
         }

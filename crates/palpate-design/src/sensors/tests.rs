@@ -21,7 +21,7 @@ fn exchanged(problem: &SensorProblem) -> Designed {
 }
 
 fn searched(problem: &SensorProblem) -> Found {
-    exchange::search(&problem.pool, &*problem.objective, &problem.feasible, 0, Watch::NONE).unwrap()
+    problem.search(Watch::NONE).greedy_exchange(&problem.feasible, 0).unwrap()
 }
 
 fn offer(kind: SensorKind, noise_sd: f64, cost: f64) -> SensorOffer {
@@ -118,7 +118,7 @@ fn greedy_and_exchange_find_the_optimum_of_small_problems() {
         let design = random_problem(&setup, &design, &mut rng);
         let problem = problem(&setup, &design);
         assert_eq!((problem.candidates(), problem.feasible.len()), (20, 4));
-        let all = exhaustive::search(&problem.pool, &*problem.objective, 4, Watch::NONE).unwrap().unwrap();
+        let all = exhaustive::search(&problem.search(Watch::NONE), 4).unwrap().unwrap();
         let ours = searched(&problem);
         assert!(ours.score >= all.score - 1e-9 * all.score.abs());
         found += usize::from(ours.score <= all.score + 1e-9 * all.score.abs());
@@ -260,7 +260,7 @@ fn no_exchange_for_one_of_very_many_matters() {
     for (symmetry, sites) in [(Symmetry::Any, 1000), (Symmetry::Wanted, 1500), (Symmetry::Forbidden, 1000)] {
         let design = SensorDesign { sites: Sites::Count(sites), symmetry, count: 4, ..design.clone() };
         let problem = problem(&setup, &design);
-        let (pool, objective) = (&problem.pool, &*problem.objective);
+        let pool = &problem.pool;
         assert!(pool.units.len() > 2000, "{}", pool.units.len());
         let found = searched(&problem);
         assert_eq!(pool.size(&found.selection), 4);
@@ -268,9 +268,9 @@ fn no_exchange_for_one_of_very_many_matters() {
             let mut others = found.selection.clone();
             let leaving = others.remove(slot);
             assert!(pool.may_join(&others, leaving), "{symmetry:?}");
-            for unit in pool.joinable(&others, &(0..pool.units.len()).collect::<Vec<_>>(), None) {
+            for unit in pool.joinable(&others, &pool.all(), None) {
                 let selection = others.iter().copied().chain([unit]).collect();
-                let other = Found::of(pool, objective, selection);
+                let other = problem.search(Watch::NONE).scored(selection);
                 let whole = pool.size(&other.selection) == 4;
                 assert!(
                     !whole || other.score > found.score * (1.0 - 1.1e-6),
