@@ -127,6 +127,17 @@ impl WeightedContacts {
         Ok(Self { positions, weights: weights.iter().map(|weight| weight / sum).collect() })
     }
 
+    /// An even sample of at most so many of them, weighted by their shares among themselves.
+    #[must_use]
+    pub(crate) fn sample(&self, most: usize) -> Self {
+        let step = self.len().div_ceil(most);
+        let share: f64 = self.weights.iter().step_by(step).sum();
+        Self {
+            positions: self.positions.iter().copied().step_by(step).collect(),
+            weights: self.weights.iter().step_by(step).map(|weight| weight / share).collect(),
+        }
+    }
+
     /// Number of contacts, at least one.
     pub fn len(&self) -> usize {
         self.positions.len()

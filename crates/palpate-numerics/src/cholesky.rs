@@ -122,21 +122,8 @@ impl Cholesky {
 
     /// L⁻¹·B, column by column, in blocks that are matrix products.
     pub fn solve_lower_matrix(&self, mut b: Array2<f64>) -> Array2<f64> {
-        let size = self.size();
-        for start in (0..size).step_by(BLOCK) {
-            let end = (start + BLOCK).min(size);
-            for i in start..end {
-                let (done, mut rest) = b.view_mut().split_at(Axis(0), i);
-                let mut row = rest.row_mut(0);
-                for k in start..i {
-                    row.scaled_add(-self.lower[[i, k]], &done.row(k));
-                }
-                row /= self.lower[[i, i]];
-            }
-            let (done, mut rest) = b.view_mut().split_at(Axis(0), end);
-            let left = self.lower.slice(s![end.., start..end]);
-            general_mat_mul(-1.0, &left, &done.slice(s![start.., ..]), 1.0, &mut rest);
-        }
+        let columns = b.ncols();
+        self.substitute_forward(&mut b, |_| columns);
         b
     }
 
@@ -147,12 +134,18 @@ impl Cholesky {
 
     /// L⁻¹, lower triangular.
     pub fn inverse_lower(&self) -> Array2<f64> {
+        let mut inverse = Array2::eye(self.size());
+        // Right of the diagonal block, rows stay 0.
+        self.substitute_forward(&mut inverse, |end| end);
+        inverse
+    }
+
+    /// L⁻¹·B in the place of B, of which the rows before `end` differ from 0 in their first `columns(end)` columns at most.
+    fn substitute_forward(&self, b: &mut Array2<f64>, columns: impl Fn(usize) -> usize) {
         let size = self.size();
-        let mut inverse = Array2::eye(size);
         for start in (0..size).step_by(BLOCK) {
             let end = (start + BLOCK).min(size);
-            // Right of the diagonal block, these rows stay 0.
-            let (mut done, mut rest) = inverse.slice_mut(s![.., ..end]).split_at(Axis(0), end);
+            let (mut done, mut rest) = b.slice_mut(s![.., ..columns(end)]).split_at(Axis(0), end);
             for i in start..end {
                 let (above, mut below) = done.view_mut().split_at(Axis(0), i);
                 let mut row = below.row_mut(0);
@@ -164,7 +157,6 @@ impl Cholesky {
             let left = self.lower.slice(s![end.., start..end]);
             general_mat_mul(-1.0, &left, &done.slice(s![start.., ..]), 1.0, &mut rest);
         }
-        inverse
     }
 
     /// Mᵀ·M for a lower triangular M: A⁻¹ where M = L⁻¹.

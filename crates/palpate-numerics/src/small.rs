@@ -182,6 +182,12 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// Adds factor·b to a.
+#[inline]
+pub fn add_multiple(a: &mut [f64], factor: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += factor * b);
+}
+
 /// The bilinear form aᵀ·M·b.
 #[inline]
 pub fn form<const N: usize>(a: &[f64; N], matrix: &Matrix<N>, b: &[f64; N]) -> f64 {

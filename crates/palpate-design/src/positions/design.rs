@@ -109,10 +109,8 @@ impl PositionDesign {
 
     /// The contacts with their weights.
     pub(super) fn weighted_contacts(&self, extent: Extent) -> Result<WeightedContacts, OutOfRange> {
-        match &self.contacts {
-            Some(contacts) => WeightedContacts::from_prior(contacts, extent),
-            None => WeightedContacts::from_prior(&ContactPrior::all_over(extent), extent),
-        }
+        let all_over = || ContactPrior::all_over(extent);
+        WeightedContacts::from_prior(&self.contacts.clone().unwrap_or_else(all_over), extent)
     }
 }
 

@@ -39,13 +39,11 @@ impl ExpectedError {
         };
         let mut places = cells(extent, side, side);
         let sites = places.len();
-        let step = contacts.len().div_ceil(MOST_CONTACTS);
-        let kept: Vec<usize> = (0..contacts.len()).step_by(step).collect();
-        let share: f64 = kept.iter().map(|i| contacts.weights[*i]).sum();
-        places.extend(kept.iter().map(|i| contacts.positions[*i]));
+        let WeightedContacts { positions, weights } = contacts.sample(MOST_CONTACTS);
+        places.extend(positions);
         Self {
             sites,
-            weights: kept.iter().map(|i| contacts.weights[*i] / share).collect(),
+            weights,
             limits_m: places[sites..].iter().map(|at| forward.limit_m(*at)).collect(),
             places,
         }

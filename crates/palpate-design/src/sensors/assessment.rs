@@ -127,26 +127,23 @@ impl SensorProblem<'_> {
             .map(|sensor| Some(PlacedSensor { offer: self.offered(sensor)?, position: sensor.position }))
             .collect();
         let Some(placed) = placed else { return false };
-        let same = |a: &PlacedSensor, b: &PlacedSensor| {
-            a.offer == b.offer && a.position.distance_m(b.position) <= 1e-6 * extent.length_m()
-        };
         let apart = placed.iter().enumerate().all(|(i, a)| {
-            placed[..i].iter().all(|b| !same(a, b) && exclusion(a, b, design, extent).is_none())
+            placed[..i].iter().all(|b| !a.is_same(b, extent) && exclusion(a, b, design, extent).is_none())
         });
         let free = placed.iter().all(|sensor| {
             design.offers[sensor.offer].kind == SensorKind::Reaction
-                || design.keep_out.iter().all(|zone| !zone.holds(sensor.position, extent))
+                || !design.keeps_out(sensor.position, extent)
         });
         let complete = design.must_have.iter().all(|wanted| {
             let wanted = PlacedSensor { offer: wanted.offer, position: wanted.position };
-            placed.iter().any(|sensor| same(sensor, &wanted))
+            placed.iter().any(|sensor| sensor.is_same(&wanted, extent))
         });
         let symmetric = design.symmetry != Symmetry::Wanted
             || placed.iter().all(|sensor| {
                 let position = mirrored(sensor.position, extent);
-                placed.iter().any(|other| same(other, &PlacedSensor { position, ..*sensor }))
+                placed.iter().any(|other| other.is_same(&PlacedSensor { position, ..*sensor }, extent))
             });
-        let paid = design.budget.is_none_or(|budget| self.cost(layout) <= budget * (1.0 + 1e-12));
+        let paid = design.affords(self.cost(layout));
         placed.len() == design.count && apart && free && complete && symmetric && paid
     }
 }

@@ -20,6 +20,13 @@ pub struct PlacedSensor {
     pub position: Position,
 }
 
+impl PlacedSensor {
+    /// Whether both are of one offer and at one place.
+    pub(super) fn is_same(&self, other: &Self, extent: Extent) -> bool {
+        self.offer == other.offer && self.position.distance_m(other.position) <= SAME * extent.length_m()
+    }
+}
+
 /// Every sensor that a layout may have.
 #[derive(Clone)]
 pub(super) struct Candidates {
@@ -40,8 +47,7 @@ impl Candidates {
             if kind == SensorKind::Reaction {
                 sensors.extend(surface.force_supports().into_iter().filter(reads).map(at));
             } else {
-                let free =
-                    |position: &Position| design.keep_out.iter().all(|zone| !zone.holds(*position, extent));
+                let free = |position: &Position| !design.keeps_out(*position, extent);
                 sensors.extend(sites.iter().copied().filter(free).filter(reads).map(at));
             }
         }
@@ -64,35 +70,26 @@ impl Candidates {
         if !reads_something(surface, kind, position) {
             return Err(DesignError::MustHaveReadsNothing { kind, position, extent });
         }
-        let kept_out = design.keep_out.iter().any(|zone| zone.holds(position, extent));
-        if kept_out && kind != SensorKind::Reaction {
+        if design.keeps_out(position, extent) && kind != SensorKind::Reaction {
             return Err(DesignError::MustHaveKeptOut { kind, position, extent });
         }
-        let index = self.add(offer, position, extent);
+        let index = self.add(PlacedSensor { offer, position }, extent);
         self.must_have.push(index);
         // Its twin need not be one of the sites either.
         let twin = mirrored(position, extent);
-        let kept_out = design.keep_out.iter().any(|zone| zone.holds(twin, extent));
-        if design.symmetry == Symmetry::Wanted && !kept_out && reads_something(surface, kind, twin) {
-            self.add(offer, twin, extent);
+        let reads = !design.keeps_out(twin, extent) && reads_something(surface, kind, twin);
+        if design.symmetry == Symmetry::Wanted && reads {
+            self.add(PlacedSensor { offer, position: twin }, extent);
         }
         Ok(())
     }
 
-    /// The candidate of an offer at a place, which becomes one if it is none.
-    fn add(&mut self, offer: usize, position: Position, extent: Extent) -> usize {
-        self.find(offer, position, extent).unwrap_or_else(|| {
-            self.sensors.push(PlacedSensor { offer, position });
+    /// Index of a sensor among the candidates, of which it becomes one if it is none.
+    fn add(&mut self, sensor: PlacedSensor, extent: Extent) -> usize {
+        self.sensors.iter().position(|other| other.is_same(&sensor, extent)).unwrap_or_else(|| {
+            self.sensors.push(sensor);
             self.sensors.len() - 1
         })
-    }
-
-    /// The candidate of an offer at a place.
-    fn find(&self, offer: usize, position: Position, extent: Extent) -> Option<usize> {
-        let same = |other: &PlacedSensor| {
-            other.offer == offer && other.position.distance_m(position) <= SAME * extent.length_m()
-        };
-        self.sensors.iter().position(same)
     }
 
     /// For each candidate the one that is its mirror image, itself in the middle.
@@ -285,9 +282,8 @@ impl Pool {
 
     /// Whether the budget lasts for a unit and for the cheapest sensors besides.
     fn is_affordable(&self, spent: f64, room: usize, unit: usize) -> bool {
-        let Some(budget) = self.design.budget else { return true };
         let rest = (room - self.units[unit].size()) as f64 * self.cheapest;
-        spent + self.unit_cost(unit) + rest <= budget * (1.0 + 1e-12)
+        self.design.affords(spent + self.unit_cost(unit) + rest)
     }
 
     /// Whether as many sensors as are wanted come in pairs and from the middle.

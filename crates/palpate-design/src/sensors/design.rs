@@ -217,6 +217,16 @@ impl SensorDesign {
         self.budget.is_some() || self.offers.windows(2).any(|pair| pair[0].cost != pair[1].cost)
     }
 
+    /// Whether no sensor may sit at a position, except reaction sensors.
+    pub(super) fn keeps_out(&self, position: Position, extent: Extent) -> bool {
+        self.keep_out.iter().any(|zone| zone.holds(position, extent))
+    }
+
+    /// Whether the budget suffices for a cost, to rounding.
+    pub(super) fn affords(&self, cost: f64) -> bool {
+        self.budget.is_none_or(|budget| cost <= budget * (1.0 + 1e-12))
+    }
+
     /// Checks every number against its bound and every position against the surface; the contacts check themselves.
     pub(super) fn check(&self, extent: Extent) -> Result<(), OutOfRange> {
         OutOfRange::check_positive([
@@ -396,11 +406,13 @@ pub enum DesignError {
 }
 
 /// Reason for which two sensors exclude each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Exclusion {
     /// They are the same.
+    #[error("they are the same sensor")]
     Same,
     /// They are closer than the spacing.
+    #[error("they are {} apart, and `spacing` is {}", format_length_mm(*distance_m), format_length_mm(*spacing_m))]
     Spacing {
         /// Their distance, in metres.
         distance_m: f64,
@@ -408,20 +420,6 @@ pub enum Exclusion {
         spacing_m: f64,
     },
     /// One is the mirror image of the other, which is forbidden.
+    #[error("they mirror each other, and `symmetry` is forbidden")]
     Mirror,
-}
-
-impl std::fmt::Display for Exclusion {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Same => f.write_str("they are the same sensor"),
-            Self::Spacing { distance_m, spacing_m } => write!(
-                f,
-                "they are {} apart, and `spacing` is {}",
-                format_length_mm(*distance_m),
-                format_length_mm(*spacing_m)
-            ),
-            Self::Mirror => f.write_str("they mirror each other, and `symmetry` is forbidden"),
-        }
-    }
 }

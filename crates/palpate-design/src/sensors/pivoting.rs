@@ -8,6 +8,7 @@
 use ndarray::Array2;
 
 use super::candidates::Pool;
+use palpate_numerics::small::{add_multiple, dot};
 use palpate_numerics::symmetric_eigen;
 
 /// Columns that are worked on at once, so that their distances stay in the nearest cache.
@@ -33,11 +34,6 @@ impl<'a> Pivoting<'a> {
         Self { modes, left, span: Vec::new(), longest }
     }
 
-    /// Squared distance of a column from the span; where the span is everything, of the column itself.
-    fn reach(&self, column: usize) -> f64 {
-        self.left[column]
-    }
-
     /// Whether no column reaches out of the span any more.
     fn is_exhausted(&self) -> bool {
         self.span.len() == self.modes.len()
@@ -55,11 +51,11 @@ impl<'a> Pivoting<'a> {
         // Twice is enough for full orthogonality (Giraud et al. 2005).
         for _ in 0..2 {
             for other in &self.span {
-                let share: f64 = unit.iter().zip(other).map(|(a, b)| a * b).sum();
-                unit.iter_mut().zip(other).for_each(|(value, other)| *value -= share * other);
+                let share = dot(&unit, other);
+                add_multiple(&mut unit, -share, other);
             }
         }
-        let length = unit.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let length = dot(&unit, &unit).sqrt();
         if length * length <= NOTHING_NEW * self.longest {
             return;
         }
@@ -128,7 +124,7 @@ pub(super) fn search(pool: &Pool, modes: &[Vec<f64>]) -> Option<Vec<usize>> {
             pivoting.restart();
         }
         let reach = |unit: usize| -> f64 {
-            let members = pool.units[unit].members().map(|candidate| pivoting.reach(candidate));
+            let members = pool.units[unit].members().map(|candidate| pivoting.left[candidate]);
             members.sum::<f64>() / pool.units[unit].size() as f64
         };
         let joinable = pool.joinable(&selection, &all, None);

@@ -105,7 +105,7 @@ fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedS
     };
     let kind = |sensor: &PlacedSensor| pool.design.offers[sensor.offer].kind;
     group.iter().enumerate().all(|(i, sensor)| {
-        pool.design.keep_out.iter().all(|zone| !zone.holds(sensor.position, pool.extent))
+        !pool.design.keeps_out(sensor.position, pool.extent)
             && reads_something(problem.sensitivity.surface, kind(sensor), sensor.position)
             && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
     })

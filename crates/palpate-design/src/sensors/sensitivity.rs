@@ -43,8 +43,8 @@ impl Sensitivity<'_> {
         self.unknowns() * self.contacts.len().div_ceil(LANES)
     }
 
-    /// The row of a sensor: derivatives of its whitened reading by ln W where the force is unknown, by x, and by y on a plane.
-    /// Row of a sensor: its sensitivity to every contact; 0 where it is saturated.
+    /// Row of a sensor: derivatives of its whitened reading at every contact by ln W where the force is unknown, by x, and by y on a
+    /// plane; 0 where it is saturated.
     pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
         let mut row = vec![[0.0; LANES]; self.row_size()];
         self.fill(&mut row, kind, position, channel);
@@ -73,7 +73,7 @@ impl Sensitivity<'_> {
         }
     }
 
-    /// The rows of all candidates, one after the other;
+    /// The rows of all candidates, one after the other.
     pub fn table(
         &self,
         sensors: &[PlacedSensor],
@@ -125,17 +125,14 @@ impl Sensitivity<'_> {
     /// Whitened readings of all candidates, a contact a row, each row times the root of the contact's share; of many contacts
     /// an even sample.
     pub fn readings(&self, sensors: &[PlacedSensor], design: &SensorDesign) -> Array2<f64> {
-        let step = self.contacts.len().div_ceil(MOST_SNAPSHOTS);
-        let kept: Vec<usize> = (0..self.contacts.len()).step_by(step).collect();
-        let share: f64 = kept.iter().map(|i| self.contacts.weights[*i]).sum();
-        let mut readings = Array2::zeros((kept.len(), sensors.len()));
+        let contacts = self.contacts.sample(MOST_SNAPSHOTS);
+        let mut readings = Array2::zeros((contacts.len(), sensors.len()));
         for (column, sensor) in sensors.iter().enumerate() {
             let offer = &design.offers[sensor.offer];
             let response = self.surface.response_function(offer.kind, sensor.position);
-            for (row, i) in kept.iter().enumerate() {
-                let contact = Contact { position: self.contacts.positions[*i], force_n: self.force_n };
-                let weight = (self.contacts.weights[*i] / share).sqrt();
-                readings[[row, column]] = weight * response.at(contact) / offer.channel.reading_sd();
+            for (row, (&position, weight)) in contacts.positions.iter().zip(&contacts.weights).enumerate() {
+                let reading = response.at(Contact { position, force_n: self.force_n });
+                readings[[row, column]] = weight.sqrt() * reading / offer.channel.reading_sd();
             }
         }
         readings

@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use serde::Serialize;
 
-use palpate_numerics::small::{Ldl, Matrix, dot, principal_variances};
+use palpate_numerics::small::{Ldl, Matrix, add_multiple, dot, principal_variances};
 
 /// The Cramér–Rao bound at one contact: what no unbiased estimator can beat there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -97,7 +97,7 @@ fn orthogonalise<const P: usize>(columns: &mut [Vec<f64>; P]) -> Option<Matrix<P
         let length = norm(column);
         for (unit, share) in before.iter().zip(shares.iter_mut()) {
             *share = dot(unit, column);
-            column.iter_mut().zip(unit).for_each(|(value, unit)| *value -= *share * unit);
+            add_multiple(column, -*share, unit);
         }
         let left = norm(column);
         if !left.is_normal() || left <= EXPLAINED * length {

@@ -29,20 +29,6 @@ pub(super) struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// Noise variance of every group over the signal's: η/p_i.
-    pub fn noise(groups: &Groups, ratio: f64) -> Vec<f64> {
-        groups.precision.iter().map(|p| ratio / p).collect()
-    }
-
-    /// s_j² for each output, given α = P·ȳ, in the groups' standardized units.
-    pub fn signal_variances(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
-        if groups.noise_given {
-            return vec![1.0 / ratio; groups.means.ncols()];
-        }
-        let rows = groups.total_rows() as f64;
-        quadratic_forms(groups, ratio, alpha).iter().map(|q| q / rows).collect()
-    }
-
     /// ln p of all outputs, and its gradient by the logarithms of the hyperparameters.
     ///
     /// # Errors
@@ -56,7 +42,7 @@ impl Evidence<'_> {
         let (scales, ratio) = (&hyperparameters.length_scales, hyperparameters.noise_ratio);
         let points =
             Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, self.trend);
-        let noise = Self::noise(groups, ratio);
+        let noise = groups.noise_ratios(ratio);
         let mut slopes = Array2::zeros((groups.len(), groups.len()));
         let correlations = points.correlations(self.kernel, Some(&mut slopes));
         let covariance = Covariance::new(correlations, &noise, &points.basis, NUGGET)?;
@@ -84,6 +70,15 @@ impl Evidence<'_> {
     }
 }
 
+/// s_j² for each output, given α = P·ȳ, in the groups' standardized units.
+pub(super) fn signal_variances(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
+    if groups.noise_given {
+        return vec![1.0 / ratio; groups.means.ncols()];
+    }
+    let rows = groups.total_rows() as f64;
+    quadratic_forms(groups, ratio, alpha).iter().map(|q| q / rows).collect()
+}
+
 /// ln p of all outputs in their own units, given α = P·ȳ.
 pub(super) fn log_evidence(groups: &Groups, ratio: f64, covariance: &Covariance, alpha: &Array2<f64>) -> f64 {
     let rows = groups.total_rows() as f64;
@@ -91,7 +86,7 @@ pub(super) fn log_evidence(groups: &Groups, ratio: f64, covariance: &Covariance,
     let precisions: f64 = groups.precision.iter().map(|p| p.ln()).sum();
     let variances: f64 = groups.log_variance.iter().sum();
     let determinant = covariance.log_determinant() + repeats * ratio.ln() + precisions + variances;
-    let signal = Evidence::signal_variances(groups, ratio, alpha);
+    let signal = signal_variances(groups, ratio, alpha);
     let quadratics = quadratic_forms(groups, ratio, alpha);
     let of_output = |j: usize| {
         let units = 2.0 * rows * groups.scale[j].ln();

@@ -85,6 +85,11 @@ impl Groups {
         self.rows.iter().sum()
     }
 
+    /// Noise variance of each over the signal's, η/p_i, for a single row's η = `ratio`.
+    pub fn noise_ratios(&self, ratio: f64) -> Vec<f64> {
+        self.precision.iter().map(|p| ratio / p).collect()
+    }
+
     /// Mean square of the outputs, so standardized, averaged over outputs.
     pub fn mean_square(&self) -> f64 {
         let weights = self.rows.iter().map(|rows| *rows as f64);

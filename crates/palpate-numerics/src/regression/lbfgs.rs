@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use crate::small::dot;
+use crate::small::{add_multiple, dot};
 
 /// Pairs of steps and gradient changes that are remembered.
 const MEMORY: usize = 12;
@@ -98,7 +98,7 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
     let mut shares = Vec::with_capacity(pairs.len());
     for pair in pairs {
         let share = dot(&pair.step, &q) / dot(&pair.step, &pair.change);
-        add(&mut q, -share, &pair.change);
+        add_multiple(&mut q, -share, &pair.change);
         shares.push(share);
     }
     let first_length = || 1.0 / dot(gradient, gradient).sqrt().max(1.0);
@@ -107,7 +107,7 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
     q.iter_mut().for_each(|q| *q *= scale);
     for (pair, share) in pairs.iter().zip(&shares).rev() {
         let correction = dot(&pair.change, &q) / dot(&pair.step, &pair.change);
-        add(&mut q, share - correction, &pair.step);
+        add_multiple(&mut q, share - correction, &pair.step);
     }
     q
 }
@@ -116,12 +116,6 @@ fn direction(gradient: &[f64], pairs: &VecDeque<Pair>) -> Vec<f64> {
 fn shrink(value: f64, slope: f64, next_value: f64) -> f64 {
     let curvature = next_value - value - slope;
     if next_value.is_finite() && curvature > 0.0 { (-0.5 * slope / curvature).clamp(0.1, 0.5) } else { 0.25 }
-}
-
-fn add(to: &mut [f64], factor: f64, other: &[f64]) {
-    for (to, other) in to.iter_mut().zip(other) {
-        *to += factor * other;
-    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use ndarray::linalg::general_mat_vec_mul;
 use ndarray::{Array2, ArrayView1, ArrayViewMut1};
 
 use super::covariance::{Covariance, Points};
-use super::evidence::{Evidence, log_evidence};
+use super::evidence::{log_evidence, signal_variances};
 use super::groups::Groups;
 use super::kernel::squared_distances_into;
 use super::{Hyperparameters, Kernel, RegressionError, Trend};
@@ -59,10 +59,10 @@ impl GaussianProcess {
         let ratio = hyperparameters.noise_ratio;
         let scales = &hyperparameters.length_scales;
         let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
-        let noise = Evidence::noise(groups, ratio);
+        let noise = groups.noise_ratios(ratio);
         let covariance = Covariance::regularised(&points, kernel, &noise)?;
         let (alpha, beta) = covariance.solve(&groups.means);
-        let signal = Evidence::signal_variances(groups, ratio, &alpha);
+        let signal = signal_variances(groups, ratio, &alpha);
         let data = PosteriorData {
             kernel,
             trend,

@@ -10,6 +10,7 @@ use ndarray::{Array1, Array2};
 use super::dissection::nested_dissection;
 use super::mesh::{Derivative, ElementStiffness, Mesh, NODE_DEGREES, element_stiffness};
 use super::spec::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
+use palpate_numerics::small::add_multiple;
 use palpate_numerics::{Cholesky, SparseCholesky, SparseSymmetric};
 
 /// The factored equations of a plate.
@@ -83,7 +84,7 @@ impl Solved {
         unit[number] = 1.0;
         let mut sum = vec![0.0; self.unknowns.count()];
         for (weight, solution) in held.compliance.solve(&unit).iter().zip(&held.solutions) {
-            add(&mut sum, *weight, solution);
+            add_multiple(&mut sum, *weight, solution);
         }
         Some(self.unknowns.expand(&sum, 1.0))
     }
@@ -119,7 +120,7 @@ impl SimpleSupports {
         let moved = self.deflections.iter().map(|deflection| reading(unknowns, deflection, u));
         let forces = self.compliance.solve(&moved.collect());
         for (force, solution) in forces.iter().zip(&self.solutions) {
-            add(u, -force, solution);
+            add_multiple(u, -force, solution);
         }
     }
 }
@@ -157,13 +158,6 @@ fn solve(unknowns: &Unknowns, factor: &SparseCholesky, loads: &[&Functional]) ->
 fn reading(unknowns: &Unknowns, functional: &Functional, u: &[f64]) -> f64 {
     let terms = functional.iter().filter_map(|(degree, value)| Some(value * u[unknowns.place(*degree)?]));
     terms.sum()
-}
-
-/// sum += factor·values.
-fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
-    for (sum, value) in sum.iter_mut().zip(values) {
-        *sum += factor * value;
-    }
 }
 
 /// The numbers of the degrees of freedom that no edge holds at zero, in the order of elimination.
