@@ -27,7 +27,7 @@ pub enum SensorKind {
 }
 
 impl SensorKind {
-    /// Every kind, in the order that messages list them.
+    /// Every kind, in the order of their declaration, by which tables over kinds are indexed and messages list them.
     pub const ALL: [Self; 5] = [Self::Deflection, Self::Slope, Self::Strain, Self::Reaction, Self::Raw];
 
     /// Its name in a rig.

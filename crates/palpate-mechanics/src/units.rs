@@ -115,11 +115,8 @@ struct Symbols(Option<Dimension>);
 
 impl fmt::Display for Symbols {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let wanted = |unit: &Unit| {
-            let (symbol, dimension) = (unit.symbol(), unit.dimension());
-            symbol.is_ascii() && !symbol.is_empty() && self.0.is_none_or(|only| only == dimension)
-        };
-        for (i, unit) in (0..UNITS.len()).map(Unit).filter(wanted).enumerate() {
+        let wanted = |unit: &Unit| self.0.is_none_or(|only| only == unit.dimension());
+        for (i, unit) in Unit::in_ascii().filter(wanted).enumerate() {
             let comma = if i == 0 { "" } else { ", " };
             write!(f, "{comma}{unit}")?;
         }
@@ -236,15 +233,10 @@ fn rounded(value: f64, decimals: usize) -> String {
 impl fmt::Display for Quantity {
     /// Six significant digits in the largest unit that keeps the number at 1 or above.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let unit = readable_unit(*self);
         let rounded: f64 = format!("{:.5e}", self.value).parse().unwrap_or(self.value);
-        let number = match unit {
-            Some(unit) => unit.format_si(rounded),
-            None => Unit::NONE.format_si(rounded),
-        };
-        match unit {
-            Some(unit) => write!(f, "{number} {unit}"),
-            None => f.write_str(&number),
+        match readable_unit(*self) {
+            Some(unit) => write!(f, "{} {unit}", unit.format_si(rounded)),
+            None => f.write_str(&Unit::NONE.format_si(rounded)),
         }
     }
 }
@@ -319,10 +311,7 @@ impl Dimension {
 
     /// The units it can be written in, ASCII spellings only, smallest first.
     pub fn units(self) -> impl Iterator<Item = Unit> {
-        (0..UNITS.len()).map(Unit).filter(move |unit| {
-            let symbol = unit.symbol();
-            unit.dimension() == self && symbol.is_ascii() && !symbol.is_empty()
-        })
+        Unit::in_ascii().filter(move |unit| unit.dimension() == self)
     }
 }
 
@@ -411,6 +400,12 @@ impl Unit {
     /// The unit with this symbol ("mm", "µε"); the empty symbol is that of a plain number.
     pub fn from_symbol(symbol: &str) -> Option<Self> {
         UNITS.iter().position(|(known, ..)| *known == symbol).map(Self)
+    }
+
+    /// All units with a symbol in ASCII, as the table has them.
+    fn in_ascii() -> impl Iterator<Item = Self> {
+        let written = |unit: &Self| unit.symbol().is_ascii() && !unit.symbol().is_empty();
+        (0..UNITS.len()).map(Self).filter(written)
     }
 
     /// Its symbol.

@@ -24,7 +24,7 @@ impl OutOfRange {
     ///
     /// # Errors
     /// The first that is not.
-    pub fn check_positive<const N: usize>(numbers: [(&'static str, f64); N]) -> Result<(), Self> {
+    pub fn check_positive(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("greater than 0 and finite", numbers, |value| value > 0.0 && value.is_finite())
     }
 
@@ -32,7 +32,7 @@ impl OutOfRange {
     ///
     /// # Errors
     /// The first that is not.
-    pub fn check_not_negative<const N: usize>(numbers: [(&'static str, f64); N]) -> Result<(), Self> {
+    pub fn check_not_negative(numbers: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), Self> {
         Self::check("at least 0 and finite", numbers, |value| value >= 0.0 && value.is_finite())
     }
 

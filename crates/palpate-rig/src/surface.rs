@@ -333,9 +333,9 @@ impl PlateKeys {
             }
             PlateError::Elements { .. } | PlateError::MeshTooLarge { .. } => place(&self.elements),
             PlateError::PoissonsRatio { .. } => Some(&self.poissons_ratio.place),
-            PlateError::NotPositive { .. }
-            | PlateError::Compliance { .. }
-            | PlateError::Unsolvable { .. } => None,
+            PlateError::NotPositive(_) | PlateError::Compliance { .. } | PlateError::Unsolvable { .. } => {
+                None
+            }
         }
     }
 }

@@ -7,6 +7,7 @@ use super::zone::{Grid, Zone, zones};
 use super::{CramerRaoBound, Force, LimitError, check_force};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
+use palpate_numerics::normal_cdf;
 use palpate_numerics::small::dot;
 
 /// A limit above this share of the length is called blind.
@@ -156,7 +157,7 @@ impl Survey<'_> {
 
     /// Each pair of zones once, however it was found.
     fn mirrors(&self) -> Vec<LimitWarning> {
-        let search = TwinSearch::new(self.limit, self.force_n, self.force, AMBIGUOUS_DISTANCE);
+        let search = TwinSearch::new(self.limit, self.force_n, self.force);
         // Where a contact is faint or blind anyway, everything around it reads alike.
         let clear = |position: Position| {
             self.signal(position) >= FAINT_SIGNAL
@@ -232,15 +233,6 @@ impl LimitWarning {
             Self::Blind { sd_m, bound_m, .. } => (*sd_m, *bound_m),
             Self::Mirror { distance, .. } => (Some(*distance), AMBIGUOUS_DISTANCE),
             Self::Faint { signal_to_noise, .. } => (Some(*signal_to_noise), FAINT_SIGNAL),
-        }
-    }
-
-    /// Probability that a reading of the one ambiguous contact is nearer to that of the other: that a standard normal
-    /// variable exceeds half their distance. `None` of other warnings.
-    pub fn mistaken(&self) -> Option<f64> {
-        match self {
-            Self::Mirror { distance, .. } => Some(upper_tail(0.5 * distance)),
-            Self::Blind { .. } | Self::Faint { .. } => None,
         }
     }
 
@@ -321,8 +313,9 @@ impl fmt::Display for LimitWarning {
                 if *distance < INDISTINGUISHABLE {
                     return write!(f, "{at} and {twin} read the same");
                 }
+                // A reading of the one is nearer to that of the other where its noise exceeds half their distance.
+                let mistaken = figure(100.0 * normal_cdf(-0.5 * distance));
                 let (distance, bound) = (figure(*distance), figure(AMBIGUOUS_DISTANCE));
-                let mistaken = figure(100.0 * self.mistaken().unwrap_or(0.0));
                 write!(
                     f,
                     "{at} and {twin} differ by {distance} standard deviations, fewer than {bound}, and are mistaken for each \
@@ -352,11 +345,6 @@ fn figure(value: f64) -> String {
     format!("{:.decimals$}", (value / unit).round() * unit)
 }
 
-/// P(z > x) of a standard normal z, for x ≥ 0: half the complementary error function of x/√2.
-fn upper_tail(x: f64) -> f64 {
-    0.5 * libm::erfc(x / std::f64::consts::SQRT_2)
-}
-
 /// Points of the straight way between two contacts at which their difference is looked at.
 const WAY_POINTS: u32 = 48;
 /// The search for the nearest reading ends at this share of the grid's pitch.
@@ -378,8 +366,6 @@ struct TwinSearch<'a> {
     limit: &'a CramerRaoBound<'a>,
     force_n: f64,
     force: Force,
-    /// Two contacts further apart than this are told apart.
-    bound: f64,
     grid: Grid,
     /// The shape of the reading at each position of the grid.
     shapes: Vec<Vec<f64>>,
@@ -388,9 +374,9 @@ struct TwinSearch<'a> {
 }
 
 impl<'a> TwinSearch<'a> {
-    pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force, bound: f64) -> Self {
+    pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force) -> Self {
         let grid = Grid::over_surface(limit.surface.extent());
-        let mut search = Self { limit, force_n, force, bound, grid, shapes: Vec::new(), spreads: Vec::new() };
+        let mut search = Self { limit, force_n, force, grid, shapes: Vec::new(), spreads: Vec::new() };
         search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();
         let spread = |i: usize| {
             let differences =
@@ -406,12 +392,14 @@ impl<'a> TwinSearch<'a> {
         let target = self.shape(position);
         let distances: Vec<f64> = self.shapes.iter().map(|shape| self.distance(&target, shape)).collect();
         let scale = if self.force == Force::Known { 1.0 } else { target.1 };
-        let reachable = |i: &usize| distances[*i] - scale * self.spreads[*i] <= self.bound;
+        let reachable = |i: &usize| distances[*i] - scale * self.spreads[*i] <= AMBIGUOUS_DISTANCE;
         let lowest = |i: &usize| self.grid.neighbours(*i).all(|j| distances[*i] <= distances[j]);
         let starts = (0..distances.len()).filter(reachable).filter(lowest);
         let twins = starts.map(|i| self.descend(&target, self.grid.positions[i], distances[i]));
         twins
-            .filter(|twin| twin.distance <= self.bound && self.apart(&target, position, twin.position))
+            .filter(|twin| {
+                twin.distance <= AMBIGUOUS_DISTANCE && self.apart(&target, position, twin.position)
+            })
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
@@ -465,7 +453,7 @@ impl<'a> TwinSearch<'a> {
             let share = f64::from(i) / f64::from(WAY_POINTS);
             let between = |a: f64, b: f64| a + share * (b - a);
             let at = Position { x_m: between(from.x_m, to.x_m), y_m: between(from.y_m, to.y_m) };
-            self.distance(target, &self.shape(at).0) > self.bound
+            self.distance(target, &self.shape(at).0) > AMBIGUOUS_DISTANCE
         })
     }
 }

@@ -32,6 +32,11 @@ fn reported(channels: &[ChannelModel], clean: &[f64], seed: u64) -> Vec<f64> {
 }
 
 #[test]
+fn kinds_are_listed_as_they_are_declared() {
+    assert!(SensorKind::ALL.iter().enumerate().all(|(index, kind)| *kind as usize == index));
+}
+
+#[test]
 fn even_sensors_sit_at_multiples_of_a_ninth() {
     let layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     let expected: Vec<Position> = (1..=8).map(|i| Position::along(f64::from(i) * 0.4 / 9.0)).collect();

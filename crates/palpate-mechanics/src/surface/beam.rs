@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, InfluenceFunction, InsensitiveSensor, Strip, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
+use palpate_numerics::OutOfRange;
 
 /// A straight beam of rectangular section on two simple supports, at x = 0 and x = l.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,13 +18,8 @@ pub struct Beam(Strip);
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BeamError {
     /// A dimension is not a positive, finite number.
-    #[error("a beam's {name} is {value}; it must be greater than 0 and finite")]
-    NotPositive {
-        /// Which: "length", "width", "thickness" or "youngs_modulus".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
-    },
+    #[error(transparent)]
+    NotPositive(#[from] OutOfRange),
     /// The compliance l³/(48·E·I) is not a positive, finite number.
     #[error(
         "a beam's compliance at mid-span is {compliance_m_per_n} m/N; it must be greater than 0 and finite"
@@ -122,7 +118,12 @@ impl TryFrom<Strip> for Beam {
     type Error = BeamError;
 
     fn try_from(strip: Strip) -> Result<Self, BeamError> {
-        strip.check().map_err(|(name, value)| BeamError::NotPositive { name, value })?;
+        strip.check([
+            "a beam's length",
+            "a beam's width",
+            "a beam's thickness",
+            "a beam's youngs_modulus",
+        ])?;
         let beam = Self(strip);
         let compliance_m_per_n = beam.full_scale(SensorKind::Deflection);
         if compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite() {

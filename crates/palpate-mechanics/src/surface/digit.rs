@@ -9,6 +9,7 @@ use super::{
 };
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
+use palpate_numerics::OutOfRange;
 
 /// A straight finger of rectangular section, clamped at x = 0 and free at x = l, that bends as far as a force bends it.
 ///
@@ -31,13 +32,8 @@ struct Finger {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DigitError {
     /// A dimension is not a positive, finite number.
-    #[error("a digit's {name} is {value}; it must be greater than 0 and finite")]
-    NotPositive {
-        /// Which: "length", "width", "thickness" or "youngs_modulus".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
-    },
+    #[error(transparent)]
+    NotPositive(#[from] OutOfRange),
     /// The force that bends it markedly, E·I/l², is not a positive, finite number.
     #[error("a digit's characteristic force E·I/l² is {force_n} N; it must be greater than 0 and finite")]
     Stiffness {
@@ -130,7 +126,12 @@ impl TryFrom<Finger> for Digit {
     type Error = DigitError;
 
     fn try_from(finger: Finger) -> Result<Self, DigitError> {
-        finger.strip.check().map_err(|(name, value)| DigitError::NotPositive { name, value })?;
+        finger.strip.check([
+            "a digit's length",
+            "a digit's width",
+            "a digit's thickness",
+            "a digit's youngs_modulus",
+        ])?;
         let digit = Self(finger);
         let force_n = digit.characteristic_force_n();
         if force_n > 0.0 && force_n.is_finite() && (1.0 / force_n).is_finite() {

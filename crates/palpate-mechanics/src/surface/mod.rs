@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
+use palpate_numerics::OutOfRange;
 
 /// An elastic surface with a model.
 ///
@@ -246,26 +247,16 @@ struct Strip {
 }
 
 impl Strip {
-    /// The first dimension, by name and value, that is not positive and finite, as an error.
-    fn check(&self) -> Result<(), (&'static str, f64)> {
-        let dimensions = [
-            ("length", self.length_m),
-            ("width", self.width_m),
-            ("thickness", self.thickness_m),
-            ("youngs_modulus", self.youngs_modulus_pa),
-        ];
-        first_not_positive(&dimensions).map_or(Ok(()), Err)
+    /// Checks that length, width, thickness and Young's modulus, named so in the error, are positive and finite.
+    fn check(&self, names: [&'static str; 4]) -> Result<(), OutOfRange> {
+        let values = [self.length_m, self.width_m, self.thickness_m, self.youngs_modulus_pa];
+        OutOfRange::check_positive(names.into_iter().zip(values))
     }
 
     /// E·I in N·m², with I = width·t³/12.
     fn bending_stiffness(&self) -> f64 {
         self.youngs_modulus_pa * self.width_m * self.thickness_m.powi(3) / 12.0
     }
-}
-
-/// The first of some dimensions, by name and value, that is not a positive, finite number.
-fn first_not_positive(dimensions: &[(&'static str, f64)]) -> Option<(&'static str, f64)> {
-    dimensions.iter().copied().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
 }
 
 #[cfg(test)]

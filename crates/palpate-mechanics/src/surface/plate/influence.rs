@@ -105,27 +105,17 @@ const ELEMENTS: usize = 24;
 /// Sensors along each side of the grid over which the largest is sought, the edges included.
 const SENSORS: usize = 9;
 
-/// The largest magnitude of each kind of influence, in the order of [`SensorKind::ALL`].
-pub(super) struct FullScales([f64; SensorKind::ALL.len()]);
-
-impl FullScales {
-    /// Those of a plate; NaN when its equations have no solution.
-    pub fn of(spec: &PlateSpec) -> Self {
-        let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
-        if spec::check(&coarse).is_err() {
-            // Supports that only the finer mesh can tell apart.
-            coarse.elements = spec.elements;
-        }
-        match Solved::new(&coarse) {
-            Ok(solved) => Self(SensorKind::ALL.map(|kind| largest(&coarse, &solved, kind))),
-            Err(_) => Self([f64::NAN; SensorKind::ALL.len()]),
-        }
+/// Largest magnitude of the influence of each kind of sensor, in the order of [`SensorKind::ALL`]; NaN when the plate's equations
+/// have no solution.
+pub(super) fn full_scales(spec: &PlateSpec) -> [f64; SensorKind::ALL.len()] {
+    let mut coarse = PlateSpec { elements: spec.elements.min(ELEMENTS), ..spec.clone() };
+    if spec::check(&coarse).is_err() {
+        // Supports that only the finer mesh can tell apart.
+        coarse.elements = spec.elements;
     }
-
-    /// The one of `kind`.
-    pub fn of_kind(&self, kind: SensorKind) -> f64 {
-        let index = SensorKind::ALL.iter().position(|other| *other == kind);
-        index.map_or(0.0, |i| self.0[i])
+    match Solved::new(&coarse) {
+        Ok(solved) => SensorKind::ALL.map(|kind| largest(&coarse, &solved, kind)),
+        Err(_) => [f64::NAN; SensorKind::ALL.len()],
     }
 }
 

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use influence::{FullScales, NotANumber, PlateInfluence};
+use influence::{NotANumber, PlateInfluence, full_scales};
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -58,7 +58,7 @@ pub struct Plate {
 #[derive(Default)]
 struct Computed {
     solved: OnceLock<Result<Solved, Unsolvable>>,
-    full_scales: OnceLock<FullScales>,
+    full_scales: OnceLock<[f64; SensorKind::ALL.len()]>,
 }
 
 impl Plate {
@@ -161,7 +161,7 @@ impl Surface for Plate {
     /// The largest influence found over a coarse grid of sensors on a coarse mesh. In this theory the strain under a force
     /// grows without bound as the contact nears the sensor: its scale is that of a force spread over such a mesh's element.
     fn full_scale(&self, kind: SensorKind) -> f64 {
-        self.computed.full_scales.get_or_init(|| FullScales::of(&self.spec)).of_kind(kind)
+        self.computed.full_scales.get_or_init(|| full_scales(&self.spec))[kind as usize]
     }
 
     fn extent(&self) -> Extent {

@@ -6,8 +6,9 @@ use super::dissection::coupled_pairs;
 use super::mesh::{Mesh, NODE_DEGREES};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use crate::surface::{Extent, InsensitiveSensor, first_not_positive};
+use crate::surface::{Extent, InsensitiveSensor};
 use crate::units::format_length_mm;
+use palpate_numerics::OutOfRange;
 
 /// A rectangular plate: x runs along its length from the left edge to the right one, y along its width from the bottom edge
 /// to the top one.
@@ -116,13 +117,8 @@ impl PointSupport {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlateError {
     /// A dimension is not a positive, finite number.
-    #[error("a plate's {name} is {value}; it must be greater than 0 and finite")]
-    NotPositive {
-        /// Which: "length", "width", "thickness" or "youngs_modulus".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
-    },
+    #[error(transparent)]
+    NotPositive(#[from] OutOfRange),
     /// No material has this Poisson's ratio.
     #[error("a plate's poissons_ratio is {value}; it must be greater than -1 and at most 0.5")]
     PoissonsRatio {
@@ -296,15 +292,12 @@ pub(super) fn check(spec: &PlateSpec) -> Result<(), PlateError> {
 }
 
 fn check_numbers(spec: &PlateSpec) -> Result<(), PlateError> {
-    let dimensions = [
-        ("length", spec.length_m),
-        ("width", spec.width_m),
-        ("thickness", spec.thickness_m),
-        ("youngs_modulus", spec.youngs_modulus_pa),
-    ];
-    if let Some((name, value)) = first_not_positive(&dimensions) {
-        return Err(PlateError::NotPositive { name, value });
-    }
+    OutOfRange::check_positive([
+        ("a plate's length", spec.length_m),
+        ("a plate's width", spec.width_m),
+        ("a plate's thickness", spec.thickness_m),
+        ("a plate's youngs_modulus", spec.youngs_modulus_pa),
+    ])?;
     let value = spec.poissons_ratio;
     if !(value > -1.0 && value <= 0.5) {
         return Err(PlateError::PoissonsRatio { value });

@@ -167,8 +167,7 @@ impl Surface for SupportedBeam {
     /// Over contact positions exact, as the extremes of cubics; over sensor positions by a scan of every element and golden
     /// section, to rounding. Found once, when the beam is made.
     fn full_scale(&self, kind: SensorKind) -> f64 {
-        let known = SensorKind::ALL.into_iter().zip(self.full_scales);
-        known.into_iter().find(|(other, _)| *other == kind).map_or(0.0, |(_, full_scale)| full_scale)
+        self.full_scales[kind as usize]
     }
 
     fn extent(&self) -> Extent {

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::surface::first_not_positive;
 use crate::units::{Dimension, Quantity, format_length_mm};
+use palpate_numerics::OutOfRange;
 
 /// A straight beam of rectangular sections and what holds it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,10 +107,10 @@ impl SupportedBeamSpec {
     /// # Errors
     /// [`SupportedBeamError`], for the first thing that is wrong.
     pub fn check(&self) -> Result<(), SupportedBeamError> {
-        let dimensions = [("length", self.length_m), ("youngs_modulus", self.youngs_modulus_pa)];
-        if let Some((name, value)) = first_not_positive(&dimensions) {
-            return Err(SupportedBeamError::NotPositive { name, value });
-        }
+        OutOfRange::check_positive([
+            ("a beam's length", self.length_m),
+            ("a beam's youngs_modulus", self.youngs_modulus_pa),
+        ])?;
         self.check_sections()?;
         self.check_supports()?;
         self.check_held()
@@ -125,10 +125,8 @@ impl SupportedBeamSpec {
         let mut from_m = 0.0;
         for (i, &BeamSection { to_m, width_m, thickness_m }) in self.sections.iter().enumerate() {
             let number = i + 1;
-            if let Some((name, value)) = first_not_positive(&[("width", width_m), ("thickness", thickness_m)])
-            {
-                return Err(SupportedBeamError::Section { number, name, value });
-            }
+            OutOfRange::check_positive([("the width", width_m), ("the thickness", thickness_m)])
+                .map_err(|fault| SupportedBeamError::Section { number, fault })?;
             if to_m.is_nan() || to_m <= from_m + slack_m {
                 return Err(SupportedBeamError::SectionsOverlap { number, from_m, to_m });
             }
@@ -158,11 +156,11 @@ impl SupportedBeamSpec {
                 return Err(SupportedBeamError::FreeWithin { number, at_m, length_m });
             }
             if let BeamSupportKind::Elastic { stiffness_n_per_m, rotational_stiffness_nm_per_rad } = kind {
-                let turning = rotational_stiffness_nm_per_rad.map(|value| ("rotational_stiffness", value));
-                let springs = [Some(("stiffness", stiffness_n_per_m)), turning];
-                if let Some((name, value)) = springs.into_iter().flatten().find(|(_, v)| !is_positive(*v)) {
-                    return Err(SupportedBeamError::Stiffness { number, name, value });
-                }
+                let turning =
+                    rotational_stiffness_nm_per_rad.map(|value| ("the rotational_stiffness", value));
+                let springs = [("the stiffness", stiffness_n_per_m)].into_iter().chain(turning);
+                OutOfRange::check_positive(springs)
+                    .map_err(|fault| SupportedBeamError::Stiffness { number, fault })?;
             }
             let together = |other: &BeamSupport| (other.at_m - at_m).abs() <= slack_m;
             if let Some(first) = self.supports[..i].iter().position(together) {
@@ -184,10 +182,6 @@ impl SupportedBeamSpec {
         };
         Err(SupportedBeamError::Mechanism { motion })
     }
-}
-
-fn is_positive(value: f64) -> bool {
-    value > 0.0 && value.is_finite()
 }
 
 impl SupportedBeamSpec {
@@ -237,32 +231,23 @@ fn kind_in_words(kind: BeamSupportKind) -> String {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SupportedBeamError {
     /// The length or the modulus is not a positive, finite number.
-    #[error("a beam's {name} is {value}; it must be greater than 0 and finite")]
-    NotPositive {
-        /// Which: "length" or "youngs_modulus".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
-    },
+    #[error(transparent)]
+    NotPositive(#[from] OutOfRange),
     /// A dimension of a section is not a positive, finite number.
-    #[error("section {number}: the {name} is {value}; it must be greater than 0 and finite")]
+    #[error("section {number}: {fault}")]
     Section {
         /// Which section.
         number: usize,
-        /// Which: "width" or "thickness".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
+        /// Which dimension, in SI units.
+        fault: OutOfRange,
     },
     /// A spring's stiffness is not a positive, finite number.
-    #[error("support {number}: the {name} is {value}; it must be greater than 0 and finite")]
+    #[error("support {number}: {fault}")]
     Stiffness {
         /// Which support.
         number: usize,
-        /// Which: "stiffness" or "rotational_stiffness".
-        name: &'static str,
-        /// Its value in SI units.
-        value: f64,
+        /// Which stiffness, in SI units.
+        fault: OutOfRange,
     },
     /// More sections than are computed.
     #[error("the beam has {found} sections; it can have at most {most}")]
@@ -412,7 +397,7 @@ impl SupportedBeamError {
     /// The part that is at fault.
     pub const fn part(&self) -> BeamPart {
         match *self {
-            Self::NotPositive { .. } | Self::Compliance { .. } => BeamPart::Whole,
+            Self::NotPositive(_) | Self::Compliance { .. } => BeamPart::Whole,
             Self::Section { number, .. }
             | Self::SectionsOverlap { number, .. }
             | Self::SectionBeyond { number, .. } => BeamPart::Section(number - 1),

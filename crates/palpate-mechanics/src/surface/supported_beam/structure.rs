@@ -133,11 +133,7 @@ impl Structure {
     fn pieces_left(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
         let Some(nearest) = around.left_element else { return Vec::new() };
         let states = self.forth.back_from(nearest, factors);
-        let piece = |(element, (start, end)): (usize, (State, State))| {
-            let Element { stiffness, .. } = self.elements[element];
-            Piece { from: self.nodes[element], to: self.nodes[element + 1], start, end, stiffness }
-        };
-        let mut pieces: Vec<Piece> = (0..=nearest).rev().zip(states).map(piece).collect();
+        let mut pieces = self.pieces((0..=nearest).rev(), states);
         if let Some(cut) = pieces.first_mut().filter(|_| nearest == site.element) {
             cut.to = cut.from + site.offset;
             cut.end = combined(around.left, factors);
@@ -146,16 +142,25 @@ impl Structure {
         pieces
     }
 
+    /// Whole elements with the states at their left and right ends.
+    fn pieces(
+        &self,
+        elements: impl Iterator<Item = usize>,
+        states: impl Iterator<Item = (State, State)>,
+    ) -> Vec<Piece> {
+        let piece = |(element, (start, end)): (usize, (State, State))| {
+            let Element { stiffness, .. } = self.elements[element];
+            Piece { from: self.nodes[element], to: self.nodes[element + 1], start, end, stiffness }
+        };
+        elements.zip(states).map(piece).collect()
+    }
+
     fn pieces_right(&self, site: Site, around: &Surroundings, factors: Factors) -> Vec<Piece> {
         let Some(nearest) = around.right_element else { return Vec::new() };
         let first = self.elements.len() - 1 - nearest;
         let states = self.back.back_from(nearest, factors);
-        let piece = |(element, (end, start)): (usize, (State, State))| {
-            let Element { stiffness, .. } = self.elements[element];
-            let [start, end] = [start, end].map(State::mirrored);
-            Piece { from: self.nodes[element], to: self.nodes[element + 1], start, end, stiffness }
-        };
-        let mut pieces: Vec<Piece> = (first..self.elements.len()).zip(states).map(piece).collect();
+        let states = states.map(|(end, start)| (start.mirrored(), end.mirrored()));
+        let mut pieces = self.pieces(first..self.elements.len(), states);
         if let Some(cut) = pieces.first_mut().filter(|_| first == site.element) {
             cut.from += site.offset;
             cut.start = combined(around.right, factors);
