@@ -1,6 +1,6 @@
 //! Rules that place the training positions.
 
-use palpate_mechanics::contact::Position;
+use palpate_mechanics::contact::{OffSurface, Position};
 use palpate_mechanics::surface::Extent;
 
 /// Rule that places the training positions.
@@ -95,19 +95,8 @@ pub enum ArrangementError {
         count: usize,
     },
     /// A position does not lie on the surface.
-    #[error(
-        "training position {number} is at {}, off the surface; it must be within {}",
-        extent.place_in_words(*position),
-        extent.bounds_in_words()
-    )]
-    OffSurface {
-        /// Which position, from 1.
-        number: usize,
-        /// Its position.
-        position: Position,
-        /// The surface.
-        extent: Extent,
-    },
+    #[error(transparent)]
+    OffSurface(#[from] OffSurface),
     /// A rule along a line, on a surface that has a width as well.
     #[error(
         "{count} training positions on a line do not say where they are on a plane; a plane needs a grid"
@@ -224,10 +213,8 @@ fn explicit(positions: &[Position], count: usize, extent: Extent) -> Result<Vec<
     if positions.len() != count {
         return Err(ArrangementError::CountDiffers { listed: positions.len(), count });
     }
-    match positions.iter().position(|position| !extent.contains(*position)) {
-        Some(i) => Err(ArrangementError::OffSurface { number: i + 1, position: positions[i], extent }),
-        None => Ok(positions.to_vec()),
-    }
+    OffSurface::check("training position", positions, extent)?;
+    Ok(positions.to_vec())
 }
 
 /// Training positions: the rule that places them, and how each is pressed.
@@ -291,6 +278,7 @@ impl Training {
 const ALONG_A_LINE: usize = 399;
 /// Positions on a plane at which an estimator is judged, about; more of them along its longer side.
 const ON_A_PLANE: f64 = 400.0;
+
 /// A spacing that makes no positions, or too many.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(

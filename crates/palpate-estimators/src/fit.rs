@@ -1,6 +1,7 @@
 //! The two traits of estimators: [`Fit`] calibrates, [`Locate`] locates; and the locator that fitting gives.
 
 use std::borrow::Borrow;
+use std::collections::VecDeque;
 
 use palpate_core::Estimate;
 use palpate_mechanics::sensing::Layout;
@@ -66,6 +67,36 @@ pub trait SeedQueue<T> {
     fn next_seed(&mut self) -> Option<u64>;
     /// Takes what a fit gave.
     fn fitted(&mut self, seed: u64, result: T);
+}
+
+/// A queue of listed seeds, which keeps the results.
+#[derive(Clone, Debug)]
+pub struct SeedList<T> {
+    waiting: VecDeque<u64>,
+    fitted: Vec<(u64, T)>,
+}
+
+impl<T> SeedList<T> {
+    /// A queue of these seeds, in this order.
+    pub fn new(seeds: impl IntoIterator<Item = u64>) -> Self {
+        Self { waiting: seeds.into_iter().collect(), fitted: Vec::new() }
+    }
+
+    /// Results of the seeds that have been fitted, by rising seed.
+    pub fn into_results(mut self) -> Vec<(u64, T)> {
+        self.fitted.sort_by_key(|(seed, _)| *seed);
+        self.fitted
+    }
+}
+
+impl<T> SeedQueue<T> for SeedList<T> {
+    fn next_seed(&mut self) -> Option<u64> {
+        self.waiting.pop_front()
+    }
+
+    fn fitted(&mut self, seed: u64, result: T) {
+        self.fitted.push((seed, result));
+    }
 }
 
 /// A queue of `U` as one of what `map` makes into `U`.
@@ -136,27 +167,17 @@ pub trait Fit {
     /// locator as [`Fit::fit_task`] does; methods that can, fit many seeds at once.
     ///
     /// ```
-    /// use palpate_estimators::fit::{Fit, FitTask, Fitted, SeedQueue};
-    /// use palpate_estimators::neighbours::{Neighbours, NeighboursLocator};
-    /// use palpate_estimators::{arrangement::Training, setup::Setup};
+    /// use palpate_estimators::fit::{Fit, FitTask, SeedList};
+    /// use palpate_estimators::{arrangement::Training, neighbours::Neighbours, setup::Setup};
     /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
-    ///
-    /// struct Seeds(Vec<u64>, Vec<Fitted<NeighboursLocator>>);
-    /// impl SeedQueue<Fitted<NeighboursLocator>> for Seeds {
-    ///     fn next_seed(&mut self) -> Option<u64> {
-    ///         self.0.pop()
-    ///     }
-    ///     fn fitted(&mut self, _seed: u64, locator: Fitted<NeighboursLocator>) {
-    ///         self.1.push(locator);
-    ///     }
-    /// }
     ///
     /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
     /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
     /// let presses = setup.simulate(&Training::even(10), 0)?;
-    /// let mut queue = Seeds(vec![2, 1, 0], Vec::new());
+    /// let mut queue = SeedList::new(0..3);
     /// Neighbours::default().fit_many(FitTask::new(&setup, &presses), &mut queue)?;
-    /// assert_eq!(queue.1[2].provenance.seed, 2);
+    /// let (seed, locator) = queue.into_results().remove(2);
+    /// assert_eq!((seed, locator.provenance.seed), (2, 2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

@@ -1,15 +1,18 @@
 //! Setups that tests of several modules share: those of the examples, as values.
 
+use std::fs::File;
+
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::ChannelModel;
 use palpate_mechanics::sensing::SensorKind::{Deflection, Strain};
+use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeam;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
-use palpate_mechanics::surface::{Beam, Digit, ForceDirection, Motion, Plate};
+use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate, SurfaceSpec};
 use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
+use palpate_testing::data;
 
 use crate::arrangement::Training;
-use crate::recording::{Columns, Frame, Recording};
+use crate::recording::{Columns, Frame, Recording, Row};
 use crate::setup::Setup;
 
 /// A setup, and how it is pressed to calibrate.
@@ -134,4 +137,36 @@ pub(crate) fn pad() -> Setup {
     let origin = Position { x_m: mm(274.0), y_m: mm(-115.0) };
     let columns = Columns::plane(2, 3, 2..=16usize).in_frame(Frame { origin, round_m: Some(mm(1.0)) });
     Setup::measured_plane(mm(30.0), mm(30.0), &names).unwrap().recorded_as(columns)
+}
+
+/// A bench without a model, read by raw channels.
+pub(crate) fn raw_setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
+    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
+    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
+}
+
+/// A recording of such a bench.
+pub(crate) fn raw_recording(rows: Vec<Row>) -> Recording {
+    let channels = rows.first().map_or(0, |row| row.reading.len());
+    Recording::new(&Layout::even(SensorKind::Raw, channels, 1.0), "test", rows)
+}
+
+/// The strip and a recording of it, from the folder of real recordings; `None`, said in one line, where the folder is absent.
+pub(crate) fn strip_recording(file: &str) -> Option<(Setup, Recording)> {
+    let path = data::recording(&format!("tactile-fsi/{file}"))?;
+    let setup = strip();
+    let recording = setup.read_recording(file, File::open(path).unwrap()).unwrap();
+    Some((setup, recording))
+}
+
+/// The pad and its recording, from the same folder.
+pub(crate) fn pad_recording() -> Option<(Setup, Recording)> {
+    let [readings, contacts] = ["readings", "contacts"].map(|name| {
+        let path = data::recording(&format!("eflesh/fixed-depth-{name}.csv"))?;
+        Some((name, File::open(path).unwrap()))
+    });
+    let setup = pad();
+    let recording = setup.read_recording_pair(readings?, contacts?).unwrap();
+    assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
+    Some((setup, recording))
 }

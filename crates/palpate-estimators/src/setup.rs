@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::arrangement::inner_grid;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
-use palpate_mechanics::contact::Position;
+use palpate_mechanics::contact::{OffSurface, Position};
 use palpate_mechanics::limit::{CramerRaoBound, LimitError};
 use palpate_mechanics::sensing::{
     Layout, LayoutError, Placement, Sensor, SensorGroup, SensorKind, even_positions,
@@ -32,19 +32,8 @@ pub struct Setup {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetupError {
     /// A sensor beside the surface.
-    #[error(
-        "sensor {number} is at {}, off the surface; it must be within {}",
-        extent.place_in_words(*position),
-        extent.bounds_in_words()
-    )]
-    OffSurface {
-        /// Which sensor of its group, from 1.
-        number: usize,
-        /// Its position.
-        position: Position,
-        /// The surface.
-        extent: Extent,
-    },
+    #[error(transparent)]
+    OffSurface(#[from] OffSurface),
     /// A reaction sensor where nothing supports the surface.
     #[error("reaction sensor {number} is at {}, where no support takes up force", extent.place_in_words(*position))]
     NoSupport {
@@ -116,7 +105,7 @@ pub fn check_sensor(
         return Err(SetupError::NotAGauge { kind });
     }
     if !extent.contains(position) {
-        return Err(SetupError::OffSurface { number, position, extent });
+        return Err(OffSurface { what: "sensor", number, position, extent }.into());
     }
     let Some(model) = surface.model() else { return Ok(()) };
     if kind == SensorKind::Raw {

@@ -8,9 +8,9 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::arrangement::{ArrangementError, Training};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
-use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::contact::{Contact, OffSurface, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
 use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
 use palpate_numerics::OutOfRange;
@@ -36,19 +36,8 @@ pub enum SimulateError {
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// A position does not lie on the surface.
-    #[error(
-        "position {number} is at {}, off the surface; it must be within {}",
-        extent.place_in_words(*position),
-        extent.bounds_in_words()
-    )]
-    OffSurface {
-        /// Which position, from 1.
-        number: usize,
-        /// Its position.
-        position: Position,
-        /// The surface.
-        extent: Extent,
-    },
+    #[error(transparent)]
+    OffSurface(#[from] OffSurface),
 }
 
 /// The sensors of a layout under a surface with a model, each with its response function.
@@ -107,22 +96,18 @@ pub fn simulate_at(
 ) -> Result<Recording, SimulateError> {
     let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
+    OffSurface::check("position", positions, surface.extent())?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     let sensors = CleanSensors::new(surface, &placed);
     let mut rows = Vec::new();
-    for (i, position) in positions.iter().copied().enumerate() {
-        if !surface.contains(position) {
-            return Err(SimulateError::OffSurface { number: i + 1, position, extent: surface.extent() });
-        }
+    for position in positions.iter().copied() {
         let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
             let reading = measure(&setup.layout, &clean, &errors, &mut rng);
             rows.push(Row { position, force_n: Some(force_n), nuisance: None, reading });
         }
     }
-    let source = "simulation".to_owned();
-    let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
-    Ok(Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance })
+    Ok(Recording::new(&setup.layout, "simulation", rows).seeded(seed))
 }
 
 /// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels

@@ -6,6 +6,37 @@ pub use palpate_core::{Contact, Position};
 
 use crate::units::format_length_mm;
 
+/// A position beside the surface.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "{what} {number} is at {}, off the surface; it must be within {}",
+    extent.place_in_words(*position),
+    extent.bounds_in_words()
+)]
+pub struct OffSurface {
+    /// Name of what lies there.
+    pub what: &'static str,
+    /// Its number in its list, from 1.
+    pub number: usize,
+    /// Its position.
+    pub position: Position,
+    /// The surface.
+    pub extent: Extent,
+}
+
+impl OffSurface {
+    /// Checks that all of a list of positions lie on a surface.
+    ///
+    /// # Errors
+    /// [`OffSurface`] for the first that does not.
+    pub fn check(what: &'static str, positions: &[Position], extent: Extent) -> Result<(), Self> {
+        match positions.iter().position(|position| !extent.contains(*position)) {
+            Some(i) => Err(Self { what, number: i + 1, position: positions[i], extent }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The line or rectangle on which contacts lie.
 ///
 /// ```

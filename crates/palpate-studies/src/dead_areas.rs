@@ -12,7 +12,7 @@ use serde::Serialize;
 use palpate_estimators::centroid::Centroid;
 use palpate_estimators::estimator::{Estimator, contenders};
 use palpate_estimators::evaluation::{Evaluation, Located, Split, evaluate_splits};
-use palpate_estimators::recording::{Provenance, Recording, Row};
+use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::contact::Position;
@@ -274,10 +274,8 @@ impl ArraySensor {
                 reading: reading.collect(),
             }
         };
-        let rows: Vec<Row> = positions.iter().map(row).collect();
-        let source = "simulation of an array sensor".to_owned();
-        let provenance = Provenance { source, rows: rows.len(), digests: Vec::new(), seed: Some(seed) };
-        Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
+        let rows = positions.iter().map(row).collect();
+        Recording::new(layout, "simulation of an array sensor", rows).seeded(seed)
     }
 }
 

@@ -41,13 +41,7 @@ fn one_by_one_prepared(network: &PreparedNetwork, inputs: &[f64]) {
 }
 
 fn one_by_one(topology: &Topology, weights: &[f64], inputs: &[f64]) {
-    let network = palpate_core::Network {
-        sizes: &topology.sizes,
-        biases: topology.biases,
-        hidden_activation: topology.hidden_activation,
-        output_activation: topology.output_activation,
-        weights,
-    };
+    let network = topology.network(weights);
     let (mut output, mut scratch) = ([0.0], [0.0; 20]);
     for reading in inputs.chunks_exact(8) {
         let sent = network.forward_into(black_box(reading), &mut output, &mut scratch);

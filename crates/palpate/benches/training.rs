@@ -2,10 +2,10 @@
 //! after the other; one core, in CPU time, the rounds interleaved so that a busy machine slows all alike; medians.
 
 use cpu_time::ThreadTime;
-use palpate_estimators::fit::SeedQueue;
+use palpate_estimators::fit::SeedList;
 use palpate_estimators::network::{
-    BackPropagation, Network, Precision, PresentationOrder, Topology, TrainedNetwork, TrainingSet,
-    TrainingTask, train_many, train_one,
+    BackPropagation, Network, Precision, PresentationOrder, Topology, TrainingSet, TrainingTask, train_many,
+    train_one,
 };
 use palpate_numerics::median;
 use palpate_numerics::simd::InstructionSet;
@@ -38,7 +38,7 @@ fn price_of_shuffling(precision: Precision) {
                 ..BackPropagation::default()
             };
             let task = TrainingTask { topology: &topology, patterns: &patterns, rule: &rule };
-            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
+            let mut queue = SeedList::new(0..4 * precision.lanes() as u64);
             let start = ThreadTime::now();
             train_many(set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             start.elapsed().as_secs_f64()
@@ -65,7 +65,7 @@ fn compare(count: usize, precision: Precision) {
         }
         rates[0].push(f64::from(4 * EPOCHS) * count as f64 / start.elapsed().as_secs_f64());
         for (set, rates) in sets.iter().zip(&mut rates[1..]) {
-            let mut queue = Seeds { left: 4 * precision.lanes() as u64 };
+            let mut queue = SeedList::new(0..4 * precision.lanes() as u64);
             let start = ThreadTime::now();
             train_many(*set, precision, &task, &mut queue, Watch::NONE).expect("nobody stops it");
             let presentations = f64::from(EPOCHS) * (count * 4 * precision.lanes()) as f64;
@@ -76,20 +76,6 @@ fn compare(count: usize, precision: Precision) {
     println!("{count} patterns, {precision:?}: one after the other {:.2} M/s", medians[0] / 1e6);
     for (set, rate) in sets.iter().zip(&medians[1..]) {
         println!("    {set:<12} {:>7.2} M/s  {:>5.2} x", rate / 1e6, rate / medians[0]);
-    }
-}
-
-struct Seeds {
-    left: u64,
-}
-
-impl SeedQueue<TrainedNetwork> for Seeds {
-    fn next_seed(&mut self) -> Option<u64> {
-        self.left = self.left.checked_sub(1)?;
-        Some(self.left)
-    }
-    fn fitted(&mut self, _: u64, network: TrainedNetwork) {
-        std::hint::black_box(network);
     }
 }
 

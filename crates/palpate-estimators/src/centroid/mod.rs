@@ -175,7 +175,7 @@ pub struct CentroidLocator {
     pub extent: Extent,
     /// One over the largest training reading of the channel's kind, in the inverse of its unit; 0 for a dead channel.
     pub channel_scales: Vec<f64>,
-    /// What the magnitudes weigh.
+    /// Points of which the centroid is taken.
     pub weighing: Weighing,
     /// A row for x, and one for y on a two-dimensional surface: with [`Weighing::Positions`] the factor of the
     /// centroid's x (and y), then a constant in metres; with [`Weighing::Channels`] a position in metres a channel.
@@ -186,7 +186,7 @@ pub struct CentroidLocator {
     pub spread: Option<HeldOutErrors>,
 }
 
-/// What the channels' magnitudes weigh.
+/// Points that the channels' magnitudes weight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weighing {

@@ -2,20 +2,15 @@
 
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
 
-fn recording(setup: &Setup, rows: Vec<Row>) -> Recording {
-    let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };
-    Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance }
-}
-
 fn fit(setup: &Setup, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitError> {
-    let recording = recording(setup, rows);
+    let recording = Recording::new(&setup.layout, "test", rows);
     let task = FitTask::new(setup, &recording);
     let locator = Centroid.fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));

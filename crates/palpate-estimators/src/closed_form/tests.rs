@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
@@ -39,9 +39,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
         nuisance: None,
         reading: vec![0.0; setup.layout.len()],
     };
-    let provenance = Provenance { source: "test".into(), rows: 1, digests: vec![], seed: None };
-    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
-    let recording = Recording { channels, kinds, rows: vec![row], provenance };
+    let recording = Recording::new(&setup.layout, "test", vec![row]);
     let task = FitTask::new(setup, &recording);
     let locator = ClosedForm.fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));

@@ -11,10 +11,11 @@
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::likelihood::ContactFit;
+use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::simulate::{CleanSensors, simulate_at};
+use crate::simulate::CleanSensors;
 use crate::status::{LINE_PLACES, OTHER_PLACE, contact_cost, misfit_bound};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
@@ -776,7 +777,7 @@ fn deviations(contact: &ContactEstimate) -> [[f64; 2]; 2] {
 
 /// A locator by the linear theory, and the exact readings that it is asked for.
 pub struct LinearTheory<'a> {
-    locator: Fitted<DigitLocator>,
+    locator: DigitLocator,
     sensors: CleanSensors<'a>,
 }
 
@@ -784,17 +785,16 @@ impl<'a> LinearTheory<'a> {
     /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
     pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
         let unknown = Setup { force_n: None, ..setup.clone() };
-        let pressed = Setup { force_n: Some(digit.characteristic_force_n()), ..setup.clone() };
         // The estimator learns nothing, but every fit wants a recording.
-        let recording = simulate_at(&pressed, &[Position::along(digit.length_m())], 1, 0).ok()?;
-        let locator = DigitEstimator { theory: DigitTheory::Linear }.fit(&unknown, &recording).ok()?;
+        let recording = Recording::new(&setup.layout, "", Vec::new());
+        let task = FitTask::new(&unknown, &recording);
+        let locator = DigitEstimator { theory: DigitTheory::Linear }.fit_method(task).ok()?;
         Some(Self { locator, sensors: CleanSensors::new(digit, &setup.layout) })
     }
 
-    /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for what is not found.
+    /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for a force that is not found.
     pub fn errors(&self, contact: Contact) -> [f64; 2] {
-        let Ok(estimate) = self.locator.locate(&self.sensors.reading(contact)) else { return [f64::NAN; 2] };
-        let found = estimate.contact;
+        let found = self.locator.locate(&self.sensors.reading(contact)).contact;
         let off_n = found.force_n.map_or(f64::NAN, |force_n| (force_n - contact.force_n).abs());
         [found.position.distance_m(contact.position), off_n]
     }

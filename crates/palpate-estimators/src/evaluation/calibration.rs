@@ -1,10 +1,8 @@
 //! Simulated calibrations: press a setup with faulty sensors, fit, touch it, locate.
 
-use std::collections::VecDeque;
-
 use super::{Evaluation, EvaluationError, Split};
 use crate::arrangement::{ArrangementError, Training, all_over};
-use crate::fit::{Fit, FitTask, Fitted, SeedQueue};
+use crate::fit::{Fit, FitTask, Fitted, SeedList};
 use crate::setup::Setup;
 use crate::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
@@ -150,19 +148,18 @@ impl Calibration {
         seeds: impl IntoIterator<Item = u64>,
         watch: Watch,
     ) -> Result<Vec<Calibrated<E::Method>>, EvaluationError<E::Error>> {
-        let seeds: VecDeque<u64> = seeds.into_iter().collect();
-        let (Some(&seed), true) = (seeds.front(), self.is_faultless()) else {
+        let seeds: Vec<u64> = seeds.into_iter().collect();
+        let (Some(&seed), true) = (seeds.first(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
         let Split { training, judged } = self.simulate(seed)?;
-        let mut queue = Queue { seeds, fitted: Vec::new() };
+        let mut queue = SeedList::new(seeds);
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;
-        queue.fitted.sort_by_key(|(seed, _)| *seed);
         let judge = |(seed, locator)| {
             Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
         };
-        queue.fitted.into_iter().map(judge).collect()
+        queue.into_results().into_iter().map(judge).collect()
     }
 
     /// Whether every channel reports what its sensor reads.
@@ -173,20 +170,4 @@ impl Calibration {
 
 fn repeated(positions: &[Position], times: usize) -> Vec<Position> {
     positions.iter().flat_map(|at| std::iter::repeat_n(*at, times)).collect()
-}
-
-/// The seeds of some fits, and the locators that they gave, in any order.
-struct Queue<M> {
-    seeds: VecDeque<u64>,
-    fitted: Vec<(u64, Fitted<M>)>,
-}
-
-impl<M> SeedQueue<Fitted<M>> for Queue<M> {
-    fn next_seed(&mut self) -> Option<u64> {
-        self.seeds.pop_front()
-    }
-
-    fn fitted(&mut self, seed: u64, locator: Fitted<M>) {
-        self.fitted.push((seed, locator));
-    }
 }

@@ -5,7 +5,7 @@ use crate::recording::Recording;
 use crate::setup::Setup;
 use palpate_numerics::mean_and_variance;
 
-/// Which numbers a reading becomes.
+/// Kind of features that a reading is turned into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureKind {
@@ -38,7 +38,7 @@ pub struct NoFeatures {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Features {
-    /// Which numbers a reading becomes.
+    /// Kind of features that a reading is turned into.
     pub kind: FeatureKind,
     /// The channels that are looked at.
     pub channels: Vec<ChannelScale>,

@@ -6,30 +6,16 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
+use crate::evaluation::{ErrorSummary, cross_validate};
 use crate::fit::{Fit, FitTask, Locate};
-use crate::recording::{Provenance, Recording, Row};
+use crate::fixtures::{pad_recording, raw_recording, raw_setup, strip_recording};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
-use palpate_testing::data::recording;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::mm;
 
 const EXTENT: Extent = Extent::Line { length_m: 0.4 };
-
-fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
-    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
-    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
-}
-
-fn recording_of(rows: Vec<Row>) -> Recording {
-    let channels = rows.first().map_or(0, |row| row.reading.len());
-    Recording {
-        channels: (0..channels).map(|c| format!("c{c}")).collect(),
-        kinds: vec![SensorKind::Raw; channels],
-        provenance: Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None },
-        rows,
-    }
-}
 
 fn fit(setup: &Setup, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
     let task = FitTask::new(setup, recording).seed(1);
@@ -56,8 +42,8 @@ fn it_locates_and_its_intervals_cover() {
             let x_m = rng.random_range(0.0..0.4);
             bells(x_m, force_n, 0.01, rng)
         };
-        let setup = setup(EXTENT, 4, force_n);
-        let recording = recording_of((0..200).map(|_| press(&mut rng)).collect());
+        let setup = raw_setup(EXTENT, 4, force_n);
+        let recording = raw_recording((0..200).map(|_| press(&mut rng)).collect());
         let locator = fit(&setup, &recording).unwrap();
         assert_eq!(locator.check(&setup), Ok(()));
         let (mut covered, mut square_m2) = (0, 0.0);
@@ -84,8 +70,8 @@ fn a_pad_is_two_dimensional() {
         reading[..4].iter_mut().for_each(|value| *value *= 0.4 + 0.2 * f64::from(i % 4));
         Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, reading }
     });
-    let setup = setup(extent, 5, None);
-    let locator = fit(&setup, &recording_of(rows.collect())).unwrap();
+    let setup = raw_setup(extent, 5, None);
+    let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
     assert_eq!(locator.check(&setup), Ok(()));
     // Between the grid's points, with half a newton, and the dead channel reading otherwise.
     let estimate = locator.locate(&[0.375, 0.125, 0.375, 0.125, 0.0].map(|r: f64| 0.5 * r));
@@ -103,8 +89,8 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
         let x_m = 0.01 * f64::from(i);
         Row { position: Position::along(x_m), force_n: None, nuisance: None, reading: vec![x_m, 1.0 - x_m] }
     });
-    let setup = setup(EXTENT, 2, Some(1.0));
-    let locator = fit(&setup, &recording_of(rows.collect())).unwrap();
+    let setup = raw_setup(EXTENT, 2, Some(1.0));
+    let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
     assert_eq!(locator.locate(&[0.42, 0.58]).status, Status::OutsideSurface);
     assert_eq!(locator.locate(&[0.2, 0.8]).status, Status::Located);
 }
@@ -112,23 +98,23 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
 #[test]
 fn recordings_that_say_nothing_are_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
-    let setup = setup(EXTENT, 4, None);
-    let one_place = recording_of((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());
+    let setup = raw_setup(EXTENT, 4, None);
+    let one_place = raw_recording((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());
     assert!(matches!(fit(&setup, &one_place), Err(GaussianProcessError::Positions(_))));
-    let mut still = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
+    let mut still = raw_recording(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
     still.rows[1].reading = still.rows[0].reading.clone();
     assert!(matches!(fit(&setup, &still), Err(GaussianProcessError::Features(_))));
     still.rows[1].reading[0] = f64::NAN;
     assert!(fit(&setup, &still).is_err());
-    let two = recording_of(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
+    let two = raw_recording(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
     assert!(fit(&setup, &two).is_ok());
 }
 
 #[test]
 fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
-    let recording = recording_of((0..40).map(|i| bells(0.01 * f64::from(i), 1.0, 1e-3, &mut rng)).collect());
-    let bench_4 = setup(EXTENT, 4, Some(1.0));
+    let recording = raw_recording((0..40).map(|i| bells(0.01 * f64::from(i), 1.0, 1e-3, &mut rng)).collect());
+    let bench_4 = raw_setup(EXTENT, 4, Some(1.0));
     let locator = fit(&bench_4, &recording).unwrap();
     let text = serde_json::to_string(&locator).unwrap();
     let back: GaussianProcessLocator = serde_json::from_str(&text).unwrap();
@@ -136,9 +122,9 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let reading = bells(0.123, 1.0, 0.0, &mut rng).reading;
     let (here, there) = (locator.locate(&reading), back.locate(&reading));
     assert!((here.contact.position.x_m - there.contact.position.x_m).abs() < 1e-9);
-    assert!(back.check(&setup(EXTENT, 2, Some(1.0))).is_err());
+    assert!(back.check(&raw_setup(EXTENT, 2, Some(1.0))).is_err());
     assert!(
-        back.check(&setup(Extent::Plane { length_m: EXTENT.length_m(), width_m: 0.1 }, 4, Some(1.0)))
+        back.check(&raw_setup(Extent::Plane { length_m: EXTENT.length_m(), width_m: 0.1 }, 4, Some(1.0)))
             .is_err()
     );
     let mut damaged = back;
@@ -146,54 +132,13 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     assert!(damaged.check(&bench_4).is_err());
 }
 
-/// Median, mean and root mean square of the distance in mm, and the share of x within its interval, pooled over five
-/// folds by position.
-struct Pooled {
-    median_mm: f64,
-    mean_mm: f64,
-    rmse_mm: f64,
-    coverage: f64,
-}
-
-fn five_folds(setup: &Setup, recording: &Recording) -> Pooled {
-    let (mut errors_mm, mut covered) = (Vec::new(), 0);
-    for fold in recording.folds(5).unwrap() {
-        let locator = fit(setup, &recording.subset(&fold.training)).unwrap();
-        for row in fold.held_out.iter().map(|i| &recording.rows[*i]) {
-            let contact = locator.locate(&row.reading).contact;
-            errors_mm.push(1e3 * contact.position.distance_m(row.position));
-            let (low_m, high_m) = contact.uncertainty.unwrap().x_95_m;
-            covered += usize::from((low_m..high_m).contains(&row.position.x_m));
-        }
-    }
-    errors_mm.sort_by(f64::total_cmp);
-    let count = errors_mm.len() as f64;
-    Pooled {
-        median_mm: errors_mm[errors_mm.len() / 2],
-        mean_mm: errors_mm.iter().sum::<f64>() / count,
-        rmse_mm: (errors_mm.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
-        coverage: covered as f64 / count,
-    }
-}
-
-/// The numbers of a CSV in the folder of other people's recordings, or `None` where the folder is absent and may be.
-fn numbers(file: &str) -> Option<Vec<Vec<f64>>> {
-    let path = recording(file)?;
-    let text = std::fs::read_to_string(path).unwrap();
-    let rows = text.lines().filter(|line| !line.starts_with('X'));
-    Some(rows.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect())
-}
-
-/// A strip of `tactile-fsi`: X in mm, two pressures, force, depth.
-fn strip(file: &str) -> Option<(Setup, Recording)> {
-    let row = |cells: &Vec<f64>| Row {
-        position: Position::along(1e-3 * cells[0]),
-        force_n: None,
-        nuisance: None,
-        reading: cells[1..3].to_vec(),
-    };
-    let rows = numbers(&format!("tactile-fsi/{file}"))?.iter().map(row).collect();
-    Some((setup(Extent::Line { length_m: 0.1 }, 2, None), recording_of(rows)))
+/// Errors over five folds by position.
+fn five_folds(name: &str, setup: &Setup, recording: &Recording) -> (ErrorSummary, f64) {
+    let task = FitTask::new(setup, recording).seed(1);
+    let held_out = cross_validate(&GaussianProcessEstimator::default(), task, 5).unwrap();
+    let (errors, coverage) = (held_out.summary(None).unwrap(), held_out.coverage_percent().unwrap());
+    eprintln!("{name}: {errors:?}, coverage {coverage:.1} %");
+    (errors, coverage)
 }
 
 /// Its hyperparameters come from other starts and a prior, so scikit-learn's figures are met within a hundredth.
@@ -202,13 +147,11 @@ const SLACK: f64 = 1.01;
 /// Fails when median and mean are beyond scikit-learn's. One error for the whole strip stands for noise that is not the
 /// same everywhere, so intervals cover what they promise only roughly: 90, 96 and 94 % over water, oil and air.
 fn check_strip(file: &str, median_mm: f64, mean_mm: f64) {
-    let Some((setup, recording)) = strip(file) else { return };
-    let found = five_folds(&setup, &recording);
-    let Pooled { median_mm: median, mean_mm: mean, rmse_mm: rmse, coverage } = found;
-    eprintln!("{file}: median {median:.3} mean {mean:.3} rmse {rmse:.3} mm, coverage {coverage:.3}");
-    let as_good = median <= SLACK * median_mm && mean <= SLACK * mean_mm;
-    assert!(as_good, "{file}: {median:.4} {mean:.4}");
-    assert!((0.88..0.98).contains(&coverage), "{file}: {coverage}");
+    let Some((setup, recording)) = strip_recording(file) else { return };
+    let (errors, coverage) = five_folds(file, &setup, &recording);
+    let as_good = errors.median_m <= SLACK * mm(median_mm) && errors.average_m <= SLACK * mm(mean_mm);
+    assert!(as_good, "{file}: {errors:?}");
+    assert!((88.0..98.0).contains(&coverage), "{file}: {coverage}");
 }
 
 #[test]
@@ -230,17 +173,7 @@ fn a_strip_over_air_is_as_scikit_learn_has_it() {
 #[test]
 #[ignore = "takes a minute"]
 fn a_magnetic_pad_is_as_scikit_learn_has_it() {
-    let Some(contacts) = numbers("eflesh/fixed-depth-contacts.csv") else { return };
-    let Some(readings) = numbers("eflesh/fixed-depth-readings.csv") else { return };
-    let least = |k: usize| contacts.iter().map(|c| c[k].round()).fold(f64::MAX, f64::min);
-    let (left, low) = (least(1), least(2));
-    let rows = contacts.iter().zip(&readings).map(|(contact, reading)| {
-        let (x_m, y_m) = (1e-3 * (contact[1].round() - left), 1e-3 * (contact[2].round() - low));
-        Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, reading: reading[1..].to_vec() }
-    });
-    let recording = recording_of(rows.collect());
-    let setup = setup(Extent::Plane { length_m: 0.03, width_m: 0.03 }, 15, None);
-    let Pooled { median_mm, mean_mm, rmse_mm, coverage } = five_folds(&setup, &recording);
-    eprintln!("eflesh: median {median_mm:.3} mean {mean_mm:.3} rmse {rmse_mm:.3} mm, coverage {coverage:.3}");
-    assert!(median_mm <= SLACK * 0.312 && mean_mm <= SLACK * 0.343, "{median_mm} {mean_mm}");
+    let Some((setup, recording)) = pad_recording() else { return };
+    let (errors, _) = five_folds("eflesh", &setup, &recording);
+    assert!(errors.median_m <= SLACK * mm(0.312) && errors.average_m <= SLACK * mm(0.343), "{errors:?}");
 }

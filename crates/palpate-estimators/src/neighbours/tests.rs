@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -32,9 +32,7 @@ fn grid(force_n: f64) -> Vec<Row> {
 }
 
 fn fit(setup: &Setup, rows: Vec<Row>) -> Result<NeighboursLocator, NeighboursFitError> {
-    let provenance = Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None };
-    let recording =
-        Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance };
+    let recording = Recording::new(&setup.layout, "test", rows);
     let task = FitTask::new(setup, &recording);
     let locator = Neighbours::default().fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));

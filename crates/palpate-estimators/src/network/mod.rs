@@ -208,11 +208,22 @@ impl Topology {
         (0..self.layers()).map(|layer| self.rows(layer) * self.row_len(layer)).sum()
     }
 
-    /// The same of a shape that may be nonsense: `None` when there is no such number.
+    /// Number of weights, biases included, of a shape from a file; `None` where it overflows.
     pub(crate) fn checked_weight_count(&self) -> Option<usize> {
         self.sizes.windows(2).try_fold(0usize, |sum, pair| {
             pair[1].checked_mul(pair[0].checked_add(usize::from(self.biases))?)?.checked_add(sum)
         })
+    }
+
+    /// The network of this shape with these weights, as it runs on a chip.
+    pub fn network<'a>(&'a self, weights: &'a [f64]) -> palpate_core::Network<'a> {
+        palpate_core::Network {
+            sizes: &self.sizes,
+            biases: self.biases,
+            hidden_activation: self.hidden_activation,
+            output_activation: self.output_activation,
+            weights,
+        }
     }
 }
 

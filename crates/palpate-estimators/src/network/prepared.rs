@@ -228,13 +228,7 @@ mod tests {
 
     /// The pass of `palpate-core`.
     fn core(topology: &Topology, weights: &[f64], inputs: &[f64]) -> Vec<f64> {
-        let network = palpate_core::Network {
-            sizes: &topology.sizes,
-            biases: topology.biases,
-            hidden_activation: topology.hidden_activation,
-            output_activation: topology.output_activation,
-            weights,
-        };
+        let network = topology.network(weights);
         let mut outputs = vec![0.0; topology.outputs()];
         network.forward_into(inputs, &mut outputs, &mut vec![0.0; network.scratch_len()]).unwrap();
         outputs

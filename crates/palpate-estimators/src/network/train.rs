@@ -16,7 +16,7 @@ use super::{
     Activation, BackPropagation, PresentationOrder, Topology, TrainedNetwork, TrainingOutcome, TrainingSet,
     logistic,
 };
-use crate::fit::SeedQueue;
+use crate::fit::{SeedList, SeedQueue};
 use order::{OrderDrawer, Streams, column_len};
 use palpate_numerics::simd::{InstructionSet, Kernel, LOOK_UP, Real, Simd, Vector, run_loops};
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -65,7 +65,7 @@ pub fn train_many(
     queue: &mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch,
 ) -> Result<(), Cancelled> {
-    set.run(InLanes(Training { precision, task, queue, watch }))
+    set.run(Training::<false> { precision, task, queue, watch })
 }
 
 /// Trains one network: the same bits as [`train_many`] gives for the seed.
@@ -78,63 +78,39 @@ pub fn train_one(
     seed: u64,
     watch: Watch,
 ) -> Result<TrainedNetwork, Cancelled> {
-    let mut queue = OneSeed { seed: Some(seed), network: None };
-    run_loops(Alone(Training { precision, task, queue: &mut queue, watch }))?;
-    Ok(queue.network.expect("a queue that nobody stops is trained to its end"))
+    let mut queue = SeedList::new([seed]);
+    run_loops(Training::<true> { precision, task, queue: &mut queue, watch })?;
+    let trained = queue.into_results().pop();
+    Ok(trained.expect("a queue that nobody stops is trained to its end").1)
 }
 
-struct Training<'a> {
+/// Training of networks one after the other where they are `ALONE`, as one is trained faster so than among lanes that are idle; else
+/// side by side, one a lane.
+struct Training<'a, const ALONE: bool> {
     precision: Precision,
     task: &'a TrainingTask<'a>,
     queue: &'a mut dyn SeedQueue<TrainedNetwork>,
     watch: Watch<'a>,
 }
 
-/// Networks side by side, one a lane.
-struct InLanes<'a>(Training<'a>);
-
-impl Kernel for InLanes<'_> {
+impl<const ALONE: bool> Kernel for Training<'_, ALONE> {
     type Output = Result<(), Cancelled>;
     const FUSED: bool = true;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Result<(), Cancelled> {
-        let Training { precision, task, queue, watch } = self.0;
-        match precision {
-            Precision::F64 => train::<S, S::F64, 8>(task, queue, watch),
-            Precision::F32 => train::<S, S::F32, 16>(task, queue, watch),
+        let Self { precision, task, queue, watch } = self;
+        if const { ALONE } {
+            match precision {
+                Precision::F64 => train::<S, S::Array<f64, 1>, 1>(task, queue, watch),
+                Precision::F32 => train::<S, S::Array<f32, 1>, 1>(task, queue, watch),
+            }
+        } else {
+            match precision {
+                Precision::F64 => train::<S, S::F64, 8>(task, queue, watch),
+                Precision::F32 => train::<S, S::F32, 16>(task, queue, watch),
+            }
         }
-    }
-}
-
-/// Networks one after the other: one is trained faster alone than among lanes that are idle.
-struct Alone<'a>(Training<'a>);
-
-impl Kernel for Alone<'_> {
-    type Output = Result<(), Cancelled>;
-    const FUSED: bool = true;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Result<(), Cancelled> {
-        let Training { precision, task, queue, watch } = self.0;
-        match precision {
-            Precision::F64 => train::<S, S::Array<f64, 1>, 1>(task, queue, watch),
-            Precision::F32 => train::<S, S::Array<f32, 1>, 1>(task, queue, watch),
-        }
-    }
-}
-
-struct OneSeed {
-    seed: Option<u64>,
-    network: Option<TrainedNetwork>,
-}
-
-impl SeedQueue<TrainedNetwork> for OneSeed {
-    fn next_seed(&mut self) -> Option<u64> {
-        self.seed.take()
-    }
-    fn fitted(&mut self, _: u64, network: TrainedNetwork) {
-        self.network = Some(network);
     }
 }
 
@@ -209,6 +185,21 @@ struct Layer<V> {
     deltas: Vec<V>,
 }
 
+impl<V: Copy> Layer<V> {
+    /// Weighted layer `k` with weights of 0.
+    fn new(topology: &Topology, k: usize, zero: V, one: V) -> Self {
+        let (weights, nodes) = (topology.rows(k) * topology.row_len(k), topology.rows(k));
+        Self {
+            activation: topology.activation(k),
+            row_len: topology.row_len(k),
+            weights: vec![zero; weights],
+            before: vec![zero; weights],
+            outputs: vec![one; nodes + usize::from(topology.biases)],
+            deltas: vec![zero; nodes + usize::from(topology.biases)],
+        }
+    }
+}
+
 struct Group<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> {
     task: &'t TrainingTask<'t>,
     /// The patterns, a column an input and a column an output.
@@ -232,14 +223,6 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
         let (topology, patterns) = (task.topology, task.patterns);
         let one = V::splat(V::Real::from_f64(1.0));
         let zero = V::splat(V::Real::from_f64(0.0));
-        let layer = |k: usize| Layer {
-            activation: topology.activation(k),
-            row_len: topology.row_len(k),
-            weights: vec![zero; topology.rows(k) * topology.row_len(k)],
-            before: vec![zero; topology.rows(k) * topology.row_len(k)],
-            outputs: vec![one; topology.rows(k) + usize::from(topology.biases)],
-            deltas: vec![zero; topology.rows(k) + usize::from(topology.biases)],
-        };
         let identity: Vec<[u32; N]> = (0..patterns.count()).map(|pattern| [pattern as u32; N]).collect();
         Self {
             task,
@@ -253,7 +236,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
             inputs: vec![one; topology.row_len(0)],
             next_inputs: vec![one; topology.row_len(0)],
             targets: vec![zero; topology.outputs()],
-            layers: (0..topology.layers()).map(layer).collect(),
+            layers: (0..topology.layers()).map(|k| Layer::new(topology, k, zero, one)).collect(),
         }
     }
 

@@ -5,7 +5,7 @@ use std::io::Read;
 use super::cells::Cells;
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem};
-use super::{Provenance, Recording, Row, sha256_hex};
+use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Extent;
@@ -39,7 +39,7 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
         let row = contact.row(cells, schema)?;
         Ok(Row { reading: channels.reading(cells)?, ..row })
     })?;
-    Ok(schema.recording(source.to_owned(), rows, vec![file.digest]))
+    Ok(schema.recording(source, rows, vec![file.digest]))
 }
 
 /// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the position and force
@@ -74,7 +74,7 @@ pub fn read_pair(
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
     let rows = rows.map(|(reading, contact)| Row { reading, ..contact }).collect();
-    Ok(schema.recording(source, rows, vec![readings.digest, contacts.digest]))
+    Ok(schema.recording(&source, rows, vec![readings.digest, contacts.digest]))
 }
 
 impl Schema<'_> {
@@ -87,9 +87,10 @@ impl Schema<'_> {
         }
     }
 
-    fn recording(&self, source: String, rows: Vec<Row>, digests: Vec<String>) -> Recording {
-        let provenance = Provenance { source, rows: rows.len(), digests, seed: None };
-        Recording { channels: self.layout.names(), kinds: self.layout.kinds(), rows, provenance }
+    fn recording(&self, source: &str, rows: Vec<Row>, digests: Vec<String>) -> Recording {
+        let mut recording = Recording::new(self.layout, source, rows);
+        recording.provenance.digests = digests;
+        recording
     }
 }
 

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::sensing::{Layout, SensorKind};
 
 /// Readings with the contacts that caused them.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +91,20 @@ pub struct TooFewPositions {
 }
 
 impl Recording {
+    /// A recording by the sensors of a layout, from a source of this name, without files or a seed.
+    pub fn new(layout: &Layout, source: &str, rows: Vec<Row>) -> Self {
+        let provenance =
+            Provenance { source: source.to_owned(), rows: rows.len(), digests: Vec::new(), seed: None };
+        Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
+    }
+
+    /// The same, simulated from a seed.
+    #[must_use]
+    pub fn seeded(mut self, seed: u64) -> Self {
+        self.provenance.seed = Some(seed);
+        self
+    }
+
     /// Every position that occurs, once, sorted by x and then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
         let mut positions: Vec<Position> = self.rows.iter().map(|row| row.position).collect();

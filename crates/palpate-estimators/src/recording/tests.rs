@@ -220,8 +220,7 @@ proptest! {
             reading: reading.to_vec(),
         });
         let rows: Vec<Row> = rows.collect();
-        let provenance = Provenance { source: String::new(), rows: rows.len(), digests: Vec::new(), seed: None };
-        let recording = Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance };
+        let recording = Recording::new(&layout, "", rows);
         let mut bytes = Vec::new();
         write(&recording, STRIP, "a\ntest", &mut bytes).unwrap();
         let columns = Columns::own(&recording.channels, &recording.kinds, STRIP);

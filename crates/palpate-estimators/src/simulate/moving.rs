@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{CleanSensors, SimulateError};
-use crate::recording::{Provenance, Recording, Row, TimedRecording};
+use crate::recording::{Recording, Row, TimedRecording};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Contact;
 use palpate_mechanics::sensing::{ChannelErrors, Layout, Sensor, measure};
@@ -99,9 +99,7 @@ pub fn simulate_moving(
         rows.push(Row { position, force_n: Some(force_n), nuisance: None, reading });
         second.extend(contacts.get(1));
     }
-    let provenance =
-        Provenance { source: "simulation".to_owned(), rows: count, digests: Vec::new(), seed: Some(seed) };
-    let recording = Recording { channels: layout.names(), kinds: layout.kinds(), rows, provenance };
+    let recording = Recording::new(layout, "simulation", rows).seeded(seed);
     Ok(TimedRecording { recording, times_s, second })
 }
 

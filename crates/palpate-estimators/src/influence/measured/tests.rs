@@ -2,7 +2,6 @@
 //! comes with them.
 
 use palpate_numerics::watch::{Cancelled, Watch};
-use std::fs::File;
 
 use palpate_core::Status;
 use rand::{RngExt, SeedableRng};
@@ -10,33 +9,18 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{MeasuredError, MeasuredInfluence, MeasuredLocator, NuisanceRole, Scale};
+use crate::evaluation::cross_validate;
 use crate::fit::{Fit, FitTask, Locate};
-use crate::fixtures::{pad, strip};
+use crate::fixtures::{pad, pad_recording, raw_recording, raw_setup, strip_recording};
 use crate::influence::{Influence, InfluenceSource};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
-use palpate_testing::data::recording;
+use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::mm;
 
 const STRIP: Extent = Extent::Line { length_m: 0.1 };
 const PAD: Extent = Extent::Plane { length_m: 0.03, width_m: 0.03 };
-
-fn setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
-    let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
-    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
-}
-
-fn recording_of(rows: Vec<Row>) -> Recording {
-    let channels = rows.first().map_or(0, |row| row.reading.len());
-    Recording {
-        channels: (0..channels).map(|c| format!("c{c}")).collect(),
-        kinds: vec![SensorKind::Raw; channels],
-        provenance: Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None },
-        rows,
-    }
-}
 
 fn try_fit(setup: &Setup, recording: &Recording) -> Result<MeasuredLocator, MeasuredError> {
     let task = FitTask::new(setup, recording).seed(1);
@@ -64,13 +48,13 @@ fn squeeze(x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
 fn squeezes(seed: u64) -> Recording {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let presses = (0..21).flat_map(|i| (0..8).map(move |k| (0.005 * f64::from(i), 1.0 + 0.5 * f64::from(k))));
-    recording_of(presses.map(|(x_m, force_n)| squeeze(x_m, force_n, &mut rng)).collect())
+    raw_recording(presses.map(|(x_m, force_n)| squeeze(x_m, force_n, &mut rng)).collect())
 }
 
 #[test]
 fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
     let recording = squeezes(1);
-    let locator = fit(&setup(STRIP, 2, None), &recording);
+    let locator = fit(&raw_setup(STRIP, 2, None), &recording);
     assert_eq!(
         (locator.role, locator.readings, locator.nuisance),
         (NuisanceRole::Force, Scale::Logarithm, Scale::Logarithm)
@@ -96,14 +80,14 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
 fn a_named_nuisance_coordinate_comes_before_the_force_and_is_not_told() {
     let mut recording = squeezes(3);
     recording.rows.iter_mut().for_each(|row| row.nuisance = row.force_n.map(|force| force - 2.0));
-    let locator = fit(&setup(STRIP, 2, None), &recording);
+    let locator = fit(&raw_setup(STRIP, 2, None), &recording);
     assert_eq!((locator.role, locator.nuisance), (NuisanceRole::Other, Scale::Linear));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let estimate = locator.locate(&squeeze(0.033, 2.7, &mut rng).reading);
     assert!((estimate.contact.position.x_m - 0.033).abs() < 3e-3, "{estimate:?}");
     assert_eq!(estimate.contact.force_n, None);
     recording.rows[7].nuisance = None;
-    let error = try_fit(&setup(STRIP, 2, None), &recording).unwrap_err();
+    let error = try_fit(&raw_setup(STRIP, 2, None), &recording).unwrap_err();
     assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 8 });
 }
 
@@ -125,7 +109,7 @@ fn repeats_tell_a_pads_noise_and_gain_and_its_intervals_cover() {
         let (x_m, y_m) = (0.0025 * f64::from(i % 13), 0.0025 * f64::from(i % 169 / 13));
         rows.push(corner(Position { x_m, y_m }, 0.05, &mut rng));
     }
-    let locator = fit(&setup(PAD, 4, None), &recording_of(rows));
+    let locator = fit(&raw_setup(PAD, 4, None), &raw_recording(rows));
     assert_eq!((locator.role, locator.readings), (NuisanceRole::None, Scale::Linear));
     assert!((0.043..0.057).contains(&locator.whitening.gain), "{}", locator.whitening.gain);
     let (mut covered, mut scores) = (0, 0.0);
@@ -153,7 +137,7 @@ fn two_places_that_read_alike_are_both_told() {
         let reading = read(x_m).iter().map(|r| r + 0.01 * noise(&mut rng)).collect();
         Row { position: Position::along(x_m), force_n: None, nuisance: None, reading }
     });
-    let locator = fit(&setup(STRIP, 2, Some(1.0)), &recording_of(rows.collect()));
+    let locator = fit(&raw_setup(STRIP, 2, Some(1.0)), &raw_recording(rows.collect()));
     let estimate = locator.locate(&read(0.08));
     assert_eq!(estimate.status, Status::Ambiguous);
     let [mode] = estimate.modes.as_slice() else { panic!("{estimate:?}") };
@@ -167,7 +151,7 @@ fn two_places_that_read_alike_are_both_told() {
 
 #[test]
 fn what_no_contact_gives_is_outside_the_model() {
-    let locator = fit(&setup(STRIP, 2, None), &squeezes(7));
+    let locator = fit(&raw_setup(STRIP, 2, None), &squeezes(7));
     for reading in [[-1.0, 1.0], [100.0, 1e-3], [f64::NAN, 1.0], [f64::INFINITY, 1.0], [1e-300, 1e300]] {
         assert_eq!(locator.locate(&reading).status, Status::OutsideModel, "{reading:?}");
     }
@@ -181,19 +165,19 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
         nuisance: None,
         reading: reading.to_vec(),
     };
-    let setup = setup(STRIP, 2, None);
-    let one = try_fit(&setup, &recording_of(vec![row(0.01, [1.0, 2.0]); 3])).unwrap_err();
+    let setup = raw_setup(STRIP, 2, None);
+    let one = try_fit(&setup, &raw_recording(vec![row(0.01, [1.0, 2.0]); 3])).unwrap_err();
     assert_eq!(one.to_string(), "the recording has 1 distinct positions; at least 2 are needed");
     for rows in [
         vec![row(0.01, [1.0, 2.0]), row(0.02, [1.5, 2.0])],
         vec![row(0.01, [0.0, 0.0]), row(0.02, [0.0, 0.0])],
         (0..40).map(|i| row(0.001 * f64::from(i % 4), [f64::from(i % 4), 7.0])).collect(),
     ] {
-        let estimate = fit(&setup, &recording_of(rows)).locate(&[1.0, 2.0]);
+        let estimate = fit(&setup, &raw_recording(rows)).locate(&[1.0, 2.0]);
         assert!(estimate.contact.position.x_m.is_finite(), "{estimate:?}");
     }
     let logarithms = MeasuredInfluence { readings: Some(Scale::Logarithm), ..MeasuredInfluence::default() };
-    let recording = recording_of(vec![row(0.01, [1.0, 2.0]), row(0.02, [1.0, -2.0])]);
+    let recording = raw_recording(vec![row(0.01, [1.0, 2.0]), row(0.02, [1.0, -2.0])]);
     let task = FitTask::new(&setup, &recording);
     let error = logarithms.fit_method(task).unwrap_err();
     assert_eq!(error, MeasuredError::NoLogarithm { what: "a reading", row: 2, value: -2.0 });
@@ -204,68 +188,31 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
 
 #[test]
 fn it_comes_back_from_a_file() {
-    let locator = fit(&setup(STRIP, 2, None), &squeezes(8));
+    let locator = fit(&raw_setup(STRIP, 2, None), &squeezes(8));
     let back: MeasuredLocator = serde_json::from_str(&serde_json::to_string(&locator).unwrap()).unwrap();
     let found = |locator: &MeasuredLocator| locator.locate(&[2.5, 1.5]).contact.position.x_m;
     assert!((found(&back) - found(&locator)).abs() < 1e-12);
     assert_eq!((back.role, back.table.means.len()), (locator.role, locator.table.means.len()));
     let mut damaged = locator;
     damaged.table.means.pop();
-    assert!(damaged.check(&setup(STRIP, 2, None)).is_err());
+    assert!(damaged.check(&raw_setup(STRIP, 2, None)).is_err());
 }
 
-fn data(file: &str) -> Option<File> {
-    recording(file).map(|path| File::open(path).unwrap())
+/// Fails unless the pooled errors of five folds by position undercut scikit-learn's best, `median_mm` and `mean_mm`, by the share `less`,
+/// and the 95 % regions hold about as many contacts as they say.
+fn check(name: &str, recorded: Option<(Setup, Recording)>, (median_mm, mean_mm): (f64, f64), less: f64) {
+    let Some((setup, recording)) = recorded else { return };
+    let task = FitTask::new(&setup, &recording).seed(1);
+    let held_out = cross_validate(&MeasuredInfluence::default(), task, 5).unwrap();
+    let (errors, coverage) = (held_out.summary(None).unwrap(), held_out.coverage_percent().unwrap());
+    let gained = (1.0 - errors.median_m / mm(median_mm), 1.0 - errors.average_m / mm(mean_mm));
+    eprintln!("{name}: {errors:?}, coverage {coverage:.1} %, less by {gained:.3?}");
+    assert!(gained.0 >= less && gained.1 >= less, "{name}: {errors:?}");
+    assert!((90.0..99.0).contains(&coverage), "{name}: {coverage}");
 }
 
-/// The pooled errors of five folds by position: median and mean, and the share within the 95 % intervals.
-#[derive(Debug)]
-struct Pooled {
-    median_mm: f64,
-    mean_mm: f64,
-    coverage: f64,
-}
-
-fn five_folds(setup: &Setup, recording: &Recording) -> Pooled {
-    let (mut errors_mm, mut covered, mut intervals) = (Vec::new(), 0, 0);
-    for fold in recording.folds(5).unwrap() {
-        let locator = fit(setup, &recording.subset(&fold.training));
-        let held_out = recording.subset(&fold.held_out);
-        for row in &held_out.rows {
-            let estimate = locator.locate(&row.reading);
-            errors_mm.push(1e3 * estimate.contact.position.distance_m(row.position));
-            let uncertainty = estimate.contact.uncertainty.unwrap();
-            let within = |(low, high): (f64, f64), value| usize::from(low <= value && value <= high);
-            covered += within(uncertainty.x_95_m, row.position.x_m);
-            intervals += 1;
-            if let Extent::Plane { .. } = setup.surface.extent() {
-                covered += within(uncertainty.y_95_m, row.position.y_m);
-                intervals += 1;
-            }
-        }
-    }
-    errors_mm.sort_by(f64::total_cmp);
-    let count = errors_mm.len() as f64;
-    Pooled {
-        median_mm: crate::evaluation::percentile(&errors_mm, 50.0).unwrap(),
-        mean_mm: errors_mm.iter().sum::<f64>() / count,
-        coverage: covered as f64 / intervals as f64,
-    }
-}
-
-/// Held to the share by which scikit-learn's best, `median_mm` and `mean_mm`, must be undercut.
-fn check_strip(file: &str, (median_mm, mean_mm): (f64, f64), less: f64) {
-    let Some(bytes) = data(&format!("tactile-fsi/{file}")) else { return };
-    let setup = strip();
-    let recording = setup.read_recording(file, bytes).unwrap();
-    check(file, &five_folds(&setup, &recording), (median_mm, mean_mm), less);
-}
-
-fn check(name: &str, found: &Pooled, (median_mm, mean_mm): (f64, f64), less: f64) {
-    let gained = (1.0 - found.median_mm / median_mm, 1.0 - found.mean_mm / mean_mm);
-    eprintln!("{name}: {found:.3?}, less by {gained:.3?}");
-    assert!(gained.0 >= less && gained.1 >= less, "{name}: {found:?}");
-    assert!((0.9..0.99).contains(&found.coverage), "{name}: {found:?}");
+fn check_strip(file: &str, scikit_learn_mm: (f64, f64), less: f64) {
+    check(file, strip_recording(file), scikit_learn_mm, less);
 }
 
 #[test]
@@ -274,13 +221,11 @@ fn a_strip_over_water_beats_scikit_learn_by_a_fifth() {
 }
 
 #[test]
-#[ignore = "the water strip's test is quicker by half"]
 fn a_strip_over_air_beats_scikit_learn() {
     check_strip("1d-air-2.0mm.csv", (0.600, 0.824), 0.15);
 }
 
 #[test]
-#[ignore = "the water strip's test is quicker by half"]
 fn a_strip_over_oil_beats_scikit_learn() {
     check_strip("1d-oil-1.0mm.csv", (0.438, 0.902), 0.05);
 }
@@ -288,20 +233,13 @@ fn a_strip_over_oil_beats_scikit_learn() {
 #[test]
 #[ignore = "takes a minute"]
 fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
-    let Some(readings) = data("eflesh/fixed-depth-readings.csv") else { return };
-    let Some(contacts) = data("eflesh/fixed-depth-contacts.csv") else { return };
-    let setup = pad();
-    let recording = setup.read_recording_pair(("readings", readings), ("contacts", contacts)).unwrap();
-    assert_eq!((recording.rows.len(), recording.distinct_positions().len()), (4805, 961));
-    check("eflesh", &five_folds(&setup, &recording), (0.312, 0.343), 0.10);
+    check("eflesh", pad_recording(), (0.312, 0.343), 0.10);
 }
 
 #[test]
 fn settings_that_need_mechanics_are_refused() {
     let setup = pad();
-    let provenance = Provenance { source: String::new(), rows: 0, digests: vec![], seed: None };
-    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
-    let recording = Recording { channels, kinds, rows: vec![], provenance };
+    let recording = Recording::new(&setup.layout, "", vec![]);
     let good = Influence::default();
     let refused = |config: Influence| {
         let task = FitTask::new(&setup, &recording);

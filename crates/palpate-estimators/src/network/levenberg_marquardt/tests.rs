@@ -5,15 +5,16 @@ use palpate_numerics::watch::{Cancelled, Watch};
 
 use super::training::{Hyperparameters, jacobians, outputs};
 use super::*;
+use crate::evaluation::cross_validate;
 use crate::fit::{Fit, FitTask, Locate};
+use crate::fixtures::strip_recording;
 use crate::network::{Activation, Topology};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, Layout, SensorKind, measure};
 use palpate_mechanics::surface::{Beam, SurfaceSpec};
 use palpate_numerics::Cholesky;
-use palpate_testing::data;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -88,10 +89,7 @@ fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u6
         nuisance: None,
         reading: reading(setup, x_m, force_n, &mut rng),
     };
-    let rows: Vec<Row> = contacts.map(row).collect();
-    let provenance =
-        Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: Some(seed) };
-    Recording { channels: setup.layout.names(), kinds: setup.layout.kinds(), rows, provenance }
+    Recording::new(&setup.layout, "test", contacts.map(row).collect())
 }
 
 fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {
@@ -200,45 +198,14 @@ fn what_cannot_be_trained_is_named() {
     assert!(Cancelled::caused(&stopped), "{stopped}");
 }
 
-/// A soft strip's recording, by its path in the folder of real recordings; `None`, said in one line, where the folder is absent.
-fn strip(name: &str) -> Option<(Setup, Recording)> {
-    use palpate_mechanics::surface::Extent;
-    let path = data::recording(&format!("tactile-fsi/{name}"))?;
-    let text = std::fs::read_to_string(path).unwrap();
-    let row = |line: &str| {
-        let cells: Vec<f64> = line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect();
-        let reading = vec![cells[1], cells[2]];
-        Row { position: Position::along(cells[0] * 1e-3), force_n: Some(cells[3]), nuisance: None, reading }
-    };
-    let rows: Vec<Row> = text.lines().skip(1).map(row).collect();
-    let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    let surface = SurfaceSpec::Measured(Extent::Line { length_m: 0.1 });
-    let setup = Setup { surface, layout, force_n: None, columns: None };
-    let provenance = Provenance { source: name.into(), rows: rows.len(), digests: vec![], seed: None };
-    let (channels, kinds) = (setup.layout.names(), setup.layout.kinds());
-    Some((setup, Recording { channels, kinds, rows, provenance }))
-}
-
 /// scikit-learn's best, a Gaussian process, has a median of 0.565 mm and a mean of 0.844 mm on these folds; one network a fold, of two
 /// trained, comes near, and the default ensemble nearer.
 #[test]
 fn a_real_strip_at_positions_held_out() {
-    let Some((setup, recording)) = strip("1d-water-1.5mm.csv") else { return };
-    let mut errors_mm = Vec::new();
-    for fold in recording.folds(5).unwrap() {
-        let training = recording.subset(&fold.training);
-        let task = FitTask::new(&setup, &training).seed(1);
-        let config = LevenbergMarquardt { ensemble: 1, ..LevenbergMarquardt::default() };
-        let locator = config.fit_method(task).unwrap();
-        let error_mm = |i: &usize| {
-            let row = &recording.rows[*i];
-            1e3 * locator.locate(&row.reading).contact.position.distance_m(row.position)
-        };
-        errors_mm.extend(fold.held_out.iter().map(error_mm));
-    }
-    errors_mm.sort_by(f64::total_cmp);
-    let (median, mean) =
-        (errors_mm[errors_mm.len() / 2], errors_mm.iter().sum::<f64>() / errors_mm.len() as f64);
-    eprintln!("water: median {median:.3} mm, mean {mean:.3} mm");
-    assert!(median < 0.75 && mean < 1.05, "median {median}, mean {mean}");
+    let Some((setup, recording)) = strip_recording("1d-water-1.5mm.csv") else { return };
+    let config = LevenbergMarquardt { ensemble: 1, ..LevenbergMarquardt::default() };
+    let held_out = cross_validate(&config, FitTask::new(&setup, &recording).seed(1), 5).unwrap();
+    let errors = held_out.summary(None).unwrap();
+    eprintln!("water: {errors:?}");
+    assert!(errors.median_m < 0.75e-3 && errors.average_m < 1.05e-3, "{errors:?}");
 }

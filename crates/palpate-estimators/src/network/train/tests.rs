@@ -25,24 +25,6 @@ impl Kernel for Twin<'_> {
     }
 }
 
-/// A queue of the seeds 0…n.
-struct Seeds {
-    next: u64,
-    end: u64,
-    networks: Vec<(u64, TrainedNetwork)>,
-}
-
-impl SeedQueue<TrainedNetwork> for Seeds {
-    fn next_seed(&mut self) -> Option<u64> {
-        let seed = (self.next < self.end).then_some(self.next)?;
-        self.next += 1;
-        Some(seed)
-    }
-    fn fitted(&mut self, seed: u64, network: TrainedNetwork) {
-        self.networks.push((seed, network));
-    }
-}
-
 /// y = sin x on a few points: enough to train on, and no symmetry to hide a mix-up of inputs.
 fn patterns(count: usize, inputs: usize, outputs: usize) -> TrainingSet {
     let value = |k: usize| 0.5 + 0.4 * (1.0 + k as f64 * 0.7).sin();
@@ -60,11 +42,11 @@ fn networks(
     task: &TrainingTask,
     seeds: u64,
 ) -> Vec<TrainedNetwork> {
-    let mut queue = Seeds { next: 0, end: seeds, networks: Vec::new() };
+    let mut queue = SeedList::new(0..seeds);
     train_many(set, precision, task, &mut queue, Watch::NONE).unwrap();
-    queue.networks.sort_by_key(|(seed, _)| *seed);
-    assert_eq!(queue.networks.len() as u64, seeds);
-    queue.networks.into_iter().map(|(_, network)| network).collect()
+    let trained = queue.into_results();
+    assert!(trained.iter().map(|(seed, _)| *seed).eq(0..seeds));
+    trained.into_iter().map(|(_, network)| network).collect()
 }
 
 fn compare_with_twin(config: &Network, patterns: &TrainingSet, seeds: u64) {
@@ -147,13 +129,7 @@ fn a_wild_step_diverges_and_says_so() {
 
 /// E = ½ Σ (t − a)², by the forward pass of the core.
 fn half_squared_error(topology: &Topology, weights: &[f64], patterns: &TrainingSet, pattern: usize) -> f64 {
-    let network = palpate_core::Network {
-        sizes: &topology.sizes,
-        biases: topology.biases,
-        hidden_activation: topology.hidden_activation,
-        output_activation: topology.output_activation,
-        weights,
-    };
+    let network = topology.network(weights);
     let mut outputs = vec![0.0; topology.outputs()];
     let mut scratch = vec![0.0; network.scratch_len()];
     let inputs = &patterns.input_values[pattern * patterns.inputs..][..patterns.inputs];

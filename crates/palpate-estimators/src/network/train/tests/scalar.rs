@@ -13,8 +13,9 @@
 //! `V` is one lane of the arithmetic that the SIMD lanes have, so that both round alike.
 
 use crate::network::logistic::{activate, derivative};
+use crate::network::train::Layer;
 use crate::network::train::order::{OrderDrawer, Streams};
-use crate::network::{Activation, PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
+use crate::network::{PresentationOrder, TrainedNetwork, TrainingOutcome, TrainingTask};
 use palpate_numerics::simd::{Real, Vector};
 
 /// Trains the network of one seed.
@@ -61,20 +62,6 @@ fn inputs_with_bias<V: Vector<1>>(task: &TrainingTask) -> Vec<V> {
     rows.flat_map(|row| row.iter().copied().chain(bias)).map(value).collect()
 }
 
-/// One layer: its rows of weights, and what flows through it.
-struct Layer<V> {
-    activation: Activation,
-    row_len: usize,
-    /// w, row by row.
-    weights: Vec<V>,
-    /// w before the last update, so that Δw is their difference.
-    before: Vec<V>,
-    /// a, followed by the 1 that the biases above weigh.
-    outputs: Vec<V>,
-    /// δ
-    deltas: Vec<V>,
-}
-
 struct Network<V> {
     layers: Vec<Layer<V>>,
     eta: V,
@@ -85,18 +72,10 @@ impl<V: Vector<1>> Network<V> {
     fn new(task: &TrainingTask, stream: &mut Streams<1>) -> Self {
         let topology = task.topology;
         let mut layer = |k: usize| {
-            let count = topology.rows(k) * topology.row_len(k);
-            let weights: Vec<V> =
-                (0..count).map(|_| value(stream.uniform(task.rule.initial_weights))).collect();
-            let nodes = topology.rows(k) + usize::from(topology.biases);
-            Layer {
-                activation: topology.activation(k),
-                row_len: topology.row_len(k),
-                before: weights.clone(),
-                weights,
-                outputs: vec![value(1.0); nodes],
-                deltas: vec![value(0.0); nodes],
-            }
+            let mut layer = Layer::new(topology, k, value(0.0), value(1.0));
+            layer.weights.fill_with(|| value(stream.uniform(task.rule.initial_weights)));
+            layer.before.clone_from(&layer.weights);
+            layer
         };
         Self {
             layers: (0..topology.layers()).map(&mut layer).collect(),
