@@ -4,7 +4,6 @@ use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::sensing::SensorKind::Deflection;
-use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Beam, Plate};
 use palpate_mechanics::units::{gpa, mm, newtons, um};
 
@@ -26,30 +25,22 @@ pub(crate) fn beam(noise_m: f64) -> Setup {
 
 /// The beam with noise, pressed at twenty places, for the influence estimator.
 pub(crate) fn noisy() -> Example {
-    Example { setup: beam(um(5.0)), design: PositionDesign::like(&Training::even(20).repeated(5)) }
+    Example { setup: beam(um(5.0)), design: PositionDesign::for_training(&Training::even(20).repeated(5)) }
 }
 
 /// The beam without noise, pressed at ten places, for the paper's network.
 pub(crate) fn paper() -> Example {
-    let design = PositionDesign::like(&Training::even(10)).estimator(Estimator::default());
+    let design = PositionDesign::for_training(&Training::even(10)).estimator(Estimator::default());
     Example { setup: beam(0.0), design }
 }
 
 /// A simply supported plate over 3 × 3 deflection sensors.
 pub(crate) fn plate(elements: usize) -> Example {
-    let plate = Plate::new(PlateSpec {
-        length_m: mm(300.0),
-        width_m: mm(300.0),
-        thickness_m: mm(0.8),
-        youngs_modulus_pa: gpa(200.0),
-        poissons_ratio: 0.3,
-        edges: Edges::all(Edge::Simple),
-        supports: Vec::new(),
-        elements,
-    });
+    let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3);
+    let plate = plate.and_then(|plate| plate.with_elements(elements));
     let setup = Setup::new(plate.unwrap()).sensors(Deflection.grid(3, 3).noise(um(5.0))).unwrap();
     let setup = setup.known_force(newtons(5.0)).unwrap();
-    Example { setup, design: PositionDesign::like(&Training::grid(6, 6).repeated(5)) }
+    Example { setup, design: PositionDesign::for_training(&Training::grid(6, 6).repeated(5)) }
 }
 
 /// The beam with the task of placing eight deflection sensors every 5 mm for contacts of unknown force within 20–380 mm.

@@ -6,7 +6,6 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind::{Deflection, Strain};
 use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeam;
-use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate, SurfaceSpec};
 use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
 use palpate_testing::data;
@@ -52,16 +51,8 @@ pub(crate) fn faulty_paper(channel: ChannelModel, repeats: usize) -> Example {
 /// A steel plate, simply supported all around, over this grid of deflection sensors; pressed with its known force at 6 × 6
 /// places, five times each.
 pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
-    let plate = Plate::new(PlateSpec {
-        length_m: mm(300.0),
-        width_m: mm(300.0),
-        thickness_m: mm(0.8),
-        youngs_modulus_pa: gpa(200.0),
-        poissons_ratio: 0.3,
-        edges: Edges::all(Edge::Simple),
-        supports: Vec::new(),
-        elements,
-    });
+    let plate = Plate::simply_supported((mm(300.0), mm(300.0)), mm(0.8), gpa(200.0), 0.3);
+    let plate = plate.and_then(|plate| plate.with_elements(elements));
     let setup = Setup::new(plate.unwrap()).sensors(Deflection.grid(3, 3).channel(channel));
     let setup = setup.and_then(|setup| setup.known_force(newtons(5.0))).unwrap();
     Example { setup, training: Training::grid(6, 6).repeated(5) }
@@ -70,7 +61,7 @@ pub(crate) fn plate(elements: usize, channel: ChannelModel) -> Example {
 /// A finger with five strain gauges whose force is not known, pressed with `force_n` at 24 places, twice each.
 pub(crate) fn digit(direction: ForceDirection, force_n: f64) -> Example {
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap().with_direction(direction);
-    let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
+    let gauges = Strain.at_x([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
     let setup = Setup::new(digit).sensors(gauges).unwrap();
     Example { setup, training: Training::even(24).repeated(2).with_force(force_n) }
 }

@@ -120,7 +120,7 @@ impl Extent {
     }
 
     /// A value that a plane has across its width; `None` on a line.
-    pub fn across<T>(&self, value: T) -> Option<T> {
+    pub fn if_plane<T>(&self, value: T) -> Option<T> {
         match self {
             Self::Line { .. } => None,
             Self::Plane { .. } => Some(value),
@@ -129,7 +129,7 @@ impl Extent {
 
     /// The coordinates of a position on it, in metres: x, and y on a plane.
     pub fn coordinates_m(&self, position: Position) -> impl Iterator<Item = f64> + use<> {
-        std::iter::once(position.x_m).chain(self.across(position.y_m))
+        std::iter::once(position.x_m).chain(self.if_plane(position.y_m))
     }
 
     /// A position in words: "75 mm", or "75 mm, 40 mm" on a plane, and of what is beside a line.

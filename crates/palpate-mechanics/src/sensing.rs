@@ -260,7 +260,7 @@ pub fn even_positions(count: usize, length_m: f64) -> impl Iterator<Item = Posit
 /// use palpate_mechanics::sensing::SensorKind;
 /// use palpate_mechanics::units::{mm, um};
 ///
-/// let gauges = SensorKind::Strain.at([mm(4.0), mm(20.0), mm(40.0)]);
+/// let gauges = SensorKind::Strain.at_x([mm(4.0), mm(20.0), mm(40.0)]);
 /// let deflections = SensorKind::Deflection.evenly(8).noise(um(5.0));
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -296,7 +296,7 @@ impl SensorKind {
     }
 
     /// Sensors of this kind at positions along the length, in metres from its left end.
-    pub fn at(self, x_m: impl IntoIterator<Item = f64>) -> SensorGroup {
+    pub fn at_x(self, x_m: impl IntoIterator<Item = f64>) -> SensorGroup {
         self.placed(Placement::At(x_m.into_iter().map(Position::along).collect()))
     }
 

@@ -43,7 +43,7 @@ pub fn normal_quantile(share: f64) -> f64 {
 ///
 /// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees, and erfc(√x) plus the
 /// same over j = ½, 3/2, … < freedom/2 for an odd one (Abramowitz and Stegun, 26.4.4 and 26.4.5).
-pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
+fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     let x = 0.5 * value;
     let odd = freedom % 2 == 1;
     let start = if odd { libm::erfc(x.sqrt()) } else { 0.0 };

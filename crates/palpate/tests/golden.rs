@@ -72,7 +72,7 @@ fn measured() -> (Setup, Recording) {
 
 fn digit() -> (Setup, Recording) {
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap();
-    let gauges = Strain.at([mm(4.0), mm(40.0), mm(80.0)]).noise(microstrain(1.0));
+    let gauges = Strain.at_x([mm(4.0), mm(40.0), mm(80.0)]).noise(microstrain(1.0));
     let setup = Setup::new(digit).sensors(gauges).unwrap();
     let presses = setup.simulate(&Training::even(6).with_force(newtons(2.0)), 1).unwrap();
     (setup, presses)

@@ -141,10 +141,10 @@ fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + us
     let sd = |variance: f64| Some(variance.sqrt()).filter(|sd| *sd > 0.0 && sd.is_finite());
     fields! {
         "x_mm": contact.position.x_m * 1e3,
-        "y_mm"?: extent.across(contact.position.y_m * 1e3),
+        "y_mm"?: extent.if_plane(contact.position.y_m * 1e3),
         "force_n"?: contact.force_n,
         "x_95_mm"?: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
-        "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.across(mm(uncertainty.y_95_m))),
+        "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.if_plane(mm(uncertainty.y_95_m))),
         "sd_mm"?: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
         "sd_force_n"?: uncertainty.and_then(|u| sd(u.covariance[5])),
     }

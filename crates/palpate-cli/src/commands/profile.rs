@@ -279,7 +279,7 @@ impl JsonProfile {
             worst_misfit: profile.worst_misfit,
             total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.total_95_n(), 1.0),
             centre_x_mm: profile.centre.map(|centre| x_mm(&centre)),
-            centre_y_mm: profile.centre.and_then(|centre| extent.across(y_mm(&centre))),
+            centre_y_mm: profile.centre.and_then(|centre| extent.if_plane(y_mm(&centre))),
             resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
             patches: patches.map(|(i, patch)| JsonPatch::of_patch(patch, limit(limits, i), extent)).collect(),
             loads: loads
@@ -324,7 +324,7 @@ impl<T> JsonPatch<T> {
         Self {
             stretch_mm: [from.x_m * 1e3, to.x_m * 1e3],
             centre_x_mm,
-            across: extent.across(Across {
+            across: extent.if_plane(Across {
                 stretch_y_mm: [from.y_m * 1e3, to.y_m * 1e3],
                 centre_y_mm,
                 limit_y_mm: limit.map(|limit| limit.sd_y_m * 1e3),
@@ -373,7 +373,7 @@ impl JsonCell {
         let (centre, (density, (low, high))) = (profile.cells.centre(cell), profile.density(cell));
         Self {
             x_mm: centre.x_m * 1e3,
-            y_mm: extent.across(centre.y_m * 1e3),
+            y_mm: extent.if_plane(centre.y_m * 1e3),
             density: density * per_mm,
             low: low * per_mm,
             high: high * per_mm,

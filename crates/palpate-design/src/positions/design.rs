@@ -66,7 +66,7 @@ impl Default for PositionDesign {
 
 impl PositionDesign {
     /// As many positions and presses as an existing arrangement has, and compared with it.
-    pub fn like(existing: &Training) -> Self {
+    pub fn for_training(existing: &Training) -> Self {
         let (count, repeats) = (existing.count, existing.repeats);
         Self { count, repeats, existing: Some(existing.clone()), ..Self::default() }
     }

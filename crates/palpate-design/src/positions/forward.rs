@@ -33,12 +33,6 @@ pub(super) struct ForwardModel {
     force: Force,
 }
 
-/// Samples of the regressions: one row a press.
-struct Whitened {
-    coordinates: Array2<f64>,
-    readings: Array2<f64>,
-}
-
 impl ForwardModel {
     /// Of a bench with a model, from its clean readings.
     pub fn of_model(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
@@ -58,16 +52,9 @@ impl ForwardModel {
             sd if sd > 0.0 => sd,
             _ => (NOMINAL_NOISE * full_scale(s)).max(f64::MIN_POSITIVE),
         };
-        let alive = living(&setup.layout);
-        let sds: Vec<f64> = alive.iter().map(|s| sd(*s)).collect();
-        let whitened = Whitened {
-            coordinates: coordinates(&positions, extent),
-            readings: Array2::from_shape_fn((positions.len(), alive.len()), |(row, j)| {
-                clean[row][alive[j]] / sds[j]
-            }),
-        };
+        let sds: Vec<(usize, f64)> = living(&setup.layout).map(|s| (s, sd(s))).collect();
         // The model is exact: regressions take as much noise as rounding leaves.
-        Self::fit(&whitened, &vec![0.0; positions.len()], extent, force, watch)
+        Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }
 
     /// Of a recording begun, whose noise its repeats tell, or else the layout.
@@ -85,35 +72,38 @@ impl ForwardModel {
         if found < FEWEST_POSITIONS {
             return Err(PositionError::TooFewPresses { found, needed: FEWEST_POSITIONS });
         }
-        let alive = living(layout);
         let scaled = at_one_force(recording);
-        let sds = alive.iter().map(|&s| {
+        let sds = living(layout).map(|s| {
             let stated = layout.sensors()[s].channel.reading_sd();
             let sd = scatter(recording, &scaled, s).unwrap_or(stated);
-            if sd > 0.0 { Ok(sd) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
+            if sd > 0.0 { Ok((s, sd)) } else { Err(PositionError::NoNoise { channel: s + 1 }) }
         });
-        let sds: Vec<f64> = sds.collect::<Result<_, _>>()?;
+        let sds = sds.collect::<Result<Vec<_>, _>>()?;
         let positions: Vec<Position> = recording.rows.iter().map(|row| row.position).collect();
-        let whitened = Whitened {
-            coordinates: coordinates(&positions, extent),
-            readings: Array2::from_shape_fn((scaled.len(), alive.len()), |(row, j)| {
-                scaled[row][alive[j]] / sds[j]
-            }),
-        };
-        Self::fit(&whitened, &vec![1.0; positions.len()], extent, force, watch)
+        Self::fit(&positions, &scaled, &sds, 1.0, extent, force, watch)
     }
 
+    /// To readings at some positions: those of the sensors in `sds`, divided by their standard deviations, then have the
+    /// `noise_variance`.
     fn fit(
-        rows: &Whitened,
-        noise: &[f64],
+        positions: &[Position],
+        readings: &[Vec<f64>],
+        sds: &[(usize, f64)],
+        noise_variance: f64,
         extent: Extent,
         force: Force,
         watch: Watch,
     ) -> Result<Self, PositionError> {
+        let rows = positions.len();
+        let coordinates = Array2::from_shape_fn((rows, extent.dimensions()), |(row, k)| {
+            [positions[row].x_m, positions[row].y_m][k]
+        });
+        let whitened =
+            Array2::from_shape_fn((rows, sds.len()), |(row, j)| readings[row][sds[j].0] / sds[j].1);
         let samples = Samples {
-            coordinates: rows.coordinates.view(),
-            outputs: rows.readings.view(),
-            noise_variance: Some(noise),
+            coordinates: coordinates.view(),
+            outputs: whitened.view(),
+            noise_variance: Some(&vec![noise_variance; rows]),
         };
         let process = Regression::default().fit(samples, watch)?;
         let outputs = process.outputs();
@@ -162,14 +152,9 @@ impl ForwardModel {
     }
 }
 
-fn living(layout: &Layout) -> Vec<usize> {
-    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead).collect()
-}
-
-fn coordinates(positions: &[Position], extent: Extent) -> Array2<f64> {
-    Array2::from_shape_fn((positions.len(), extent.sides_m().count()), |(row, k)| {
-        [positions[row].x_m, positions[row].y_m][k]
-    })
+/// Indices of the sensors that are alive.
+fn living(layout: &Layout) -> impl Iterator<Item = usize> {
+    (0..layout.len()).filter(|s| !layout.sensors()[*s].channel.dead)
 }
 
 /// Readings brought to the mean force, where forces are known.

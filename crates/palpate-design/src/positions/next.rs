@@ -48,22 +48,17 @@ impl Advice {
     pub const MOST_AHEAD: usize = MOST_AHEAD;
 
     /// By how much endlessly many presses would lower the error, in %.
-    pub fn to_gain_percent(&self) -> f64 {
+    pub fn remaining_gain_percent(&self) -> f64 {
         100.0 * (1.0 - self.endless_error_m / self.error_m)
-    }
-
-    /// By how much the next press lowers the error, in %; `None` where there is none.
-    pub fn next_gain_percent(&self) -> Option<f64> {
-        self.next.first().map(|press| 100.0 * (1.0 - press.error_m / self.error_m))
     }
 
     /// Whether the rule says to stop.
     pub fn is_enough(&self) -> bool {
-        self.to_gain_percent() < self.stop_percent
+        self.remaining_gain_percent() < self.stop_percent
     }
 
     /// Whether the presses to come reach what the rule asks for.
-    pub fn gets_there(&self) -> bool {
+    pub fn reaches_goal(&self) -> bool {
         let last_m = self.next.last().map_or(self.error_m, |press| press.error_m);
         100.0 * (1.0 - self.endless_error_m / last_m) < self.stop_percent
     }
@@ -124,7 +119,7 @@ pub fn next_press(
     if advice.is_enough() {
         return Ok(advice);
     }
-    while advice.next.len() < MOST_AHEAD && !advice.gets_there() {
+    while advice.next.len() < MOST_AHEAD && !advice.reaches_goal() {
         watch.round()?;
         let (site, error_m) = expected.best(&posterior, 1.0);
         posterior.condition(site, 1.0);

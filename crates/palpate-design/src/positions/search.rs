@@ -112,7 +112,7 @@ impl PatternSearch {
         step_m: f64,
     ) -> Vec<Vec<Position>> {
         let steps = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
-        let moved = steps.into_iter().take(2 * self.extent.sides_m().count()).map(|(x, y)| {
+        let moved = steps.into_iter().take(2 * self.extent.dimensions()).map(|(x, y)| {
             let mut moved = positions.to_vec();
             moved[group.0].x_m += x * step_m;
             moved[group.0].y_m += y * step_m;

@@ -210,8 +210,8 @@ fn the_next_press_is_where_nobody_pressed_and_lowers_the_error() {
 fn enough_is_said_when_little_is_left_to_gain() {
     let all: Vec<f64> = (0..40).map(|i| 0.005 + 0.01 * f64::from(i)).collect();
     let advice = advised(&all, 10);
-    assert!(advice.is_enough() && advice.gets_there() && advice.next.is_empty(), "{advice:?}");
-    assert!(advice.to_gain_percent() < 5.0);
+    assert!(advice.is_enough() && advice.reaches_goal() && advice.next.is_empty(), "{advice:?}");
+    assert!(advice.remaining_gain_percent() < 5.0);
 }
 
 #[test]

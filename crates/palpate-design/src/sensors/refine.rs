@@ -65,7 +65,7 @@ fn improve(problem: &SensorProblem, groups: &mut [Vec<PlacedSensor>], index: usi
     let mut least = score(problem, &state, &groups[index]);
     let mut moved = false;
     let directions = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-    for [x, y] in directions.into_iter().take(2 * pool.extent.sides_m().count()) {
+    for [x, y] in directions.into_iter().take(2 * pool.extent.dimensions()) {
         let group = shifted(problem, &groups[index], [x * step_m, y * step_m]);
         if !is_allowed(problem, &group, &others) {
             continue;

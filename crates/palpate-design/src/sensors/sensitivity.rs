@@ -35,7 +35,7 @@ pub(super) struct Sensitivity<'a> {
 impl Sensitivity<'_> {
     /// Number of unknowns of a contact.
     fn unknowns(&self) -> usize {
-        usize::from(self.force == Force::Unknown) + self.surface.extent().sides_m().count()
+        usize::from(self.force == Force::Unknown) + self.surface.extent().dimensions()
     }
 
     /// Number of blocks in the row of a sensor.

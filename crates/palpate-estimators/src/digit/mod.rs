@@ -35,7 +35,7 @@ use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95}
 /// use palpate_mechanics::units::{gpa, microstrain, mm, newtons};
 ///
 /// let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0))?;
-/// let gauges = Strain.at([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
+/// let gauges = Strain.at_x([4.0, 20.0, 40.0, 60.0, 80.0].map(mm)).noise(microstrain(1.0));
 /// let setup = Setup::new(digit).sensors(gauges)?;
 /// let presses = setup.simulate(&Training::even(12).with_force(newtons(4.0)), 0)?;
 /// let locator = DigitEstimator::default().fit(&setup, &presses)?;

@@ -17,7 +17,7 @@ mod zone;
 
 pub use bound::Bound;
 pub use curve::{LimitCurve, LimitPoint, LimitSummary};
-pub use warning::{AMBIGUOUS_DISTANCE, BLIND_SHARE, FAINT_SIGNAL, LimitWarning, limit_warnings};
+pub use warning::{LimitWarning, limit_warnings};
 pub use zone::Zone;
 
 use std::sync::Arc;
@@ -140,7 +140,7 @@ impl<'a> CramerRaoBound<'a> {
             columns.along.push(weight * along_x);
             across.push(weight * along_y);
         }
-        columns.across = self.surface.extent().across(across);
+        columns.across = self.surface.extent().if_plane(across);
         columns
     }
 }

@@ -11,12 +11,12 @@ use palpate_numerics::normal_cdf;
 use palpate_numerics::small::dot;
 
 /// A limit above this share of the length is called blind.
-pub const BLIND_SHARE: f64 = 0.1;
+const BLIND_SHARE: f64 = 0.1;
 /// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
 /// for the other contact's more than once in a hundred times (2·2.326).
-pub const AMBIGUOUS_DISTANCE: f64 = 4.653;
+const AMBIGUOUS_DISTANCE: f64 = 4.653;
 /// A touch that stands out of the noise by fewer standard deviations than this is called faint.
-pub const FAINT_SIGNAL: f64 = 5.0;
+const FAINT_SIGNAL: f64 = 5.0;
 /// Readings that differ by fewer standard deviations than this are the same.
 const INDISTINGUISHABLE: f64 = 0.05;
 /// A touch that stands out by fewer standard deviations than this does not show at all.

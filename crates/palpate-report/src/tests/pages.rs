@@ -295,7 +295,7 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
 #[test]
 fn a_limit_is_drawn_and_told() {
     let deflections = |count| Deflection.evenly(count).noise(um(5.0));
-    let reactions = Reaction.at([mm(0.0), mm(400.0)]).noise(newtons(0.01));
+    let reactions = Reaction.at_x([mm(0.0), mm(400.0)]).noise(newtons(0.01));
     let cases = [
         (deflections(8), Force::Known, "7.7 %"),
         (deflections(8), Force::Unknown, "reaction sensors at the supports"),

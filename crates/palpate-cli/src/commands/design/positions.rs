@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// Design settings of the rig and the command line.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
-    let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::like);
+    let design = rig.training.as_ref().map_or_else(PositionDesign::default, PositionDesign::for_training);
     let design = rig.design.iter().fold(design, PositionDesign::contacts_of);
     PositionDesign {
         estimator: rig.estimator.clone(),
@@ -327,12 +327,12 @@ fn advice_to_json(arguments: &Arguments, advice: &Advice) -> impl Serialize {
         "positions": advice.positions,
         "expected_error_mm": advice.error_m * 1e3,
         "endless_error_mm": advice.endless_error_m * 1e3,
-        "to_gain_percent": advice.to_gain_percent(),
+        "to_gain_percent": advice.remaining_gain_percent(),
         "stop_below_percent": advice.stop_percent,
         "enough": advice.is_enough(),
         "next": next.collect::<Vec<_>>(),
         // Presses to come until it is enough; null where more than are looked ahead.
-        "presses_to_go": advice.gets_there().then_some(advice.next.len()),
+        "presses_to_go": advice.reaches_goal().then_some(advice.next.len()),
     }
 }
 
@@ -343,7 +343,7 @@ fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
         advice.positions,
         advice.error_m * 1e3,
         advice.endless_error_m * 1e3,
-        advice.to_gain_percent(),
+        advice.remaining_gain_percent(),
     ))?;
     if advice.is_enough() {
         return output::say(format!("Enough: less than {} % is left to gain.", advice.stop_percent));
@@ -365,7 +365,7 @@ fn print_advice(advice: &Advice, extent: Extent) -> Result<(), Failure> {
         .column("expected error, mm", |(press, _)| format!("{:.4}", press.error_m * 1e3))
         .column("gain, %", |(_, gain)| format!("{gain:.2}"));
     output::say(format!("\n{table}"))?;
-    if advice.gets_there() {
+    if advice.reaches_goal() {
         let count = advice.next.len();
         let words = if count == 1 { "press leaves" } else { "presses leave" };
         output::say(format!("\n{count} {words} less than {} % to gain.", advice.stop_percent))

@@ -94,6 +94,14 @@ impl Plate {
         })
     }
 
+    /// The same on a mesh of so many elements along the longer side.
+    ///
+    /// # Errors
+    /// [`PlateError`] as for [`Plate::new`].
+    pub fn with_elements(self, elements: usize) -> Result<Self, PlateError> {
+        Self::new(PlateSpec { elements, ..self.spec })
+    }
+
     /// The description.
     pub fn spec(&self) -> &PlateSpec {
         &self.spec
