@@ -1,4 +1,4 @@
-//! Where to put the sensors and where to press, scored by the location error that follows.
+//! Placement of sensors and of training presses, scored by the location error that follows.
 //!
 //! [`sensors`] places sensors so that the Cramér–Rao bound over the expected contacts is small; [`positions`] places the training
 //! presses so that the estimator errs least after simulated calibrations, and says where a recording begun goes on. What both

@@ -1,4 +1,4 @@
-//! What locators achieve after simulated calibrations.
+//! Errors of locators after simulated calibrations.
 
 use palpate_estimators::evaluation::{Evaluation, Located, median};
 use palpate_numerics::{mean, standard_error};

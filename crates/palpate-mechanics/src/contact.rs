@@ -1,4 +1,4 @@
-//! Where and how hard a surface is touched, and how large it is. Contact and position are those of the microcontroller.
+//! Contacts, positions, and the extent of a surface. Contact and position are those of the microcontroller.
 
 use serde::{Deserialize, Serialize};
 

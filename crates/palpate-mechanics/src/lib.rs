@@ -1,4 +1,4 @@
-//! What sensors read when a contact touches an elastic surface, and what physics allows to be told from it.
+//! Readings of sensors on an elastic surface that a contact touches, and the limit of what can be told from them.
 //!
 //! [`surface`] has the surfaces (beams, plates, the digit) and answers one question: what does this sensor read when a
 //! force acts there. [`sensing`] says what is measured where and how well, [`limit`] which error no estimator can beat, and

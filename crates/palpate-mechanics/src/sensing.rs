@@ -1,4 +1,4 @@
-//! What is measured where, and how well: sensor kinds, the layout, and the faults of real channels.
+//! Sensors: their kinds, their layout, and the faults of real channels.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What training positions are designed for, and how they come about.
+//! Task of a design of training positions, and the ways in which they are placed.
 
 use crate::contacts::{ContactPrior, WeightedContacts};
 use crate::sensors::{SensorDesign, TOLERANCE_M};

@@ -1,4 +1,4 @@
-//! What sensors read, as a Gaussian process of the contact's position, in units of their noise.
+//! Readings as a Gaussian process of the contact's position, in units of their noise.
 
 use super::design::PositionError;
 use ndarray::Array2;
@@ -34,8 +34,8 @@ pub(super) struct ForwardModel {
 }
 
 impl ForwardModel {
-    /// Of a bench with a model, from its clean readings.
-    pub fn of_model(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
+    /// Model of a bench from the clean readings that its mechanics give.
+    pub fn from_mechanics(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
         let surface = setup.surface.model().ok_or(PositionError::NoModel)?;
         let force_n = setup.force_n.ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
@@ -57,8 +57,8 @@ impl ForwardModel {
         Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }
 
-    /// Of a recording begun, whose noise its repeats tell, or else the layout.
-    pub fn of_recording(
+    /// Model of a bench from a recording begun, whose noise its repeats tell, or else the layout.
+    pub fn from_recording(
         recording: &Recording,
         layout: &Layout,
         extent: Extent,
@@ -83,7 +83,7 @@ impl ForwardModel {
         Self::fit(&positions, &scaled, &sds, 1.0, extent, force, watch)
     }
 
-    /// To readings at some positions: those of the sensors in `sds`, divided by their standard deviations, then have the
+    /// Fits to readings at some positions: those of the sensors in `sds`, divided by their standard deviations, then have the
     /// `noise_variance`.
     fn fit(
         positions: &[Position],

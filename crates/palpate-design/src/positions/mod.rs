@@ -1,4 +1,4 @@
-//! Where to press: training positions for an estimator and a budget of presses.
+//! Placement of presses: training positions for an estimator and a budget of presses.
 //!
 //! ```
 //! use palpate_design::positions::{PositionDesign, PositionProblem, best_placed};
@@ -205,7 +205,7 @@ impl PositionProblem {
 
     fn variance_optimal(&self, watch: Watch) -> Result<Vec<Position>, PositionError> {
         watch.stage("least variance", f64::NAN)?;
-        let forward = ForwardModel::of_model(&self.pressed, self.force, watch)?;
+        let forward = ForwardModel::from_mechanics(&self.pressed, self.force, watch)?;
         Ok(variance::least(&forward, &self.contacts, self.extent, &self.design, watch)?)
     }
 

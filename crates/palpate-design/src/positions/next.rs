@@ -16,7 +16,7 @@ const MOST_AHEAD: usize = 200;
 /// A press to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextPress {
-    /// Where.
+    /// Position to press.
     pub position: Position,
     /// The error that is expected after it, in metres.
     pub error_m: f64,
@@ -98,7 +98,7 @@ pub fn next_press(
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
     let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let forward = ForwardModel::of_recording(recording, &setup.layout, extent, force, watch)?;
+    let forward = ForwardModel::from_recording(recording, &setup.layout, extent, force, watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
     let first = expected.places.len();

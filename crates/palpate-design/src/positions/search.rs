@@ -38,7 +38,7 @@ pub(super) fn evaluate(
     Ok(scores)
 }
 
-/// Steps of one position at a time, or of one and its mirror image, ever smaller (pattern search: Hooke and Jeeves 1961).
+/// Pattern search by ever smaller steps of one position at a time, or of one and its mirror image (Hooke and Jeeves 1961).
 pub(super) struct PatternSearch {
     pub extent: Extent,
     /// Whether positions that mirror each other are moved together.

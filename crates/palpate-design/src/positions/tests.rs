@@ -73,7 +73,7 @@ fn a_bench_is_mirrored_or_not() {
 }
 
 fn forward(setup: &Setup) -> ForwardModel {
-    ForwardModel::of_model(setup, Force::Known, Watch::NONE).unwrap()
+    ForwardModel::from_mechanics(setup, Force::Known, Watch::NONE).unwrap()
 }
 
 #[test]

@@ -49,7 +49,7 @@ impl ExpectedError {
         }
     }
 
-    /// Which places can be pressed.
+    /// Indices of the places that can be pressed.
     pub fn sites(&self) -> std::ops::Range<usize> {
         0..self.sites
     }
@@ -77,7 +77,7 @@ pub(super) struct Posterior {
 }
 
 impl Posterior {
-    /// Before any press.
+    /// The prior: covariances before any press.
     pub fn prior(forward: &ForwardModel, places: &[Position]) -> Self {
         let covariance = Array2::from_shape_fn((places.len(), places.len()), |(a, b)| {
             forward.covariance(places[a], places[b])
@@ -85,7 +85,7 @@ impl Posterior {
         Self { covariance }
     }
 
-    /// After the mean of presses at a place, whose noise has this `variance` in units of one press's:
+    /// Conditions on the mean of presses at a place, whose noise has this `variance` in units of one press's:
     /// C − c·cᵀ/(C_pp + variance), c = C's column of the place.
     pub fn condition(&mut self, place: usize, variance: f64) {
         let column = self.covariance.column(place).to_owned();

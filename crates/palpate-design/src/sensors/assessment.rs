@@ -1,4 +1,4 @@
-//! What a layout is worth, whoever placed its sensors: by the limit, by simulated calibrations, and against fewer sensors.
+//! Assessment of a layout, whoever placed its sensors: by the limit, by simulated calibrations, and against fewer sensors.
 
 use std::ops::RangeInclusive;
 

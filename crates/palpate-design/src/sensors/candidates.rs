@@ -1,4 +1,4 @@
-//! What searches choose from: the sensors that a layout may have, one or two at a time, and which go together.
+//! Candidates of searches: the sensors that a layout may have, one or two at a time, and which go together.
 
 use std::collections::HashMap;
 

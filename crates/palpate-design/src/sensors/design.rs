@@ -1,4 +1,4 @@
-//! What a sensor design may choose from, and what it must keep to.
+//! Task of a sensor design: the sensors on offer, and the constraints.
 
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -358,7 +358,7 @@ pub enum DesignError {
         first: Position,
         /// Position of the other.
         second: Position,
-        /// Why.
+        /// Reason for which they do.
         reason: Exclusion,
         /// The surface.
         extent: Extent,

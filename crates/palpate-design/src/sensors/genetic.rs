@@ -38,7 +38,7 @@ pub(super) fn search(search: &Search, feasible: &[usize], seed: u64) -> Result<F
         let mut next: Vec<Found> = population[..ELITE].to_vec();
         while next.len() < POPULATION {
             let [one, other] = [parent(&population, &mut rng), parent(&population, &mut rng)];
-            // Children that find no way to be whole are not born.
+            // Where the constraints leave no way to complete a child, a parent lives on.
             let layout = child(pool, one, other, &mut rng).unwrap_or_else(|| one.selection.clone());
             next.push(search.scored(layout));
         }

@@ -227,7 +227,7 @@ impl SensorProblem<'_> {
         Ok(Designed { method, layout, assessment })
     }
 
-    /// Kind by kind, from left to right.
+    /// Layout of some sensors, kind by kind, from left to right.
     fn layout(&self, mut placed: Vec<PlacedSensor>) -> Result<Layout, DesignError> {
         placed.sort_by(|a, b| {
             let by_offer = a.offer.cmp(&b.offer);

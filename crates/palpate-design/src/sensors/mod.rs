@@ -1,4 +1,4 @@
-//! Where to put the sensors: k of many candidate sites, of several kinds, for the contacts that are expected.
+//! Placement of sensors: k of many candidate sites, of several kinds, for the contacts that are expected.
 //!
 //! ```
 //! use palpate_design::sensors::{ContactPrior, SensorDesign, SensorProblem, Sites};

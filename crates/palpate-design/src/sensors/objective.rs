@@ -1,4 +1,4 @@
-//! What searches ask of a criterion: the score of a layout, and quickly that of the same with one more sensor.
+//! Criteria as searches use them: the score of a layout, and quickly that of the same with one more sensor.
 
 /// Numbers that are worked on side by side, which compilers turn into vector instructions.
 pub(super) const LANES: usize = 8;

@@ -9,7 +9,7 @@ use palpate_numerics::{mean, percentile};
 /// The limit at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitPoint {
-    /// Where.
+    /// Position of the contact.
     pub position: Position,
     /// The bound there; `None` where the readings do not tell the position.
     pub bound: Option<Bound>,

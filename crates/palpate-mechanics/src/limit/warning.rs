@@ -1,4 +1,4 @@
-//! What a limit warns of, in words: where, how bad, and what would help.
+//! Warnings of a limit, in words: the zone, how bad it is, and what would help.
 
 use std::fmt;
 
@@ -29,7 +29,7 @@ const CONSTANT_REACTION: f64 = 1e-6;
 pub enum LimitWarning {
     /// The limit is a large part of the surface, or there is none.
     Blind {
-        /// Where.
+        /// Zone with such limits.
         zone: Zone,
         /// Knowledge of the force.
         force: Force,
@@ -46,7 +46,7 @@ pub enum LimitWarning {
     },
     /// Two contacts far apart whose readings are alike.
     Mirror {
-        /// Where.
+        /// Zone of such contacts.
         zone: Zone,
         /// Zone of the other contacts.
         twins: Zone,
@@ -61,7 +61,7 @@ pub enum LimitWarning {
     },
     /// A contact that hardly shows in the readings.
     Faint {
-        /// Where.
+        /// Zone of such contacts.
         zone: Zone,
         /// Position of the faintest contact.
         at: Position,

@@ -169,9 +169,9 @@ pub(super) struct Grid {
 impl Grid {
     /// Fine enough to see what a limit does.
     pub fn over_surface(extent: Extent) -> Self {
-        let Some(width_m) = extent.width_m() else { return Self::new(extent, ALONG_A_LINE, 1) };
+        let Some(width_m) = extent.width_m() else { return Self::even(extent, ALONG_A_LINE, 1) };
         let side = |ratio: f64| (ON_A_PLANE * ratio).sqrt().clamp(5.0, ON_A_PLANE / 5.0).round() as usize;
-        Self::new(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
+        Self::even(extent, side(extent.length_m() / width_m), side(width_m / extent.length_m()))
     }
 
     /// `every_m` apart, from `every_m` to as far as the surface reaches.
@@ -182,18 +182,22 @@ impl Grid {
         if !(columns >= 1.0 && rows >= 1.0 && count <= MOST as f64) {
             return Err(LimitError::Positions { count: count.max(0.0), most: MOST });
         }
-        let y_m = |row: usize| extent.width_m().map_or(0.0, |_| row as f64 * every_m);
-        let row =
-            |row| (1..=columns as usize).map(move |i| Position { x_m: i as f64 * every_m, y_m: y_m(row) });
-        Ok(Self { positions: (1..=rows as usize).flat_map(row).collect(), columns: columns as usize })
+        let y_m = |row: usize| extent.if_plane(row as f64 * every_m).unwrap_or(0.0);
+        Ok(Self::new(columns as usize, rows as usize, |column| column as f64 * every_m, y_m))
     }
 
-    fn new(extent: Extent, columns: usize, rows: usize) -> Self {
+    /// `columns` × `rows` evenly between the edges.
+    fn even(extent: Extent, columns: usize, rows: usize) -> Self {
         let share = |i: usize, count: usize| i as f64 / (count + 1) as f64;
         let y_m = |row: usize| extent.width_m().map_or(0.0, |width_m| share(row, rows) * width_m);
-        let x_m = |column: usize| share(column, columns) * extent.length_m();
-        let row = |row| (1..=columns).map(move |column| Position { x_m: x_m(column), y_m: y_m(row) });
-        Self { positions: (1..=rows).flat_map(row).collect(), columns }
+        Self::new(columns, rows, |column| share(column, columns) * extent.length_m(), y_m)
+    }
+
+    /// From x of each column and y of each row, which count from 1.
+    fn new(columns: usize, rows: usize, x_m: impl Fn(usize) -> f64, y_m: impl Fn(usize) -> f64) -> Self {
+        let x_m: Vec<f64> = (1..=columns).map(x_m).collect();
+        let row = |y_m: f64| x_m.iter().map(move |&x_m| Position { x_m, y_m });
+        Self { positions: (1..=rows).map(y_m).flat_map(row).collect(), columns }
     }
 
     /// On a line, with these positions among the others where they lie between its ends; on a plane as it is.

@@ -1,4 +1,4 @@
-//! What a sensor reads when a unit force acts somewhere on the surface; nothing of recordings or estimators.
+//! Surfaces and their influence functions: the reading of a sensor when a unit force acts somewhere; nothing of recordings or estimators.
 
 mod beam;
 mod digit;

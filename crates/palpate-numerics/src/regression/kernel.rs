@@ -68,7 +68,7 @@ impl Trend {
     }
 }
 
-/// The numbers that say how smooth the functions are and how noisy the rows.
+/// Length scales of the functions, which say how smooth they are, and noise ratio of the rows.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hyperparameters {

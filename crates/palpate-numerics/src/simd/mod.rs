@@ -48,7 +48,7 @@ pub trait Kernel {
     type Output;
     /// Whether it uses [`Vector::mul_add`] or [`Vector::mul_sub`]. One that does not is compiled once less.
     const FUSED: bool;
-    /// Does it with the vectors of `S`. To be `#[inline(always)]`, as all that it spends its time in.
+    /// Does the work with the vectors of `S`. To be `#[inline(always)]`, as all that it spends its time in.
     fn run<S: Simd>(self) -> Self::Output;
 }
 

@@ -1,4 +1,4 @@
-//! What numbers side by side can do. Every operation is lane by lane and rounds as IEEE 754 says.
+//! Operations on numbers side by side. Every operation is lane by lane and rounds as IEEE 754 says.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

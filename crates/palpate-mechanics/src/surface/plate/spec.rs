@@ -235,7 +235,7 @@ pub enum PlateError {
     /// The equations could not be solved.
     #[error("the equations of the plate could not be solved: {reason}")]
     Unsolvable {
-        /// Why.
+        /// Reason for which they could not.
         reason: Unsolvable,
     },
 }

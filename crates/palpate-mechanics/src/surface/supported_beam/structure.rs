@@ -92,7 +92,7 @@ impl Structure {
         }
     }
 
-    /// The shape when nothing happens.
+    /// Shape of the undisturbed beam: no deflection anywhere.
     pub fn unbent(&self) -> Shape {
         let nothing = State::DEFLECTION * 0.0;
         let piece = Piece { from: 0.0, to: 1.0, start: nothing, end: nothing, stiffness: 1.0 };
@@ -320,7 +320,7 @@ struct Passage {
     before: [Factors; 2],
 }
 
-/// Nothing holds the air before the beam.
+/// States of a section before the beam, which nothing holds.
 const FREE: Pair = [State::DEFLECTION, State::SLOPE];
 
 impl Sweep {

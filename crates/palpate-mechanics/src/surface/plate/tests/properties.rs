@@ -1,4 +1,4 @@
-//! What is true of every plate.
+//! Properties of every plate.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! What holds of every beam.
+//! Properties of every beam.
 
 use proptest::prelude::*;
 
