@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 
 /// Result of a command that was watched.
 pub struct Watched {
-    /// It exited with 0.
+    /// Whether it exited with 0.
     pub succeeded: bool,
     /// Everything it printed, without colours: its output first, then its error output.
     pub lines: Vec<String>,

@@ -15,15 +15,15 @@ use crate::tidy;
 /// Tells a test that it must fail where it would skip.
 const STRICT: &str = "PALPATE_STRICT";
 
-/// All that is checked: every crate, with the features that are off by default.
+/// Arguments for all that is checked: every crate, with the features that are off by default.
 const EVERYTHING: [&str; 2] = ["--workspace", "--all-features"];
 
 /// Verdict on a test that is skipped for want of a prerequisite.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Skips {
-    /// It is named and counted.
+    /// The test is named and counted.
     Pass,
-    /// It fails.
+    /// The test fails.
     Fail,
 }
 

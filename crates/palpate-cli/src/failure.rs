@@ -7,6 +7,7 @@ use palpate_numerics::watch::Cancelled;
 use std::fmt;
 use std::io::IsTerminal;
 use std::ops::Range;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Outcome of a command that did not simply succeed.
@@ -35,7 +36,7 @@ impl Failure {
         if Cancelled::caused(error) { Self::stopped() } else { Complaint::new(error).into() }
     }
 
-    /// Says what happened on stderr.
+    /// Prints the message on stderr, and gives the exit code.
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
             Self::BadInput(complaint) => {
@@ -64,7 +65,7 @@ pub struct Complaint {
 #[derive(Debug)]
 struct Excerpt {
     file: String,
-    /// From 0.
+    /// Number of the line, from 0.
     line: usize,
     text: String,
     span: Range<usize>,
@@ -76,7 +77,12 @@ impl Complaint {
         Self { message: message.to_string(), help: None, excerpt: None }
     }
 
-    /// Adds what would help.
+    /// A complaint about a file, of which no place is known.
+    pub fn about(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::new(format!("{}: {problem}", path.display()))
+    }
+
+    /// Adds a remedy.
     pub fn help(mut self, help: impl fmt::Display) -> Self {
         self.help = Some(help.to_string());
         self

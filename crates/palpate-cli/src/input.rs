@@ -164,7 +164,7 @@ fn rig_complaint(error: RigError, path: &Path, text: &str) -> Failure {
 }
 
 fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Complaint {
-    let complaint = Complaint::new(format!("{}: {error}", path.display()));
+    let complaint = Complaint::about(path, error);
     let Some((line, column)) = error.place() else { return complaint };
     let line_text = text.lines().nth(line - 1).unwrap_or_default();
     let start = (column - 1).min(line_text.len());

@@ -1,4 +1,10 @@
 //! The `palpate` command: arguments, files, progress, messages. What it says is computed by the library.
+//!
+//! ```console
+//! $ palpate fit examples/paper.toml -o locator.json
+//! $ palpate simulate examples/paper.toml --every "1 mm" -o presses.csv
+//! $ palpate evaluate locator.json --data presses.csv --out report
+//! ```
 #![forbid(unsafe_code)]
 
 mod commands;

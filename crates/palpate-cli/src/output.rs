@@ -116,7 +116,7 @@ impl<R> Table<R> {
         Self { cells: vec![Vec::new(); rows.len()], heading: Vec::new(), rows }
     }
 
-    /// Adds a column with what it says of each row.
+    /// Adds a column with its cell of each row.
     pub fn column(mut self, heading: impl Into<String>, cell: impl Fn(&R) -> String) -> Self {
         self.heading.push(heading.into());
         self.cells.iter_mut().zip(&self.rows).for_each(|(cells, row)| cells.push(cell(row)));

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C (and a polite kill) asks long work to stop, and the second time ends the process.
+/// Makes Ctrl-C (and a polite kill) ask long work to stop, and end the process the second time.
 pub fn install_interrupt_handler() {
     let installed = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
@@ -53,12 +53,12 @@ struct State {
 const STAGE_STEPS: f64 = 1000.0;
 
 impl Observer {
-    /// Of an iteration of at most so many rounds.
+    /// Observer of an iteration of at most so many rounds.
     pub fn of_rounds(most: u64) -> Self {
         Self::new(bar(most, "fitting"))
     }
 
-    /// Of work that reports stages; the bar begins anew with every stage.
+    /// Observer of work that reports stages; the bar begins anew with every stage.
     pub fn of_stages() -> Self {
         Self::new(bar(STAGE_STEPS as u64, "beginning"))
     }

@@ -130,7 +130,7 @@ impl BeamDrawing {
     }
 }
 
-/// From millimetres to pixels.
+/// Mapping from millimetres to pixels.
 struct Frame {
     width: f64,
     length_mm: f64,

@@ -35,7 +35,7 @@ pub(super) fn bench_figure(
     Some(Figure::new(format!("{what}: beam, supports, sensors and load"), svg, caption))
 }
 
-/// Every layout a named row, the first uppermost; a marker a kind.
+/// Chart of the sensors of some layouts: a named row each, the first uppermost; a marker for each kind of sensor.
 pub(super) fn sites_chart(layouts: &[(String, &Layout)], length_m: f64, marks: Vec<Mark>) -> Chart {
     let kinds = SensorKind::ALL.into_iter().enumerate().filter_map(|(colour, kind)| {
         let of_row = |(row, (_, layout)): (usize, &(String, &Layout))| -> Vec<(f64, f64)> {

@@ -166,7 +166,7 @@ impl<'a> SensorDesignReport<'a> {
             .caption(html! { "Where their sensors sit." })
     }
 
-    /// Every layout a row.
+    /// Figure of the sensors of every layout.
     fn sites_figure(&self) -> Figure {
         let row = |designed: &'a Designed| (designed.method.name().to_owned(), &designed.layout);
         let rows: Vec<_> = self.designed.iter().map(row).collect();

@@ -21,7 +21,7 @@ const JUDGED_CONTACTS: [f64; 3] = [0.45, 0.6, 0.8];
 const SHAPE_STEPS: u32 = 120;
 /// Forces of a curve, from a hundredth of the largest load to all of it.
 const FORCES: u32 = 60;
-/// Above and below what a chart draws.
+/// Margin of a chart around the finger, as a share of its length.
 const MARGIN: f64 = 0.06;
 
 /// `what` ("The bench"), the finger as it is and bent by `force_n` newtons at three places; x and y have the same scale.

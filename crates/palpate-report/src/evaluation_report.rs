@@ -16,7 +16,7 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_rig::Rig;
 
-/// More positions than this are drawn as a line: markers would hide each other.
+/// Greatest number of positions that are drawn as markers; of more, markers would hide each other, and a line is drawn.
 const MOST_MARKERS: usize = 80;
 
 /// Contents of an evaluation's report.
@@ -39,9 +39,9 @@ pub struct EvaluationReport<'a> {
 /// Origin of an evaluation's answers.
 #[derive(Clone, Copy, Debug)]
 pub enum Judged<'a> {
-    /// Those of a locator.
+    /// Answers of a locator.
     Locator(&'a Locator),
-    /// Those of locators of one rig, each fitted without the positions that it was asked for.
+    /// Answers of locators of one rig, each fitted without the positions that it was asked for.
     CrossValidated {
         /// The rig.
         rig: &'a Rig,

@@ -1,5 +1,34 @@
 //! Reports: self-contained HTML pages with their figures as SVG, handed back as [`ReportFile`]s.
 //!
+//! ```
+//! use palpate_estimators::arrangement::Training;
+//! use palpate_estimators::estimator::Estimator;
+//! use palpate_estimators::evaluation::Evaluation;
+//! use palpate_estimators::fit::Fit;
+//! use palpate_estimators::influence::Influence;
+//! use palpate_estimators::setup::Setup;
+//! use palpate_mechanics::sensing::SensorKind::Deflection;
+//! use palpate_mechanics::surface::Beam;
+//! use palpate_mechanics::units::{gpa, mm, newtons, um};
+//! use palpate_report::{EvaluationReport, Judged, evaluation_report};
+//!
+//! let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+//! let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+//! let presses = setup.simulate(&Training::even(10).with_force(newtons(3.0)), 0)?;
+//! let locator = Estimator::Influence(Influence::default()).fit(&setup, &presses)?;
+//! let files = evaluation_report(&EvaluationReport {
+//!     title: "How well the locator remembers",
+//!     judged: Judged::Locator(&locator),
+//!     evaluation: &Evaluation::new(&locator, &presses)?,
+//!     recording: &presses.provenance,
+//!     portions: &[],
+//!     tolerance_m: mm(2.0),
+//! });
+//! let page = String::from_utf8_lossy(&files[0].bytes);
+//! assert!(files[0].name == "report.html" && page.contains("10 readings"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Beneath them lie charts and maps, which know nothing of what is drawn: a [`Chart`] is plain data that the caller fills in.
 //! No function touches a file, the clock or the fonts of the machine, so the same data give the same bytes everywhere.
 //!

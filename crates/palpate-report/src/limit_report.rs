@@ -267,7 +267,7 @@ fn limit_axis(extremes: Extremes, length_mm: f64) -> Axis {
     }
 }
 
-/// With a capital at its beginning and a full stop at its end.
+/// A text as a sentence: with a capital at its beginning and a full stop at its end.
 fn sentence(words: &str) -> String {
     let mut characters = words.chars();
     let first = characters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();

@@ -58,7 +58,7 @@ pub(crate) fn whole(value: f64) -> String {
     signed(rounded, format_count(rounded.abs() as u64))
 }
 
-/// As it was written, with separators of thousands from 1,000 on: "3.6", "26,850".
+/// A number as it was written, with separators of thousands from 1,000 on: "3.6", "26,850".
 pub(crate) fn as_written(value: f64) -> String {
     if value.abs() >= 1e3 { whole(value) } else { format!("{value}") }
 }

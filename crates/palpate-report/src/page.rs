@@ -146,7 +146,7 @@ pub(crate) struct Column {
     class: &'static str,
 }
 
-/// A table that is made column by column, with what each column says of every row.
+/// A table that is made column by column, with a cell for every row.
 pub(crate) struct Columns<R> {
     rows: Vec<R>,
     columns: Vec<Column>,
@@ -217,17 +217,17 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
 }
 
 impl Page {
-    /// A page with its title, what was found (the items of a list), and its sections.
+    /// A page with its title, the items of its summary, and its sections.
     pub fn new(title: impl Into<String>, summary: Markup, sections: Vec<Section>) -> Self {
         Self { title: title.into(), lead: Markup::default(), summary, sections, source: Markup::default() }
     }
 
-    /// Adds what stands between the title and what was found.
+    /// Adds an introduction between the title and the summary.
     pub fn with_lead(self, lead: Markup) -> Self {
         Self { lead, ..self }
     }
 
-    /// Adds what the page was made from, as it goes on after "Made by palpate 1.2.3".
+    /// Adds the source of the page, as it goes on after "Made by palpate 1.2.3".
     pub fn with_source(self, source: Markup) -> Self {
         Self { source, ..self }
     }

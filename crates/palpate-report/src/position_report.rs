@@ -106,7 +106,7 @@ impl<'a> PositionDesignReport<'a> {
             .caption(html! { "Where to press." })
     }
 
-    /// Every arrangement a row, the first uppermost.
+    /// Figure of the positions of every arrangement, a row each, the first uppermost.
     fn rows_figure(&self) -> Figure {
         let rows = self.placed.len();
         let series = self.placed.iter().enumerate().map(|(row, placed)| {
@@ -141,7 +141,7 @@ impl<'a> PositionDesignReport<'a> {
         Figure::chart(&chart, html! { "The mean error at each contact over all verifying calibrations." })
     }
 
-    /// On a plane, the error with the even arrangement and with the best, side by side in one scale, with the positions.
+    /// Maps of the error over a plane with the even arrangement and with the best, side by side in one scale, with the positions.
     fn maps(&self) -> Vec<Figure> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);

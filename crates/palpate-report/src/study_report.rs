@@ -13,9 +13,9 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_studies::{Arm, ArmOutcome, ArmResults, PreparedStudy, RunFacts, StudyResults};
 
-/// So many arms are told apart in a table; more are also drawn side by side.
+/// Number of arms that are told apart in a table; more are also drawn side by side.
 const FEW_ARMS: usize = 3;
-/// So many bands may lie over each other in a figure.
+/// Greatest number of bands that lie over each other in a figure.
 const MOST_BANDS: usize = 2;
 /// Markers of an arm stand this far beside each other, in rows.
 const BESIDE: f64 = 0.22;
@@ -364,10 +364,10 @@ pub(crate) fn chart_of_errors(report: &StudyReport, title: &str, series: Vec<Ser
     Chart::new(title, x, y, series).with_marks(vec![tolerance_mark(report.study.judging().tolerance_m)])
 }
 
-/// Errors cross zero, which a logarithmic axis cannot show; below this nobody looks.
+/// Low end of the axis of errors: they cross zero, which a logarithmic axis cannot show.
 const LEAST_ERROR_MM: f64 = 0.05;
 
-/// Every arm with its figures; a column only where some arm fills it.
+/// Table of every arm with its figures; a column only where some arm fills it.
 pub(crate) fn arms_table(report: &StudyReport) -> Table {
     let arms = &report.results.arms;
     let mut table = Table::from_rows(arms.iter().enumerate()).short("arm", |(_, arm)| arm.name.clone());

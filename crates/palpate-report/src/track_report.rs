@@ -11,9 +11,9 @@ use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, tracked_of};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
 
-/// More points than this hide the track, so that of single estimates only every so many is drawn.
+/// Greatest number of single estimates that are drawn; more would hide the track.
 const MOST_POINTS: usize = 60;
-/// More points of a line than this cannot be told apart.
+/// Greatest number of points of a line; more cannot be told apart.
 const MOST_OF_LINE: usize = 2000;
 /// Width of the plot area of a chart, and what there is above and below it, both about: a plane is drawn to scale.
 const PLOT_WIDTH_PX: f64 = 630.0;
@@ -246,7 +246,7 @@ impl TrackReport<'_> {
 
 /// Coordinate of a contact whose errors are drawn.
 struct Coordinate {
-    /// As it goes on after "track".
+    /// Name, as it goes on after "track".
     name: &'static str,
     contact: usize,
     across: bool,

@@ -15,9 +15,9 @@ use crate::error::RigError;
 use crate::sensors::kind_on;
 use crate::values::{AtLeastZero, Count, Length, NotNegative, Number, Point, Positive, Written, check_order};
 
-/// More candidate sites than a search goes through in reasonable time.
+/// Greatest number of candidate sites that a search goes through in reasonable time.
 const MOST_SITES: i64 = 1_000_000;
-/// More contact positions than a layout needs to be judged by.
+/// Greatest number of contact positions to judge a layout by.
 const MOST_CONTACTS: f64 = 10_000.0;
 
 /// Candidates of a sensor design, and its constraints.
@@ -59,11 +59,11 @@ pub(crate) struct DesignKeys {
     expecting = "a distance such as \"5 mm\", a number of sites, or a list of positions"
 )]
 pub(crate) enum SitesKeys {
-    /// So far apart.
+    /// Distance of neighbouring sites.
     Text(Positive<Length>),
-    /// So many, evenly along a line.
+    /// Number of sites, evenly along a line.
     Number(Count<1, MOST_SITES>),
-    /// These.
+    /// The sites one by one.
     List(Vec<At<Point>>),
 }
 

@@ -119,7 +119,7 @@ pub enum RigProblem {
         extent.place_in_words(*position)
     )]
     InsensitiveSensor {
-        /// Which sensor of its section, from 1.
+        /// Number of the sensor in its section, from 1.
         number: usize,
         /// Its kind.
         kind: SensorKind,
@@ -137,7 +137,7 @@ pub enum RigProblem {
         force_takers(*extent, supports)
     )]
     NoSupport {
-        /// Which sensor of its section, from 1.
+        /// Number of the sensor in its section, from 1.
         number: usize,
         /// Its position.
         position: Position,
@@ -156,7 +156,7 @@ pub enum RigProblem {
 /// Place of a value in the document, and the text that is written there.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
-    /// Its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
+    /// Path: its key after those of the tables around it, with dots between; that of its list for an element; empty for the document.
     pub path: String,
     /// Its bytes in the document.
     pub span: Range<usize>,
@@ -174,7 +174,7 @@ impl Place {
         self.refuse_as(&self.written, bound)
     }
 
-    /// The same, for a value in other words than it is written in.
+    /// The error for a value outside its bound, in other words than it is written in.
     pub fn refuse_as(&self, value: impl Display, bound: impl Display) -> RigError {
         let (value, bound) = (value.to_string(), bound.to_string());
         RigProblem::OutOfRange { key: self.key().to_owned(), value, bound }.at_place(self)
@@ -218,7 +218,7 @@ impl RigError {
         }
     }
 
-    /// Names the value that a type has refused, unless a value within it has been named already.
+    /// Sets key and place to those of the value that a type has refused, unless a value within it has been named already.
     pub(crate) fn with_place(mut self, place: &Place) -> Self {
         if self.span.is_some() {
             return self;
@@ -239,7 +239,7 @@ impl RigError {
         self
     }
 
-    /// Names the place of a key that a table has refused, and what tells the table's keys.
+    /// Sets the place to that of a key that a table has refused, and what tells the table's keys.
     pub(crate) fn at_key(mut self, span: Range<usize>, tag: Option<(&'static str, &str)>) -> Self {
         if let (RigProblem::UnknownKey { known, with, .. }, Some((key, word))) = (&mut *self.problem, tag) {
             known.insert(0, key);

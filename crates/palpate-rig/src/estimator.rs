@@ -67,7 +67,7 @@ pub(crate) struct NetworkKeys {
     pub aggregate_error: Option<Positive<Number>>,
     /// Training is capped after this many epochs.
     pub max_epochs: Option<Count<1, { u32::MAX as i64 }>>,
-    /// In which order patterns are presented.
+    /// Order in which patterns are presented.
     pub order: Option<PresentationOrder>,
     /// Weights start uniform within ± this.
     pub initial_weights: Option<Positive<Number>>,

@@ -37,7 +37,7 @@ pub(crate) struct MotionKeys {
     pub damping: Option<At<Fraction>>,
 }
 
-/// More readings than a recording should hold in memory.
+/// Greatest number of readings that a recording should hold in memory.
 const MOST_READINGS: f64 = 1e7;
 /// A turn takes this share of the way, and a touch this long, unless the rig says otherwise.
 const TURN: f64 = 0.2;

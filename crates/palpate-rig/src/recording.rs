@@ -85,7 +85,7 @@ impl At<RecordingKeys> {
         })
     }
 
-    /// Without a header, columns must be numbers; the force can be missing.
+    /// Checks that without a header columns are numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
         let values = [&self.force, &self.nuisance].into_iter().flatten();

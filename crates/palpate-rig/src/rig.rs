@@ -146,7 +146,7 @@ pub enum RigSimulationError {
     Simulate(#[from] SimulateError),
 }
 
-/// More values than a recording of the training positions should hold in memory.
+/// Greatest number of values that a recording of the training positions should hold in memory.
 const MOST_VALUES: usize = 100_000_000;
 
 /// A rig file.

@@ -13,7 +13,7 @@ use crate::recording::{ColumnKey, RecordingKeys};
 use crate::values::{AtLeastZero, Count, Finite, Fraction, Grid, Length, NotNegative, OneOrMany, Point};
 use crate::values::{ON_A_PLANE, Written};
 
-/// More sensors than anyone wires up.
+/// Greatest number of sensors of a section.
 const MOST: i64 = 10_000;
 
 /// Sensors of one kind.
@@ -49,7 +49,7 @@ pub(crate) struct SensorsKeys {
 #[serde(expecting = "a list of 2, the lower value first")]
 pub(crate) struct RangeKeys(At<Written>, At<Written>);
 
-/// Every sensor of `sections`, named after the channels of the recording where it names them.
+/// The layout of `sections`: every sensor, named after the channels of the recording where it names them.
 pub(crate) fn build(
     sections: &At<OneOrMany<SensorsKeys>>,
     recording: Option<&RecordingKeys>,
@@ -187,7 +187,7 @@ impl At<SensorsKeys> {
     }
 }
 
-/// Under a modelled surface a reaction sensor must sit at a support, and the others where something moves.
+/// Checks that under a modelled surface a reaction sensor sits at a support, and the others where something moves.
 fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,

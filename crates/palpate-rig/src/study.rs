@@ -255,7 +255,7 @@ fn checked_name(name: &At<String>) -> Result<String, RigError> {
 }
 
 impl StudyFile {
-    /// Without an `[evaluation]`: 399 positions, 5 readings at each, tolerance 2 mm, no portions.
+    /// The `[evaluation]`; without one, 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
         let extent = first.rig.setup.surface.extent();
         if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {

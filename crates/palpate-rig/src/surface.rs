@@ -74,7 +74,7 @@ pub(crate) enum BeamSupportKeys {
     Simple { at: At<Quantity<Length>> },
     /// Neither deflection nor slope.
     Clamped { at: At<Quantity<Length>> },
-    /// Nothing: an end of the beam without a support, said so.
+    /// No support: a free end, said so.
     Free { at: At<Quantity<Length>> },
     /// No slope, free to deflect.
     Guided { at: At<Quantity<Length>> },
@@ -143,7 +143,7 @@ pub(crate) enum PointSupportsKeys {
     expecting = "a support such as { at = [\"10 mm\", \"10 mm\"], kind = \"simple\" }"
 )]
 pub(crate) enum PointSupportKeys {
-    /// It does not move, and the plate can turn on it.
+    /// No deflection; the plate can turn on it.
     Simple { at: At<Point> },
     /// A spring.
     Elastic {

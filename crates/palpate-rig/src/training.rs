@@ -9,7 +9,7 @@ use crate::document::{At, place};
 use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Force, Grid, ON_A_PLANE, Point, Positive, Quantity, Ratio, check_order};
 
-/// More training positions, or presses of one position, than anyone makes.
+/// Greatest number of training positions, and of presses of one position.
 const MOST: i64 = 100_000;
 
 /// The contacts to be located.

@@ -79,7 +79,7 @@ pub enum DeadAreasError {
     /// The rig cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] RigSimulationError),
-    /// It was stopped.
+    /// The study was stopped.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
 }
@@ -98,7 +98,7 @@ impl DeadAreas {
                 self.judge("distributive", &rig, &estimator, &trials, &mut findings, watch)?;
             }
             for spread in [PointSpread::Metres(FIXED_SPREAD_M), PointSpread::Pitches(0.5)] {
-                let array = ArraySensor::like(&rig, count, spread)?;
+                let array = ArraySensor::new(&rig, count, spread)?;
                 let trials = array.trials(self.calibrations, self.seed);
                 let estimator = Estimator::Centroid(Centroid);
                 self.judge(&array.name(), array.rig(), &estimator, &trials, &mut findings, watch)?;
@@ -191,9 +191,8 @@ pub struct ArraySensor {
     rig: Rig,
     spread: PointSpread,
     spread_m: f64,
-    noise_sd: f64,
-    training: Vec<Position>,
-    repeats: usize,
+    /// Position of each training press.
+    presses: Vec<Position>,
 }
 
 impl ArraySensor {
@@ -202,7 +201,7 @@ impl ArraySensor {
     ///
     /// # Errors
     /// [`RigSimulationError`] for a rig without a model or training positions.
-    pub fn like(rig: &Rig, count: usize, spread: PointSpread) -> Result<Self, RigSimulationError> {
+    pub fn new(rig: &Rig, count: usize, spread: PointSpread) -> Result<Self, RigSimulationError> {
         let model = rig.setup.surface.model().ok_or(SimulateError::NoModel)?;
         let force_n = rig.setup.force_n.ok_or(SimulateError::NoForce)?;
         let training = rig.training()?;
@@ -226,10 +225,11 @@ impl ArraySensor {
             PointSpread::Metres(spread_m) => spread_m,
             PointSpread::Pitches(pitches) => pitches * pitch_m,
         };
-        let (positions, repeats) =
-            (training.positions(setup.surface.extent()).map_err(SimulateError::from)?, training.repeats);
+        let positions = training.positions(setup.surface.extent()).map_err(SimulateError::from)?;
+        let presses =
+            positions.into_iter().flat_map(|at| std::iter::repeat_n(at, training.repeats)).collect();
         let rig = Rig { setup, loads: Vec::new(), ..rig.clone() };
-        Ok(Self { rig, spread, spread_m, noise_sd, training: positions, repeats })
+        Ok(Self { rig, spread, spread_m, presses })
     }
 
     /// Its bench, with the rig's training positions.
@@ -248,13 +248,11 @@ impl ArraySensor {
     /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
         let length_m = self.rig.setup.surface.extent().length_m();
-        let pressed: Vec<Position> =
-            self.training.iter().flat_map(|at| std::iter::repeat_n(*at, self.repeats)).collect();
         let judged: Vec<Position> =
             (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
-            let training = self.recording(&pressed, seed, &mut rng);
+            let training = self.recording(&self.presses, seed, &mut rng);
             Split { training, judged: self.recording(&judged, seed, &mut rng) }
         };
         (0..count).map(trial).collect()
@@ -265,7 +263,7 @@ impl ArraySensor {
         let row = |position: &Position| {
             let reading = layout.sensors().iter().map(|sensor| {
                 let off = position.distance_m(sensor.position) / self.spread_m;
-                (-0.5 * off * off).exp() + self.noise_sd * rng.sample::<f64, _>(StandardNormal)
+                (-0.5 * off * off).exp() + sensor.channel.noise_sd * rng.sample::<f64, _>(StandardNormal)
             });
             Row {
                 position: *position,

@@ -262,7 +262,7 @@ pub struct RunOptions {
     pub threads: usize,
 }
 
-/// Is told of every seed that is fitted, from many threads at once.
+/// Callback for every seed that is fitted, from many threads at once.
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {

@@ -110,8 +110,7 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
     let Some(recording) = arguments.files.read(&rig.setup)? else {
         let trials = rig.trials(u64::from(arguments.calibrations), arguments.seed);
         let trials = trials.map_err(|error| {
-            Complaint::new(format!("{}: {error}", arguments.rig.display()))
-                .help("--data names a recording to compare on")
+            Complaint::about(&arguments.rig, error).help("--data names a recording to compare on")
         })?;
         let calibrations = arguments.calibrations;
         let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());

@@ -64,7 +64,7 @@ pub struct ErrorFigures {
 }
 
 impl ErrorFigures {
-    /// In the unit to which `unit` takes metres.
+    /// The figures in the unit to which `unit` takes metres.
     pub fn new(summary: &ErrorSummary, unit: impl Fn(f64) -> f64) -> Self {
         Self {
             mean: unit(summary.average_m),

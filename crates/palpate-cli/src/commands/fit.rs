@@ -38,8 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
         None => rig.simulate(arguments.seed).map_err(|error| {
-            Complaint::new(format!("{}: {error}", arguments.rig.display()))
-                .help("--data names a recording to fit")
+            Complaint::about(&arguments.rig, error).help("--data names a recording to fit")
         })?,
     };
     let rig = decided(rig, &recording, arguments)?;

@@ -256,7 +256,7 @@ fn shape(topology: &Topology) -> String {
     topology.sizes.iter().map(usize::to_string).collect::<Vec<_>>().join("–")
 }
 
-/// With a rig the CSV is read as its recording; otherwise it is described as a table.
+/// Description of a CSV file: with a rig as its recording, otherwise as a table.
 fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failure> {
     let Some(rig) = rig else { return Ok(table(text)) };
     let setup = input::read_rig(rig)?.setup;

@@ -87,7 +87,7 @@ fn setup(arguments: &Arguments) -> Result<Setup, Failure> {
 }
 
 fn complaint(error: LimitError, rig: &Path) -> Failure {
-    let complaint = Complaint::new(format!("{}: {error}", rig.display()));
+    let complaint = Complaint::about(rig, error);
     let help = match error {
         LimitError::NoModel => {
             "give a surface with a model, such as `kind = \"beam\"`; how far a locator is off on recordings says `palpate evaluate`"
@@ -130,7 +130,7 @@ fn limits<'a>(
     })
 }
 
-/// From one end to the other, for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one
+/// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one
 /// side to the other.
 fn a_few(extent: Extent) -> Vec<Position> {
     const ON_A_LINE: [f64; 9] = [0.0025, 0.05, 0.125, 0.25, 0.5, 0.75, 0.875, 0.95, 0.9975];
@@ -286,7 +286,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
-/// Of the whole surface, whatever positions are listed.
+/// Rows of the limit over the whole surface, whatever positions are listed.
 fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
     let summaries = [limits.known.summary(), limits.unknown.summary()];
     let row = |name: &str, of: fn(&LimitSummary) -> f64| {

@@ -57,7 +57,7 @@ fn sensors_complaint(error: LoadSensorsError, path: &Path) -> Complaint {
         LoadSensorsError::NoModel => "give a surface with a model, such as `kind = \"beam\"`",
         LoadSensorsError::Noise(error) => error.help(),
     };
-    Complaint::new(format!("{}: {error}", path.display())).help(help)
+    Complaint::about(path, error).help(help)
 }
 
 struct Printer<'a> {
@@ -186,7 +186,7 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
     output::say(format!("\n{}", JsonPatch::columns(&told.loads, "true load", told.extent, number)))
 }
 
-/// All that a reading tells of the load; what it does not tell is null.
+/// Load profile of a reading as JSON; what the reading does not tell is null.
 #[derive(serde::Serialize)]
 struct JsonProfile {
     /// The line of the reading; null for a simulated one.

@@ -46,8 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             .map_err(|error| error.to_string())
         }
     };
-    let recording =
-        recording.map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
+    let recording = recording.map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut csv = Vec::new();
     recording::write(&recording, rig.setup.surface.extent(), &comment(arguments), &mut csv)
         .map_err(|error| output::cannot("write", &arguments.out, &error))?;
@@ -61,9 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
-    let timed = rig
-        .simulate_moving(arguments.seed)
-        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.rig.display())))?;
+    let timed =
+        rig.simulate_moving(arguments.seed).map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut csv = Vec::new();
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());
     let how = if swings { "" } else { ", in balance at every reading, without inertia" };

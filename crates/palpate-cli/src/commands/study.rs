@@ -46,7 +46,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Everything that `results.json` holds.
+/// Content of `results.json`.
 #[derive(serde::Serialize)]
 struct ResultsFile<'a> {
     #[serde(flatten)]
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     print_tables(&file, &out)
 }
 
-/// With a caret where the study file asks for what cannot be had.
+/// Complaint about a study, with a caret where its file asks for what cannot be had.
 fn complaint(error: &StudyRunError, name: &str, text: &str) -> Failure {
     let complaint = Complaint::new(error);
     match error {
@@ -224,7 +224,7 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     output::say_report("", Some(out))
 }
 
-/// Every arm a row; a column only where some arm fills it.
+/// Table of the arms; a column only where some arm fills it.
 fn arms_table(arms: &[ArmResults]) -> String {
     let mut table = Table::from_rows(arms);
     for (heading, of) in arm_columns(arms) {

@@ -61,9 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let own =
         beam.map(|beam| Swing { frequency_hz: beam.frequency_hz(1), damping_ratio: beam.damping_ratio() });
     let config = TrackerConfig { swing: told.or(own), ..TrackerConfig::default() };
-    let tracking = locator
-        .tracking(&config)
-        .map_err(|error| Complaint::new(format!("{}: {error}", arguments.locator.display())))?;
+    let tracking = locator.tracking(&config).map_err(|error| Complaint::about(&arguments.locator, error))?;
     let extent = tracking.likelihood().extent();
     let columns = match (extent, tracking.likelihood().most_contacts()) {
         (Extent::Plane { .. }, _) => Columns::Plane,
@@ -270,11 +268,11 @@ impl Stream<'_> {
 /// Columns of the CSV; the cells of a contact that does not touch are empty.
 #[derive(Clone, Copy)]
 enum Columns {
-    /// One contact on a line.
+    /// Columns of one contact on a line.
     One,
-    /// Two contacts on a line.
+    /// Columns of two contacts on a line.
     Two,
-    /// One contact on a plane.
+    /// Columns of one contact on a plane.
     Plane,
 }
 

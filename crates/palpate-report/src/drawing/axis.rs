@@ -85,7 +85,7 @@ impl AxisScale {
         drawable(self.scale, value).then(|| self.tick_share(value))
     }
 
-    /// As [`AxisScale::share`] for a value on the axis itself, whose rounded ends may exceed what data may be.
+    /// Position as of [`AxisScale::share`], for a value on the axis itself, whose rounded ends may exceed what data may be.
     pub fn tick_share(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -94,7 +94,7 @@ impl AxisScale {
         share.clamp(-1e6, 1e6)
     }
 
-    /// As [`AxisScale::share`], but a finite value that is not positive lies on the low end of a logarithmic axis.
+    /// Position as of [`AxisScale::share`], but a finite value that is not positive lies on the low end of a logarithmic axis.
     pub fn share_or_low_end(&self, value: f64) -> Option<f64> {
         match self.scale {
             Scale::Log10 if value <= 0.0 && value.is_finite() => Some(0.0),
@@ -164,15 +164,15 @@ fn round_step_above(least: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
-/// Most ticks on one axis.
+/// Greatest number of ticks on one axis.
 const MOST: usize = 11;
 /// Multiples of a power of ten, from fine to coarse, for a logarithmic axis of few decades.
 const LOG_MULTIPLES: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
 pub(crate) const TICK_SIZE: f64 = 11.5;
-/// From the plot to the labels of the vertical axis.
+/// Distance from the plot to the labels of the vertical axis.
 pub(crate) const TICK_GAP: f64 = 8.0;
-/// From the plot down to the middle of the labels of the horizontal axis.
+/// Distance from the plot down to the middle of the labels of the horizontal axis.
 const TICK_DROP: f64 = 16.0;
 /// Least distances between neighbouring labels, and between their middles.
 pub(crate) const LABEL_GAP: f64 = 14.0;
@@ -210,7 +210,7 @@ pub(crate) fn minor_ticks(axis: &AxisScale, ticks: &[Tick]) -> Vec<f64> {
     multiples_of_decades(axis, &[2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1)
 }
 
-/// Those on the axis that leave each other room.
+/// Ticks that are asked for, less those off the axis and those without room.
 fn chosen(axis: &AxisScale, asked: &[(f64, String)], fits: &dyn Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let on_axis = asked.iter().filter(|(value, _)| is_on_axis(axis, *value));
     let mut asked: Vec<Tick> =

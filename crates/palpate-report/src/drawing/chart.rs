@@ -230,7 +230,7 @@ impl Extremes {
         finite.fold(None, wider).unwrap_or_default()
     }
 
-    /// Of the heights of all lines.
+    /// Extremes of the heights of all lines.
     pub fn from_lines(series: &[Series]) -> Self {
         Self::from_values(series.iter().flat_map(|series| match &series.kind {
             SeriesKind::Line { points, .. } => points.iter().map(|point| point.1).collect(),

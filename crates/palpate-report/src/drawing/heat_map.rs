@@ -12,17 +12,17 @@ const TITLE_SIZE: f64 = 15.0;
 const TITLE_LINE: f64 = 26.0;
 const NAME_SIZE: f64 = 12.5;
 const NAME_LINE: f64 = 28.0;
-/// From the top of a map or of the colour bar up to the middle of its name, clear of the uppermost label beside it.
+/// Distance from the top of a map or of the colour bar up to the middle of its name, clear of the uppermost label beside it.
 const NAME_RISE: f64 = 17.0;
 /// Room left of a map for the labels of its ticks, and beneath it.
 const GUTTER: f64 = 40.0;
 const FOOT: f64 = 26.0;
-/// From one map to the next.
+/// Distance from one map to the next.
 const GAP: f64 = 18.0;
 const BAR_WIDTH: f64 = 16.0;
 /// Room for the labels of the colour bar.
 const BAR_LABELS: f64 = 54.0;
-/// Most height of one map.
+/// Greatest height of one map.
 const MOST_HEIGHT: f64 = 420.0;
 /// Cells overlap by this much, or a line of background would show between them.
 const OVERLAP: f64 = 0.5;

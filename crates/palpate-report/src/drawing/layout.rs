@@ -19,9 +19,9 @@ const AXIS_LABEL_LINE: f64 = 20.0;
 const TICK_LINE: f64 = 24.0;
 const MARK_SIZE: f64 = 11.5;
 const MARK_LINE: f64 = 17.0;
-/// From the header to the plot or the names of marks, and from the axis label to the legend.
+/// Distance from the header to the plot or the names of marks, and from the axis label to the legend.
 const STRIP_GAP: f64 = 8.0;
-/// Most rows of names above the plot.
+/// Greatest number of rows of names above the plot.
 const MARK_ROWS: usize = 3;
 /// Share of the image's height that the legend leaves to the plot.
 const LEAST_PLOT_SHARE: f64 = 0.25;
@@ -95,17 +95,17 @@ impl<'a> Layout<'a> {
         self.place(x, y).filter(|&at| self.plot.contains(at))
     }
 
-    /// As [`Layout::place`], but a y that is not positive lies on the low end of a logarithmic axis.
+    /// Point as of [`Layout::place`], but a y that is not positive lies on the low end of a logarithmic axis.
     pub fn place_edge(&self, x: f64, y: f64) -> Option<Point> {
         Some((self.x_px(self.x.share(x)?), self.y_px(self.y.share_or_low_end(y)?)))
     }
 
-    /// From a share of the horizontal axis to pixels.
+    /// Pixels from the left at a share of the horizontal axis.
     pub fn x_px(&self, share: f64) -> f64 {
         self.plot.left + share * self.plot.width()
     }
 
-    /// From a share of the vertical axis to pixels.
+    /// Pixels from the top at a share of the vertical axis.
     pub fn y_px(&self, share: f64) -> f64 {
         self.plot.bottom - share * self.plot.height()
     }
@@ -207,7 +207,7 @@ fn overhang(axis: &AxisScale, ticks: &[Tick], width: f64) -> f64 {
     reach.clamp(4.0, OVERHANG)
 }
 
-/// Every x and every y that the chart's data and marks name.
+/// Values of x and of y that the chart's data and marks name.
 fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
     let (mut xs, mut ys) = (Vec::new(), Vec::new());
     for series in &chart.series {
@@ -242,7 +242,7 @@ fn values(chart: &Chart) -> (Vec<f64>, Vec<f64>) {
 const ROW_HEIGHT: f64 = 20.0;
 const NAME_SIZE: f64 = 12.0;
 const SWATCH_WIDTH: f64 = 24.0;
-/// From the left of a swatch to the left of its name.
+/// Distance from the left of a swatch to the left of its name.
 const INDENT: f64 = 31.0;
 const GAP: f64 = 18.0;
 
@@ -261,7 +261,7 @@ pub(crate) struct Entry<'a> {
     /// Box for the sample of its drawing.
     pub swatch: Rect,
     pub label: Label,
-    /// All the room it takes.
+    /// Room of swatch and name.
     pub area: Rect,
 }
 
@@ -269,7 +269,7 @@ pub(crate) struct Entry<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legend<'a> {
     pub entries: Vec<Entry<'a>>,
-    /// Says how many names found no room.
+    /// Remark on how many names found no room.
     pub remainder: Option<Label>,
     pub width: f64,
     pub height: f64,

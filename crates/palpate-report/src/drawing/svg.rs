@@ -3,7 +3,7 @@
 use super::geometry::{Point, Rect};
 use std::fmt::{self, Write};
 
-/// From the middle of the capitals down to the baseline, in units of the font size.
+/// Distance from the middle of the capitals down to the baseline, in units of the font size.
 const CAPITALS_HALF_HEIGHT: f64 = 0.36;
 
 /// A colour and how opaque it is.
@@ -66,7 +66,7 @@ impl fmt::Display for Fill {
     }
 }
 
-/// Which part of a text stands at its position.
+/// Part of a text that stands at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,

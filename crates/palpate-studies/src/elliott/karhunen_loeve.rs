@@ -24,7 +24,7 @@ pub struct KarhunenLoeve {
 }
 
 impl KarhunenLoeve {
-    /// Of a recording with at least one row, whose channels have noise of these standard deviations.
+    /// The components of a recording with at least one row, whose channels have noise of these standard deviations.
     pub fn new(recording: &Recording, noise_sd: &[f64]) -> Self {
         let (rows, channels) = (recording.rows.len(), recording.channels.len());
         let at = |(row, channel): (usize, usize)| recording.rows[row].reading[channel];

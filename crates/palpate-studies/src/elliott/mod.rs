@@ -71,7 +71,7 @@ pub enum Chain {
     Influence,
     /// The influence locator's tracker, as readings come.
     Filter,
-    /// The same, with all readings.
+    /// The influence locator's smoother, with all readings.
     Smoother,
 }
 
@@ -140,10 +140,10 @@ pub enum ElliottError {
         /// Sensors.
         sensors: usize,
     },
-    /// Nothing is left to be judged.
+    /// No calibration is asked for.
     #[error("no calibration is asked for; there must be at least 1")]
     NoCalibration,
-    /// Nothing was tracked.
+    /// The tracker never found the moving load.
     #[error("the tracker never found the moving load")]
     NothingTracked,
 }

@@ -114,12 +114,12 @@ pub struct PublishedFigure {
     pub agrees: bool,
 }
 
-/// Published figures that agree, of how many.
+/// Number of published figures that agree, and of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreement {
-    /// Those that agree.
+    /// Number that agrees.
     pub agreeing: usize,
-    /// All.
+    /// Number of all.
     pub compared: usize,
 }
 

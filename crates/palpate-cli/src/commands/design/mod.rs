@@ -7,9 +7,12 @@ pub use sensors::help;
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::watch::Cancelled;
 use palpate_rig::Rig;
 use std::path::Path;
-use toml_edit::{DocumentMut, TomlError};
+use toml_edit::{DocumentMut, TomlError, Value};
 
 /// Where to put the sensors, and where to press.
 #[derive(clap::Args)]
@@ -50,6 +53,25 @@ fn changed_rig(
         .map_err(|error| Complaint::new(format!("cannot put the {what} into the rig: {error}")))?;
     // Whatever else the rig says must go with it.
     Ok((input::parse_rig(path, &written)?, written))
+}
+
+/// Failure of a design that was stopped, or that the rig does not allow.
+fn design_complaint(error: &(dyn std::error::Error + 'static), rig: &Path, help: &str) -> Failure {
+    if Cancelled::caused(error) { Failure::stopped() } else { Complaint::about(rig, error).help(help).into() }
+}
+
+/// A position as a rig has it: along a line a length, on a plane a pair of them. `in_mm` rounds.
+fn toml_position(position: Position, extent: Extent, in_mm: fn(f64) -> f64) -> Value {
+    let lengths = extent.coordinates_m(position).map(|at_m| format!("{} mm", in_mm(at_m)));
+    match extent {
+        Extent::Line { .. } => lengths.collect::<String>().into(),
+        Extent::Plane { .. } => Value::Array(lengths.collect()),
+    }
+}
+
+/// A length in millimetres, to a micrometre.
+fn to_micrometre(length_m: f64) -> f64 {
+    (length_m * 1e6).round() / 1e3
 }
 
 fn with_changes(text: &str, change: impl FnOnce(&mut DocumentMut)) -> Result<String, TomlError> {

@@ -1,7 +1,7 @@
 //! `palpate design positions`: where to press, against even positions; and the next press of a recording begun.
 
-use super::{changed_rig, say_files};
-use crate::failure::{Complaint, Failure};
+use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
+use crate::failure::Failure;
 use crate::input::{self, RecordingFiles};
 use crate::json::object;
 use crate::output::{self, Table};
@@ -13,12 +13,11 @@ use palpate_estimators::recording::Recording;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{format_count, format_length_mm};
-use palpate_numerics::watch::Cancelled;
 use palpate_report::{PositionDesignReport, position_design_report};
 use palpate_rig::Rig;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use toml_edit::{Array, DocumentMut, Item, Table as TomlTable, Value, value};
+use toml_edit::{Array, DocumentMut, Item, Table as TomlTable, value};
 
 /// Where to press: training positions by rules and by search, scored by the location error after calibrating.
 ///
@@ -66,7 +65,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Everything that was found out.
+/// Designed positions, with what they were designed for.
 struct Outcome<'a> {
     rig: &'a Path,
     estimator: &'static str,
@@ -140,10 +139,7 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 fn complaint(error: &PositionError, rig: &Path) -> Failure {
-    if Cancelled::caused(error) {
-        return Failure::stopped();
-    }
-    Complaint::new(format!("{}: {error}", rig.display())).help(help(error)).into()
+    design_complaint(error, rig, help(error))
 }
 
 /// Remedy for an error of placing training positions.
@@ -279,27 +275,18 @@ fn place_presses(rig: &mut DocumentMut, positions: &[Position], repeats: usize, 
     let mut training = own.unwrap_or_else(TomlTable::new);
     PLACES.iter().for_each(|key| drop(training.remove(key)));
     training.insert("arrangement", value("explicit"));
-    training.insert("positions", value(listed(positions, extent)));
+    let listed: Array = positions.iter().map(|at| toml_position(*at, extent, to_micrometre)).collect();
+    training.insert("positions", value(listed));
     if repeats > 1 || training.contains_key("repeats") {
         training.insert("repeats", value(i64::try_from(repeats).unwrap_or(i64::MAX)));
     }
     rig.insert("training", Item::Table(training));
 }
 
-/// Along a line lengths, on a plane pairs of them, to a micrometre.
-fn listed(positions: &[Position], extent: Extent) -> Array {
-    let length = |at_m: f64| format!("{} mm", (at_m * 1e6).round() / 1e3);
-    let place = |at: &Position| match extent {
-        Extent::Line { .. } => Value::from(length(at.x_m)),
-        Extent::Plane { .. } => Value::from(Array::from_iter([length(at.x_m), length(at.y_m)])),
-    };
-    positions.iter().map(place).collect()
-}
-
 /// Presses that a table shows.
 const SHOWN: usize = 5;
 
-/// Says where to press next.
+/// Prints advice on the next presses.
 fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(), Failure> {
     let design = what_to_design(arguments, rig);
     let advice = Observer::of_stages()

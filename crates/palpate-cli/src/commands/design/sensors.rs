@@ -1,6 +1,6 @@
 //! `palpate design sensors`: which sensors where, against the even layout.
 
-use super::{changed_rig, say_files};
+use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::{Object, fields, object};
@@ -17,13 +17,13 @@ use palpate_mechanics::limit::LimitError;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
-use palpate_numerics::watch::{Cancelled, Watch};
+use palpate_numerics::watch::Watch;
 use palpate_report::{SensorDesignReport, sensor_design_report};
 use palpate_rig::Rig;
 use serde::Serialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, Value, value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, value};
 
 /// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
 ///
@@ -63,7 +63,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Everything that was found out.
+/// Designed layouts, with what they were designed for.
 struct Outcome<'a> {
     rig: &'a Path,
     problem: &'a SensorProblem<'a>,
@@ -184,10 +184,7 @@ fn write_report(outcome: &Outcome, setup: &Setup, out: &Path) -> Result<(), Fail
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {
-    if Cancelled::caused(error) {
-        return Failure::stopped();
-    }
-    Complaint::new(format!("{}: {error}", rig.display())).help(help(error)).into()
+    design_complaint(error, rig, help(error))
 }
 
 /// More sensors than a curve is drawn for.
@@ -471,21 +468,17 @@ fn section(kind: SensorKind, own: &[TomlTable], channel: &ChannelModel) -> TomlT
     section
 }
 
-/// Along a line lengths, on a plane pairs of them.
+/// Positions of some sensors of one kind, as a rig has them.
 fn positions(sensors: &[&Sensor], extent: Extent) -> Array {
-    let length = |sensor: &Sensor, at_m: f64| {
+    let written = |sensor: &&Sensor| {
         // A reaction sensor must meet its support to the last digit; a micrometre is enough for the others.
-        let mm = if sensor.kind == SensorKind::Reaction { at_m * 1e3 } else { (at_m * 1e6).round() / 1e3 };
-        format!("{mm} mm")
+        let in_mm = match sensor.kind {
+            SensorKind::Reaction => |at_m| at_m * 1e3,
+            _ => to_micrometre,
+        };
+        toml_position(sensor.position, extent, in_mm)
     };
-    let place = |sensor: &&Sensor| match extent {
-        Extent::Line { .. } => Value::from(length(sensor, sensor.position.x_m)),
-        Extent::Plane { .. } => {
-            let pair = [length(sensor, sensor.position.x_m), length(sensor, sensor.position.y_m)];
-            Value::from(Array::from_iter(pair))
-        }
-    };
-    sensors.iter().map(place).collect()
+    sensors.iter().map(written).collect()
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ pub fn presentations(prepared: &PreparedStudy, arm: usize, fit: &TrainedSeed) ->
     u64::from(fit.locator.training_outcome().unwrap_or_default().epochs) * prepared.patterns(arm) as u64
 }
 
-/// Called by every training thread.
+/// Progress of a run, which every training thread notes its fits in.
 pub struct Tally<'a> {
     prepared: &'a PreparedStudy,
     table: &'a NetworksCsv<'a>,
