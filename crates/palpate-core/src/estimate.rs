@@ -39,6 +39,13 @@ pub struct Uncertainty {
     pub y_95_m: (f64, f64),
 }
 
+impl Uncertainty {
+    /// Uncertainty of a contact on a line, from the covariance of position and force: xx, xf, ff.
+    pub const fn on_line([xx, xf, ff]: [f64; 3], x_95_m: (f64, f64)) -> Self {
+        Self { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) }
+    }
+}
+
 /// One place that explains a reading, and how probable it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mode {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::arrangement::inner_grid;
 use crate::recording::{self, Columns, CsvError, Recording, Schema};
 use palpate_mechanics::contact::{OffSurface, Position};
-use palpate_mechanics::limit::{CramerRaoBound, LimitError};
+use palpate_mechanics::limit::{CramerRaoBound, Force, LimitError};
 use palpate_mechanics::sensing::{
     Layout, LayoutError, Placement, Sensor, SensorGroup, SensorKind, even_positions,
 };
@@ -206,6 +206,11 @@ impl Setup {
     pub fn known_force(self, force_n: f64) -> Result<Self, SetupError> {
         OutOfRange::check_positive([("the force in newtons", force_n)])?;
         Ok(Self { force_n: Some(force_n), ..self })
+    }
+
+    /// Knowledge of the contact force.
+    pub fn force(&self) -> Force {
+        if self.force_n.is_some() { Force::Known } else { Force::Unknown }
     }
 
     /// The same, whose recordings have these columns.

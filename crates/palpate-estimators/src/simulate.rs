@@ -147,7 +147,7 @@ fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256Pl
 
 /// The layout as one simulated bench happens to have it: every sensor within its position error of its place, held at the
 /// surface's edge. A perfectly placed sensor stays where it is.
-pub fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
+pub(crate) fn displaced(layout: &Layout, extent: Extent, rng: &mut impl Rng) -> Layout {
     layout.clone().with_positions(|sensor| {
         let error_m = sensor.channel.position_error_m;
         let mut beside =

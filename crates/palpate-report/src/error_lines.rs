@@ -50,7 +50,7 @@ pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
 /// or does not; contacts have `force_n` newtons either way.
 pub(super) fn limit_line_of_arm(setup: &Setup, force_n: f64, colour: usize, label: &str) -> Option<Series> {
     let limit = setup.cramer_rao_bound().ok()?;
-    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let force = setup.force();
     Some(line(&LimitCurve::over_surface(&limit, force_n, force).ok()?, colour, label.to_owned()))
 }
 

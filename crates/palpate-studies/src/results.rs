@@ -185,7 +185,7 @@ impl SetUp {
         let setup = &arm.rig.setup;
         Self {
             estimator: arm.rig.estimator.kind(),
-            force: if setup.force_n.is_some() { Force::Known } else { Force::Unknown },
+            force: setup.force(),
             layout: arm.layout.as_ref().map(|asked| asked.method.name()),
             sensors: setup.layout.sensors().iter().map(place).collect(),
         }
@@ -294,7 +294,7 @@ pub(super) fn average_percent(evaluation: &Evaluation, keep: impl Fn(Position) -
 /// √(2/π) / √(1/s² + 12/l²), with l the surface's length. Where s is small, that is the mean error of the bound itself.
 fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Option<Vec<f64>> {
     let limit = setup.cramer_rao_bound().ok()?;
-    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
+    let force = setup.force();
     let length_m = setup.surface.extent().length_m();
     let at = |&position: &Position| {
         let bound = limit.bound_at(Contact { position, force_n }, force);

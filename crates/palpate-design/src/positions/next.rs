@@ -6,7 +6,6 @@ use super::variance::{ExpectedError, Posterior};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::limit::Force;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
@@ -97,8 +96,7 @@ pub fn next_press(
     let stop = [("the gain in % that is worth a press", stop_percent)];
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
-    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
-    let forward = ForwardModel::from_recording(recording, &setup.layout, extent, force, watch)?;
+    let forward = ForwardModel::from_recording(recording, &setup.layout, extent, setup.force(), watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
     let first = expected.places.len();

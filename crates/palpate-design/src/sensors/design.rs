@@ -177,7 +177,7 @@ impl SensorDesign {
             offers,
             sites: Sites::Every(spacing(extent, SITES_ALONG_A_LINE, SITES_ALONG_A_PLANE)),
             contacts: ContactPrior::all_over(extent),
-            force: if setup.force_n.is_some() { Force::Known } else { Force::Unknown },
+            force: setup.force(),
             criterion: DesignCriterion::MeanLimit,
             tolerance_m: TOLERANCE_M,
             spacing_m: 0.0,

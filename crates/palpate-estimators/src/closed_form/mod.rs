@@ -168,7 +168,7 @@ impl ClosedFormLocator {
         let (left_n, right_n) = (reading[left], reading[right]);
         let [var_left, var_right] =
             [left, right].map(|i| self.layout.sensors()[i].channel.reading_sd().powi(2));
-        let (position_m, force_n, [xx, xf, ff]) = match self.force_n {
+        let (position_m, force_n, covariance) = match self.force_n {
             None => {
                 let force_n = left_n + right_n;
                 let position_m = length_m * right_n / force_n;
@@ -191,7 +191,7 @@ impl ClosedFormLocator {
             Noise::Known => misfit_bound(1) * (var_left + var_right),
             Noise::Unknown => (0.1 * force_n).powi(2),
         };
-        let sd_m = xx.sqrt();
+        let sd_m = covariance[0].sqrt();
         let on_surface = self.beam.contains(Position::along(position_m));
         let near = |edge_m: f64| noise == Noise::Known && (position_m - edge_m).abs() <= 3.0 * sd_m;
         let (status, held_m) = if force_n <= 0.0 || misfit_n.powi(2) > tolerated {
@@ -202,11 +202,8 @@ impl ClosedFormLocator {
         } else {
             (Status::OutsideSurface, position_m)
         };
-        let uncertainty = (noise == Noise::Known).then_some(Uncertainty {
-            covariance: [xx, 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: normal_interval_95(position_m, sd_m),
-            y_95_m: (0.0, 0.0),
-        });
+        let uncertainty = (noise == Noise::Known)
+            .then_some(Uncertainty::on_line(covariance, normal_interval_95(position_m, sd_m)));
         let position = Position::along(held_m);
         Estimate::of_contact(ContactEstimate { position, force_n: Some(force_n), uncertainty }, status)
     }
@@ -410,11 +407,10 @@ impl Posterior<'_> {
     fn contact(&self, explanation: &Explanation) -> ContactEstimate {
         let Explanation { from_m, to_m, position_m, covariance: [xx, xf, ff], .. } = *explanation;
         let half_m = NORMAL_95 * xx.sqrt();
-        let uncertainty = Uncertainty {
-            covariance: [xx.max((to_m - from_m).powi(2) / 12.0), 0.0, xf, 0.0, 0.0, ff],
-            x_95_m: clamped_interval((from_m - half_m, to_m + half_m), self.length_m()),
-            y_95_m: (0.0, 0.0),
-        };
+        let uncertainty = Uncertainty::on_line(
+            [xx.max((to_m - from_m).powi(2) / 12.0), xf, ff],
+            clamped_interval((from_m - half_m, to_m + half_m), self.length_m()),
+        );
         ContactEstimate {
             position: Position::along(position_m),
             force_n: Some(explanation.force_n),

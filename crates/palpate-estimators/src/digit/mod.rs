@@ -244,12 +244,10 @@ fn are_apart(a: &Piece, b: &Piece) -> bool {
 }
 
 fn contact(piece: &Piece, x_95_m: (f64, f64)) -> ContactEstimate {
-    let [xx, xf, ff] = piece.covariance;
-    let uncertainty = Uncertainty { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
     ContactEstimate {
         position: Position::along(piece.best.position_m),
         force_n: Some(piece.best.force_n),
-        uncertainty: Some(uncertainty),
+        uncertainty: Some(Uncertainty::on_line(piece.covariance, x_95_m)),
     }
 }
 

@@ -12,7 +12,6 @@ use crate::setup::Setup;
 use crate::simulate::SimulateError;
 use palpate_core::ContactEstimate;
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_mechanics::limit::Force;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -214,7 +213,6 @@ const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
 /// 1/200 of the length, on a plane 1/20.
 pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let limit = setup.cramer_rao_bound().ok()?;
-    let force = if setup.force_n.is_some() { Force::Known } else { Force::Unknown };
     let extent = setup.surface.extent();
     let within =
         |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
@@ -228,7 +226,7 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
         let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
-        let bound = limit.bound_at(Contact { position: located.truth, force_n }, force);
+        let bound = limit.bound_at(Contact { position: located.truth, force_n }, setup.force());
         let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m()) else {
             continue;
         };

@@ -118,19 +118,12 @@ impl Features {
         self.features.is_empty()
     }
 
-    /// Writes the features of a reading; `out` is as long as there are features.
-    pub fn apply_into(&self, reading: &[f64], out: &mut [f64]) {
-        let norm = self.norm(reading).max(self.least_norm);
-        for (out, feature) in out.iter_mut().zip(&self.features) {
-            *out = (self.raw(feature.source, reading, norm) - feature.centre) / feature.spread;
-        }
-    }
-
     /// The features of a reading.
     pub fn apply(&self, reading: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; self.len()];
-        self.apply_into(reading, &mut out);
-        out
+        let norm = self.norm(reading).max(self.least_norm);
+        let standardized =
+            |feature: &Feature| (self.raw(feature.source, reading, norm) - feature.centre) / feature.spread;
+        self.features.iter().map(standardized).collect()
     }
 
     /// Checks what a file may have got wrong, for readings of `channels` channels.

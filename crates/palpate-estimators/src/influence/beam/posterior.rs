@@ -72,8 +72,7 @@ fn contact(search: &Search, minimum: &Minimum, x_95_m: (f64, f64)) -> ContactEst
     let [xx, xf, ff] = minimum.covariance;
     // On a line of length l nothing is known less than of a uniform distribution.
     let most = search.table.length_m.powi(2) / 12.0;
-    let uncertainty =
-        Uncertainty { covariance: [xx.min(most), 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) };
+    let uncertainty = Uncertainty::on_line([xx.min(most), xf, ff], x_95_m);
     ContactEstimate {
         position: Position::along(minimum.x_m),
         force_n: Some(minimum.force_n),
