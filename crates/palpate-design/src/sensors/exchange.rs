@@ -76,17 +76,17 @@ impl Search<'_> {
     /// The best layout of several starts; `feasible` is one that keeps all constraints.
     pub fn greedy_exchange(&self, feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
         if self.pool.units.len() <= SAMPLE {
-            return self.from_starts(&self.pool.all(), feasible, seed);
+            return self.best_of_starts(&self.pool.all(), feasible, seed);
         }
         let coarse = sample(self.pool, COARSE_SAMPLE, feasible);
-        let found = self.from_starts(&coarse, feasible, seed)?;
+        let found = self.best_of_starts(&coarse, feasible, seed)?;
         let fine = sample(self.pool, SAMPLE, &found.selection);
         let found = self.exchange(&fine, found.selection)?;
         self.exchange_among_many(found)
     }
 
     /// The best layout of several starts.
-    fn from_starts(&self, among: &[usize], feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
+    fn best_of_starts(&self, among: &[usize], feasible: &[usize], seed: u64) -> Result<Found, Cancelled> {
         let starts = [self.greedy(among), even_start(self.pool, among), Some(feasible.to_vec())];
         let random = (0..RANDOM_STARTS).map(|k| random_start(self.pool, among, seed.wrapping_add(k)));
         let starts: Vec<Vec<usize>> = starts.into_iter().chain(random).flatten().collect();

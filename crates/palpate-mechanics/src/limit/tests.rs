@@ -29,8 +29,12 @@ fn sd_mm(limit: &CramerRaoBound, a_mm: f64, force: Force) -> f64 {
     limit.bound_at(contact, force).unwrap().sd_x_m * 1e3
 }
 
+fn bound(layout: &Layout) -> CramerRaoBound<'static> {
+    CramerRaoBound::new(&*BEAM, layout).unwrap()
+}
+
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
-    limit_warnings(&CramerRaoBound::new(&*BEAM, layout).unwrap(), 3.0, force).unwrap()
+    limit_warnings(&bound(layout), 3.0, force).unwrap()
 }
 
 /// The words of some warnings.
@@ -40,8 +44,7 @@ fn words(warnings: &[LimitWarning]) -> String {
 
 #[test]
 fn the_papers_beam_has_the_limits_that_the_paper_leaves_room_for() {
-    let layout = deflections(8);
-    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+    let limit = bound(&deflections(8));
     // What physics allows at 5 µm and 3 N, from a calculation of its own.
     let known = [(1.0, 0.087), (50.0, 0.095), (100.0, 0.12), (200.0, 0.69)];
     let unknown = [(1.0, 8300.0), (20.0, 21.0), (50.0, 3.3), (200.0, 0.69)];
@@ -68,7 +71,7 @@ fn two_reactions_give_the_closed_form() {
     let mut layout = with_noise(Layout::even(SensorKind::Reaction, 2, BEAM.length_m()), 0.01);
     layout.edit(|sensors| sensors[0].position = Position::along(0.0)).unwrap();
     layout.edit(|sensors| sensors[1].position = Position::along(0.4)).unwrap();
-    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+    let limit = bound(&layout);
     for a_m in [0.0, 0.05, 0.2, 0.4] {
         let contact = Contact { position: Position::along(a_m), force_n: 3.0 };
         let known = limit.bound_at(contact, Force::Known).unwrap();
@@ -192,8 +195,7 @@ fn most_likely(limit: &CramerRaoBound, reading: &[f64], near_m: f64, step_m: f64
 #[test]
 fn maximum_likelihood_spreads_as_the_limit_says() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(20);
-    let layout = deflections(8);
-    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+    let limit = bound(&deflections(8));
     const DRAWS: usize = 4000;
     for (a_mm, force) in [
         (5.0, Force::Known),
@@ -226,7 +228,7 @@ proptest! {
     fn less_noise_more_force_and_more_sensors_lower_the_limit(a in 0.002..0.398_f64, factor in 1.5..10.0_f64) {
         let at = |layout: &Layout, force_n, force| {
             let contact = Contact { position: Position::along(a), force_n };
-            CramerRaoBound::new(&*BEAM, layout).unwrap().bound_at(contact, force).unwrap().sd_x_m
+            bound(layout).bound_at(contact, force).unwrap().sd_x_m
         };
         let layout = deflections(8);
         for force in [Force::Known, Force::Unknown] {
@@ -236,7 +238,7 @@ proptest! {
             let mut more = layout.clone();
             more.edit(|sensors| sensors.extend(deflections(3).into_sensors())).unwrap();
             prop_assert!(at(&more, 3.0, force) < limit);
-            let mirrored = CramerRaoBound::new(&*BEAM, &layout).unwrap().bound_at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
+            let mirrored = bound(&layout).bound_at(Contact { position: Position::along(0.4 - a), force_n: 3.0 }, force);
             prop_assert!((mirrored.unwrap().sd_x_m / limit - 1.0).abs() < 1e-4);
         }
         prop_assert!(at(&layout, 3.0, Force::Known) <= at(&layout, 3.0, Force::Unknown) * (1.0 + 1e-9));
@@ -251,14 +253,12 @@ fn a_dead_channel_counts_as_if_it_were_not_there() {
     dead.edit(|sensors| sensors[2].channel.noise_sd = 0.0).unwrap();
     let mut without = deflections(8);
     without.edit(|sensors| drop(sensors.remove(2))).unwrap();
-    let (dead, without) =
-        (CramerRaoBound::new(&*BEAM, &dead).unwrap(), CramerRaoBound::new(&*BEAM, &without).unwrap());
+    let (dead, without) = (bound(&dead), bound(&without));
     assert_eq!(dead.alive(), 7);
     for force in [Force::Known, Force::Unknown] {
         assert_eq!(sd_mm(&dead, 130.0, force), sd_mm(&without, 130.0, force));
     }
-    let whole = deflections(8);
-    let whole = CramerRaoBound::new(&*BEAM, &whole).unwrap();
+    let whole = bound(&deflections(8));
     assert!(sd_mm(&dead, 130.0, Force::Known) > sd_mm(&whole, 130.0, Force::Known));
 }
 
@@ -268,8 +268,7 @@ fn quantisation_is_noise_of_a_twelfth_of_its_square() {
     coarse
         .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.resolution = 4e-6 * 12f64.sqrt()))
         .unwrap();
-    let (coarse, plain) = (CramerRaoBound::new(&*BEAM, &coarse).unwrap(), deflections(8));
-    let plain = CramerRaoBound::new(&*BEAM, &plain).unwrap();
+    let (coarse, plain) = (bound(&coarse), bound(&deflections(8)));
     let ratio = sd_mm(&coarse, 70.0, Force::Known) / sd_mm(&plain, 70.0, Force::Known);
     assert!((ratio - 1.0).abs() < 1e-12);
     let mut silent = with_noise(deflections(8), 0.0);
@@ -285,7 +284,7 @@ fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
     without.edit(|sensors| drop(sensors.remove(3))).unwrap();
     let whole = deflections(8);
     let [saturating, without, whole] = [saturating, without, whole].map(|layout| {
-        let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+        let limit = bound(&layout);
         [10.0, 200.0].map(|a_mm| sd_mm(&limit, a_mm, Force::Known))
     });
     assert_eq!(saturating[1], without[1], "3 N at mid-span lower sensor 4 by more than 1 mm");
@@ -294,16 +293,14 @@ fn a_saturated_channel_tells_nothing_where_it_is_saturated() {
 
 #[test]
 fn what_has_no_limit_says_why() {
-    let clean = deflections(8);
-    let clean = with_noise(clean, 0.0);
+    let clean = with_noise(deflections(8), 0.0);
     let mut one_clean = deflections(8);
     one_clean.edit(|sensors| sensors[4].channel.noise_sd = 0.0).unwrap();
     let mut dead = deflections(2);
     dead.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true)).unwrap();
     let said = |layout: &Layout| CramerRaoBound::new(&*BEAM, layout).err().unwrap().to_string();
     let no_model = LimitError::NoModel.to_string();
-    let layout = deflections(8);
-    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+    let limit = bound(&deflections(8));
     let force = |force_n| LimitCurve::over_surface(&limit, force_n, Force::Known).unwrap_err().to_string();
     let every =
         |every_m| LimitCurve::with_spacing(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
@@ -324,8 +321,7 @@ fn what_has_no_limit_says_why() {
 
 #[test]
 fn no_information_is_none_and_never_infinite() {
-    let layout = deflections(8);
-    let limit = CramerRaoBound::new(&*BEAM, &layout).unwrap();
+    let limit = bound(&deflections(8));
     let at = |x_m, force_n, force| limit.bound_at(Contact { position: Position::along(x_m), force_n }, force);
     assert_eq!(at(0.0, 3.0, Force::Unknown), None);
     assert_eq!(at(0.4, 3.0, Force::Unknown), None);
@@ -333,8 +329,7 @@ fn no_information_is_none_and_never_infinite() {
     assert_eq!(at(0.2, f64::NAN, Force::Known), None);
     assert!(at(0.0, 3.0, Force::Known).is_some(), "the beam tilts when a known force leaves its support");
     // One sensor cannot tell two numbers; nor can it see a small move of a force right above it.
-    let one = deflections(1);
-    let one = CramerRaoBound::new(&*BEAM, &one).unwrap();
+    let one = bound(&deflections(1));
     let contact = |x_m| Contact { position: Position::along(x_m), force_n: 3.0 };
     assert_eq!(one.bound_at(contact(0.1), Force::Unknown), None);
     assert_eq!(one.bound_at(contact(0.2), Force::Known), None);
