@@ -21,9 +21,9 @@ pub struct Network<'a> {
 /// A buffer does not fit the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferMismatch {
-    /// Numbers that the network asks for.
+    /// Length that the network asks for.
     pub needed: usize,
-    /// Numbers that there are.
+    /// Length of the buffer.
     pub found: usize,
 }
 

@@ -17,9 +17,9 @@ pub struct FitTask<'a> {
     pub setup: &'a Setup,
     /// Readings with their contacts; as many channels as the bench has sensors, and at least one row.
     pub recording: &'a Recording,
-    /// Fixes whatever the method draws at random.
+    /// Seed of whatever the method draws at random.
     pub seed: u64,
-    /// Is told of the progress, and may stop the fit.
+    /// Watch over the fit: it is told of the progress, and may stop it.
     pub watch: Watch<'a>,
 }
 
@@ -65,7 +65,7 @@ pub struct ChannelMismatch {
 pub trait SeedQueue<T> {
     /// The seed of the next fit; `None` when all are taken.
     fn next_seed(&mut self) -> Option<u64>;
-    /// Takes what a fit gave.
+    /// Takes the result of a fit.
     fn fitted(&mut self, seed: u64, result: T);
 }
 

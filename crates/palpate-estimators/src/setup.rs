@@ -24,7 +24,7 @@ pub struct Setup {
     pub layout: Layout,
     /// The contact force in newtons, greater than 0, where it is known.
     pub force_n: Option<f64>,
-    /// Which column of a recording is what; `None` for the columns that palpate itself writes.
+    /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
     pub columns: Option<Columns>,
 }
 
@@ -58,7 +58,7 @@ pub enum SetupError {
         position: Position,
         /// The surface.
         extent: Extent,
-        /// Why.
+        /// Reason for which it would read nothing.
         reason: InsensitiveSensor,
     },
     /// A sensor on a digit that is no strain gauge.
@@ -227,7 +227,7 @@ impl Setup {
         CramerRaoBound::new(self.surface.model().ok_or(LimitError::NoModel)?, &self.layout)
     }
 
-    /// Which column of a recording is what: those that were named, or those that palpate itself writes.
+    /// Roles of a recording's columns: those that were named, or those that palpate itself writes.
     pub fn recording_columns(&self) -> Columns {
         match &self.columns {
             Some(columns) => columns.clone(),

@@ -53,10 +53,10 @@ pub struct DigitEstimator {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DigitTheory {
-    /// As far as the force bends it: the elastica.
+    /// The elastica: the finger bends as far as the force bends it.
     #[default]
     Exact,
-    /// Hardly at all: strain is force times lever. For comparison, and for small forces.
+    /// Small deflections: strain is force times lever. For comparison, and for small forces.
     Linear,
 }
 
@@ -77,7 +77,7 @@ pub enum DigitFitError {
         "gauge {gauge} has neither noise nor resolution; the digit estimator weighs gauges by their noise: give `noise` in [sensors]"
     )]
     NoNoise {
-        /// Which, from 1.
+        /// Number of the gauge, from 1.
         gauge: usize,
     },
     /// Too few gauges for what is to be found.
@@ -302,7 +302,7 @@ struct Posterior {
 struct Piece {
     /// The most likely contact; of a curve, its median.
     best: Guess,
-    /// |r|² there.
+    /// |r|² of the best contact.
     chi_squared: f64,
     /// Covariance of position and force: xx, xf, ff.
     covariance: [f64; 3],
@@ -315,9 +315,9 @@ struct Piece {
 /// Marginal distribution of the position over a stretch.
 #[derive(Clone, Debug)]
 enum Marginal {
-    /// Normally, but cut off at the ends of the stretch.
+    /// A normal distribution, cut off at the ends of the stretch.
     Normal { centre_m: f64, sd_m: f64, from_m: f64, to_m: f64 },
-    /// At the best position, as the piece is cut off far out in its tail.
+    /// All of it at the best position, as the piece is cut off far out in its tail.
     Point,
     /// Along a curve: equal steps from one position to another, and the share of the probability up to the end of each.
     Curve { from_m: f64, to_m: f64, shares: Vec<f64> },
@@ -477,7 +477,7 @@ fn curve(likelihood: &Likelihood, stretch: Stretch) -> Option<Piece> {
 struct CurvePoint {
     guess: Guess,
     chi_squared: f64,
-    /// Of the force, at this position.
+    /// Variance of the force, given this position.
     force_variance: f64,
     log_weight: f64,
 }
@@ -780,7 +780,7 @@ pub struct LinearTheory<'a> {
 }
 
 impl<'a> LinearTheory<'a> {
-    /// On the bench of a digit; `None` where the linear theory does not suit its sensors.
+    /// A locator for the bench of a digit; `None` where the linear theory does not suit its sensors.
     pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
         let unknown = Setup { force_n: None, ..setup.clone() };
         // The estimator learns nothing, but every fit wants a recording.

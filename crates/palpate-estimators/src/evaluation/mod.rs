@@ -17,7 +17,7 @@ use palpate_numerics::small::Ldl;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{ELLIPSE_95, mean, root_mean_square};
 
-/// One reading whose contact was known, and where the locator saw it.
+/// True and estimated position of one reading's contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
     /// True position of the contact.
@@ -67,10 +67,10 @@ impl Portion {
     }
 }
 
-/// Location errors in short.
+/// Summary of location errors.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ErrorSummary {
-    /// Answers that it is of.
+    /// Number of answers.
     pub count: usize,
     /// Mean, in metres.
     pub average_m: f64,

@@ -163,7 +163,7 @@ pub struct CentreOfPressure {
 }
 
 impl<'a> Profiler<'a> {
-    /// For readings of a setup, by mechanics.
+    /// A profiler for readings of a setup, by mechanics.
     ///
     /// # Errors
     /// [`LoadSensorsError`] as for [`LoadSensors::from_setup`].
@@ -171,7 +171,7 @@ impl<'a> Profiler<'a> {
         Ok(Self::new(LoadSensors::from_setup(setup)?))
     }
 
-    /// For readings of these sensors.
+    /// A profiler for readings of these sensors.
     pub fn new(sensors: LoadSensors<'a>) -> Self {
         let cells = Cells::new(sensors.extent);
         let alive: Vec<&LoadChannel> = sensors.alive().collect();

@@ -106,9 +106,9 @@ fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<
 pub struct NeighboursLocator {
     /// The surface.
     pub extent: Extent,
-    /// By what readings are compared.
+    /// Features by which readings are compared.
     pub features: Features,
-    /// k, how many neighbours are asked.
+    /// k, the number of neighbours.
     pub count: usize,
     /// The training rows.
     pub rows: Vec<Neighbour>,

@@ -116,7 +116,7 @@ pub struct BackPropagation {
     pub aggregate_error: f64,
     /// Training is capped after this many epochs.
     pub max_epochs: u32,
-    /// In which order the patterns are presented.
+    /// Order in which the patterns are presented.
     pub order: PresentationOrder,
     /// Weights start uniform within ± this.
     pub initial_weights: f64,
@@ -441,7 +441,7 @@ pub struct TrainingOutcome {
 }
 
 impl Default for TrainingOutcome {
-    /// That of a method which is not trained by epochs: converged before the first.
+    /// Outcome of a method that is not trained by epochs: converged before the first.
     fn default() -> Self {
         Self { status: TrainingStatus::Converged, epochs: 0, aggregate_error: 0.0 }
     }

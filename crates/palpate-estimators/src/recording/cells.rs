@@ -36,7 +36,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Which field of every line `column` is, as this first line of the file tells.
+    /// Index of `column` among the fields of every line, from this first line of the file.
     pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
         let count = self.width();
         let name = match column {

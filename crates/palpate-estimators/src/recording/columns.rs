@@ -9,7 +9,7 @@ use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// Which column is what. Columns that have no role are ignored.
+/// Roles of a file's columns. Columns without a role are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Columns {
     /// Whether the first line names the columns.
@@ -56,9 +56,9 @@ impl Frame {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Header {
-    /// It does.
+    /// The first line names them.
     Present,
-    /// It is a row like the others; columns are known by their numbers.
+    /// The first line is a row like the others; columns are known by their numbers.
     Absent,
 }
 
@@ -111,7 +111,7 @@ pub enum PositionColumns {
 /// A column of numbers and their unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ValueColumn {
-    /// Which column.
+    /// The column.
     pub column: Column,
     /// The unit of its numbers.
     pub unit: Unit,
@@ -120,7 +120,7 @@ pub struct ValueColumn {
 /// The column of the contact force.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForceColumn {
-    /// Which column, and its unit of force.
+    /// The column, and its unit of force.
     pub values: ValueColumn,
     /// Treatment of a file that lacks it.
     pub need: Need,

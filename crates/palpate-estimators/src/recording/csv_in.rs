@@ -14,7 +14,7 @@ use palpate_mechanics::units::Unit;
 /// Schema of a recording of a bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Schema<'a> {
-    /// Which column is what.
+    /// Roles of the columns.
     pub columns: &'a Columns,
     /// The sensors; as many as `columns` has channels.
     pub layout: &'a Layout,
@@ -142,7 +142,7 @@ fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
     CsvProblem::NotUtf8.in_line(source, line, before + &after, mark)
 }
 
-/// Which fields of a row say where and how hard the contact was.
+/// Fields of a row for the position, force and nuisance coordinate of the contact.
 #[derive(Clone, Debug)]
 struct ContactFields {
     x: usize,
@@ -266,7 +266,7 @@ impl ReadingParser {
     }
 }
 
-/// Which fields of a row are the channels, in the layout's order.
+/// Fields of a row for the channels, in the layout's order.
 #[derive(Clone, Debug)]
 struct ChannelFields(Vec<(usize, Unit)>);
 
@@ -330,7 +330,7 @@ pub struct TimedParser<'a> {
     schema: Schema<'a>,
 }
 
-/// Which fields of a row say when it was taken, what touched, and what was read.
+/// Fields of a row for the time, the contacts and the channels.
 #[derive(Clone, Debug)]
 struct TimedFields {
     time: Option<usize>,

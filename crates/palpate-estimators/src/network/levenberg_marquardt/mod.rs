@@ -285,7 +285,7 @@ impl OutputScale {
     }
 }
 
-/// One network, and how sure it is.
+/// One network, with the curvature and noise that its uncertainty is made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
@@ -295,7 +295,7 @@ pub struct Member {
     pub curvature_factor: Vec<f64>,
     /// Variance 1/β of each output's noise, in units of the output's own variance.
     pub noise: Vec<f64>,
-    /// γ, how many of the weights the recording determines.
+    /// γ, the number of weights that the recording determines.
     pub effective_parameters: f64,
     /// Logarithm of the evidence, up to a constant that is the same for all members.
     pub log_evidence: f64,
