@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_2_PI;
 
 use serde::Serialize;
 
-use super::{Arm, ArmOutcome, Judging, PreparedStudy, TrainedSeed};
+use super::{Arm, ArmOutcome, Judging, PreparedStudy, RunOptions, TrainedSeed};
 use palpate_estimators::evaluation::{
     ErrorSummary, Evaluation, Portion, Quantiles, limit_ratio, percentage_error,
 };
@@ -44,6 +44,30 @@ pub struct RunFacts {
     pub seconds: f64,
     /// Their ratio.
     pub presentations_per_second: f64,
+}
+
+impl RunFacts {
+    /// Facts of a run of `study` that presented so many patterns in so many seconds.
+    pub fn new(
+        study: &PreparedStudy,
+        options: RunOptions,
+        arithmetic: String,
+        presentations: u64,
+        seconds: f64,
+    ) -> Self {
+        Self {
+            palpate: env!("CARGO_PKG_VERSION"),
+            study: study.study.name.clone(),
+            study_sha256: study.study.digest.clone(),
+            seeds: options.seeds,
+            threads: options.threads,
+            precision: study.study.precision,
+            arithmetic,
+            presentations,
+            seconds,
+            presentations_per_second: presentations as f64 / seconds,
+        }
+    }
 }
 
 /// An arm's figures over its seeds.

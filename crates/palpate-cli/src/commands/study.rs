@@ -172,19 +172,8 @@ fn facts(
             presentations += fits::presentations(prepared, arm, fit);
         }
     }
-    let precision = prepared.study.precision;
-    RunFacts {
-        palpate: env!("CARGO_PKG_VERSION"),
-        study: prepared.study.name.clone(),
-        study_sha256: prepared.study.digest.clone(),
-        seeds: options.seeds,
-        threads: options.threads,
-        precision,
-        arithmetic: format!("{}, {} lanes", InstructionSet::best(), precision.lanes()),
-        presentations,
-        seconds,
-        presentations_per_second: presentations as f64 / seconds,
-    }
+    let arithmetic = format!("{}, {} lanes", InstructionSet::best(), prepared.study.precision.lanes());
+    RunFacts::new(prepared, options, arithmetic, presentations, seconds)
 }
 
 fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {

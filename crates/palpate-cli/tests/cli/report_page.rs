@@ -5,7 +5,6 @@ use std::fs;
 use crate::support::browser::measure;
 use crate::support::examples::PAPER;
 use crate::support::toml::Toml;
-use palpate_estimators::network::Precision;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_numerics::watch::Watch;
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
@@ -17,22 +16,10 @@ use tempfile::TempDir;
 fn pages() -> [Vec<ReportFile>; 2] {
     let toml = Toml::parse(paper::STUDY_TOML).set("estimator.max_epochs", 50).to_string();
     let study = PreparedStudy::new(Study::from_toml(&toml).unwrap(), Watch::NONE).unwrap();
-    let seeds = 2;
-    let options = RunOptions { seeds, threads: 1 };
+    let options = RunOptions { seeds: 2, threads: 1 };
     let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
     let results = StudyResults::new(&outcomes, &study);
-    let run = RunFacts {
-        palpate: env!("CARGO_PKG_VERSION"),
-        study: study.study.name.clone(),
-        study_sha256: study.study.digest.clone(),
-        seeds,
-        threads: 1,
-        precision: Precision::F64,
-        arithmetic: "eight lanes".to_owned(),
-        presentations: 1_000_000,
-        seconds: 0.1,
-        presentations_per_second: 1e7,
-    };
+    let run = RunFacts::new(&study, options, "eight lanes".to_owned(), 1_000_000, 0.1);
     let report = StudyReport { study: &study, outcomes: &outcomes, results: &results, run: &run };
     [paper_report(&report), study_report(&report)]
 }

@@ -9,7 +9,6 @@ use crate::{
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Evaluation, Portion};
 use palpate_estimators::fit::Fit;
-use palpate_estimators::network::Precision;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::contact::Position;
@@ -34,18 +33,7 @@ fn run(toml: &str, seeds: u64) -> Run {
     let options = RunOptions { seeds, threads: 1 };
     let outcomes = study.run(options, Vec::new(), &|_| {}, Watch::NONE).unwrap();
     let results = StudyResults::new(&outcomes, &study);
-    let facts = RunFacts {
-        palpate: env!("CARGO_PKG_VERSION"),
-        study: study.study.name.clone(),
-        study_sha256: study.study.digest.clone(),
-        seeds,
-        threads: 1,
-        precision: Precision::F64,
-        arithmetic: "portable".to_owned(),
-        presentations: 12_345,
-        seconds: 0.5,
-        presentations_per_second: 24_690.0,
-    };
+    let facts = RunFacts::new(&study, options, "portable".to_owned(), 12_345, 0.5);
     Run { study, outcomes, results, facts }
 }
 
