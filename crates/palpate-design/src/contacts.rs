@@ -77,7 +77,7 @@ pub(crate) fn spacing(extent: Extent, along_a_line: f64, along_a_plane: f64) -> 
 ///
 /// // Every 100 mm from 0 to 400 mm, three times as often in the right half.
 /// let prior = ContactPrior { weights: vec![1.0, 3.0], ..ContactPrior::along(0.0, 0.4, 0.1) };
-/// let contacts = WeightedContacts::from_prior(&prior, Extent::Line { length_m: 0.4 })?;
+/// let contacts = WeightedContacts::from_prior(&prior, Extent::line(0.4)?)?;
 /// assert_eq!(contacts.len(), 5);
 /// assert!((contacts.weights[4] - 3.0 / 11.0).abs() < 1e-15);
 /// # Ok::<(), palpate_numerics::OutOfRange>(())

@@ -128,9 +128,9 @@ impl Arrangement {
     /// use palpate_mechanics::units::mm;
     ///
     /// let dense = Arrangement::EdgeDense { middle: 4, portion: Arrangement::PAPER_PORTION };
-    /// let positions = dense.positions(10, Extent::Line { length_m: mm(400.0) })?;
+    /// let positions = dense.positions(10, Extent::line(mm(400.0))?)?;
     /// assert!((positions[0].x_m - mm(25.0)).abs() < 1e-12 && (positions[3].x_m - mm(100.0)).abs() < 1e-12);
-    /// # Ok::<(), palpate_estimators::arrangement::ArrangementError>(())
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
@@ -148,9 +148,11 @@ impl Arrangement {
             (_, Extent::Plane { .. }) => Err(ArrangementError::LineOnPlane { count }),
             (Self::Even, _) => Ok(cells(extent, count, 1)),
             (Self::Chebyshev, _) => Ok(warped_cells(extent, count, 1, chebyshev)),
-            (Self::EvenOver { portion }, Extent::Line { length_m }) => even_over(count, *portion, length_m),
-            (Self::EdgeDense { middle, portion }, Extent::Line { length_m }) => {
-                edge_dense(count, *middle, *portion, length_m)
+            (Self::EvenOver { portion }, Extent::Line { .. }) => {
+                even_over(count, *portion, extent.length_m())
+            }
+            (Self::EdgeDense { middle, portion }, Extent::Line { .. }) => {
+                edge_dense(count, *middle, *portion, extent.length_m())
             }
         }
     }
@@ -364,9 +366,9 @@ fn rows_of(
 ) -> Vec<Position> {
     let x_m = |i: usize| place(i, columns, extent.length_m());
     let row = |y_m: f64| (0..columns).map(move |i| Position { x_m: x_m(i), y_m });
-    match extent {
-        Extent::Line { .. } => row(0.0).collect(),
-        Extent::Plane { width_m, .. } => (0..rows).flat_map(|j| row(place(j, rows, width_m))).collect(),
+    match extent.width_m() {
+        None => row(0.0).collect(),
+        Some(width_m) => (0..rows).flat_map(|j| row(place(j, rows, width_m))).collect(),
     }
 }
 

@@ -156,7 +156,7 @@ impl Setup {
     /// # Errors
     /// [`SetupError`] without channels, or for a length that is not greater than 0 and finite.
     pub fn measured(length_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
-        Self::of_extent(Extent::Line { length_m }, channels)
+        Self::of_extent(Extent::line(length_m)?, channels)
     }
 
     /// A plane without a model, known by recordings only; see [`Setup::measured`].
@@ -164,14 +164,10 @@ impl Setup {
     /// # Errors
     /// [`SetupError`] without channels, or for a length or width that is not greater than 0 and finite.
     pub fn measured_plane(length_m: f64, width_m: f64, channels: &[&str]) -> Result<Self, SetupError> {
-        Self::of_extent(Extent::Plane { length_m, width_m }, channels)
+        Self::of_extent(Extent::plane(length_m, width_m)?, channels)
     }
 
     fn of_extent(extent: Extent, channels: &[&str]) -> Result<Self, SetupError> {
-        OutOfRange::check_positive([
-            ("the length in metres", extent.length_m()),
-            ("the width in metres", extent.width_m().unwrap_or(1.0)),
-        ])?;
         let positions = vec![Position::default(); channels.len()];
         let mut setup = Self::new(extent).sensors(SensorKind::Raw.at_positions(positions))?;
         setup.layout.edit(|sensors| {
@@ -264,7 +260,7 @@ impl Setup {
 
 fn positions_of(placement: Placement, extent: Extent) -> Result<Vec<Position>, SetupError> {
     let positions = match (placement, extent) {
-        (Placement::Evenly(count), Extent::Line { length_m }) => even_positions(count, length_m).collect(),
+        (Placement::Evenly(count), Extent::Line { .. }) => even_positions(count, extent.length_m()).collect(),
         (Placement::Evenly(count), Extent::Plane { .. }) => return Err(SetupError::EvenlyOnPlane { count }),
         (Placement::Grid(columns, rows), Extent::Plane { .. }) => inner_grid(extent, columns, rows),
         (Placement::Grid(..), Extent::Line { .. }) => return Err(SetupError::GridOnLine),

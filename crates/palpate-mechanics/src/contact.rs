@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 pub use palpate_core::{Contact, Position};
 
 use crate::units::format_length_mm;
+use palpate_numerics::OutOfRange;
 
 /// A position beside the surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -42,41 +43,48 @@ impl OffSurface {
 /// ```
 /// use palpate_mechanics::contact::{Extent, Position};
 ///
-/// let plate = Extent::Plane { length_m: 0.3, width_m: 0.2 };
+/// let plate = Extent::plane(0.3, 0.2)?;
 /// assert!(plate.contains(Position { x_m: 0.3, y_m: 0.1 }) && !plate.contains(Position { x_m: 0.1, y_m: 0.3 }));
 /// assert_eq!(plate.bounds_in_words(), "0 and 300 mm along, 0 and 200 mm across");
+/// # Ok::<(), palpate_numerics::OutOfRange>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Sides", into = "Sides")]
+#[serde(try_from = "Unchecked", into = "Unchecked")]
 pub enum Extent {
     /// A line along x, on which y is 0.
     Line {
-        /// Length along x, in metres; greater than 0.
-        length_m: f64,
+        /// Length along x.
+        length: Side,
     },
     /// A rectangle with one corner at the origin.
     Plane {
-        /// Length along x, in metres; greater than 0.
-        length_m: f64,
-        /// Width along y, in metres; greater than 0.
-        width_m: f64,
+        /// Length along x.
+        length: Side,
+        /// Width along y.
+        width: Side,
     },
 }
 
+/// Side of an [`Extent`], in metres: greater than 0 and finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Side(f64);
+
 /// An extent as files have it.
 #[derive(Serialize, Deserialize)]
-struct Sides {
+struct Unchecked {
     length_m: f64,
     width_m: Option<f64>,
 }
 
-impl From<Sides> for Extent {
-    fn from(Sides { length_m, width_m }: Sides) -> Self {
+impl TryFrom<Unchecked> for Extent {
+    type Error = OutOfRange;
+
+    fn try_from(Unchecked { length_m, width_m }: Unchecked) -> Result<Self, OutOfRange> {
         Self::new(length_m, width_m)
     }
 }
 
-impl From<Extent> for Sides {
+impl From<Extent> for Unchecked {
     fn from(extent: Extent) -> Self {
         Self { length_m: extent.length_m(), width_m: extent.width_m() }
     }
@@ -84,17 +92,54 @@ impl From<Extent> for Sides {
 
 impl Extent {
     /// A plane where there is a width, else a line; lengths in metres.
-    pub fn new(length_m: f64, width_m: Option<f64>) -> Self {
-        match width_m {
-            None => Self::Line { length_m },
-            Some(width_m) => Self::Plane { length_m, width_m },
-        }
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a length or width that is not greater than 0 and finite.
+    pub fn new(length_m: f64, width_m: Option<f64>) -> Result<Self, OutOfRange> {
+        OutOfRange::check_positive([("the length in metres", length_m)])?;
+        OutOfRange::check_positive(width_m.map(|width_m| ("the width in metres", width_m)))?;
+        Ok(match width_m {
+            None => Self::checked_line(length_m),
+            Some(width_m) => Self::checked_plane(length_m, width_m),
+        })
+    }
+
+    /// A line of this length, in metres.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a length that is not greater than 0 and finite.
+    pub fn line(length_m: f64) -> Result<Self, OutOfRange> {
+        Self::new(length_m, None)
+    }
+
+    /// A plane of this length and width, in metres.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a length or width that is not greater than 0 and finite.
+    pub fn plane(length_m: f64, width_m: f64) -> Result<Self, OutOfRange> {
+        Self::new(length_m, Some(width_m))
+    }
+
+    /// A line whose length is checked already.
+    pub(crate) const fn checked_line(length_m: f64) -> Self {
+        Self::Line { length: Side(length_m) }
+    }
+
+    /// A plane whose sides are checked already.
+    pub(crate) const fn checked_plane(length_m: f64, width_m: f64) -> Self {
+        Self::Plane { length: Side(length_m), width: Side(width_m) }
+    }
+
+    /// The line along x, as long as this.
+    #[must_use]
+    pub fn along_x(&self) -> Self {
+        Self::checked_line(self.length_m())
     }
 
     /// Length along x, in metres.
     pub fn length_m(&self) -> f64 {
         match *self {
-            Self::Line { length_m } | Self::Plane { length_m, .. } => length_m,
+            Self::Line { length } | Self::Plane { length, .. } => length.0,
         }
     }
 
@@ -102,7 +147,7 @@ impl Extent {
     pub fn width_m(&self) -> Option<f64> {
         match *self {
             Self::Line { .. } => None,
-            Self::Plane { width_m, .. } => Some(width_m),
+            Self::Plane { width, .. } => Some(width.0),
         }
     }
 
@@ -199,8 +244,8 @@ fn grid(positions: &[Position]) -> Option<(Vec<String>, Vec<String>)> {
 mod tests {
     use super::*;
 
-    const LINE: Extent = Extent::Line { length_m: 0.4 };
-    const PLANE: Extent = Extent::Plane { length_m: 0.4, width_m: 0.2 };
+    const LINE: Extent = Extent::checked_line(0.4);
+    const PLANE: Extent = Extent::checked_plane(0.4, 0.2);
 
     #[test]
     fn positions_read_well() {
@@ -228,5 +273,24 @@ mod tests {
         assert_eq!(text, r#"[{"length_m":0.4,"width_m":null},{"length_m":0.4,"width_m":0.2}]"#);
         assert_eq!(serde_json::from_str::<[Extent; 2]>(&text).unwrap(), [LINE, PLANE]);
         assert_eq!(serde_json::from_str::<Extent>(r#"{"length_m":0.4}"#).unwrap(), LINE);
+    }
+
+    #[test]
+    fn a_side_is_greater_than_0_and_finite() {
+        for bad in [0.0, -0.4, f64::NAN, f64::INFINITY] {
+            let refused = Extent::line(bad).unwrap_err().to_string();
+            assert_eq!(
+                refused,
+                format!("the length in metres is {bad}; it must be greater than 0 and finite")
+            );
+            let refused = Extent::plane(0.4, bad).unwrap_err().to_string();
+            assert_eq!(
+                refused,
+                format!("the width in metres is {bad}; it must be greater than 0 and finite")
+            );
+            assert!(Extent::plane(bad, 0.4).is_err());
+        }
+        assert!(serde_json::from_str::<Extent>(r#"{"length_m":-0.4,"width_m":null}"#).is_err());
+        assert!(serde_json::from_str::<Extent>(r#"{"length_m":0.4,"width_m":0}"#).is_err());
     }
 }

@@ -90,7 +90,9 @@ impl ComparisonReport<'_> {
         Table::from_rows(tried)
             .short("estimator", |(comparison, ..)| comparison.estimator.kind())
             .mm("mean", |(.., summary)| summary.average_m)
-            .number("% of length", |(_, of, summary)| percentage_error(summary.average_m, of.length_m))
+            .number("% of length", |(_, of, summary)| {
+                percentage_error(summary.average_m, of.extent.length_m())
+            })
             .mm("median", |(.., summary)| summary.median_m)
             .mm("95th", |(.., summary)| summary.p95_m)
             .mm("RMS", |(.., summary)| summary.rmse_m)

@@ -84,7 +84,7 @@ impl EvaluationReport<'_> {
             @if let Some(summary) = self.evaluation.summary(None) {
                 li {
                     "Average error " b { (number(summary.average_m * 1e3)) " mm" } ", "
-                    (number(percentage_error(summary.average_m, self.evaluation.length_m))) " % of the length; largest "
+                    (number(percentage_error(summary.average_m, self.evaluation.extent.length_m()))) " % of the length; largest "
                     (number(summary.largest_m * 1e3)) " mm."
                 }
                 li { "Within " (mm(self.tolerance_m)) " mm: " b { (number(effective)) " %" } " of the readings." }
@@ -155,7 +155,7 @@ impl EvaluationReport<'_> {
     }
 
     fn estimate_figure(&self) -> Figure {
-        let length_mm = self.evaluation.length_m * 1e3;
+        let length_mm = self.evaluation.extent.length_m() * 1e3;
         let identity = vec![(0.0, 0.0), (length_mm, length_mm)];
         let mut series = vec![Series::dashes("estimated = true", 6, identity)];
         let along = |located: &Located| (located.truth.x_m, located.estimate.x_m);
@@ -178,7 +178,7 @@ impl EvaluationReport<'_> {
     }
 
     fn axis(&self, label: &str) -> Axis {
-        Axis::linear(label).from_to(0.0, self.evaluation.length_m * 1e3)
+        Axis::linear(label).from_to(0.0, self.evaluation.extent.length_m() * 1e3)
     }
 
     /// A marker a reading, of where the contact was and where it was seen; where that would be too many, the median of the readings
@@ -208,11 +208,11 @@ impl EvaluationReport<'_> {
         let rows = everywhere.chain(portions).filter_map(|(name, portion)| {
             let inside = |located: &&Located| portion.is_none_or(|portion| portion.contains(located.truth));
             let located = self.evaluation.located.iter().filter(inside).copied().collect();
-            let part = Evaluation { length_m: self.evaluation.length_m, located };
+            let part = Evaluation { extent: self.evaluation.extent, located };
             Some((name, part, self.evaluation.summary(portion)?))
         });
         let both = |error_m: f64| {
-            let percent = percentage_error(error_m, self.evaluation.length_m);
+            let percent = percentage_error(error_m, self.evaluation.extent.length_m());
             format!("{} ({})", number(error_m * 1e3), number(percent))
         };
         let effective = match self.extent() {

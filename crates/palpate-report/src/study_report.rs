@@ -38,9 +38,9 @@ pub fn study_report(report: &StudyReport) -> Vec<ReportFile> {
     let layouts = layouts(report);
     let mut sections =
         vec![Section::new("arms", "All arms").figures(overview(report)).table(arms_table(report))];
-    if layouts.len() > 1 {
+    if let (Some(extent), [_, _, ..]) = (report.extent(), layouts.as_slice()) {
         let section = Section::new("layouts", "The layouts").figure(layouts_figure(report, &layouts));
-        sections.push(section.table(layouts_table(&layouts, Extent::Line { length_m: report.length_m() })));
+        sections.push(section.table(layouts_table(&layouts, extent)));
     }
     sections.extend([
         Section::new("errors", "Errors along the surface").figures(along_the_surface(report)),
@@ -311,9 +311,14 @@ impl<'a> StudyReport<'a> {
         Some(Portion { from_m: positions.first()?.x_m, to_m: positions.last()?.x_m })
     }
 
-    /// Length of the surface in metres; that of the first arm.
+    /// The line along the surface; that of the first arm.
+    fn extent(&self) -> Option<Extent> {
+        Some(self.study.study.arms.first()?.rig.setup.surface.extent().along_x())
+    }
+
+    /// Its length in metres.
     pub(crate) fn length_m(&self) -> f64 {
-        self.study.study.arms.first().map_or(f64::NAN, |arm| arm.rig.setup.surface.extent().length_m())
+        self.extent().map_or(f64::NAN, |extent| extent.length_m())
     }
 
     /// A sentence on the networks that did not converge; none where all did.

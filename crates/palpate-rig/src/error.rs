@@ -89,6 +89,9 @@ pub enum RigProblem {
         /// The bound, in words.
         bound: String,
     },
+    /// A surface with a side out of its range.
+    #[error(transparent)]
+    Extent(OutOfRange),
     /// A beam that cannot be computed.
     #[error(transparent)]
     Beam(BeamError),

@@ -186,7 +186,8 @@ impl At<SurfaceKeys> {
                 Ok(SurfaceSpec::Digit(digit.with_direction(keys.direction)))
             }
             SurfaceKeys::Measured(keys) => {
-                Ok(Extent::new(keys.length.si, keys.width.map(|width| width.si)).into())
+                let extent = Extent::new(keys.length.si, keys.width.map(|width| width.si));
+                Ok(extent.map_err(|error| RigProblem::Extent(error).at_place(&self.place))?.into())
             }
         }
     }
@@ -290,7 +291,8 @@ impl BeamSupportKeys {
 
 impl PlateKeys {
     fn build(&self, place: &Place) -> Result<Plate, RigError> {
-        let extent = Extent::Plane { length_m: self.length.si, width_m: self.width.si };
+        let extent = Extent::plane(self.length.si, self.width.si)
+            .map_err(|error| RigProblem::Extent(error).at_place(place))?;
         let edges = match self.edges.as_deref() {
             None => Edges::default(),
             Some(EdgesKeys::Text(edge)) => Edges::all(*edge),

@@ -39,7 +39,7 @@ fn the_papers_bench_is_what_the_paper_says() {
 #[test]
 fn the_water_strip_maps_foreign_columns() {
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    assert_eq!(rig.setup.surface, SurfaceSpec::Measured(Extent::Line { length_m: 0.1 }));
+    assert_eq!(rig.setup.surface, SurfaceSpec::Measured(Extent::line(0.1).unwrap()));
     assert_eq!(rig.setup.layout.names(), ["Pl", "Pr"]);
     let Estimator::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
     assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));

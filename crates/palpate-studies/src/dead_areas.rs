@@ -17,7 +17,7 @@ use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
-use palpate_mechanics::surface::{Extent, SurfaceSpec};
+use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
 
@@ -216,7 +216,7 @@ impl ArraySensor {
             channel: ChannelModel { noise_sd, ..ChannelModel::default() },
         };
         let setup = Setup {
-            surface: SurfaceSpec::Measured(Extent::Line { length_m }),
+            surface: SurfaceSpec::Measured(model.extent().along_x()),
             layout: Layout::new((0..count).map(sensor).collect()).map_err(SimulateError::from)?,
             force_n: Some(force_n),
             columns: None,

@@ -301,7 +301,7 @@ pub(super) fn percent(
     portion: Option<Portion>,
     pick: fn(ErrorSummary) -> f64,
 ) -> Option<f64> {
-    evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.length_m))
+    evaluation.summary(portion).map(|summary| percentage_error(pick(summary), evaluation.extent.length_m()))
 }
 
 /// Average error of the contacts at the positions that `keep` wants, in % of the length.

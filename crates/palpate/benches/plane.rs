@@ -27,7 +27,7 @@ fn main() {
         .collect();
     println!("fit of 36 × 5 presses: {:.0} ms", median(times).expect("rounds") * 1e3);
     let all =
-        every(Extent::Plane { length_m: 0.3, width_m: 0.3 }, 0.01).expect("a centimetre is a fair spacing");
+        every(Extent::plane(0.3, 0.3).expect("it has sides"), 0.01).expect("a centimetre is a fair spacing");
     let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
     let plain: Vec<Position> = all.iter().copied().filter(middle).collect();
     for force_n in [Some(5.0), None] {

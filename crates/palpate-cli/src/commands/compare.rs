@@ -167,7 +167,7 @@ fn json_row(rig: &Rig, comparison: &Comparison, arguments: &Arguments) -> Option
     Some(object! {
         "name": comparison.estimator.kind(),
         "error_mm": ErrorFigures::new(&summary, |error_m| error_m * 1e3),
-        "error_percent": percentage_error(summary.average_m, evaluation.length_m),
+        "error_percent": percentage_error(summary.average_m, evaluation.extent.length_m()),
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "coverage_95": evaluation.coverage_percent(),
         "limit_ratio": limit_ratio(&rig.setup, evaluation),
@@ -185,7 +185,7 @@ fn table(rig: &Rig, comparisons: &[Comparison], arguments: &Arguments) -> String
     Table::from_rows(rows)
         .column("error, mm (% of length)", |(comparison, ..)| comparison.estimator.kind().to_owned())
         .column("mean", |(_, evaluation, summary)| {
-            let percent = percentage_error(summary.average_m, evaluation.length_m);
+            let percent = percentage_error(summary.average_m, evaluation.extent.length_m());
             format!("{:.4} ({percent:.4})", summary.average_m * 1e3)
         })
         .column("median", |(.., summary)| format!("{:.4}", summary.median_m * 1e3))

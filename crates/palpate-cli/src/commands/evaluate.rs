@@ -115,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "data": &answers.recording.source,
         "folds": folds,
         "seed": arguments.seed,
-        "length_mm": evaluation.length_m * 1e3,
+        "length_mm": evaluation.extent.length_m() * 1e3,
         "tolerance_mm": arguments.tolerance * 1e3,
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "errors": errors,
@@ -183,7 +183,7 @@ fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<Por
         let summary = evaluation.summary(portion).ok_or_else(|| {
             Complaint::new(format!("{name} has no contact in {data}")).help("name a portion that was pressed")
         })?;
-        let percent = |error_m| percentage_error(error_m, evaluation.length_m);
+        let percent = |error_m| percentage_error(error_m, evaluation.extent.length_m());
         Ok(PortionErrors {
             portion: name,
             count: summary.count,

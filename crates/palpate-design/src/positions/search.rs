@@ -125,16 +125,12 @@ impl PatternSearch {
     }
 
     fn is_sound(&self, positions: &[Position]) -> bool {
-        let inside = |at_m: f64, side_m: f64| (EDGE * side_m..=(1.0 - EDGE) * side_m).contains(&at_m);
-        match self.extent {
-            Extent::Line { length_m } => {
-                let in_order = |pair: &[Position]| pair[0].x_m + EDGE * length_m <= pair[1].x_m;
-                positions.iter().all(|at| inside(at.x_m, length_m)) && positions.windows(2).all(in_order)
-            }
-            Extent::Plane { length_m, width_m } => {
-                positions.iter().all(|at| inside(at.x_m, length_m) && inside(at.y_m, width_m))
-            }
-        }
+        let extent = self.extent;
+        let within = |(at_m, side_m): (f64, f64)| (EDGE * side_m..=(1.0 - EDGE) * side_m).contains(&at_m);
+        let inside = |at: &Position| extent.coordinates_m(*at).zip(extent.sides_m()).all(within);
+        let in_order = |pair: &[Position]| pair[0].x_m + EDGE * extent.length_m() <= pair[1].x_m;
+        let has_order = matches!(extent, Extent::Line { .. });
+        positions.iter().all(inside) && (!has_order || positions.windows(2).all(in_order))
     }
 }
 

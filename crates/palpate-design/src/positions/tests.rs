@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use super::search::reads_mirrored;
 use super::variance::{ExpectedError, Posterior};
 use super::*;
@@ -25,14 +27,14 @@ fn off(wanted_m: &[f64]) -> impl Fn(&[Position], f64) -> Result<f64, PositionErr
     }
 }
 
-const BEAM: Extent = Extent::Line { length_m: 0.4 };
+static BEAM: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.4).unwrap());
 
 #[test]
 fn positions_move_to_where_the_score_is_least() {
     let wanted_m = [0.01, 0.08, 0.23, 0.39];
-    let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 10_000 };
+    let search = PatternSearch { extent: *BEAM, mirrored: false, most_trials: 10_000 };
     let score = off(&wanted_m);
-    let found = search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap();
+    let found = search.run(&score, cells(*BEAM, 4, 1), f64::INFINITY).unwrap();
     for (at, wanted_m) in found.iter().zip(wanted_m) {
         assert!((at.x_m - wanted_m).abs() < 2e-3, "{found:?}");
     }
@@ -40,9 +42,9 @@ fn positions_move_to_where_the_score_is_least() {
 
 #[test]
 fn mirrored_positions_stay_mirrored() {
-    let search = PatternSearch { extent: BEAM, mirrored: true, most_trials: 10_000 };
+    let search = PatternSearch { extent: *BEAM, mirrored: true, most_trials: 10_000 };
     let score = off(&[0.03, 0.1, 0.2, 0.3, 0.35]);
-    let found = search.run(&score, cells(BEAM, 5, 1), f64::INFINITY).unwrap();
+    let found = search.run(&score, cells(*BEAM, 5, 1), f64::INFINITY).unwrap();
     for (a, b) in found.iter().zip(found.iter().rev()) {
         assert!((a.x_m + b.x_m - 0.4).abs() < 1e-12, "{found:?}");
     }
@@ -57,8 +59,8 @@ fn a_search_keeps_to_its_trials() {
         asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         off(&[0.0; 4])(positions, 0.0)
     };
-    let search = PatternSearch { extent: BEAM, mirrored: false, most_trials: 7 };
-    search.run(&score, cells(BEAM, 4, 1), f64::INFINITY).unwrap();
+    let search = PatternSearch { extent: *BEAM, mirrored: false, most_trials: 7 };
+    search.run(&score, cells(*BEAM, 4, 1), f64::INFINITY).unwrap();
     assert!(asked.into_inner() <= 7);
 }
 

@@ -248,8 +248,8 @@ impl SensorProblem<'_> {
 
 /// i·l/(k+1) on a line; on a plane the inner crossings of the grid whose cells are closest to squares.
 fn even_positions(count: usize, extent: Extent) -> Vec<Position> {
-    if let Extent::Line { length_m } = extent {
-        return sensing::even_positions(count, length_m).collect();
+    if let Extent::Line { .. } = extent {
+        return sensing::even_positions(count, extent.length_m()).collect();
     }
     let (columns, rows) = squarest(extent, count);
     inner_grid(extent, columns, rows)

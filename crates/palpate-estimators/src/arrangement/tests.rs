@@ -1,11 +1,13 @@
+use std::sync::LazyLock;
+
 use super::*;
 
 /// The founding paper's beam.
-const LINE: Extent = Extent::Line { length_m: 0.4 };
-const PLANE: Extent = Extent::Plane { length_m: 0.3, width_m: 0.2 };
+static LINE: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.4).unwrap());
+static PLANE: LazyLock<Extent> = LazyLock::new(|| Extent::plane(0.3, 0.2).unwrap());
 
 fn millimetres(arrangement: &Arrangement, count: usize) -> Vec<f64> {
-    let positions = arrangement.positions(count, LINE).unwrap();
+    let positions = arrangement.positions(count, *LINE).unwrap();
     positions.iter().map(|position| position.x_m * 1e3).collect()
 }
 
@@ -39,10 +41,10 @@ fn even_positions_over_a_portion_include_its_ends() {
     // The paper's ten even positions are those over their own span.
     assert_close(&millimetres(&over((0.05, 0.95)), 10), &millimetres(&Arrangement::Even, 10));
     for portion in [(0.5, 0.5), (-0.1, 0.5), (0.5, 1.1), (f64::NAN, 0.5)] {
-        let refused = over(portion).positions(3, LINE).unwrap_err();
+        let refused = over(portion).positions(3, *LINE).unwrap_err();
         assert!(matches!(refused, ArrangementError::EvenPortion { .. }), "{refused}");
     }
-    assert!(matches!(over((0.1, 0.9)).positions(3, PLANE), Err(ArrangementError::LineOnPlane { .. })));
+    assert!(matches!(over((0.1, 0.9)).positions(3, *PLANE), Err(ArrangementError::LineOnPlane { .. })));
 }
 
 /// Both edges at one pitch, and between them `middle` positions from 100 to 300 mm.
@@ -87,14 +89,14 @@ fn what_cannot_be_laid_out_is_refused_with_value_and_bound() {
         (explicit(0.41), 2),
         (explicit(f64::NAN), 2),
     ];
-    let messages = refusals.map(|(rule, count)| rule.positions(count, LINE).unwrap_err().to_string());
+    let messages = refusals.map(|(rule, count)| rule.positions(count, *LINE).unwrap_err().to_string());
     insta::assert_snapshot!(messages.join("\n"));
 }
 
 #[test]
 fn a_grid_lies_in_the_middles_of_cells() {
     let grid = Arrangement::Grid { columns: 3, rows: 2 };
-    let positions = grid.positions(6, PLANE).unwrap();
+    let positions = grid.positions(6, *PLANE).unwrap();
     let millimetres: Vec<_> = positions.iter().map(|p| [p.x_m, p.y_m].map(|m| (m * 1e3).round())).collect();
     let expected =
         [[50.0, 50.0], [150.0, 50.0], [250.0, 50.0], [50.0, 150.0], [150.0, 150.0], [250.0, 150.0]];
@@ -106,12 +108,12 @@ fn lines_and_planes_are_not_mixed_up() {
     let grid = Arrangement::Grid { columns: 3, rows: 2 };
     let explicit = Arrangement::Explicit(vec![Position { x_m: 0.1, y_m: 0.25 }]);
     let refusals = [
-        (grid.clone(), 6, LINE),
-        (grid, 7, PLANE),
-        (Arrangement::Even, 6, PLANE),
-        (edge_dense(4), 10, PLANE),
-        (explicit.clone(), 1, PLANE),
-        (explicit, 1, LINE),
+        (grid.clone(), 6, *LINE),
+        (grid, 7, *PLANE),
+        (Arrangement::Even, 6, *PLANE),
+        (edge_dense(4), 10, *PLANE),
+        (explicit.clone(), 1, *PLANE),
+        (explicit, 1, *LINE),
     ];
     let messages =
         refusals.map(|(rule, count, extent)| rule.positions(count, extent).unwrap_err().to_string());
@@ -127,34 +129,34 @@ fn lines_and_planes_are_not_mixed_up() {
 
 #[test]
 fn judging_covers_the_surface() {
-    let line = all_over(LINE);
+    let line = all_over(*LINE);
     assert_eq!((line.len(), line[0], line[398]), (399, Position::along(0.001), Position::along(0.399)));
-    let plane = all_over(PLANE);
+    let plane = all_over(*PLANE);
     assert_eq!(plane.len(), 24 * 16);
     let mean = |of: fn(&Position) -> f64| plane.iter().map(of).sum::<f64>() / plane.len() as f64;
     assert!((mean(|p| p.x_m) - 0.15).abs() < 1e-12 && (mean(|p| p.y_m) - 0.1).abs() < 1e-12);
-    assert_eq!(every(LINE, 0.1).unwrap().len(), 3);
-    let apart = every(PLANE, 0.05).unwrap();
+    assert_eq!(every(*LINE, 0.1).unwrap().len(), 3);
+    let apart = every(*PLANE, 0.05).unwrap();
     assert_eq!((apart.len(), apart[0]), (15, Position { x_m: 0.05, y_m: 0.05 }));
-    assert!(every(PLANE, 0.25).is_err() && every(PLANE, 1e-5).is_err() && every(PLANE, f64::NAN).is_err());
+    assert!(every(*PLANE, 0.25).is_err() && every(*PLANE, 1e-5).is_err() && every(*PLANE, f64::NAN).is_err());
 }
 
 #[test]
 fn chebyshevs_nodes_are_the_zeros_of_his_polynomial() {
-    let found = Arrangement::Chebyshev.positions(7, LINE).unwrap();
+    let found = Arrangement::Chebyshev.positions(7, *LINE).unwrap();
     for at in &found {
         // T_7 over the length, mapped to −1…1.
         let x = 2.0 * at.x_m / LINE.length_m() - 1.0;
         assert!((7.0 * x.acos()).cos().abs() < 1e-12, "{found:?}");
     }
     assert!(found.is_sorted_by(|a, b| a.x_m < b.x_m));
-    let refused = Arrangement::Chebyshev.positions(7, PLANE);
+    let refused = Arrangement::Chebyshev.positions(7, *PLANE);
     assert_eq!(refused, Err(ArrangementError::LineOnPlane { count: 7 }));
 }
 
 #[test]
 fn the_squarest_grid_has_the_sides_of_the_plane() {
-    assert_eq!(squarest(LINE, 12), (12, 1));
-    assert_eq!(squarest(PLANE, 6), (3, 2));
-    assert_eq!(squarest(PLANE, 24), (6, 4));
+    assert_eq!(squarest(*LINE, 12), (12, 1));
+    assert_eq!(squarest(*PLANE, 6), (3, 2));
+    assert_eq!(squarest(*PLANE, 24), (6, 4));
 }

@@ -24,7 +24,12 @@ fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     let mut layout = Layout::even(SensorKind::Raw, channels, 0.1);
     let name = |(i, sensor): (usize, &mut Sensor)| sensor.name = format!("c{i}");
     layout.edit(|sensors| sensors.iter_mut().enumerate().for_each(name)).unwrap();
-    Setup { surface: SurfaceSpec::Measured(Extent::new(0.1, width_m)), layout, force_n: None, columns: None }
+    Setup {
+        surface: SurfaceSpec::Measured(Extent::new(0.1, width_m).unwrap()),
+        layout,
+        force_n: None,
+        columns: None,
+    }
 }
 
 /// Two supports share a force by the lever: their centroid is the contact itself.

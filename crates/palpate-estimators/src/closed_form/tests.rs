@@ -198,7 +198,7 @@ fn a_dead_channel_is_left_out() {
 fn what_does_not_suit_is_named() {
     let message = |setup: &Setup| fit(setup).unwrap_err().to_string();
     let mut measured = setup(&SCALES, 0.0, None);
-    measured.surface = SurfaceSpec::Measured(Extent::Line { length_m: 0.4 });
+    measured.surface = SurfaceSpec::Measured(Extent::line(0.4).unwrap());
     assert!(message(&measured).contains("no model"));
     assert_eq!(
         message(&setup(&[(SensorKind::Raw, 0.1)], 0.0, None)),

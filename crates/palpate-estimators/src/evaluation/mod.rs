@@ -40,8 +40,8 @@ impl Located {
 /// A locator's answers to a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evaluation {
-    /// Length of the surface in metres, which percentage errors refer to.
-    pub length_m: f64,
+    /// The surface, to whose length percentage errors refer.
+    pub extent: Extent,
     /// The answers, in the recording's order.
     pub located: Vec<Located>,
 }
@@ -119,7 +119,7 @@ impl Evaluation {
             })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { length_m: locator.setup.surface.extent().length_m(), located })
+        Ok(Self { extent: locator.setup.surface.extent(), located })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.
@@ -159,7 +159,7 @@ impl Evaluation {
     /// The mean position and the median error of the contacts in each of `count` equal stretches along the surface, in metres; nothing
     /// for a stretch without contacts.
     pub fn median_by_stretch_m(&self, count: usize) -> Vec<(f64, f64)> {
-        let extent = Extent::Line { length_m: self.length_m };
+        let extent = self.extent.along_x();
         let point = |stretch: Vec<&Located>| {
             let mean_m = stretch.iter().map(|located| located.truth.x_m).sum::<f64>() / stretch.len() as f64;
             Some((mean_m, percentile(&sorted_errors_m(stretch), 50.0)?))
@@ -188,7 +188,7 @@ impl Evaluation {
         sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
         let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
         let summaries = groups.filter_map(|group| {
-            let part = Self { length_m: self.length_m, located: group.to_vec() };
+            let part = Self { extent: self.extent, located: group.to_vec() };
             Some((group[0].truth, part.summary(None)?))
         });
         summaries.collect()
@@ -313,7 +313,7 @@ pub fn evaluate_splits<E: Fit>(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
-    let mut evaluation = Evaluation { length_m: setup.surface.extent().length_m(), located: Vec::new() };
+    let mut evaluation = Evaluation { extent: setup.surface.extent(), located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for split in splits {
         let start = clock();

@@ -9,7 +9,7 @@ fn evaluation() -> Evaluation {
         let estimate = Position::along(truth.x_m + f64::from(k) * 0.5e-3);
         Located { truth, force_n: None, estimate, covered: None }
     });
-    Evaluation { length_m: 0.1, located: located.collect() }
+    Evaluation { extent: Extent::line(0.1).unwrap(), located: located.collect() }
 }
 
 fn close(value: f64, expected: f64) {
@@ -57,7 +57,7 @@ fn positions_gather_their_repeats() {
 #[test]
 fn errors_are_summed_up_by_cells_stretches_and_shares() {
     let evaluation = evaluation();
-    let extent = Extent::Plane { length_m: 0.1, width_m: 0.05 };
+    let extent = Extent::plane(0.1, 0.05).unwrap();
     let medians = evaluation.median_by_cell_m(&Cells { extent, columns: 5, rows: 2 });
     assert_eq!(medians.len(), 10);
     for (cell, median) in medians.iter().enumerate() {

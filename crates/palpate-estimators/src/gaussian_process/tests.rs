@@ -1,5 +1,7 @@
 //! The method on simulated benches, and on other people's recordings by the protocol that comes with them.
 
+use std::sync::LazyLock;
+
 use palpate_core::Status;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -15,7 +17,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::mm;
 
-const EXTENT: Extent = Extent::Line { length_m: 0.4 };
+static EXTENT: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.4).unwrap());
 
 fn fit(setup: &Setup, recording: &Recording) -> Result<GaussianProcessLocator, GaussianProcessError> {
     let task = FitTask::new(setup, recording).seed(1);
@@ -42,7 +44,7 @@ fn it_locates_and_its_intervals_cover() {
             let x_m = rng.random_range(0.0..0.4);
             bells(x_m, force_n, 0.01, rng)
         };
-        let setup = raw_setup(EXTENT, 4, force_n);
+        let setup = raw_setup(*EXTENT, 4, force_n);
         let recording = raw_recording((0..200).map(|_| press(&mut rng)).collect());
         let locator = fit(&setup, &recording).unwrap();
         assert_eq!(locator.check(&setup), Ok(()));
@@ -62,7 +64,7 @@ fn it_locates_and_its_intervals_cover() {
 
 #[test]
 fn a_pad_is_two_dimensional() {
-    let extent = Extent::Plane { length_m: 0.2, width_m: 0.1 };
+    let extent = Extent::plane(0.2, 0.1).unwrap();
     let rows = (0..120).map(|i| {
         let (x_m, y_m) = (0.02 * f64::from(i % 11), 0.01 * f64::from(i / 11));
         let (u, v) = (x_m / 0.2, y_m / 0.1);
@@ -89,7 +91,7 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
         let x_m = 0.01 * f64::from(i);
         Row { position: Position::along(x_m), force_n: None, nuisance: None, reading: vec![x_m, 1.0 - x_m] }
     });
-    let setup = raw_setup(EXTENT, 2, Some(1.0));
+    let setup = raw_setup(*EXTENT, 2, Some(1.0));
     let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
     assert_eq!(locator.locate(&[0.42, 0.58]).status, Status::OutsideSurface);
     assert_eq!(locator.locate(&[0.2, 0.8]).status, Status::Located);
@@ -98,7 +100,7 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
 #[test]
 fn recordings_that_say_nothing_are_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
-    let setup = raw_setup(EXTENT, 4, None);
+    let setup = raw_setup(*EXTENT, 4, None);
     let one_place = raw_recording((0..9).map(|_| bells(0.1, 1.0, 0.01, &mut rng)).collect());
     assert!(matches!(fit(&setup, &one_place), Err(GaussianProcessError::Positions(_))));
     let mut still = raw_recording(vec![bells(0.1, 1.0, 0.0, &mut rng), bells(0.3, 1.0, 0.0, &mut rng)]);
@@ -114,7 +116,7 @@ fn recordings_that_say_nothing_are_refused() {
 fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let recording = raw_recording((0..40).map(|i| bells(0.01 * f64::from(i), 1.0, 1e-3, &mut rng)).collect());
-    let bench_4 = raw_setup(EXTENT, 4, Some(1.0));
+    let bench_4 = raw_setup(*EXTENT, 4, Some(1.0));
     let locator = fit(&bench_4, &recording).unwrap();
     let text = serde_json::to_string(&locator).unwrap();
     let back: GaussianProcessLocator = serde_json::from_str(&text).unwrap();
@@ -122,11 +124,8 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     let reading = bells(0.123, 1.0, 0.0, &mut rng).reading;
     let (here, there) = (locator.locate(&reading), back.locate(&reading));
     assert!((here.contact.position.x_m - there.contact.position.x_m).abs() < 1e-9);
-    assert!(back.check(&raw_setup(EXTENT, 2, Some(1.0))).is_err());
-    assert!(
-        back.check(&raw_setup(Extent::Plane { length_m: EXTENT.length_m(), width_m: 0.1 }, 4, Some(1.0)))
-            .is_err()
-    );
+    assert!(back.check(&raw_setup(*EXTENT, 2, Some(1.0))).is_err());
+    assert!(back.check(&raw_setup(Extent::plane(EXTENT.length_m(), 0.1).unwrap(), 4, Some(1.0))).is_err());
     let mut damaged = back;
     damaged.features.features.pop();
     assert!(damaged.check(&bench_4).is_err());

@@ -186,7 +186,7 @@ mod tests {
     use ndarray::Array1;
 
     fn line(columns: usize) -> Cells {
-        Cells { extent: Extent::Line { length_m: 0.4 }, columns, rows: 1 }
+        Cells { extent: Extent::line(0.4).unwrap(), columns, rows: 1 }
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn every_cell_holds_its_middle() {
-        let plane = Extent::Plane { length_m: 0.3, width_m: 0.15 };
+        let plane = Extent::plane(0.3, 0.15).unwrap();
         let cells = Cells::nearly_square(plane, 200.0, 5..=60);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         assert!(cells.centres().enumerate().all(|(cell, centre)| cells.cell_of(centre) == cell));
@@ -213,7 +213,7 @@ mod tests {
         let at = |x_m, y_m| Position { x_m, y_m };
         let on_line = UniformLoad::new(at(0.05, 0.0), at(0.17, 0.0), 3.0);
         let on_plane = UniformLoad::new(at(0.05, 0.02), at(0.17, 0.09), 3.0);
-        let plane = Cells::new(Extent::Plane { length_m: 0.3, width_m: 0.15 });
+        let plane = Cells::new(Extent::plane(0.3, 0.15).unwrap());
         for (cells, load) in [(line(7), on_line), (plane, on_plane)] {
             let density = cells.mean_density(&[load, load]);
             assert!((density.iter().sum::<f64>() * cells.measure() - 6.0).abs() < 1e-12);
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn on_a_plane_a_tilt_costs_nothing_inside() {
-        let extent = Extent::Plane { length_m: 0.3, width_m: 0.15 };
+        let extent = Extent::plane(0.3, 0.15).unwrap();
         let cells = Cells::new(extent);
         assert_eq!((cells.columns, cells.rows), (20, 10));
         let tilt = Array1::from_shape_fn(cells.len(), |cell| {

@@ -247,7 +247,7 @@ impl Surface for Foam {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Plane { length_m: 0.2, width_m: 0.1 }
+        Extent::plane(0.2, 0.1).unwrap()
     }
 }
 

@@ -10,7 +10,7 @@ use palpate_mechanics::surface::{Extent, SurfaceSpec};
 
 fn setup(force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    let surface = SurfaceSpec::Measured(Extent::Plane { length_m: 0.1, width_m: 0.1 });
+    let surface = SurfaceSpec::Measured(Extent::plane(0.1, 0.1).unwrap());
     Setup { surface, layout, force_n, columns: None }
 }
 

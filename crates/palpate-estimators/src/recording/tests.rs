@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -5,7 +7,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-const STRIP: Extent = Extent::Line { length_m: 0.1 };
+static STRIP: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.1).unwrap());
 
 fn named(name: &str) -> Column {
     Column::Name(name.to_owned())
@@ -44,7 +46,7 @@ fn numbered() -> Columns {
 
 fn read_as(columns: &Columns, bytes: &[u8]) -> Result<Recording, CsvError> {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    read("bench.csv", bytes, &Schema { columns, layout: &layout, extent: STRIP, known_force_n: None })
+    read("bench.csv", bytes, &Schema { columns, layout: &layout, extent: *STRIP, known_force_n: None })
 }
 
 #[test]
@@ -66,7 +68,7 @@ fn columns_are_mapped_and_others_ignored() {
 #[test]
 fn readings_and_contacts_in_two_files_without_headers_pair_row_by_row() {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
-    let extent = Extent::Plane { length_m: 0.1, width_m: 0.1 };
+    let extent = Extent::plane(0.1, 0.1).unwrap();
     let columns = numbered();
     let schema = Schema { columns: &columns, layout: &layout, extent, known_force_n: Some(2.0) };
     let readings = "1.0,7,8,9\n1.1,5,6,7\n";
@@ -222,9 +224,9 @@ proptest! {
         let rows: Vec<Row> = rows.collect();
         let recording = Recording::new(&layout, "", rows);
         let mut bytes = Vec::new();
-        write(&recording, STRIP, "a\ntest", &mut bytes).unwrap();
-        let columns = Columns::own(&recording.channels, &recording.kinds, STRIP);
-        let schema = Schema { columns: &columns, layout: &layout, extent: STRIP, known_force_n: None };
+        write(&recording, *STRIP, "a\ntest", &mut bytes).unwrap();
+        let columns = Columns::own(&recording.channels, &recording.kinds, *STRIP);
+        let schema = Schema { columns: &columns, layout: &layout, extent: *STRIP, known_force_n: None };
         prop_assert_eq!(read("", bytes.as_slice(), &schema).unwrap().rows, recording.rows);
     }
 

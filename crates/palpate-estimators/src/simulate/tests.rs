@@ -63,7 +63,7 @@ fn what_cannot_be_simulated_is_refused_with_the_reason() {
 
 #[test]
 fn sensors_sit_beside_their_places_by_no_more_than_they_may() {
-    let line = Extent::Line { length_m: 0.4 };
+    let line = Extent::line(0.4).unwrap();
     let mut here = Layout::even(SensorKind::Deflection, 8, 0.4);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     assert_eq!(displaced(&here, line, &mut rng), here);

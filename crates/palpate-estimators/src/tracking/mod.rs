@@ -173,7 +173,7 @@ impl Tracked {
         let (true, [first]) = (*weight < SURE * sum, best.as_slice()) else {
             return Self::from_belief(best, likelihood);
         };
-        let Extent::Line { length_m } = likelihood.extent() else {
+        let extent @ Extent::Line { .. } = likelihood.extent() else {
             return Self::from_belief(&[spread(first, beliefs, sum)], likelihood);
         };
         let mut all = Self::from_belief(best, likelihood);
@@ -182,7 +182,7 @@ impl Tracked {
             let parts = beliefs.iter().map(|(weight, contacts)| {
                 (weight / sum, contacts[0].mean[0], (contacts[0].variance[0] + floor_m2).sqrt())
             });
-            one.x_95_m = interval(&parts.collect::<Vec<_>>(), length_m);
+            one.x_95_m = interval(&parts.collect::<Vec<_>>(), extent.length_m());
         }
         all
     }

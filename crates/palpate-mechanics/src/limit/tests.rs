@@ -116,7 +116,7 @@ impl Surface for Pad {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Plane { length_m: 0.06, width_m: 0.04 }
+        Extent::plane(0.06, 0.04).unwrap()
     }
 }
 

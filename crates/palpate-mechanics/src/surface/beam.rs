@@ -241,6 +241,6 @@ impl Surface for Beam {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.length_m() }
+        Extent::checked_line(self.length_m())
     }
 }

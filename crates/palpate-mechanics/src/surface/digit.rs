@@ -213,7 +213,7 @@ impl Surface for Digit {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.length_m() }
+        Extent::checked_line(self.length_m())
     }
 }
 

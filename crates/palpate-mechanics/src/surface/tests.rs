@@ -157,7 +157,7 @@ fn the_extent_includes_its_boundary_and_nothing_beyond() {
     assert!(line.contains(Position::along(0.0)) && line.contains(Position::along(0.4)));
     assert!(!line.contains(Position::along(0.401)) && !line.contains(Position { x_m: 0.2, y_m: 0.001 }));
     assert!(!line.contains(Position::along(f64::NAN)));
-    let plane = Extent::Plane { length_m: 0.4, width_m: 0.3 };
+    let plane = Extent::plane(0.4, 0.3).unwrap();
     assert!(
         plane.contains(Position { x_m: 0.4, y_m: 0.3 }) && !plane.contains(Position { x_m: 0.4, y_m: -0.1 })
     );

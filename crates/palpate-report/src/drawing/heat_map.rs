@@ -70,7 +70,7 @@ impl HeatPanel {
 /// use palpate_mechanics::surface::Extent;
 /// use palpate_report::{HeatMap, HeatPanel, heat_map_to_svg};
 ///
-/// let cells = Cells { extent: Extent::Plane { length_m: 0.3, width_m: 0.2 }, columns: 3, rows: 2 };
+/// let cells = Cells { extent: Extent::plane(0.3, 0.2)?, columns: 3, rows: 2 };
 /// let values = (0..6).map(f64::from).collect();
 /// let svg = heat_map_to_svg(&HeatMap {
 ///     title: "Errors over a plate".to_owned(),
@@ -82,6 +82,7 @@ impl HeatPanel {
 ///     width_px: 640,
 /// });
 /// assert!(svg.contains("Errors over a plate"));
+/// # Ok::<(), palpate_numerics::OutOfRange>(())
 /// ```
 pub fn heat_map_to_svg(map: &HeatMap) -> String {
     let width_px = map.width_px.clamp(320, 4000);

@@ -6,7 +6,7 @@ use palpate_estimators::load_profile::Cells;
 use palpate_mechanics::surface::Extent;
 
 fn map(panels: usize, width_m: f64, values: impl Fn(usize) -> f64) -> HeatMap {
-    let cells = Cells { extent: Extent::Plane { length_m: 0.3, width_m }, columns: 6, rows: 4 };
+    let cells = Cells { extent: Extent::plane(0.3, width_m).unwrap(), columns: 6, rows: 4 };
     let panel = |i| HeatPanel::new(format!("panel {i} <&>"), (0..cells.len()).map(&values).collect());
     HeatMap {
         title: "Errors over a plate, of every estimator that has a name, and the limit beside them"

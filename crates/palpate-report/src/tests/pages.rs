@@ -15,7 +15,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_mechanics::sensing::SensorGroup;
 use palpate_mechanics::sensing::SensorKind::{Deflection, Reaction};
-use palpate_mechanics::surface::Beam;
+use palpate_mechanics::surface::{Beam, Extent};
 use palpate_mechanics::units::{gpa, mm, newtons, um};
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
@@ -253,7 +253,7 @@ fn an_evaluation_of_nothing_has_a_report() {
     let locator = rig.estimator.fit(&rig.setup, &recording).unwrap();
     let files = evaluation_report(&EvaluationReport {
         title: "Nothing",
-        evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
+        evaluation: &Evaluation { extent: Extent::line(0.4).unwrap(), located: Vec::new() },
         recording: &recording.provenance,
         judged: Judged::Locator(&locator),
         portions: &[],
@@ -315,7 +315,7 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
         let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {
             title: "Errors",
-            evaluation: &Evaluation { length_m: 0.4, located: Vec::new() },
+            evaluation: &Evaluation { extent: Extent::line(0.4).unwrap(), located: Vec::new() },
             recording: &recording.provenance,
             judged: Judged::CrossValidated { rig: &rig, folds: 5, seed: 0 },
             portions: &[],

@@ -4,6 +4,7 @@ use super::*;
 use palpate_estimators::evaluation::{Evaluation, Located};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 fn study(counts: &[usize]) -> DeadAreaResults {
@@ -54,7 +55,8 @@ fn errors_are_folded_over_the_gaps() {
     };
     // Over a sensor, in the middle of a gap, and beyond the outermost sensor.
     let located = vec![off(0.1, 1e-3), off(0.2, 3e-3), off(0.25, 8e-3), off(0.05, 1.0)];
-    let folded = FoldedErrors::new(&Evaluation { length_m: 0.4, located }, &layout, 2e-3);
+    let folded =
+        FoldedErrors::new(&Evaluation { extent: Extent::line(0.4).unwrap(), located }, &layout, 2e-3);
     assert!((folded.at_sensors_m - 2e-3).abs() < 1e-12 && (folded.between_m - 8e-3).abs() < 1e-12);
     assert!((folded.dead_percent - 200.0 / 3.0).abs() < 1e-9);
     assert_eq!(folded.folds.iter().map(|fold| fold.contacts).collect::<Vec<_>>(), [2, 1]);

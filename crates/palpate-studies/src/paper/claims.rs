@@ -275,7 +275,7 @@ impl Table<'_> {
             Figure::EdgeError => error(&|at| !GOOD.contains(at)),
             Figure::LargestPosition => {
                 let positions = evaluation.located.iter().map(|located| located.estimate.x_m);
-                positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.length_m * 100.0
+                positions.fold(f64::NEG_INFINITY, f64::max) / evaluation.extent.length_m() * 100.0
             }
             Figure::Epochs => f64::from(fit.locator.training_outcome().unwrap_or_default().epochs),
             Figure::Effective => evaluation.effective_percent(self.judging.tolerance_m),

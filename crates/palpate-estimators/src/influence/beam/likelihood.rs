@@ -140,7 +140,7 @@ impl Likelihood for BeamLikelihood {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.table().length_m }
+        Extent::line(self.table().length_m).expect("a table is longer than 0")
     }
 
     fn known_force_n(&self) -> Option<f64> {

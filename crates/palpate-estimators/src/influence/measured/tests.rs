@@ -1,6 +1,8 @@
 //! The method on surfaces whose readings are known functions, and on other people's recordings by the protocol that
 //! comes with them.
 
+use std::sync::LazyLock;
+
 use palpate_numerics::watch::{Cancelled, Watch};
 
 use palpate_core::Status;
@@ -19,8 +21,8 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::mm;
 
-const STRIP: Extent = Extent::Line { length_m: 0.1 };
-const PAD: Extent = Extent::Plane { length_m: 0.03, width_m: 0.03 };
+static STRIP: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.1).unwrap());
+static PAD: LazyLock<Extent> = LazyLock::new(|| Extent::plane(0.03, 0.03).unwrap());
 
 fn try_fit(setup: &Setup, recording: &Recording) -> Result<MeasuredLocator, MeasuredError> {
     let task = FitTask::new(setup, recording).seed(1);
@@ -54,7 +56,7 @@ fn squeezes(seed: u64) -> Recording {
 #[test]
 fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
     let recording = squeezes(1);
-    let locator = fit(&raw_setup(STRIP, 2, None), &recording);
+    let locator = fit(&raw_setup(*STRIP, 2, None), &recording);
     assert_eq!(
         (locator.role, locator.readings, locator.nuisance),
         (NuisanceRole::Force, Scale::Logarithm, Scale::Logarithm)
@@ -80,14 +82,14 @@ fn an_unknown_force_is_found_with_the_position_and_intervals_cover() {
 fn a_named_nuisance_coordinate_comes_before_the_force_and_is_not_told() {
     let mut recording = squeezes(3);
     recording.rows.iter_mut().for_each(|row| row.nuisance = row.force_n.map(|force| force - 2.0));
-    let locator = fit(&raw_setup(STRIP, 2, None), &recording);
+    let locator = fit(&raw_setup(*STRIP, 2, None), &recording);
     assert_eq!((locator.role, locator.nuisance), (NuisanceRole::Other, Scale::Linear));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let estimate = locator.locate(&squeeze(0.033, 2.7, &mut rng).reading);
     assert!((estimate.contact.position.x_m - 0.033).abs() < 3e-3, "{estimate:?}");
     assert_eq!(estimate.contact.force_n, None);
     recording.rows[7].nuisance = None;
-    let error = try_fit(&raw_setup(STRIP, 2, None), &recording).unwrap_err();
+    let error = try_fit(&raw_setup(*STRIP, 2, None), &recording).unwrap_err();
     assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 8 });
 }
 
@@ -109,7 +111,7 @@ fn repeats_tell_a_pads_noise_and_gain_and_its_intervals_cover() {
         let (x_m, y_m) = (0.0025 * f64::from(i % 13), 0.0025 * f64::from(i % 169 / 13));
         rows.push(corner(Position { x_m, y_m }, 0.05, &mut rng));
     }
-    let locator = fit(&raw_setup(PAD, 4, None), &raw_recording(rows));
+    let locator = fit(&raw_setup(*PAD, 4, None), &raw_recording(rows));
     assert_eq!((locator.role, locator.readings), (NuisanceRole::None, Scale::Linear));
     assert!((0.043..0.057).contains(&locator.whitening.gain), "{}", locator.whitening.gain);
     let (mut covered, mut scores) = (0, 0.0);
@@ -137,7 +139,7 @@ fn two_places_that_read_alike_are_both_told() {
         let reading = read(x_m).iter().map(|r| r + 0.01 * noise(&mut rng)).collect();
         Row { position: Position::along(x_m), force_n: None, nuisance: None, reading }
     });
-    let locator = fit(&raw_setup(STRIP, 2, Some(1.0)), &raw_recording(rows.collect()));
+    let locator = fit(&raw_setup(*STRIP, 2, Some(1.0)), &raw_recording(rows.collect()));
     let estimate = locator.locate(&read(0.08));
     assert_eq!(estimate.status, Status::Ambiguous);
     let [mode] = estimate.modes.as_slice() else { panic!("{estimate:?}") };
@@ -151,7 +153,7 @@ fn two_places_that_read_alike_are_both_told() {
 
 #[test]
 fn what_no_contact_gives_is_outside_the_model() {
-    let locator = fit(&raw_setup(STRIP, 2, None), &squeezes(7));
+    let locator = fit(&raw_setup(*STRIP, 2, None), &squeezes(7));
     for reading in [[-1.0, 1.0], [100.0, 1e-3], [f64::NAN, 1.0], [f64::INFINITY, 1.0], [1e-300, 1e300]] {
         assert_eq!(locator.locate(&reading).status, Status::OutsideModel, "{reading:?}");
     }
@@ -165,7 +167,7 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
         nuisance: None,
         reading: reading.to_vec(),
     };
-    let setup = raw_setup(STRIP, 2, None);
+    let setup = raw_setup(*STRIP, 2, None);
     let one = try_fit(&setup, &raw_recording(vec![row(0.01, [1.0, 2.0]); 3])).unwrap_err();
     assert_eq!(one.to_string(), "the recording has 1 distinct positions; at least 2 are needed");
     for rows in [
@@ -188,14 +190,14 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
 
 #[test]
 fn it_comes_back_from_a_file() {
-    let locator = fit(&raw_setup(STRIP, 2, None), &squeezes(8));
+    let locator = fit(&raw_setup(*STRIP, 2, None), &squeezes(8));
     let back: MeasuredLocator = serde_json::from_str(&serde_json::to_string(&locator).unwrap()).unwrap();
     let found = |locator: &MeasuredLocator| locator.locate(&[2.5, 1.5]).contact.position.x_m;
     assert!((found(&back) - found(&locator)).abs() < 1e-12);
     assert_eq!((back.role, back.table.means.len()), (locator.role, locator.table.means.len()));
     let mut damaged = locator;
     damaged.table.means.pop();
-    assert!(damaged.check(&raw_setup(STRIP, 2, None)).is_err());
+    assert!(damaged.check(&raw_setup(*STRIP, 2, None)).is_err());
 }
 
 /// Fails unless the pooled errors of five folds by position undercut scikit-learn's best, `median_mm` and `mean_mm`, by the share `less`,

@@ -73,7 +73,7 @@ impl Likelihood for PlateLikelihood {
 
     fn extent(&self) -> Extent {
         let [length_m, width_m] = self.search.size_m;
-        Extent::Plane { length_m, width_m }
+        Extent::plane(length_m, width_m).expect("a table is longer and wider than 0")
     }
 
     fn known_force_n(&self) -> Option<f64> {

@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_bicubic_is_given_back_with_its_gradient() {
-        let mut table = PlaneTable::empty(3, Extent::Plane { length_m: 0.6, width_m: 0.4 });
+        let mut table = PlaneTable::empty(3, Extent::plane(0.6, 0.4).unwrap());
         for node in 0..table.nodes() {
             let at = table.node(node);
             table.values[3 * node + 1] = cubic(at.x_m, at.y_m);

@@ -44,7 +44,7 @@ fn sensors(setup: &Setup) -> CleanSensors<'_> {
 fn inner_positions(extent: Extent, side: usize) -> Vec<Position> {
     let share = 0.9f64.sqrt();
     let width_m = extent.width_m().unwrap();
-    let inner = Extent::Plane { length_m: share * extent.length_m(), width_m: share * width_m };
+    let inner = Extent::plane(share * extent.length_m(), share * width_m).unwrap();
     let margin = |size_m: f64| 0.5 * (1.0 - share) * size_m;
     let moved =
         |at: Position| Position { x_m: at.x_m + margin(extent.length_m()), y_m: at.y_m + margin(width_m) };

@@ -93,9 +93,9 @@ impl PlateSpec {
         self.youngs_modulus_pa * self.thickness_m.powi(3) / (12.0 * (1.0 - self.poissons_ratio.powi(2)))
     }
 
-    /// The area that can be touched.
-    pub fn extent(&self) -> Extent {
-        Extent::Plane { length_m: self.length_m, width_m: self.width_m }
+    /// The area that can be touched, once its sides are checked.
+    pub(super) fn extent(&self) -> Extent {
+        Extent::checked_plane(self.length_m, self.width_m)
     }
 }
 

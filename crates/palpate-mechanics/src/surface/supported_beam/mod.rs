@@ -171,7 +171,7 @@ impl Surface for SupportedBeam {
     }
 
     fn extent(&self) -> Extent {
-        Extent::Line { length_m: self.spec.length_m }
+        Extent::checked_line(self.spec.length_m)
     }
 }
 

@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use super::super::with_changes;
 use super::*;
 use palpate_mechanics::contact::Position;
@@ -22,7 +24,7 @@ noise = \"5 um\"     # by the data sheet
 force = \"3 N\" # a weight
 ";
 
-const LINE: Extent = Extent::Line { length_m: 0.4 };
+static LINE: LazyLock<Extent> = LazyLock::new(|| Extent::line(0.4).unwrap());
 
 fn sensor(kind: SensorKind, x_m: f64, noise_sd: f64) -> Sensor {
     let channel = ChannelModel { noise_sd, ..ChannelModel::default() };
@@ -38,12 +40,12 @@ fn only_the_sensors_change() {
         sensor(SensorKind::Reaction, 0.4, 0.005),
     ])
     .unwrap();
-    let written = with_changes(RIG, |rig| place_sensors(rig, &layout, LINE)).unwrap();
+    let written = with_changes(RIG, |rig| place_sensors(rig, &layout, *LINE)).unwrap();
     insta::assert_snapshot!(written);
     let rig = Rig::from_toml(&written).unwrap();
     let places: Vec<f64> = rig.setup.layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
     assert_eq!(places, [0.035, 0.26, 0.123457, 0.4]);
-    let again = with_changes(&written, |rig| place_sensors(rig, &layout, LINE)).unwrap();
+    let again = with_changes(&written, |rig| place_sensors(rig, &layout, *LINE)).unwrap();
     assert_eq!(again, written);
 }
 

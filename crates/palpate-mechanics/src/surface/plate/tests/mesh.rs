@@ -72,7 +72,7 @@ fn no_factor_is_larger_than_was_estimated() {
 #[test]
 fn a_mesh_has_no_element_longer_than_wide_unless_four_are_too_many() {
     let mesh = |length_m, width_m, elements| {
-        let Mesh { across, up, .. } = Mesh::new(Extent::Plane { length_m, width_m }, elements);
+        let Mesh { across, up, .. } = Mesh::new(Extent::plane(length_m, width_m).unwrap(), elements);
         (across, up)
     };
     assert_eq!(mesh(0.3, 0.3, 48), (48, 48));
