@@ -2,8 +2,8 @@
 //! its channels.
 //!
 //! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
-//!   exceeds more often than [`FALSE_ALARM_RATE`], and a contact explains the reading no better than its unknowns cost
-//!   ([`contact_cost`]).
+//!   exceeds more often than [`FALSE_ALARM_RATE`], and the best contact takes no more of it off than a contact costs by the extended
+//!   Bayesian information criterion.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
 //!   [`FALSE_ALARM_RATE`].
 //! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
@@ -13,33 +13,97 @@
 //! and hides contacts that are that much stronger.
 
 use palpate_core::{ContactEstimate, Estimate, Status};
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::chi_squared_critical_value;
 
-/// The share of readings that are called `outside_model`, or not called `no_contact`, by noise alone.
+/// Share of readings whose noise alone exceeds the bound on |d|² of `no_contact`, and of those whose noise makes a contact
+/// `outside_model`.
 pub const FALSE_ALARM_RATE: f64 = 1e-3;
 
 /// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
 /// fewer than one in a hundred comes from another place than the one that is said.
 pub const OTHER_PLACE: f64 = 0.01;
 
-/// The χ² of `freedom` channels more than unknowns that noise exceeds at [`FALSE_ALARM_RATE`]; infinite for none, as every reading
-/// is then explained.
-pub fn misfit_bound(freedom: usize) -> f64 {
-    if freedom == 0 { f64::INFINITY } else { chi_squared_critical_value(FALSE_ALARM_RATE, freedom) }
+/// χ² that noise exceeds at [`FALSE_ALARM_RATE`], with `freedom` channels more than unknowns; without any, that of one. Contacts press and
+/// lie on the surface, so that as many readings as unknowns need not have a contact that explains them; what the best leaves then is the
+/// noise of the direction in which an end or a force of 0 held it.
+pub(crate) fn misfit_bound(freedom: usize) -> f64 {
+    chi_squared_critical_value(FALSE_ALARM_RATE, freedom.max(1))
 }
 
 /// Places along a line that readings tell apart.
-pub const LINE_PLACES: usize = 33;
+pub(crate) const LINE_PLACES: usize = 33;
 
 /// Cost in χ² of a contact with so many unknowns, read by so many channels, that could have been at so many places, by the extended
 /// Bayesian information criterion (Chen and Chen, Biometrika 95, 2008): unknowns·ln channels + 2·ln places.
-pub fn contact_cost(unknowns: usize, channels: usize, places: usize) -> f64 {
+pub(crate) fn contact_cost(unknowns: usize, channels: usize, places: usize) -> f64 {
     unknowns as f64 * (channels as f64).ln() + 2.0 * (places as f64).ln()
 }
 
+/// Numbers that a reading must tell of a contact: the coordinates of its position, and its force where that is not known.
+pub(crate) fn unknowns(coordinates: usize, force_n: Option<f64>) -> usize {
+    coordinates + usize::from(force_n.is_none())
+}
+
+/// The bounds of `no_contact` and `outside_model`, for readings of given channels.
+///
+/// Symbols: |d|² squared length of the whitened reading, χ² misfit of the best contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StatusRule {
+    /// Largest |d|² of noise alone.
+    noise_bound: f64,
+    /// Least |d|² − χ² of a contact.
+    contact_cost: f64,
+    /// Largest χ² of a contact.
+    misfit_bound: f64,
+}
+
+impl StatusRule {
+    /// The rule for `channels` whose noise is known, and a contact of so many unknowns that could be at so many places.
+    pub fn new(channels: usize, unknowns: usize, places: usize) -> Self {
+        Self {
+            noise_bound: misfit_bound(channels),
+            contact_cost: contact_cost(unknowns, channels, places),
+            misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
+        }
+    }
+
+    /// The rule for a reading of channels whose noise is not known: only zeros are no contact, and the best contact may leave the share
+    /// `misfit` of the reading's `square`.
+    pub fn without_noise(square: f64, misfit: f64) -> Self {
+        Self { noise_bound: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
+    }
+
+    /// Whether noise alone gives readings of length `square` = |d|².
+    #[inline(always)]
+    pub fn is_within_noise(&self, square: f64) -> bool {
+        square <= self.noise_bound
+    }
+
+    /// Whether noise alone explains a reading of length `square` = |d|², and no worse than a contact whose χ² is `misfit`.
+    #[inline(always)]
+    pub fn is_no_contact(&self, square: f64, misfit: f64) -> bool {
+        square <= misfit + self.contact_cost && self.is_within_noise(square)
+    }
+
+    /// Whether a contact whose χ² is `misfit` explains the reading; otherwise it is `outside_model`.
+    #[inline(always)]
+    pub fn is_explained(&self, misfit: f64) -> bool {
+        misfit <= self.misfit_bound
+    }
+
+    /// χ² that a contact costs.
+    pub fn contact_cost(&self) -> f64 {
+        self.contact_cost
+    }
+}
+
+/// The estimate of a reading that nothing but noise is in.
+pub(crate) const NO_CONTACT: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
+
 /// The estimate of a method that does not know the noise of its channels: located, or outside the surface.
-pub fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {
+pub(crate) fn on_surface(contact: ContactEstimate, extent: Extent) -> Estimate {
     let status = if extent.contains(contact.position) { Status::Located } else { Status::OutsideSurface };
     Estimate::of_contact(contact, status)
 }
@@ -52,6 +116,6 @@ mod tests {
     fn the_bound_is_the_quantile_of_chi_squared() {
         // Of two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
         assert!((misfit_bound(2) + 2.0 * FALSE_ALARM_RATE.ln()).abs() < 1e-6);
-        assert_eq!(misfit_bound(0), f64::INFINITY);
+        assert_eq!(misfit_bound(0), misfit_bound(1));
     }
 }

@@ -7,8 +7,8 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::held_out::HeldOutErrors;
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
-use crate::status::on_surface;
-use palpate_core::{ContactEstimate, Estimate, Status};
+use crate::status::{NO_CONTACT, on_surface};
+use palpate_core::{ContactEstimate, Estimate};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
@@ -237,7 +237,7 @@ impl CentroidLocator {
 impl Locate for CentroidLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let Some(position) = self.position(reading) else {
-            return Estimate::of_position(Position::default(), Status::NoContact);
+            return NO_CONTACT;
         };
         let uncertainty = self.spread.map(|spread| spread.uncertainty(position));
         on_surface(ContactEstimate { position, force_n: self.force_n, uncertainty }, self.extent)

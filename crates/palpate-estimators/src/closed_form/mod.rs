@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
-use crate::status::{LINE_PLACES, OTHER_PLACE, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -92,7 +92,7 @@ impl Fit for ClosedForm {
             return Err(ClosedFormFitError::NotModelled { kind });
         }
         let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
-        let (needed, found) = (locator.unknowns(), locator.seeing().len());
+        let (needed, found) = (unknowns(1, setup.force_n), locator.seeing().len());
         if found < needed { Err(ClosedFormFitError::TooFewSensors { needed, found }) } else { Ok(locator) }
     }
 }
@@ -110,11 +110,6 @@ pub struct ClosedFormLocator {
 }
 
 impl ClosedFormLocator {
-    /// 1 for the position, and 1 for a force that is unknown.
-    fn unknowns(&self) -> usize {
-        1 + usize::from(self.force_n.is_none())
-    }
-
     /// Channels that are not dead and that see a contact somewhere.
     fn seeing(&self) -> Vec<usize> {
         let sees = |sensor: &Sensor| {
@@ -222,21 +217,24 @@ impl Locate for ClosedFormLocator {
         let (weights, noise) = self.weights(&channels);
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
         let size: f64 = whitened.iter().map(|r| r * r).sum();
-        let quiet = size <= if noise == Noise::Known { misfit_bound(channels.len()) } else { 0.0 };
+        let rule = match noise {
+            Noise::Known => StatusRule::new(channels.len(), unknowns(1, self.force_n), LINE_PLACES),
+            Noise::Unknown => StatusRule::without_noise(size, 0.01),
+        };
         let scales = self.scales(&channels);
-        if let (false, Some(scales)) = (quiet, scales) {
+        if let (false, Some(scales)) = (rule.is_within_noise(size), scales) {
             return self.balance(scales, reading, noise);
         }
         let segments = self.segments(&channels, &weights);
         let posterior = Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise };
         let found = posterior.explanations();
         let least = found.iter().fold(f64::INFINITY, |least, explanation| least.min(explanation.chi_squared));
-        if quiet && size <= least + contact_cost(self.unknowns(), channels.len(), LINE_PLACES) {
-            return Estimate::of_position(Position::default(), Status::NoContact);
+        if rule.is_no_contact(size, least) {
+            return NO_CONTACT;
         }
         match scales {
             Some(scales) => self.balance(scales, reading, noise),
-            None => posterior.estimate(found),
+            None => posterior.estimate(found, &rule),
         }
     }
 
@@ -246,7 +244,7 @@ impl Locate for ClosedFormLocator {
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
-        let (needed, found) = (self.unknowns(), self.seeing().len());
+        let (needed, found) = (unknowns(1, self.force_n), self.seeing().len());
         if found < needed {
             return Err(LocatorFault::Count { what: "sensors that see a contact", needed, found });
         }
@@ -278,13 +276,13 @@ struct Explanation {
 }
 
 impl Posterior<'_> {
-    fn estimate(&self, mut found: Vec<Explanation>) -> Estimate {
+    fn estimate(&self, mut found: Vec<Explanation>, rule: &StatusRule) -> Estimate {
         found.sort_by(|a, b| self.log_weight(b).total_cmp(&self.log_weight(a)));
         let Some(best) = found.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
         let mut estimate = Estimate::of_contact(self.contact(best), Status::Located);
-        if best.force_n <= 0.0 || best.chi_squared > self.tolerated() {
+        if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) {
             estimate.status = Status::OutsideModel;
             return estimate;
         }
@@ -392,15 +390,6 @@ impl Posterior<'_> {
                 -0.5 * explanation.chi_squared + 0.5 * volume.max(width * ff).max(f64::MIN_POSITIVE).ln()
             }
             Noise::Unknown => -0.5 * explanation.chi_squared / (1e-10 * self.size()),
-        }
-    }
-
-    fn tolerated(&self) -> f64 {
-        let unknowns = 1 + usize::from(self.force_n.is_none());
-        match self.noise {
-            // Contacts press and lie on the beam, so that as many readings as unknowns need not have one that explains them.
-            Noise::Known => misfit_bound(self.reading.len().saturating_sub(unknowns).max(1)),
-            Noise::Unknown => 0.01 * self.size(),
         }
     }
 

@@ -16,7 +16,7 @@ use crate::likelihood::ContactFit;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
-use crate::status::{LINE_PLACES, OTHER_PLACE, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, unknowns};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -128,7 +128,7 @@ impl Fit for DigitEstimator {
         if let Some(i) = locator.layout.sensors().iter().position(noiseless) {
             return Err(DigitFitError::NoNoise { gauge: i + 1 });
         }
-        let (needed, found) = (locator.unknowns(), locator.living().count());
+        let (needed, found) = (unknowns(1, force_n), locator.living().count());
         if found < needed {
             return Err(DigitFitError::TooFewGauges { needed, found });
         }
@@ -189,7 +189,7 @@ impl DigitLocator {
 
     /// Leaves a dead gauge out from now on; false, with nothing changed, when too few would be left.
     pub fn leave_out(&mut self, gauge: usize) -> bool {
-        let needed = self.unknowns();
+        let needed = unknowns(1, self.force_n);
         let Some(sensor) = self.layout.sensors().get(gauge) else { return false };
         let was_dead = sensor.channel.dead;
         self.layout.set_dead(gauge, true);
@@ -200,19 +200,13 @@ impl DigitLocator {
         enough
     }
 
-    /// 1 for the position, and 1 for a force that is unknown.
-    fn unknowns(&self) -> usize {
-        1 + usize::from(self.force_n.is_none())
-    }
-
     /// Gauges that are not dead.
     fn living(&self) -> impl Iterator<Item = &Sensor> {
         self.layout.sensors().iter().filter(|sensor| !sensor.channel.dead)
     }
 
-    fn estimate(&self, mut posterior: Posterior, freedom: usize) -> Estimate {
-        // Contacts press and lie on the digit, so that as many readings as unknowns need not have one that explains them.
-        let explained = posterior.keep_explanations(misfit_bound(freedom.max(1)));
+    fn estimate(&self, mut posterior: Posterior, rule: &StatusRule) -> Estimate {
+        let explained = posterior.keep_explanations(rule);
         let Some(best) = posterior.pieces.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
@@ -256,15 +250,15 @@ impl Locate for DigitLocator {
         let gauges = gauges(&self.layout, reading);
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
         let none_saturated = gauges.len() == self.living().count();
-        let quiet = none_saturated && size <= misfit_bound(gauges.len());
+        let rule = StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES);
         let likelihood =
             Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
         let posterior = Posterior::new(&likelihood);
         let least = posterior.pieces.iter().fold(f64::INFINITY, |least, piece| least.min(piece.chi_squared));
-        if quiet && size <= least + contact_cost(self.unknowns(), gauges.len(), LINE_PLACES) {
-            return Estimate::of_position(Position::default(), Status::NoContact);
+        if none_saturated && rule.is_no_contact(size, least) {
+            return NO_CONTACT;
         }
-        self.estimate(posterior, gauges.len().saturating_sub(self.unknowns()))
+        self.estimate(posterior, &rule)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
@@ -277,7 +271,7 @@ impl Locate for DigitLocator {
         let noise = self.living().map(|sensor| sensor.channel.reading_sd());
         LocatorFault::check_numbers("gauge noise", noise, |sd| sd > 0.0, "a number greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
-        let (needed, found) = (self.unknowns(), self.living().count());
+        let (needed, found) = (unknowns(1, self.force_n), self.living().count());
         if found < needed {
             return Err(LocatorFault::Count { what: "living gauges", needed, found });
         }
@@ -346,9 +340,9 @@ impl Posterior {
         posterior
     }
 
-    /// Drops pieces whose best contact leaves an |r|² of more than `most`, unless all do; says whether any is left that does not.
-    fn keep_explanations(&mut self, most: f64) -> bool {
-        let explains = |piece: &Piece| piece.chi_squared <= most;
+    /// Drops pieces whose best contact does not explain the reading, unless none does; says whether any does.
+    fn keep_explanations(&mut self, rule: &StatusRule) -> bool {
+        let explains = |piece: &Piece| rule.is_explained(piece.chi_squared);
         let any = self.pieces.iter().any(explains);
         if any {
             self.pieces.retain(explains);

@@ -79,11 +79,6 @@ impl ForceBelief {
         if let Self::Known(force_n) = self { Some(force_n) } else { None }
     }
 
-    /// Numbers that a reading must tell: 1, the position, or 2, with the force.
-    pub(super) fn unknowns(self) -> usize {
-        if self.known_n().is_some() { 1 } else { 2 }
-    }
-
     /// The force by which the calibration's variances weigh before a reading, with `reference_n` that of the calibration.
     /// Offsets are as uncertain as influences at that force, so a softer touch counts as one of it.
     pub(super) fn weights_force_n(self, reference_n: f64) -> f64 {

@@ -180,7 +180,7 @@ impl<'a> Profiler<'a> {
             let sum = points.iter().map(|point| alive[i].influence.at(*point)).sum::<f64>();
             sum / points.len() as f64 / alive[i].noise_sd
         });
-        let worst_misfit = misfit_bound(alive.len().max(1));
+        let worst_misfit = misfit_bound(alive.len());
         Self { sensors, cells, problem: Problem::new(influence, cells.roughness()), worst_misfit }
     }
 

@@ -20,8 +20,8 @@ use crate::fit::{Locate, LocatorFault};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
+use crate::status::NO_CONTACT;
 use palpate_core::{Estimate, Status};
-use palpate_mechanics::contact::Position;
 use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
 
@@ -57,7 +57,7 @@ impl BeamLocator {
 
     /// [`Locate::locate`] with memory of the caller's.
     pub fn locate_with(&self, reading: &[f64], scratch: &mut Scratch) -> Estimate {
-        let (search, mut estimate) = (&self.search, NOTHING);
+        let (search, mut estimate) = (&self.search, NO_CONTACT);
         let rows = Rows { readings: reading, channels: reading.len() };
         locate_rows(search, rows, scratch, std::slice::from_mut(&mut estimate));
         if self.stored.contacts > 1 && estimate.status == Status::OutsideModel {
@@ -136,9 +136,6 @@ impl Locate for BeamLocator {
         LocatorFault::check_count("channels", setup.layout.len(), self.stored.table.sensors)
     }
 }
-
-/// An estimate of nothing, to be written over.
-pub(super) const NOTHING: Estimate = Estimate::of_position(Position::along(0.0), Status::NoContact);
 
 /// Readings one after the other, of so many channels each.
 #[derive(Clone, Copy)]

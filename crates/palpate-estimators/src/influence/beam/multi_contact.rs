@@ -27,7 +27,7 @@ pub(super) fn locate_several(
 ) -> Option<Estimate> {
     let channels = search.live.len();
     let one_more = contact_cost(2, channels, LINE_PLACES);
-    let mut least = misfit + search.contact_cost;
+    let mut least = misfit + search.rule.contact_cost();
     let mut best = None;
     for count in 2..=most {
         let Some(together) = explain(search, whitened, count) else { break };

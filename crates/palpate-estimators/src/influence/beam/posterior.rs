@@ -23,7 +23,7 @@ pub(super) fn conclude(
     let best = &minima[0];
     estimate.modes.clear();
     estimate.further.clear();
-    if is_no_contact(search, square, best.misfit) {
+    if search.rule.is_no_contact(square, best.misfit) {
         estimate.contact =
             ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
         estimate.status = Status::NoContact;
@@ -38,7 +38,7 @@ pub(super) fn conclude(
     } else {
         write_competing(search, minima, profile.misfits(), estimate);
     }
-    if best.misfit > search.misfit_bound {
+    if !search.rule.is_explained(best.misfit) {
         estimate.status = Status::OutsideModel;
     }
 }
@@ -58,13 +58,6 @@ fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE],
             estimate.status = Status::Ambiguous;
         }
     }
-}
-
-/// Whether noise alone explains a reading of whitened length `square`, and better than a contact whose best misfit is
-/// `misfit`, by the criterion that also counts several contacts.
-#[inline(always)]
-fn is_no_contact(search: &Search, square: f64, misfit: f64) -> bool {
-    square <= misfit + search.contact_cost && square <= search.noise_bound
 }
 
 #[inline(always)]

@@ -15,7 +15,7 @@ use super::gauss_newton::{GaussNewton, Minimum, grouped, paired};
 use super::table::InfluenceTable;
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
-use crate::status::{LINE_PLACES, contact_cost, misfit_bound};
+use crate::status::{LINE_PLACES, StatusRule, unknowns};
 use palpate_numerics::simd::Eight;
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
@@ -32,11 +32,8 @@ pub(super) struct Search {
     pub coarse: Coarse,
     pub gauss_newton: GaussNewton,
     pub force: ForceBelief,
-    /// Cost of a contact, by the criterion that counts contacts.
-    pub contact_cost: f64,
-    /// The largest misfit of one contact, and the largest |d|² of noise alone, by the rule of [`crate::status`].
-    pub misfit_bound: f64,
-    pub noise_bound: f64,
+    /// The rule for one contact.
+    pub rule: StatusRule,
 }
 
 /// A minimum this much above the best has a share of e⁻¹² of the probability.
@@ -58,9 +55,7 @@ impl Search {
             scaling: paired(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),
             coarse: Coarse::new(&table, &gauss_newton.weights, force),
             gauss_newton,
-            contact_cost: contact_cost(force.unknowns(), live.len(), LINE_PLACES),
-            misfit_bound: misfit_bound(live.len().saturating_sub(force.unknowns())),
-            noise_bound: misfit_bound(live.len()),
+            rule: StatusRule::new(live.len(), unknowns(1, force.known_n()), LINE_PLACES),
             live,
             table,
             force,

@@ -36,7 +36,7 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
     let square = search.whiten(reading, &mut scratch.whitened);
     let (minima, count) = search.minima(square, &scratch.whitened, &mut scratch.profile);
     let (minima, best) = (&minima[..count], minima[0]);
-    if square <= best.misfit + search.charge && square <= search.noise_bound {
+    if search.rule.is_no_contact(square, best.misfit) {
         return Estimate::of_position(position(best.at), Status::NoContact);
     }
     let surroundings = search.surroundings(minima, scratch);
@@ -47,7 +47,7 @@ pub(super) fn locate(search: &Search, reading: &[f64], scratch: &mut Scratch) ->
         estimate.modes.push(palpate_core::Mode { contact: alone(mode), probability: mode.weight });
         estimate.status = Status::Ambiguous;
     }
-    if best.misfit > search.misfit_bound {
+    if !search.rule.is_explained(best.misfit) {
         estimate.status = Status::OutsideModel;
     }
     estimate

@@ -9,7 +9,7 @@ use super::coarse::{Coarse, MOST_VALLEYS, Profile};
 use super::table::{Lanes, Patches, PlaneTable};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
-use crate::status::{contact_cost, misfit_bound};
+use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_numerics::small::{Ldl, Matrix, add_outer};
 
@@ -35,11 +35,7 @@ pub(super) struct Search {
     pub force: ForceBelief,
     /// Length and width, in metres.
     pub size_m: [f64; 2],
-    /// Cost of a contact, by the criterion that counts contacts.
-    pub charge: f64,
-    /// The largest misfit of one contact, and the largest |d|² of noise alone, by the rule of [`crate::status`].
-    pub misfit_bound: f64,
-    pub noise_bound: f64,
+    pub rule: StatusRule,
 }
 
 /// x and y in metres, and the force in newtons.
@@ -87,13 +83,9 @@ impl Search {
             node(patches.nearest(x_m, y_m)).copied().fold(1.0, f64::min)
         };
         let least_weights = (0..coarse.cells()).map(least).collect();
-        let unknowns = 1 + force.unknowns();
-        let channels = live.len();
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
-            charge: contact_cost(unknowns, channels, coarse.cells()),
-            misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
-            noise_bound: misfit_bound(channels),
+            rule: StatusRule::new(live.len(), unknowns(2, force.known_n()), coarse.cells()),
             size_m: [table.length_m, table.width_m],
             live,
             inverse_sd,

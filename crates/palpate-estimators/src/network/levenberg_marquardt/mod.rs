@@ -11,8 +11,8 @@ use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
-use crate::status::on_surface;
-use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};
+use crate::status::{NO_CONTACT, on_surface};
+use palpate_core::{ContactEstimate, Estimate, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
@@ -374,7 +374,7 @@ impl Locate for LevenbergMarquardtLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self.predict(&self.inputs.values(reading)) {
             Some((mean, covariance)) => on_surface(self.contact(&mean, &covariance), self.extent),
-            None => Estimate::of_position(Position::default(), Status::NoContact),
+            None => NO_CONTACT,
         }
     }
 

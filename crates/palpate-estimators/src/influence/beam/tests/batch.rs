@@ -5,9 +5,10 @@ use crate::fit::Locate;
 use crate::fixtures::paper;
 use crate::influence::Influence;
 use crate::influence::Scratch;
-use crate::influence::beam::locator::{LocateRows, NOTHING, Rows};
+use crate::influence::beam::locator::{LocateRows, Rows};
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
+use crate::status::NO_CONTACT;
 use palpate_core::{Estimate, Status};
 use palpate_numerics::simd::InstructionSet;
 use rand::SeedableRng;
@@ -54,7 +55,7 @@ fn a_batch_answers_as_readings_one_by_one_do() {
         let readings = readings(&setup);
         let single: Vec<Estimate> = readings.iter().map(|reading| locator.locate(reading)).collect();
         // Twice, the second time over estimates of other readings.
-        let mut estimates = vec![NOTHING; readings.len()];
+        let mut estimates = vec![NO_CONTACT; readings.len()];
         let mut scratch = Scratch::default();
         for order in [readings.iter().rev().flatten().copied().collect::<Vec<f64>>(), readings.concat()] {
             assert_eq!(locator.locate_batch(&order, &mut scratch, &mut estimates), readings.len());
@@ -78,7 +79,7 @@ fn every_instruction_set_answers_as_plain_arrays_do() {
             let flat = readings.concat();
             let rows = Rows { readings: &flat, channels: 8 };
             let by = |set: InstructionSet| {
-                let mut estimates = vec![NOTHING; readings.len()];
+                let mut estimates = vec![NO_CONTACT; readings.len()];
                 let (search, scratch) = (locator.search(), &mut Scratch::default());
                 set.run(LocateRows { search, rows, scratch, estimates: &mut estimates });
                 estimates
@@ -96,7 +97,7 @@ fn a_batch_locates_as_many_as_there_are() {
     let rig = paper(5e-6, 2);
     let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     assert!(matches!(locator.force(), ForceBelief::Known(_)));
-    let mut estimates = vec![NOTHING; 3];
+    let mut estimates = vec![NO_CONTACT; 3];
     let mut scratch = Scratch::default();
     assert_eq!(locator.locate_batch(&[0.0; 39], &mut scratch, &mut estimates), 3);
     assert_eq!(locator.locate_batch(&[0.0; 15], &mut scratch, &mut estimates), 1);
