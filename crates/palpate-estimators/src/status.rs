@@ -16,6 +16,7 @@ use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::chi_squared_critical_value;
+use std::sync::OnceLock;
 
 /// Share of readings whose noise alone exceeds the bound on |d|² of `no_contact`, and of those whose noise makes a contact
 /// `outside_model`.
@@ -29,7 +30,11 @@ pub const OTHER_PLACE: f64 = 0.01;
 /// lie on the surface, so that as many readings as unknowns need not have a contact that explains them; what the best leaves then is the
 /// noise of the direction in which an end or a force of 0 held it.
 pub(crate) fn misfit_bound(freedom: usize) -> f64 {
-    chi_squared_critical_value(FALSE_ALARM_RATE, freedom.max(1))
+    /// Bounds that were asked for: estimators that weigh their channels anew for each reading ask every time.
+    static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
+    let freedom = freedom.max(1);
+    let bound = || chi_squared_critical_value(FALSE_ALARM_RATE, freedom);
+    KNOWN.get(freedom).map_or_else(bound, |known| *known.get_or_init(bound))
 }
 
 /// Places along a line that readings tell apart.

@@ -225,6 +225,10 @@ impl Locate for ClosedFormLocator {
         if let (false, Some(scales)) = (rule.is_within_noise(size), scales) {
             return self.balance(scales, reading, noise);
         }
+        // No contact leaves less than 0, so that most of what is noise needs no search.
+        if rule.is_no_contact(size, 0.0) {
+            return NO_CONTACT;
+        }
         let segments = self.segments(&channels, &weights);
         let posterior = Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise };
         let found = posterior.explanations();

@@ -251,11 +251,16 @@ impl Locate for DigitLocator {
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
         let none_saturated = gauges.len() == self.living().count();
         let rule = StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES);
+        let is_no_contact = |misfit: f64| none_saturated && rule.is_no_contact(size, misfit);
+        // No contact leaves less than 0, so that most of what is noise needs no search.
+        if is_no_contact(0.0) {
+            return NO_CONTACT;
+        }
         let likelihood =
             Likelihood { digit: &self.digit, theory: self.theory, gauges: &gauges, force_n: self.force_n };
         let posterior = Posterior::new(&likelihood);
         let least = posterior.pieces.iter().fold(f64::INFINITY, |least, piece| least.min(piece.chi_squared));
-        if none_saturated && rule.is_no_contact(size, least) {
+        if is_no_contact(least) {
             return NO_CONTACT;
         }
         self.estimate(posterior, &rule)
