@@ -1,0 +1,226 @@
+//! The rule measured: how often noise alone is not `no_contact`, and how often a contact of the model is `outside_model`.
+
+use super::*;
+use crate::closed_form::ClosedForm;
+use crate::digit::{DigitEstimator, DigitTheory};
+use crate::estimator::Estimator;
+use crate::fit::Fit;
+use crate::fixtures::{Example, beam, digit, paper, plate};
+use crate::influence::Influence;
+use crate::setup::Setup;
+use crate::simulate::{CleanSensors, clean_reading};
+use ndarray::Array1;
+use palpate_mechanics::contact::Contact;
+use palpate_mechanics::sensing::SensorKind::Deflection;
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use palpate_mechanics::surface::ForceDirection;
+use palpate_numerics::normal_cdf;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::TAU;
+
+#[test]
+fn the_bound_is_the_quantile_of_chi_squared() {
+    // Of two degrees of freedom the distribution is exponential: P(χ² > b) = e^(−b/2).
+    assert!((misfit_bound(2) + 2.0 * FALSE_ALARM_RATE.ln()).abs() < 1e-6);
+    assert_eq!(misfit_bound(0), misfit_bound(1));
+}
+
+/// An estimator that knows its noise, on a bench.
+struct Case {
+    name: &'static str,
+    bench: Example,
+    estimator: Estimator,
+    /// Readings of noise alone, and as many of contacts.
+    readings: usize,
+}
+
+/// Presses at a place: so many that noise and influence functions are known as well as a layout tells them.
+const REPEATS: usize = 1000;
+
+fn influence() -> Estimator {
+    Estimator::Influence(Influence::default())
+}
+
+fn cases() -> [Case; 4] {
+    let mut plane = plate(24, ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() });
+    plane.training = plane.training.repeated(REPEATS);
+    // Where a digit is hardly bent the linear theory gives the readings of the exact one, and takes a tenth of its time.
+    let linear = Estimator::Digit(DigitEstimator { theory: DigitTheory::Linear });
+    let case = |name, bench, estimator, readings| Case { name, bench, estimator, readings };
+    [
+        case("influence, beam", paper(5e-6, REPEATS), influence(), 100_000),
+        case("influence, plane", plane, influence(), 5_000),
+        case("closed form", paper(5e-6, 1), Estimator::ClosedForm(ClosedForm), 20_000),
+        case("digit", digit(ForceDirection::Normal, 0.02), linear, 20_000),
+    ]
+}
+
+/// Readings of a case that the rule got wrong.
+#[derive(Clone, Copy, Debug, Default)]
+struct FalseAlarms {
+    /// Of noise alone: those longer than its bound.
+    beyond_noise: usize,
+    /// Of noise alone: those within its bound, that a contact explains by more than it costs.
+    like_contact: usize,
+    /// Of contacts anywhere: those that are `outside_model`.
+    outside_model: usize,
+}
+
+fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
+    let locator = case.estimator.fit(setup, &case.bench.simulate(0)).unwrap();
+    let clean = CleanSensors::new(setup.surface.model().unwrap(), &setup.layout);
+    let (errors, extent) = (ChannelErrors::none(&setup.layout), setup.surface.extent());
+    let (silence, bound) = (vec![0.0; setup.layout.len()], misfit_bound(setup.layout.len()));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
+    let force_n = case.bench.pressed_setup().force_n.unwrap();
+    let mut alarms = FalseAlarms::default();
+    for _ in 0..case.readings {
+        let noise = measure(&setup.layout, &silence, &errors, &mut rng);
+        if locator.locate(&noise).unwrap().status != Status::NoContact {
+            let whitened = whitened(setup, &noise);
+            let is_beyond = whitened.dot(&whitened) > bound;
+            *(if is_beyond { &mut alarms.beyond_noise } else { &mut alarms.like_contact }) += 1;
+        }
+        let x_m = rng.random_range(0.0..extent.length_m());
+        let y_m = extent.width_m().map_or(0.0, |width_m| rng.random_range(0.0..width_m));
+        let contact = Contact { position: Position { x_m, y_m }, force_n };
+        let reading = measure(&setup.layout, &clean.reading(contact), &errors, &mut rng);
+        let status = locator.locate(&reading).unwrap().status;
+        alarms.outside_model += usize::from(status == Status::OutsideModel);
+    }
+    alarms
+}
+
+fn whitened(setup: &Setup, reading: &[f64]) -> Array1<f64> {
+    setup
+        .layout
+        .sensors()
+        .iter()
+        .zip(reading)
+        .map(|(sensor, value)| value / sensor.channel.reading_sd())
+        .collect()
+}
+
+/// Least and most of `count` readings that are false alarms at a rate, each missed by a rule of that rate once in 10,000 times: the
+/// quantiles of the binomial distribution.
+fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
+    const MISSED: f64 = 1e-4;
+    let n = count as f64;
+    let mut probability = (n * (-rate).ln_1p()).exp();
+    let (mut cumulative, mut least) = (probability, 0);
+    for found in 0..count {
+        if cumulative <= MISSED {
+            least = found + 1;
+        }
+        if cumulative >= 1.0 - MISSED {
+            return (least, found);
+        }
+        probability *= (n - found as f64) / (found as f64 + 1.0) * rate / (1.0 - rate);
+        cumulative += probability;
+    }
+    (least, count)
+}
+
+/// Bound on the chance that a contact explains noise by more than `cost`: that whitened noise has a component greater than u = √cost
+/// along the whitened readings of some contact, all scaled to unit length. Its expected Euler characteristic (Adler and
+/// Taylor, Random Fields and Geometry, 2007, section 12.4) is Φ(−u) + (L₁/2π + L₂·u/(2π)^(3/2))·e^(−u²/2), with half the
+/// circumference L₁ and the area L₂ of these readings; on a line L₁ is their length, and L₂ 0.
+fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
+    const SIDE: usize = 60;
+    let clean = CleanSensors::new(setup.surface.model().unwrap(), &setup.layout);
+    let extent = setup.surface.extent();
+    let rows = if extent.width_m().is_some() { SIDE } else { 1 };
+    // The direction of no reading is not a number, and adds nothing to lengths below.
+    let direction = |column: usize, row: usize| {
+        let share = |i: usize| (i as f64 + 0.5) / SIDE as f64;
+        let y_m = extent.width_m().map_or(0.0, |width_m| share(row) * width_m);
+        let position = Position { x_m: share(column) * extent.length_m(), y_m };
+        let whitened = whitened(setup, &clean.reading(Contact { position, force_n: 1e-3 }));
+        let length = whitened.dot(&whitened).sqrt();
+        whitened / length
+    };
+    let grid: Vec<Vec<Array1<f64>>> =
+        (0..rows).map(|row| (0..SIDE).map(|column| direction(column, row)).collect()).collect();
+    let distance = |a: &Array1<f64>, b: &Array1<f64>| (b - a).dot(&(b - a)).sqrt().max(0.0);
+    let along = |row: usize| grid[row].windows(2).map(|pair| distance(&pair[0], &pair[1])).sum::<f64>();
+    let across =
+        |column: usize| grid.windows(2).map(|pair| distance(&pair[0][column], &pair[1][column])).sum::<f64>();
+    let half = 0.5 * (along(0) + along(rows - 1) + across(0) + across(SIDE - 1));
+    let parallelogram = |row: usize, column: usize| {
+        let here = &grid[row][column];
+        let (a, b) = (&grid[row][column + 1] - here, &grid[row + 1][column] - here);
+        (a.dot(&a) * b.dot(&b) - a.dot(&b).powi(2)).sqrt().max(0.0)
+    };
+    let area: f64 = (1..rows)
+        .flat_map(|row| (1..SIDE).map(move |column| (row - 1, column - 1)))
+        .map(|(row, column)| parallelogram(row, column))
+        .sum();
+    let u = cost.sqrt();
+    normal_cdf(-u) + (half / TAU + area * u / TAU.powf(1.5)) * (-0.5 * cost).exp()
+}
+
+/// Measures a case with its force known or not, and says what it found as a row of the table.
+fn check(case: &Case, force_n: Option<f64>) -> String {
+    let setup = Setup { force_n, ..case.bench.setup.clone() };
+    let coordinates = 1 + usize::from(setup.surface.extent().width_m().is_some());
+    // A plane has more places, and a contact on it costs more.
+    let cost = contact_cost(unknowns(coordinates, force_n), setup.layout.len(), LINE_PLACES);
+    let chance = chance_of_contact(&setup, cost);
+    let FalseAlarms { beyond_noise, like_contact, outside_model } = false_alarms(case, &setup);
+    let per_thousand = |count: usize| 1e3 * count as f64 / case.readings as f64;
+    let row = format!(
+        "| {} | {} | {} | {:.2} ‰ | {:.2} ‰ ({:.2} ‰) | {:.2} ‰ | {:.2} ‰ |",
+        case.name,
+        if force_n.is_some() { "known" } else { "unknown" },
+        case.readings,
+        per_thousand(beyond_noise),
+        per_thousand(like_contact),
+        1e3 * chance,
+        per_thousand(beyond_noise + like_contact),
+        per_thousand(outside_model),
+    );
+    let (least, most) = binomial_bounds(case.readings, FALSE_ALARM_RATE);
+    for alarms in [beyond_noise, outside_model] {
+        assert!((least..=most).contains(&alarms), "{row}: {alarms} not in {least}..={most}");
+    }
+    let (_, most) = binomial_bounds(case.readings, chance);
+    assert!(like_contact <= most, "{row}: {like_contact}, at most {most}");
+    row
+}
+
+/// Printed with --nocapture.
+#[test]
+fn false_alarms_are_as_rare_as_the_rule_says() {
+    let cases = cases();
+    let rows: Vec<String> = std::thread::scope(|scope| {
+        let checks = cases.iter().flat_map(|case| {
+            [case.bench.pressed_setup().force_n, None]
+                .map(|force_n| scope.spawn(move || check(case, force_n)))
+        });
+        let running: Vec<_> = checks.collect();
+        running.into_iter().map(|check| check.join().unwrap()).collect()
+    });
+    println!(
+        "| estimator | force | readings | beyond noise | like a contact (at most) | not `no_contact` | `outside_model` |"
+    );
+    println!("|---|---|---|---|---|---|---|\n{}", rows.join("\n"));
+}
+
+#[test]
+fn as_many_readings_as_unknowns_can_be_outside_the_model() {
+    let mut bench = paper(5e-6, REPEATS);
+    bench.setup.layout = Setup::new(beam()).sensors(Deflection.evenly(2).noise(5e-6)).unwrap().layout;
+    let setup = Setup { force_n: None, ..bench.setup.clone() };
+    let pressed = Contact { position: Position::along(0.2), force_n: 3.0 };
+    let lifted: Vec<f64> = clean_reading(&beam(), &setup.layout, pressed).iter().map(|r| -r).collect();
+    for estimator in [influence(), Estimator::ClosedForm(ClosedForm)] {
+        let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
+        assert_eq!(locator.locate(&lifted).unwrap().status, Status::OutsideModel);
+        let case = Case { name: "two sensors", bench: bench.clone(), estimator, readings: 20_000 };
+        let FalseAlarms { outside_model, .. } = false_alarms(&case, &setup);
+        // Most contacts have a place and a force that explain them to the last bit.
+        let (_, most) = binomial_bounds(case.readings, FALSE_ALARM_RATE);
+        assert!(outside_model <= most, "{}: {outside_model}", locator.kind());
+    }
+}
