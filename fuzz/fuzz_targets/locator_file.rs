@@ -6,6 +6,6 @@ use palpate_estimators::estimator::Locator;
 
 fuzz_target!(|text: &str| {
     if let Ok(locator) = Locator::from_json(text) {
-        let _ = locator.locate(&vec![0.5; locator.setup.layout.len()]);
+        let _ = locator.locate(&vec![0.5; locator.setup.layout().len()]);
     }
 });

@@ -20,7 +20,7 @@
 //! // Where the four sensors tell most.
 //! let design = SensorDesign::for_setup(&setup)?.sites(Sites::Every(mm(10.0)));
 //! let best = SensorProblem::new(&setup, &design, Watch::NONE)?.greedy_exchange(0, Watch::NONE)?;
-//! let setup = Setup { layout: best.layout, ..setup.clone() };
+//! let setup = setup.with_layout(best.layout)?;
 //!
 //! // Where to press next after six presses, and what that gains.
 //! let presses = setup.simulate(&Training::even(6).repeated(3), 0)?;

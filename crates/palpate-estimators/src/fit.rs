@@ -46,7 +46,7 @@ impl<'a> FitTask<'a> {
     /// # Errors
     /// [`ChannelMismatch`], with both numbers.
     pub fn check_channels(&self) -> Result<(), ChannelMismatch> {
-        let (needed, found) = (self.setup.layout.len(), self.recording.channels.len());
+        let (needed, found) = (self.setup.layout().len(), self.recording.channels.len());
         if needed == found { Ok(()) } else { Err(ChannelMismatch { needed, found }) }
     }
 }
@@ -250,7 +250,7 @@ impl<M> Fitted<M> {
 
     /// The sensors, a channel of a reading each.
     pub fn layout(&self) -> &Layout {
-        &self.setup.layout
+        self.setup.layout()
     }
 }
 
@@ -260,7 +260,7 @@ impl<M: Locate> Fitted<M> {
     /// # Errors
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
-        ReadingError::check(reading, self.setup.layout.len())?;
+        ReadingError::check(reading, self.setup.layout().len())?;
         Ok(self.method.locate(reading))
     }
 

@@ -6,7 +6,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind::{Deflection, Strain};
 use palpate_mechanics::sensing::{ChannelModel, Layout, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeam;
-use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate, SurfaceSpec};
+use palpate_mechanics::surface::{Beam, Digit, Extent, ForceDirection, Motion, Plate};
 use palpate_mechanics::units::{Unit, gpa, microstrain, mm, newtons, um};
 use palpate_testing::data;
 
@@ -27,7 +27,7 @@ impl Example {
     }
 
     pub fn pressed_setup(&self) -> Setup {
-        self.setup.pressed_by(&self.training)
+        self.setup.pressed_by(&self.training).unwrap()
     }
 }
 
@@ -133,7 +133,7 @@ pub(crate) fn pad() -> Setup {
 /// A bench without a model, read by raw channels.
 pub(crate) fn raw_setup(extent: Extent, channels: usize, force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, channels, extent.length_m());
-    Setup { surface: SurfaceSpec::Measured(extent), layout, force_n, columns: None }
+    Setup::new(extent).with_layout(layout).unwrap().with_force(force_n).unwrap()
 }
 
 /// A recording of such a bench.

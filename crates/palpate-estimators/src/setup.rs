@@ -14,18 +14,33 @@ use palpate_mechanics::sensing::{
 use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
 use palpate_numerics::OutOfRange;
 
-/// A surface with its sensors, all checked. A rig describes it, and a locator keeps it.
+/// A surface with its sensors, all on it, and the contact force where it is known. A rig describes it, and a locator keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Unchecked")]
 pub struct Setup {
-    /// The surface that is touched.
-    pub surface: SurfaceSpec,
-    /// Its sensors, one a channel of a reading.
-    pub layout: Layout,
-    /// The contact force in newtons, greater than 0, where it is known.
-    pub force_n: Option<f64>,
-    /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
-    pub columns: Option<Columns>,
+    surface: SurfaceSpec,
+    layout: Layout,
+    force_n: Option<f64>,
+    columns: Option<Columns>,
+}
+
+/// A setup as a file has it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename = "Setup")]
+struct Unchecked {
+    surface: SurfaceSpec,
+    layout: Layout,
+    force_n: Option<f64>,
+    columns: Option<Columns>,
+}
+
+impl TryFrom<Unchecked> for Setup {
+    type Error = SetupError;
+
+    fn try_from(Unchecked { surface, layout, force_n, columns }: Unchecked) -> Result<Self, SetupError> {
+        let setup = Self { columns, ..Self::new(surface) };
+        Ok(setup.with_layout(layout)?.with_force(force_n)?)
+    }
 }
 
 /// A sensor, or a force, that does not go with its surface.
@@ -94,7 +109,7 @@ pub enum SetupError {
 ///
 /// # Errors
 /// [`SetupError`] off the surface, where it would read nothing, or for a kind that does not go with the surface.
-pub fn check_sensor(
+fn check_sensor(
     surface: &SurfaceSpec,
     kind: SensorKind,
     number: usize,
@@ -131,7 +146,7 @@ impl Setup {
     ///
     /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
     /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
-    /// assert_eq!(setup.layout.len(), 8);
+    /// assert_eq!(setup.layout().len(), 8);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(surface: impl Into<SurfaceSpec>) -> Self {
@@ -170,10 +185,30 @@ impl Setup {
     fn of_extent(extent: Extent, channels: &[&str]) -> Result<Self, SetupError> {
         let positions = vec![Position::default(); channels.len()];
         let mut setup = Self::new(extent).sensors(SensorKind::Raw.at_positions(positions))?;
-        setup.layout.edit(|sensors| {
+        setup.edit_sensors(|sensors| {
             sensors.iter_mut().zip(channels).for_each(|(sensor, name)| (*name).clone_into(&mut sensor.name));
         })?;
         Ok(setup)
+    }
+
+    /// The surface that is touched.
+    pub fn surface(&self) -> &SurfaceSpec {
+        &self.surface
+    }
+
+    /// Its sensors, one a channel of a reading.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The contact force in newtons, greater than 0, where it is known.
+    pub fn force_n(&self) -> Option<f64> {
+        self.force_n
+    }
+
+    /// Roles of a recording's columns; `None` for the columns that palpate itself writes.
+    pub fn columns(&self) -> Option<&Columns> {
+        self.columns.as_ref()
     }
 
     /// The same with further sensors; each kind is numbered by itself: "deflection_1", "strain_1".
@@ -195,13 +230,58 @@ impl Setup {
         Ok(self)
     }
 
+    /// The same with these sensors instead, whether or not they read something there.
+    ///
+    /// # Errors
+    /// [`OffSurface`] for the first sensor beside the surface.
+    pub fn with_layout(self, layout: Layout) -> Result<Self, OffSurface> {
+        self.check_places(&layout)?;
+        Ok(Self { layout, ..self })
+    }
+
+    /// Changes the sensors; the setup stays as it was where they are then refused.
+    ///
+    /// # Errors
+    /// [`SetupError`] for a sensor beside the surface, or with a number out of its range.
+    pub fn edit_sensors(&mut self, edit: impl FnOnce(&mut Vec<Sensor>)) -> Result<(), SetupError> {
+        let mut layout = self.layout.clone();
+        layout.edit(edit)?;
+        self.check_places(&layout)?;
+        self.layout = layout;
+        Ok(())
+    }
+
+    fn check_places(&self, layout: &Layout) -> Result<(), OffSurface> {
+        let positions: Vec<_> = layout.sensors().iter().map(|sensor| sensor.position).collect();
+        OffSurface::check("sensor", &positions, self.surface.extent())
+    }
+
+    /// Says whether a channel, by its index from 0, is dead; see [`Layout::set_dead`].
+    pub fn set_dead(&mut self, channel: usize, dead: bool) {
+        self.layout.set_dead(channel, dead);
+    }
+
     /// The same, touched by contacts of this known force in newtons.
     ///
     /// # Errors
     /// [`SetupError::OutOfRange`] for a force that is not greater than 0 and finite.
     pub fn known_force(self, force_n: f64) -> Result<Self, SetupError> {
-        OutOfRange::check_positive([("the force in newtons", force_n)])?;
-        Ok(Self { force_n: Some(force_n), ..self })
+        Ok(self.with_force(Some(force_n))?)
+    }
+
+    /// The same, touched by contacts of unknown force.
+    #[must_use]
+    pub fn unknown_force(self) -> Self {
+        Self { force_n: None, ..self }
+    }
+
+    /// The same, touched by contacts of this force in newtons, or of an unknown one.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a force that is not greater than 0 and finite.
+    pub fn with_force(self, force_n: Option<f64>) -> Result<Self, OutOfRange> {
+        OutOfRange::check_positive(force_n.map(|force_n| ("the force in newtons", force_n)))?;
+        Ok(Self { force_n, ..self })
     }
 
     /// Knowledge of the contact force.
@@ -267,4 +347,49 @@ fn positions_of(placement: Placement, extent: Extent) -> Result<Vec<Position>, S
         (Placement::At(positions), _) => positions,
     };
     if positions.is_empty() { Err(SetupError::NoSensors) } else { Ok(positions) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+
+    #[test]
+    fn bad_sensors_and_forces_are_refused_from_callers_and_from_files() {
+        let good = fixtures::paper(5e-6, 1).setup;
+        let text = serde_json::to_string(&good).unwrap();
+        assert_eq!(serde_json::from_str::<Setup>(&text).unwrap(), good);
+        let read = |text: &str| serde_json::from_str::<Setup>(text).unwrap_err().to_string();
+
+        for force_n in [0.0, -3.0, f64::NAN, f64::INFINITY] {
+            let refused = good.clone().with_force(Some(force_n)).unwrap_err().to_string();
+            let message = format!("the force in newtons is {force_n}; it must be greater than 0 and finite");
+            assert_eq!(refused, message);
+        }
+        let damaged = text.replace(r#""force_n":3.0"#, r#""force_n":-3.0"#);
+        assert!(
+            read(&damaged).starts_with("the force in newtons is -3; it must be greater than 0 and finite")
+        );
+
+        let message = "sensor 2 is at 500 mm, off the surface; it must be within 0 and 400 mm";
+        let mut layout = good.layout().clone();
+        layout.edit(|sensors| sensors[1].position.x_m = 0.5).unwrap();
+        let mut setup = good.clone();
+        let refused = setup.edit_sensors(|sensors| sensors[1].position.x_m = 0.5).unwrap_err();
+        assert_eq!((refused.to_string().as_str(), &setup), (message, &good));
+        let damaged = text.replace(
+            &serde_json::to_string(good.layout()).unwrap(),
+            &serde_json::to_string(&layout).unwrap(),
+        );
+        assert!(read(&damaged).starts_with(message));
+        assert_eq!(good.with_layout(layout).unwrap_err().to_string(), message);
+    }
+
+    #[test]
+    fn a_measured_surface_has_a_length() {
+        for length_m in [0.0, -0.1, f64::NAN] {
+            let refused = Setup::measured(length_m, &["a", "b"]).unwrap_err();
+            assert!(matches!(refused, SetupError::OutOfRange(_)), "{refused}");
+        }
+    }
 }

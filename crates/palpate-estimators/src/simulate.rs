@@ -32,7 +32,7 @@ pub enum SimulateError {
     /// A number of a sensor is not in its range.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// A speed of a moving contact is not in its range.
+    /// A force, or the speed of a moving contact, is not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
     /// A position does not lie on the surface.
@@ -66,8 +66,11 @@ pub fn clean_reading(surface: &dyn Surface, layout: &Layout, contact: Contact) -
 
 impl Setup {
     /// The bench as it is when pressed to calibrate: with the force of these presses.
-    pub fn pressed_by(&self, training: &Training) -> Self {
-        Self { force_n: training.force_n.or(self.force_n), ..self.clone() }
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    pub fn pressed_by(&self, training: &Training) -> Result<Self, OutOfRange> {
+        self.clone().with_force(training.force_n.or(self.force_n()))
     }
 
     /// Presses the simulated surface at the training positions, with the force of the training presses, and records what its
@@ -76,8 +79,8 @@ impl Setup {
     /// # Errors
     /// [`SimulateError`] when the bench lacks a model or a force, or the positions cannot be laid out.
     pub fn simulate(&self, training: &Training, seed: u64) -> Result<Recording, SimulateError> {
-        let positions = training.positions(self.surface.extent())?;
-        simulate_at(&self.pressed_by(training), &positions, training.repeats, seed)
+        let positions = training.positions(self.surface().extent())?;
+        simulate_at(&self.pressed_by(training)?, &positions, training.repeats, seed)
     }
 }
 
@@ -94,8 +97,8 @@ pub fn simulate_at(
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
-    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
-    let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
+    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
     OffSurface::check("position", positions, surface.extent())?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     let sensors = CleanSensors::new(surface, &placed);
@@ -103,11 +106,11 @@ pub fn simulate_at(
     for position in positions.iter().copied() {
         let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
-            let reading = measure(&setup.layout, &clean, &errors, &mut rng);
+            let reading = measure(setup.layout(), &clean, &errors, &mut rng);
             rows.push(Row { position, force_n: Some(force_n), nuisance: None, reading });
         }
     }
-    Ok(Recording::new(&setup.layout, "simulation", rows).seeded(seed))
+    Ok(Recording::new(setup.layout(), "simulation", rows).seeded(seed))
 }
 
 /// Spreads `loads` over the bench's simulated surface, all at once, `repeats` times in a row, and gives what its faulty channels
@@ -123,7 +126,7 @@ pub fn simulate_loads(
     repeats: usize,
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
-    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
+    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     // By superposition.
     let reading = |sensor: &Sensor| {
@@ -131,7 +134,7 @@ pub fn simulate_loads(
         loads.iter().map(|load| load.force_n() * load.mean(&*function)).sum()
     };
     let clean: Vec<f64> = placed.sensors().iter().map(reading).collect();
-    Ok((0..repeats).map(|_| measure(&setup.layout, &clean, &errors, &mut rng)).collect())
+    Ok((0..repeats).map(|_| measure(setup.layout(), &clean, &errors, &mut rng)).collect())
 }
 
 /// The places of the sensors, the gains and offsets of the channels, and the stream of their noise.
@@ -140,8 +143,8 @@ fn draw_faults(setup: &Setup, seed: u64) -> (Layout, ChannelErrors, Xoshiro256Pl
     // Places have a stream of their own, so that the noise is the same whether or not sensors are displaced.
     let mut places = rng.clone();
     places.jump();
-    let placed = displaced(&setup.layout, setup.surface.extent(), &mut places);
-    let errors = ChannelErrors::draw(&setup.layout, &mut rng);
+    let placed = displaced(setup.layout(), setup.surface().extent(), &mut places);
+    let errors = ChannelErrors::draw(setup.layout(), &mut rng);
     (placed, errors, rng)
 }
 

@@ -220,7 +220,7 @@ pub fn sweep_speeds(
     seed: u64,
 ) -> Result<Vec<SpeedErrors>, SweepError> {
     let beam = moving.beam.ok_or(SweepError::NoCriticalSpeed)?;
-    let extent = setup.surface.extent();
+    let extent = setup.surface().extent();
     let mut sweep = Vec::new();
     for ratio in SPEED_RATIOS {
         let speed_m_per_s = ratio * beam.critical_speed_m_per_s();

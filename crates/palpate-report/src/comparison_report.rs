@@ -52,7 +52,7 @@ pub fn comparison_report(report: &ComparisonReport) -> Vec<ReportFile> {
 
 impl ComparisonReport<'_> {
     fn extent(&self) -> Extent {
-        self.setup.surface.extent()
+        self.setup.surface().extent()
     }
 
     fn summary(&self) -> Markup {
@@ -138,7 +138,7 @@ impl ComparisonReport<'_> {
     }
 
     fn along_figure(&self) -> Figure {
-        let length_mm = self.setup.surface.extent().length_m() * 1e3;
+        let length_mm = self.setup.surface().extent().length_m() * 1e3;
         let mut series = self.series(|evaluation| in_milli(evaluation.median_by_stretch_m(STRETCHES)));
         series.extend(limit_line(self.setup));
         let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);

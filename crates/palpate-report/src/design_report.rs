@@ -50,7 +50,7 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
         Extent::Line { .. } => {
             let setup = report.best().and_then(|best| {
                 let what = "The bench with the best layout";
-                bench_figure(what, &report.setup.surface, &best.layout, report.problem.force_n())
+                bench_figure(what, report.setup.surface(), &best.layout, report.problem.force_n())
             });
             vec![layouts.figure(report.sites_figure()), limit.figure(setup).figure(report.limit_figure())]
         }
@@ -79,7 +79,7 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn length_mm(&self) -> f64 {
-        self.setup.surface.extent().length_m() * 1e3
+        self.setup.surface().extent().length_m() * 1e3
     }
 
     fn summary(&self) -> Markup {
@@ -215,7 +215,7 @@ impl<'a> SensorDesignReport<'a> {
 
     /// The limit of a layout at the contacts of the design.
     fn limit_of(&self, designed: &Designed) -> Option<LimitCurve> {
-        let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };
+        let setup = self.setup.clone().with_layout(designed.layout.clone()).ok()?;
         let positions = &self.problem.contacts().positions;
         let limit = setup.cramer_rao_bound().ok()?;
         LimitCurve::at_positions(&limit, self.problem.force_n(), self.problem.force(), positions).ok()
@@ -223,10 +223,10 @@ impl<'a> SensorDesignReport<'a> {
 
     /// The limit over a plane with the best and with the even layout.
     fn limit_maps(&self) -> Vec<Figure> {
-        let cells = Cells::nearly_square(self.setup.surface.extent(), CELLS, CELLS_A_SIDE);
+        let cells = Cells::nearly_square(self.setup.surface().extent(), CELLS, CELLS_A_SIDE);
         let force = (self.problem.force_n(), self.problem.force());
         let limits = |designed: &'a Designed| {
-            let setup = Setup { layout: designed.layout.clone(), ..self.setup.clone() };
+            let setup = self.setup.clone().with_layout(designed.layout.clone()).ok()?;
             let values =
                 limits_mm(&setup.cramer_rao_bound().ok()?, &cells, force, |bound| bound.sd_position_m);
             let dots_mm = sensors_mm(&designed.layout);

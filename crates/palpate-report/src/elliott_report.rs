@@ -156,7 +156,7 @@ impl ElliottReport<'_> {
         html! {
             p {
                 "After Elliott and others, who told the place of a load that moves over a plate from principal components of a grid \
-                 of sensors by a back-propagation network. Here the readings of " (self.study.rig.setup.layout.len()) " sensors, less \
+                 of sensors by a back-propagation network. Here the readings of " (self.study.rig.setup.layout().len()) " sensors, less \
                  their mean and over their noise, are turned onto the eigenvectors of their covariance over the presses of a \
                  calibration (Karhunen–Loève), and the first components, each scaled to variance 1, are what a network with one hidden \
                  layer sees. Networks stop after " (whole(f64::from(self.study.presentations))) " presentations. The effective area \

@@ -29,15 +29,15 @@ pub(super) fn tolerance_mark(tolerance_m: f64) -> Mark {
 /// The mean error of the best unbiased estimator along a bench's surface, in mm, dashed in black; `None` where there is
 /// none: a surface without a model, clean sensors, a force that is not known.
 pub(super) fn limit_line(setup: &Setup) -> Option<Series> {
-    Some(line(&curve(setup, &setup.layout).ok()?, 6, format!("{LABEL}: what physics allows")))
+    Some(line(&curve(setup, setup.layout()).ok()?, 6, format!("{LABEL}: what physics allows")))
 }
 
 /// The limit as [`limit_line`] has it; where deflection sensors are clean, the limit for a noise that the legend states.
 pub(super) fn limit_line_or_assumed(setup: &Setup) -> Option<Series> {
     let clean = |sensor: &Sensor| sensor.kind == SensorKind::Deflection && sensor.channel.noise_sd == 0.0;
-    match curve(setup, &setup.layout) {
-        Err(LimitError::Noise(NoiseError::Singular { .. })) if setup.layout.sensors().iter().all(clean) => {
-            let mut layout = setup.layout.clone();
+    match curve(setup, setup.layout()) {
+        Err(LimitError::Noise(NoiseError::Singular { .. })) if setup.layout().sensors().iter().all(clean) => {
+            let mut layout = setup.layout().clone();
             let assume = |sensor: &mut Sensor| sensor.channel.noise_sd = ASSUMED_NOISE_M;
             layout.edit(|sensors| sensors.iter_mut().for_each(assume)).ok()?;
             Some(line(&curve(setup, &layout).ok()?, 6, assumed_label()))
@@ -73,8 +73,8 @@ fn assumed_label() -> String {
 }
 
 fn curve(setup: &Setup, layout: &Layout) -> Result<LimitCurve, LimitError> {
-    let limit = CramerRaoBound::new(setup.surface.model().ok_or(LimitError::NoModel)?, layout)?;
-    LimitCurve::over_surface(&limit, setup.force_n.ok_or(LimitError::NoForce)?, Force::Known)
+    let limit = CramerRaoBound::new(setup.surface().model().ok_or(LimitError::NoModel)?, layout)?;
+    LimitCurve::over_surface(&limit, setup.force_n().ok_or(LimitError::NoForce)?, Force::Known)
 }
 
 fn line(curve: &LimitCurve, colour: usize, label: String) -> Series {

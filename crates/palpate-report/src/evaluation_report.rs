@@ -115,7 +115,7 @@ impl EvaluationReport<'_> {
     }
 
     fn extent(&self) -> Extent {
-        self.setup().surface.extent()
+        self.setup().surface().extent()
     }
 
     fn judged_heading(&self) -> &'static str {
@@ -238,7 +238,7 @@ impl EvaluationReport<'_> {
     }
 
     fn facts_table(&self) -> Table {
-        let force = self.setup().force_n;
+        let force = self.setup().force_n();
         let force = force.map_or("unknown".to_owned(), |force_n| format!("{} N", number(force_n)));
         let mut facts = vec![
             ("surface", text(self.surface_in_words())),
@@ -256,8 +256,8 @@ impl EvaluationReport<'_> {
     }
 
     fn surface_in_words(&self) -> String {
-        let extent = self.setup().surface.extent();
-        let kind = match &self.setup().surface {
+        let extent = self.setup().surface().extent();
+        let kind = match &self.setup().surface() {
             SurfaceSpec::Beam(_) => "beam".to_owned(),
             SurfaceSpec::SupportedBeam(beam) => format!("beam, {}", beam.spec().supports_in_words()),
             SurfaceSpec::Plate(_) => "plate".to_owned(),
@@ -269,8 +269,9 @@ impl EvaluationReport<'_> {
     }
 
     fn sensors_in_words(&self) -> String {
-        let names = self.setup().layout.names();
-        let mut kinds: Vec<&str> = self.setup().layout.kinds().into_iter().map(|kind| kind.name()).collect();
+        let names = self.setup().layout().names();
+        let mut kinds: Vec<&str> =
+            self.setup().layout().kinds().into_iter().map(|kind| kind.name()).collect();
         kinds.dedup();
         format!("{}, {}: {}", names.len(), listed(&kinds), names.join(", "))
     }

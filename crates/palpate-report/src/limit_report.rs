@@ -71,14 +71,14 @@ pub struct LimitReport<'a> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
-    let (layout, force_n) = (&report.setup.layout, report.known.force_n);
+    let (layout, force_n) = (report.setup.layout(), report.known.force_n);
     let (heading, figure) = match report.known.extent {
         Extent::Line { .. } => ("The limit along the surface", report.limit_figure()),
         Extent::Plane { .. } => ("The limit over the surface", report.limit_map()),
     };
     let sections = vec![
         Section::new("bench", "The bench")
-            .figure(bench_figure("The bench", &report.setup.surface, layout, force_n))
+            .figure(bench_figure("The bench", report.setup.surface(), layout, force_n))
             .table(report.sensor_table()),
         Section::new("limit", heading)
             .figure(figure)
@@ -188,7 +188,7 @@ impl LimitReport<'_> {
             title: "The least standard deviation of a located contact".to_owned(),
             cells,
             panels,
-            dots_mm: sensors_mm(&self.setup.layout),
+            dots_mm: sensors_mm(self.setup.layout()),
             label: "limit, mm".to_owned(),
             most: length_mm,
             width_px: 860,
@@ -204,7 +204,7 @@ impl LimitReport<'_> {
 
     /// Figures of a digit alone: the limit of the force, and how far the linear theory goes.
     fn digit_figures(&self) -> Vec<Figure> {
-        let SurfaceSpec::Digit(digit) = &self.setup.surface else { return Vec::new() };
+        let SurfaceSpec::Digit(digit) = self.setup.surface() else { return Vec::new() };
         let force_limit = force_limit_figure(self.unknown);
         std::iter::once(force_limit).chain(linear_theory_figures(self.setup, self.limit, digit)).collect()
     }
@@ -245,7 +245,7 @@ impl LimitReport<'_> {
     }
 
     fn sensor_table(&self) -> Table {
-        Table::from_rows(self.setup.layout.sensors().iter().zip(1..))
+        Table::from_rows(self.setup.layout().sensors().iter().zip(1..))
             .short("sensor", |(_, number)| number.to_string())
             .words("measures", |(sensor, _)| sensor.kind.name())
             .numeric("position, mm", |(sensor, _)| place(sensor.position, self.known.extent))

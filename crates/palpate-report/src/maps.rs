@@ -25,7 +25,7 @@ pub(super) fn error_map(
     what: &str,
     evaluations: &[(&str, &Evaluation)],
 ) -> Figure {
-    let cells = error_cells(evaluations, setup.surface.extent());
+    let cells = error_cells(evaluations, setup.surface().extent());
     let in_mm = |errors_m: Vec<f64>| errors_m.into_iter().map(|error_m| error_m * 1e3).collect();
     let errors = evaluations
         .iter()
@@ -34,13 +34,13 @@ pub(super) fn error_map(
     let finite =
         panels.iter().flat_map(|panel| &panel.values).copied().filter(|error_mm| error_mm.is_finite());
     let most = finite.fold(0.0, f64::max);
-    let limit = setup.cramer_rao_bound().ok().zip(setup.force_n).map(|(limit, force_n)| {
+    let limit = setup.cramer_rao_bound().ok().zip(setup.force_n()).map(|(limit, force_n)| {
         let values = limits_mm(&limit, &cells, (force_n, Force::Known), Bound::mean_error_m);
         HeatPanel::new("the limit", values)
     });
     let limited = limit.is_some();
     panels.extend(limit);
-    let (dots_mm, label) = (sensors_mm(&setup.layout), "error, mm".to_owned());
+    let (dots_mm, label) = (sensors_mm(setup.layout()), "error, mm".to_owned());
     let map = HeatMap { title: title.to_owned(), cells, panels, dots_mm, label, most, width_px: 860 };
     let [along, across] = cells.sides_m().map(|side_m| number(side_m * 1e3));
     let caption = html! {

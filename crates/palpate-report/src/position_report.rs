@@ -145,7 +145,7 @@ impl<'a> PositionDesignReport<'a> {
     fn maps(&self) -> Vec<Figure> {
         let contacts = &self.problem.contacts().positions;
         let columns = contacts.iter().take_while(|at| at.y_m == contacts[0].y_m).count().max(1);
-        let cells = Cells { extent: self.setup.surface.extent(), columns, rows: contacts.len() / columns };
+        let cells = Cells { extent: self.setup.surface().extent(), columns, rows: contacts.len() / columns };
         let designed = |placed: &'a Placed| Designed {
             name: placed.placement.name(),
             values: placed.errors_m.iter().map(|error_m| error_m * 1e3).collect(),
@@ -163,7 +163,7 @@ impl<'a> PositionDesignReport<'a> {
     }
 
     fn axis(&self, label: &str) -> Axis {
-        Axis::linear(label).from_to(0.0, self.setup.surface.extent().length_m() * 1e3)
+        Axis::linear(label).from_to(0.0, self.setup.surface().extent().length_m() * 1e3)
     }
 
     fn meaning(&self) -> Markup {

@@ -169,7 +169,7 @@ fn layouts<'a>(report: &StudyReport<'a>) -> Vec<(Vec<&'a str>, &'a Layout)> {
         layout.sensors().iter().map(|sensor| (sensor.kind, sensor.position)).collect()
     };
     for arm in &report.study.study.arms {
-        let layout = &arm.rig.setup.layout;
+        let layout = arm.rig.setup.layout();
         match layouts.iter_mut().find(|(_, other)| places(other) == places(layout)) {
             Some((arms, _)) => arms.push(&arm.name),
             None => layouts.push((vec![&arm.name], layout)),
@@ -221,7 +221,7 @@ fn single(report: &StudyReport, arm: &Arm, colour: usize) -> Option<Figure> {
     let title = format!("Location error of {}", arm.name);
     let label = if seeds == 1 { "its seed" } else { "median, and 5–95 % of the seeds" };
     let line = ArmLine { arm: &arm.name, label, colour };
-    let (chart, limit) = if arm.rig.setup.force_n.is_some() {
+    let (chart, limit) = if arm.rig.setup.force_n().is_some() {
         let chart = error_chart(report, &title, &[line])?;
         let words = limit_in_words(&chart);
         (chart, words)
@@ -261,7 +261,7 @@ fn shared(report: &StudyReport, title: &str, arms: &[&Arm]) -> Option<Figure> {
 
 fn limit_of(arm: &Arm, colour: usize, label: &str) -> Option<Series> {
     let setup = &arm.rig.setup;
-    limit_line_of_arm(setup, setup.force_n.or(arm.rig.pressed_setup().force_n)?, colour, label)
+    limit_line_of_arm(setup, setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?, colour, label)
 }
 
 /// An arm among the lines of a figure.
@@ -313,7 +313,7 @@ impl<'a> StudyReport<'a> {
 
     /// The line along the surface; that of the first arm.
     fn extent(&self) -> Option<Extent> {
-        Some(self.study.study.arms.first()?.rig.setup.surface.extent().along_x())
+        Some(self.study.study.arms.first()?.rig.setup.surface().extent().along_x())
     }
 
     /// Its length in metres.

@@ -117,7 +117,7 @@ pub(crate) struct MustHaveKeys {
 
 impl At<DesignKeys> {
     pub fn build(&self, setup: &Setup) -> Result<SensorDesign, RigError> {
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let Ok(default) = SensorDesign::for_setup(setup) else {
             let with = "a surface without a model, which cannot tell what a sensor elsewhere would read";
             return Err(self.place.unused(with));
@@ -166,8 +166,8 @@ fn offers(listed: &At<Vec<At<OfferKeys>>>, setup: &Setup) -> Result<Vec<SensorOf
 impl At<OfferKeys> {
     /// A kind with its noise and cost; the faults that are not named here are those of the rig's own sensors of the kind.
     fn build(&self, setup: &Setup) -> Result<SensorOffer, RigError> {
-        let kind = kind_on(&setup.surface, &self.measure)?;
-        let own = setup.layout.sensors().iter().find(|sensor| sensor.kind == kind);
+        let kind = kind_on(setup.surface(), &self.measure)?;
+        let own = setup.layout().sensors().iter().find(|sensor| sensor.kind == kind);
         let own = own.map_or_else(ChannelModel::default, |sensor| sensor.channel);
         let size = |key: &Option<At<Written>>, own| {
             key.as_ref().map_or(Ok(own), |written| written.si::<AtLeastZero>(kind.dimension()))

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::ops::Range;
 
 use palpate_estimators::arrangement::ArrangementError;
+use palpate_estimators::setup::SetupError;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{LayoutError, SensorKind};
 use palpate_mechanics::surface::modal::ModalBeamError;
@@ -113,6 +114,9 @@ pub enum RigProblem {
     /// A sensor with a number out of its range.
     #[error(transparent)]
     Layout(LayoutError),
+    /// Sensors or a force that do not go with the surface.
+    #[error(transparent)]
+    Setup(SetupError),
     /// Training positions that cannot be laid out.
     #[error(transparent)]
     Arrangement(ArrangementError),

@@ -7,10 +7,11 @@ use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Calibration, Split};
 use palpate_estimators::recording::{Recording, TimedRecording};
-use palpate_estimators::setup::Setup;
+use palpate_estimators::setup::{Setup, SetupError};
 use palpate_estimators::simulate::{MovingContacts, SimulateError, simulate_moving};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::{SurfaceSpec, UniformLoad};
+use palpate_numerics::OutOfRange;
 
 use crate::design::DesignKeys;
 use crate::document::{self, At};
@@ -51,7 +52,7 @@ impl Rig {
     ///
     /// let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/paper.toml"));
     /// let rig = Rig::from_toml(text)?;
-    /// assert_eq!((rig.setup.layout.len(), rig.setup.force_n), (8, Some(3.0)));
+    /// assert_eq!((rig.setup.layout().len(), rig.setup.force_n()), (8, Some(3.0)));
     ///
     /// let text = text.replace("\"400 mm\"", "\"400 N\"");
     /// let error = Rig::from_toml(&text).unwrap_err();
@@ -64,8 +65,14 @@ impl Rig {
     }
 
     /// The bench as it is when pressed to calibrate: with the force of the training presses.
-    pub fn pressed_setup(&self) -> Setup {
-        self.training.as_ref().map_or_else(|| self.setup.clone(), |training| self.setup.pressed_by(training))
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    pub fn pressed_setup(&self) -> Result<Setup, OutOfRange> {
+        match &self.training {
+            Some(training) => self.setup.pressed_by(training),
+            None => Ok(self.setup.clone()),
+        }
     }
 
     /// Presses the simulated surface at the training positions, with the force of the training presses; see [`Setup::simulate`].
@@ -92,7 +99,7 @@ impl Rig {
     /// # Errors
     /// [`RigSimulationError`] when the rig has no training positions, or they cannot be laid out.
     pub fn calibration(&self) -> Result<Calibration, RigSimulationError> {
-        Ok(Calibration::from_training(&self.setup, self.training()?).map_err(SimulateError::from)?)
+        Ok(Calibration::from_training(&self.setup, self.training()?)?)
     }
 
     /// Simulated calibrations with `count` seeds from the first on, each judged by one contact at each position of
@@ -128,7 +135,8 @@ impl Rig {
     /// ```
     pub fn simulate_moving(&self, seed: u64) -> Result<TimedRecording, RigSimulationError> {
         let moving = self.motion.as_ref().ok_or(RigSimulationError::NoMotion)?;
-        Ok(simulate_moving(&self.pressed_setup(), moving, seed)?)
+        let pressed = self.pressed_setup().map_err(SimulateError::from)?;
+        Ok(simulate_moving(&pressed, moving, seed)?)
     }
 }
 
@@ -199,7 +207,12 @@ impl RigFile {
             self.recording.as_ref().map(|keys| keys.build(&layout, surface.extent())).transpose()?;
         let moving = |keys| motion::build(keys, &surface, surface_keys.density(), force_n);
         let motion = self.motion.as_ref().map(moving).transpose()?;
-        let setup = Setup { surface, layout, force_n, columns };
+        let setup = Setup::new(surface).with_layout(layout).map_err(SetupError::from);
+        let setup = setup.and_then(|setup| Ok(setup.with_force(force_n)?));
+        let mut setup = setup.map_err(|error| RigProblem::Setup(error).without_place())?;
+        if let Some(columns) = columns {
+            setup = setup.recorded_as(columns);
+        }
         let design = self.design.as_ref().map(|keys| keys.build(&setup)).transpose()?;
         Ok(Rig { setup, training, estimator, loads, motion, design })
     }

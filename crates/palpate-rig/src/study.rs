@@ -162,7 +162,7 @@ impl Study {
     /// let text = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../studies/paper.toml"));
     /// let study = Study::from_toml(text)?;
     /// assert_eq!((study.name.as_str(), study.arms.len()), ("paper", 12));
-    /// assert_eq!(study.arms[0].rig.setup.layout.len(), 8);
+    /// assert_eq!(study.arms[0].rig.setup.layout().len(), 8);
     /// # Ok::<(), palpate_rig::RigError>(())
     /// ```
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
@@ -225,7 +225,7 @@ impl ArmKeys {
         };
         let layout = self.asked_layout()?;
         let rig = rig.build()?;
-        if let (Some(surface), None) = (&base.surface, rig.setup.surface.model()) {
+        if let (Some(surface), None) = (&base.surface, rig.setup.surface().model()) {
             return Err(surface.place.refuse_as("measured", "a surface with a model: a study simulates it"));
         }
         if rig.training.is_none() {
@@ -257,7 +257,7 @@ fn checked_name(name: &At<String>) -> Result<String, RigError> {
 impl StudyFile {
     /// The `[evaluation]`; without one, 399 positions, 5 readings at each, tolerance 2 mm, no portions.
     fn judging(&self, first: &Arm) -> Result<Judging, RigError> {
-        let extent = first.rig.setup.surface.extent();
+        let extent = first.rig.setup.surface().extent();
         if let (Some(surface), Extent::Plane { .. }) = (&self.surface, extent) {
             return Err(surface.place.refuse_as("a plane", "a line, along which a study judges"));
         }

@@ -23,27 +23,27 @@ const FSI_WATER: &str = include_str!("../../../examples/fsi-water.toml");
 fn the_papers_bench_is_what_the_paper_says() {
     let rig = Rig::from_toml(PAPER).unwrap();
     let beam = Beam::new(0.4, 0.04, 0.0012, 200e9).unwrap();
-    assert_eq!(rig.setup.surface, SurfaceSpec::Beam(beam));
+    assert_eq!(rig.setup.surface(), &SurfaceSpec::Beam(beam));
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = 5e-6)).unwrap();
-    assert_eq!(rig.setup.layout, layout);
-    assert_eq!(rig.setup.force_n, Some(3.0));
+    assert_eq!(rig.setup.layout(), &layout);
+    assert_eq!(rig.setup.force_n(), Some(3.0));
     assert_eq!(
         rig.training,
         Some(Training { arrangement: Arrangement::Even, count: 10, repeats: 1, force_n: None })
     );
     assert_eq!(rig.estimator, Estimator::Network(Network::default()));
-    assert_eq!(rig.setup.columns, None);
+    assert_eq!(rig.setup.columns(), None);
 }
 
 #[test]
 fn the_water_strip_maps_foreign_columns() {
     let rig = Rig::from_toml(FSI_WATER).unwrap();
-    assert_eq!(rig.setup.surface, SurfaceSpec::Measured(Extent::line(0.1).unwrap()));
-    assert_eq!(rig.setup.layout.names(), ["Pl", "Pr"]);
+    assert_eq!(rig.setup.surface(), &SurfaceSpec::Measured(Extent::line(0.1).unwrap()));
+    assert_eq!(rig.setup.layout().names(), ["Pl", "Pr"]);
     let Estimator::Network(network) = &rig.estimator else { panic!("{:?}", rig.estimator) };
     assert_eq!((network.output, network.input_scale), (OutputCoding::Normalized, InputScale::Standardized));
-    let columns = rig.setup.columns.unwrap();
+    let columns = rig.setup.columns().unwrap();
     assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
     assert_eq!(columns.position_unit.symbol(), "mm");
 }

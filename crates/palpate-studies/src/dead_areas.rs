@@ -17,7 +17,6 @@ use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelModel, Layout, Sensor, SensorKind};
-use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Rig, RigSimulationError};
 
@@ -119,13 +118,12 @@ impl DeadAreas {
     /// The rig with so many sensors of its first kind, evenly placed.
     fn with_sensors(&self, count: usize) -> Rig {
         let mut rig = self.rig.clone();
-        let length_m = rig.setup.surface.extent().length_m();
-        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout.sensors().first().cloned() {
-            let mut layout = Layout::even(kind, count, length_m);
-            // A channel of the rig, which was checked.
-            if layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel = channel)).is_ok() {
-                rig.setup.layout = layout;
-            }
+        let length_m = rig.setup.surface().extent().length_m();
+        if let Some(Sensor { kind, channel, .. }) = rig.setup.layout().sensors().first().cloned() {
+            let even = Layout::even(kind, count, length_m).into_sensors().into_iter();
+            let even = even.map(|sensor| Sensor { channel, ..sensor }).collect();
+            let placed = rig.setup.edit_sensors(|sensors| *sensors = even);
+            placed.expect("the channel was checked, and they are along the surface");
         }
         rig
     }
@@ -153,7 +151,7 @@ impl DeadAreas {
         findings: &mut DeadAreaResults,
         watch: Watch,
     ) -> Result<(), Cancelled> {
-        let sensors = rig.setup.layout.len();
+        let sensors = rig.setup.layout().len();
         match evaluate_splits(&rig.setup, estimator, trials, self.seed, &|| 0.0, watch) {
             Ok(tried) => {
                 let evaluation = &tried.evaluation;
@@ -163,7 +161,7 @@ impl DeadAreas {
                     sensors,
                     effective_percent: evaluation.effective_percent(self.tolerance_m),
                     mean_error_m: evaluation.summary(None).map_or(f64::NAN, |summary| summary.average_m),
-                    folded: FoldedErrors::new(evaluation, &rig.setup.layout, self.tolerance_m),
+                    folded: FoldedErrors::new(evaluation, rig.setup.layout(), self.tolerance_m),
                 });
             }
             Err(error) if Cancelled::caused(&error) => return Err(Cancelled),
@@ -202,12 +200,12 @@ impl ArraySensor {
     /// # Errors
     /// [`RigSimulationError`] for a rig without a model or training positions.
     pub fn new(rig: &Rig, count: usize, spread: PointSpread) -> Result<Self, RigSimulationError> {
-        let model = rig.setup.surface.model().ok_or(SimulateError::NoModel)?;
-        let force_n = rig.setup.force_n.ok_or(SimulateError::NoForce)?;
+        let model = rig.setup.surface().model().ok_or(SimulateError::NoModel)?;
+        let force_n = rig.setup.force_n().ok_or(SimulateError::NoForce)?;
         let training = rig.training()?;
         let length_m = model.length_m();
         let share = |sensor: &Sensor| sensor.channel.noise_sd / (force_n * model.full_scale(sensor.kind));
-        let noise_sd = rig.setup.layout.sensors().first().map_or(0.0, share);
+        let noise_sd = rig.setup.layout().sensors().first().map_or(0.0, share);
         let pitch_m = length_m / count as f64;
         let sensor = |i: usize| Sensor {
             kind: SensorKind::Raw,
@@ -215,17 +213,14 @@ impl ArraySensor {
             name: format!("raw_{}", i + 1),
             channel: ChannelModel { noise_sd, ..ChannelModel::default() },
         };
-        let setup = Setup {
-            surface: SurfaceSpec::Measured(model.extent().along_x()),
-            layout: Layout::new((0..count).map(sensor).collect()).map_err(SimulateError::from)?,
-            force_n: Some(force_n),
-            columns: None,
-        };
+        let layout = Layout::new((0..count).map(sensor).collect()).map_err(SimulateError::from)?;
+        let setup = Setup::new(model.extent().along_x()).with_layout(layout).map_err(SimulateError::from)?;
+        let setup = setup.with_force(Some(force_n)).map_err(SimulateError::from)?;
         let spread_m = match spread {
             PointSpread::Metres(spread_m) => spread_m,
             PointSpread::Pitches(pitches) => pitches * pitch_m,
         };
-        let positions = training.positions(setup.surface.extent()).map_err(SimulateError::from)?;
+        let positions = training.positions(setup.surface().extent()).map_err(SimulateError::from)?;
         let presses =
             positions.into_iter().flat_map(|at| std::iter::repeat_n(at, training.repeats)).collect();
         let rig = Rig { setup, loads: Vec::new(), ..rig.clone() };
@@ -247,7 +242,7 @@ impl ArraySensor {
 
     /// Simulated calibrations, each judged by one press at each of 399 positions 1/400 of the length apart.
     pub fn trials(&self, count: u64, seed: u64) -> Vec<Split> {
-        let length_m = self.rig.setup.surface.extent().length_m();
+        let length_m = self.rig.setup.surface().extent().length_m();
         let judged: Vec<Position> =
             (1..400).map(|i| Position::along(f64::from(i) / 400.0 * length_m)).collect();
         let trial = |k: u64| {
@@ -259,7 +254,7 @@ impl ArraySensor {
     }
 
     fn recording(&self, positions: &[Position], seed: u64, rng: &mut Xoshiro256PlusPlus) -> Recording {
-        let layout = &self.rig.setup.layout;
+        let layout = self.rig.setup.layout();
         let row = |position: &Position| {
             let reading = layout.sensors().iter().map(|sensor| {
                 let off = position.distance_m(sensor.position) / self.spread_m;
@@ -267,7 +262,7 @@ impl ArraySensor {
             });
             Row {
                 position: *position,
-                force_n: self.rig.setup.force_n,
+                force_n: self.rig.setup.force_n(),
                 nuisance: None,
                 reading: reading.collect(),
             }

@@ -211,7 +211,7 @@ impl SetUp {
             estimator: arm.rig.estimator.kind(),
             force: setup.force(),
             layout: arm.layout.as_ref().map(|asked| asked.method.name()),
-            sensors: setup.layout.sensors().iter().map(place).collect(),
+            sensors: setup.layout().sensors().iter().map(place).collect(),
         }
     }
 }
@@ -224,7 +224,7 @@ impl ArmResults {
         let error = |portion: Option<Portion>, pick: fn(ErrorSummary) -> f64| {
             spread(&|fit: &TrainedSeed| percent(&fit.evaluation, portion, pick))
         };
-        let length_m = arm.rig.setup.surface.extent().length_m();
+        let length_m = arm.rig.setup.surface().extent().length_m();
         let allowed = allowed(arm, judging);
         let portions = judging.portions.iter().filter_map(|portion| {
             Some(PortionResults {
@@ -265,7 +265,7 @@ impl ArmResults {
 
 /// Positions where locators are judged, with the mean error there of an estimator at the limit, in metres.
 fn allowed(arm: &Arm, judging: &Judging) -> Option<Vec<(Position, f64)>> {
-    let force_n = arm.rig.setup.force_n.or(arm.rig.pressed_setup().force_n)?;
+    let force_n = arm.rig.setup.force_n().or(arm.rig.pressed_setup().ok()?.force_n())?;
     let errors_m = expected_errors_m(&arm.rig.setup, force_n, &judging.positions)?;
     Some(judging.positions.iter().copied().zip(errors_m).collect())
 }
@@ -279,7 +279,7 @@ fn mean(figures: &[(Position, f64)], portion: Option<Portion>) -> Option<f64> {
 
 fn training_span(outcome: &ArmOutcome, arm: &Arm) -> Option<TrainingSpanResults> {
     let training = arm.rig.training.as_ref()?;
-    let positions = training.positions(arm.rig.setup.surface.extent()).ok()?;
+    let positions = training.positions(arm.rig.setup.surface().extent()).ok()?;
     let (low, high) = positions
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at.x_m), high.max(at.x_m)));
@@ -319,7 +319,7 @@ pub(super) fn average_percent(evaluation: &Evaluation, keep: impl Fn(Position) -
 fn expected_errors_m(setup: &Setup, force_n: f64, positions: &[Position]) -> Option<Vec<f64>> {
     let limit = setup.cramer_rao_bound().ok()?;
     let force = setup.force();
-    let length_m = setup.surface.extent().length_m();
+    let length_m = setup.surface().extent().length_m();
     let at = |&position: &Position| {
         let bound = limit.bound_at(Contact { position, force_n }, force);
         expected_error_m(bound.as_ref(), length_m)
@@ -348,12 +348,12 @@ mod tests {
             let bound = limit.bound_at(Contact { position: at, force_n: 3.0 }, Force::Known).unwrap();
             assert!((expected_m / bound.mean_error_m() - 1.0).abs() < 1e-4);
         }
-        let mut setup = Setup { force_n: None, ..setup.clone() };
+        let mut setup = setup.clone().unknown_force();
         let unknown = expected_errors_m(&setup, 3.0, &positions).unwrap();
         let most_m = 0.4 / 12.0_f64.sqrt() * FRAC_2_PI.sqrt();
         assert!(unknown[0] < most_m && unknown[0] > 0.99 * most_m, "{unknown:?}");
         let clean = |sensor: &mut Sensor| sensor.channel.noise_sd = 0.0;
-        setup.layout.edit(|sensors| sensors.iter_mut().for_each(clean)).unwrap();
+        setup.edit_sensors(|sensors| sensors.iter_mut().for_each(clean)).unwrap();
         assert_eq!(expected_errors_m(&setup, 3.0, &positions), None);
     }
 }

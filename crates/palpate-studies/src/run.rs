@@ -12,6 +12,7 @@ use palpate_estimators::evaluation::{
 use palpate_estimators::fit::{Fit, FitTask, SeedQueue};
 use palpate_estimators::network::{Network, TrainingOutcome};
 use palpate_estimators::setup::Setup;
+use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::sensing::{ChannelModel, Layout};
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_rig::{Arm, AskedLayout, Judging, RigSimulationError, Study};
@@ -145,7 +146,7 @@ impl PreparedArm {
         let judging = &study.judging;
         let simulated = |error| StudyRunError::Simulate { arm: arm.name.clone(), error };
         let setup = &arm.rig.setup;
-        let perfect = setup.layout.sensors().iter().all(|sensor| sensor.channel == ChannelModel::default());
+        let perfect = setup.layout().sensors().iter().all(|sensor| sensor.channel == ChannelModel::default());
         match &arm.rig.estimator {
             Estimator::Network(network) if perfect => {
                 let calibration = arm.rig.calibration().map_err(simulated)?.judged_at(&judging.positions, 1);
@@ -156,7 +157,7 @@ impl PreparedArm {
             }
             estimator => {
                 // Where sensors have noise, locators are judged by as many readings at each position as the study says.
-                let noisy = setup.layout.sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
+                let noisy = setup.layout().sensors().iter().any(|sensor| sensor.channel.noise_sd > 0.0);
                 let readings = if noisy { judging.readings } else { 1 };
                 let calibration = arm.rig.calibration().map_err(simulated)?;
                 let calibration = calibration.judged_at(&judging.positions, readings);
@@ -187,7 +188,9 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
                 layout
             }
         };
-        arm.rig.setup.layout = layout;
+        arm.rig.setup = arm.rig.setup.clone().with_layout(layout).map_err(|error| {
+            StudyRunError::Simulate { arm: arm.name.clone(), error: SimulateError::from(error).into() }
+        })?;
     }
     Ok(study)
 }
@@ -209,7 +212,7 @@ impl LayoutRequest {
 
 fn request(arm: &Arm) -> Option<(AskedLayout, LayoutRequest)> {
     let asked = arm.layout.clone()?;
-    let setup = arm.rig.pressed_setup();
+    let setup = arm.rig.pressed_setup().ok()?;
     let design = arm.rig.design.clone().or_else(|| SensorDesign::for_setup(&arm.rig.setup).ok())?;
     let method = asked.method;
     Some((asked, LayoutRequest { method, setup, design }))

@@ -136,7 +136,7 @@ fn layouts_are_found_once_for_arms_that_ask_alike() {
     let prepared = PreparedStudy::new(beam(arms), Watch::new(&count));
     let prepared = prepared.unwrap();
     assert!(asked.load(Ordering::Relaxed) > 0);
-    let layout = |arm: usize| &prepared.study.arms[arm].rig.setup.layout;
+    let layout = |arm: usize| prepared.study.arms[arm].rig.setup.layout();
     assert_ne!(layout(0), layout(1));
     assert_eq!(layout(1), layout(3));
     assert_eq!([layout(1).len(), layout(2).len()], [8, 4]);

@@ -25,7 +25,7 @@ fn main() {
     let design =
         SensorDesign { sites: Sites::Count(SITES), ..rig.design.clone().expect("the example designs") };
     by_limit(&rig.setup, &design);
-    let SurfaceSpec::Beam(beam) = rig.setup.surface else { return };
+    let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return };
     by_pivoting("sines", &sines());
     by_pivoting("deflections at 8 contacts, orthonormal", &deflections(&beam));
 }

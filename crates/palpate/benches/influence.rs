@@ -32,7 +32,7 @@ fn main() {
         println!("fit of 10 × 10 presses, {from:?}: {:.2} ms", median(times).expect("rounds") * 1e3);
     }
     for force_n in [Some(3.0), None] {
-        let setup = Setup { force_n, ..rig.setup.clone() };
+        let setup = rig.setup.clone().with_force(force_n).expect("a force is more than 0");
         let locator = fit(Influence::default(), &setup, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
         let Times { single, batch } = nanoseconds(&locator, &rig);
@@ -58,11 +58,11 @@ struct Times {
 
 /// Median times of an estimate, alone and in a batch, over readings all along the beam in no order.
 fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
-    let surface = rig.setup.surface.model().expect("a beam has a model");
+    let surface = rig.setup.surface().model().expect("a beam has a model");
     let readings: Vec<f64> = (0..READINGS)
         .flat_map(|i| {
             let position = Position::along(0.02 + 0.36 * (i * 619 % READINGS) as f64 / READINGS as f64);
-            clean_reading(surface, &rig.setup.layout, Contact { position, force_n: 3.0 })
+            clean_reading(surface, rig.setup.layout(), Contact { position, force_n: 3.0 })
         })
         .collect();
     let mut scratch = Scratch::default();
@@ -71,7 +71,7 @@ fn nanoseconds(locator: &BeamLocator, rig: &Rig) -> Times {
     let (mut single, mut batch) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
         let start = ThreadTime::now();
-        for reading in readings.chunks_exact(rig.setup.layout.len()) {
+        for reading in readings.chunks_exact(rig.setup.layout().len()) {
             std::hint::black_box(locator.locate_with(reading, &mut scratch));
         }
         single.push(start.elapsed().as_nanos() as f64 / READINGS as f64);

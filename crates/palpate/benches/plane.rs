@@ -31,7 +31,7 @@ fn main() {
     let middle = |at: &Position| [at.x_m, at.y_m].iter().all(|m| (0.075..=0.225).contains(m));
     let plain: Vec<Position> = all.iter().copied().filter(middle).collect();
     for force_n in [Some(5.0), None] {
-        let setup = Setup { force_n, ..rig.setup.clone() };
+        let setup = rig.setup.clone().with_force(force_n).expect("a force is more than 0");
         let locator = fit(&setup, &recording);
         let known = if force_n.is_some() { "known" } else { "unknown" };
         for (place, positions) in [("the middle, half as long and wide", &plain), ("the whole plate", &all)] {
@@ -48,8 +48,8 @@ fn fit(setup: &Setup, recording: &Recording) -> PlaneLocator {
 
 /// Median time of an estimate, readings being all alike.
 fn microseconds(locator: &PlaneLocator, rig: &Rig, positions: &[Position]) -> f64 {
-    let surface = rig.setup.surface.model().expect("a plate has a model");
-    let sensors = CleanSensors::new(surface, &rig.setup.layout);
+    let surface = rig.setup.surface().model().expect("a plate has a model");
+    let sensors = CleanSensors::new(surface, rig.setup.layout());
     let readings: Vec<Vec<f64>> =
         positions.iter().map(|&position| sensors.reading(Contact { position, force_n: 5.0 })).collect();
     let mut scratch = PlaneScratch::default();

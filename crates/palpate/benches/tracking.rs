@@ -5,7 +5,6 @@ use cpu_time::ThreadTime;
 use palpate_estimators::estimator::{Locator, Swing, Track, Tracker, TrackerConfig};
 use palpate_estimators::fit::Fit;
 use palpate_estimators::recording::TimedRecording;
-use palpate_estimators::setup::Setup;
 use palpate_estimators::track_errors::{Followed, TrackErrors, follow};
 use palpate_numerics::median;
 use palpate_rig::Rig;
@@ -21,7 +20,7 @@ fn main() {
     for (name, text) in [("beam", BEAM), ("plate", PLATE)] {
         let rig = Rig::from_toml(text).expect("the example is sound");
         let moving = rig.motion.expect("the example moves");
-        for force_n in [rig.setup.force_n, None] {
+        for force_n in [rig.setup.force_n(), None] {
             println!("{name}, force {}", if force_n.is_some() { "known" } else { "unknown" });
             let locator = fit(&rig, force_n);
             for speed_m_per_s in [0.1, 0.2, 0.5, 1.0] {
@@ -34,7 +33,7 @@ fn main() {
 }
 
 fn fit(rig: &Rig, force_n: Option<f64>) -> Locator {
-    let setup = Setup { force_n, ..rig.setup.clone() };
+    let setup = rig.setup.clone().with_force(force_n).expect("a force is more than 0");
     let recording = rig.simulate(1).expect("the example can be simulated");
     rig.estimator.fit(&setup, &recording).expect("the presses suit the bench")
 }
@@ -59,7 +58,7 @@ fn measure(locator: &Locator, rig: &Rig) {
                 .iter()
                 .zip(&moving)
                 .map(|(followed, timed)| {
-                    TrackErrors::new(tracks(followed), &timed.truths(), rig.setup.surface.extent())
+                    TrackErrors::new(tracks(followed), &timed.truths(), rig.setup.surface().extent())
                         .expect("something was tracked")
                 })
                 .collect();

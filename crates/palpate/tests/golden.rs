@@ -64,8 +64,8 @@ fn beam() -> (Setup, Recording) {
 fn measured() -> (Setup, Recording) {
     let (_, mut presses) = beam();
     let setup = Setup::measured(mm(400.0), &["a", "b", "c"]).unwrap();
-    presses.channels = setup.layout.names();
-    presses.kinds = setup.layout.kinds();
+    presses.channels = setup.layout().names();
+    presses.kinds = setup.layout().kinds();
     presses.rows.iter_mut().for_each(|row| row.force_n = None);
     (setup, presses)
 }
@@ -143,7 +143,7 @@ fn write() {
     let mut csv = Vec::new();
     palpate::estimators::recording::write(
         &presses,
-        setup.surface.extent(),
+        setup.surface().extent(),
         "palpate 0.1.0, a golden recording, seed 1",
         &mut csv,
     )

@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "trials": trials.len(),
             "readings": readings,
             "seed": arguments.seed,
-            "length_mm": rig.setup.surface.extent().length_m() * 1e3,
+            "length_mm": rig.setup.surface().extent().length_m() * 1e3,
             "tolerance_mm": arguments.tolerance * 1e3,
             "estimators": estimators.collect::<Vec<_>>(),
             "left_out": left_out.iter().map(|(name, why)| object! { "name": name, "why": why }).collect::<Vec<_>>(),

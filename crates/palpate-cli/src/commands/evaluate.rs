@@ -155,7 +155,7 @@ fn simulation_complaint(error: impl std::fmt::Display) -> Complaint {
 
 /// The bench pressed all over: for the paper's beam at every millimetre, on a plane in the middles of about 400 cells.
 fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
-    let positions = all_over(locator.setup.surface.extent());
+    let positions = all_over(locator.setup.surface().extent());
     Ok(simulate_at(&locator.setup, &positions, 1, seed).map_err(simulation_complaint)?)
 }
 
@@ -221,7 +221,7 @@ fn print(
     )?;
     let share = answers.evaluation.effective_percent(arguments.tolerance);
     let tolerance = arguments.tolerance * 1e3;
-    let what = match answers.subject.setup().surface.extent() {
+    let what = match answers.subject.setup().surface().extent() {
         Extent::Line { .. } => "effective",
         Extent::Plane { .. } => "effective area",
     };

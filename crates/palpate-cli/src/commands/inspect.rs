@@ -53,9 +53,9 @@ fn rig(rig: &Rig) -> Vec<String> {
 }
 
 fn setup(setup: &Setup) -> Vec<String> {
-    let extent = setup.surface.extent();
+    let extent = setup.surface().extent();
     let modulus = |value| Quantity { value, dimension: Dimension::Modulus };
-    let surface = match &setup.surface {
+    let surface = match setup.surface() {
         SurfaceSpec::Beam(beam) => format!(
             "simply supported beam, {} × {} × {}, Young's modulus {}",
             format_length_mm(beam.length_m()),
@@ -94,10 +94,10 @@ fn setup(setup: &Setup) -> Vec<String> {
             None => format!("measured, {} long", format_length_mm(extent.length_m())),
         },
     };
-    let force = setup.force_n.map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
+    let force = setup.force_n().map_or("unknown".to_owned(), |force_n| format!("{force_n} N, known"));
     vec![
         format!("surface: {surface}"),
-        format!("sensors: {}", layout(&setup.layout, extent)),
+        format!("sensors: {}", layout(setup.layout(), extent)),
         format!("contact force: {force}"),
     ]
 }
@@ -269,7 +269,7 @@ fn csv(path: &Path, text: &str, rig: Option<&Path>) -> Result<Vec<String>, Failu
         let (low, high) = range(&mut positions.iter().map(of));
         format!("{} to {}", format_length_mm(low), format_length_mm(high))
     };
-    let positioned = match setup.surface.extent() {
+    let positioned = match setup.surface().extent() {
         Extent::Line { .. } => ends(|at| at.x_m),
         Extent::Plane { .. } => format!("{} along, {} across", ends(|at| at.x_m), ends(|at| at.y_m)),
     };

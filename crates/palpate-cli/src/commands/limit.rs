@@ -72,12 +72,12 @@ fn setup(arguments: &Arguments) -> Result<Setup, Failure> {
     let mut setup = input::read_rig(&arguments.rig)?.setup;
     for noise in &arguments.noise {
         let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
-        if !setup.layout.sensors().iter().any(meant) {
+        if !setup.layout().sensors().iter().any(meant) {
             let complaint =
                 Complaint::new(format!("--noise {noise}: no sensor of the rig measures in this unit"));
             return Err(complaint.help("give the noise in the unit of the readings, as in \"5 um\"").into());
         }
-        let edited = setup.layout.edit(|sensors| {
+        let edited = setup.edit_sensors(|sensors| {
             let meant = sensors.iter_mut().filter(|sensor| meant(sensor));
             meant.for_each(|sensor| sensor.channel.noise_sd = noise.value);
         });
@@ -108,10 +108,10 @@ fn limits<'a>(
     setup: &Setup,
     arguments: &Arguments,
 ) -> Result<Limits<'a>, LimitError> {
-    let force_n = arguments.force.or(setup.force_n).ok_or(LimitError::NoForce)?;
-    let unknown = arguments.unknown_force || setup.force_n.is_none();
+    let force_n = arguments.force.or(setup.force_n()).ok_or(LimitError::NoForce)?;
+    let unknown = arguments.unknown_force || setup.force_n().is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };
-    let extent = setup.surface.extent();
+    let extent = setup.surface().extent();
     let listed = match arguments.every {
         Some(every_m) => {
             let curve = LimitCurve::with_spacing(limit, force_n, force, every_m)?;
@@ -209,8 +209,8 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
     object! {
         "palpate": env!("CARGO_PKG_VERSION"),
         "rig": arguments.rig.display().to_string(),
-        "length_mm": setup.surface.extent().length_m() * 1e3,
-        "sensors": setup.layout.len(),
+        "length_mm": setup.surface().extent().length_m() * 1e3,
+        "sensors": setup.layout().len(),
         "sensors_alive": limits.limit.alive(),
         "force_n": limits.force_n,
         // What the rig knows of it: what the warnings are about.
@@ -231,7 +231,7 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
         "{}: {} of {} sensors alive, {} N, force {}\n",
         arguments.rig.display(),
         limits.limit.alive(),
-        setup.layout.len(),
+        setup.layout().len(),
         limits.force_n,
         limits.force.name()
     ))?;

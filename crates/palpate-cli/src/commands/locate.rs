@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
     let mut readings = Readings::open(path, &locator.setup, arguments.no_header)?;
-    let extent = locator.setup.surface.extent();
+    let extent = locator.setup.surface().extent();
     let mut out = std::io::stdout().lock();
     if !arguments.json {
         output::print(&mut out, heading(extent).as_bytes())?;

@@ -38,8 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(every_m) => {
             let repeats = rig.training.as_ref().map_or(1, |training| training.repeats);
             simulate_at(
-                &rig.pressed_setup(),
-                &every(rig.setup.surface.extent(), every_m).map_err(too_many)?,
+                &rig.pressed_setup().map_err(|error| Complaint::about(&arguments.rig, error))?,
+                &every(rig.setup.surface().extent(), every_m).map_err(too_many)?,
                 repeats,
                 arguments.seed,
             )
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let recording = recording.map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut csv = Vec::new();
-    recording::write(&recording, rig.setup.surface.extent(), &comment(arguments), &mut csv)
+    recording::write(&recording, rig.setup.surface().extent(), &comment(arguments), &mut csv)
         .map_err(|error| output::cannot("write", &arguments.out, &error))?;
     output::write_file(&arguments.out, &csv)?;
     output::say(format!(
@@ -66,7 +66,7 @@ fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
     let swings = rig.motion.is_some_and(|moving| moving.beam.is_some());
     let how = if swings { "" } else { ", in balance at every reading, without inertia" };
     let comment = comment(arguments) + how;
-    recording::write_timed(&timed, rig.setup.surface.extent(), &comment, &mut csv)
+    recording::write_timed(&timed, rig.setup.surface().extent(), &comment, &mut csv)
         .map_err(|error| output::cannot("write", &arguments.out, &error))?;
     output::write_file(&arguments.out, &csv)?;
     let rows = format_count(timed.recording.rows.len() as u64);

@@ -92,8 +92,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(folder) = &arguments.report {
         let sweep = match rig.as_ref().and_then(|rig| Some((rig, rig.motion.as_ref()?))) {
             Some((rig, moving)) if beam.is_some() => {
-                sweep_speeds(&locator, config, &rig.pressed_setup(), moving, arguments.seed)
-                    .map_err(Complaint::new)?
+                let pressed = rig.pressed_setup().map_err(Complaint::new)?;
+                sweep_speeds(&locator, config, &pressed, moving, arguments.seed).map_err(Complaint::new)?
             }
             _ => Vec::new(),
         };

@@ -36,23 +36,23 @@ pub(super) struct ForwardModel {
 impl ForwardModel {
     /// Model of a bench from the clean readings that its mechanics give.
     pub fn from_mechanics(setup: &Setup, force: Force, watch: Watch) -> Result<Self, PositionError> {
-        let surface = setup.surface.model().ok_or(PositionError::NoModel)?;
-        let force_n = setup.force_n.ok_or(PositionError::NoForce)?;
+        let surface = setup.surface().model().ok_or(PositionError::NoModel)?;
+        let force_n = setup.force_n().ok_or(PositionError::NoForce)?;
         let extent = surface.extent();
         let side = match extent {
             Extent::Line { .. } => ASKED,
             Extent::Plane { .. } => ASKED_ON_A_PLANE,
         };
         let positions = cells(extent, side, side);
-        let sensors = CleanSensors::new(surface, &setup.layout);
+        let sensors = CleanSensors::new(surface, setup.layout());
         let clean: Vec<Vec<f64>> =
             positions.iter().map(|&position| sensors.reading(Contact { position, force_n })).collect();
         let full_scale = |s: usize| clean.iter().map(|reading| reading[s].abs()).fold(0.0, f64::max);
-        let sd = |s: usize| match setup.layout.sensors()[s].channel.reading_sd() {
+        let sd = |s: usize| match setup.layout().sensors()[s].channel.reading_sd() {
             sd if sd > 0.0 => sd,
             _ => (NOMINAL_NOISE * full_scale(s)).max(f64::MIN_POSITIVE),
         };
-        let sds: Vec<(usize, f64)> = living(&setup.layout).map(|s| (s, sd(s))).collect();
+        let sds: Vec<(usize, f64)> = living(setup.layout()).map(|s| (s, sd(s))).collect();
         // The model is exact: regressions take as much noise as rounding leaves.
         Self::fit(&positions, &clean, &sds, 0.0, extent, force, watch)
     }

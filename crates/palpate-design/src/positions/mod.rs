@@ -103,13 +103,13 @@ impl PositionProblem {
     /// # Errors
     /// [`PositionError`], with what is missing.
     pub fn new(setup: &Setup, design: &PositionDesign) -> Result<Self, PositionError> {
-        if setup.surface.model().is_none() {
+        if setup.surface().model().is_none() {
             return Err(PositionError::NoModel);
         }
         design.check()?;
         let press_force_n = design.existing.as_ref().and_then(|training| training.force_n);
-        let pressed = Setup { force_n: press_force_n.or(setup.force_n), ..setup.clone() };
-        if pressed.force_n.is_none() {
+        let pressed = setup.clone().with_force(press_force_n.or(setup.force_n()))?;
+        if pressed.force_n().is_none() {
             return Err(PositionError::NoForce);
         }
         if design.estimator == Estimator::Auto {
@@ -119,11 +119,11 @@ impl PositionProblem {
         if count < needed {
             return Err(PositionError::TooFew { count, needed, kind: design.estimator.kind() });
         }
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let contacts = design.weighted_contacts(extent)?;
-        let calibration = Calibration::new(setup, press_force_n);
+        let calibration = Calibration::new(setup, press_force_n)?;
         let (force, calibration) = match design.force {
-            Force::Known if setup.force_n.is_some() => (Force::Known, calibration),
+            Force::Known if setup.force_n().is_some() => (Force::Known, calibration),
             _ => (Force::Unknown, calibration.unknown_force()),
         };
         Ok(Self { design: design.clone(), pressed, calibration, extent, force, contacts })
@@ -230,9 +230,9 @@ impl PositionProblem {
 
     /// Whether the setup reads the same, sensors in reverse, when the contact is mirrored.
     fn is_mirrored(&self) -> bool {
-        let Setup { surface, layout, force_n, .. } = &self.pressed;
-        let (Some(surface), Some(force_n)) = (surface.model(), *force_n) else { return false };
-        matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, layout, force_n)
+        let setup = &self.pressed;
+        let (Some(surface), Some(force_n)) = (setup.surface().model(), setup.force_n()) else { return false };
+        matches!(self.extent, Extent::Line { .. }) && search::reads_mirrored(surface, setup.layout(), force_n)
     }
 
     /// Result of calibrations with fresh noise.
@@ -263,7 +263,7 @@ impl PositionProblem {
         (first, count): (u64, usize),
         watch: Watch,
     ) -> Result<Vec<Evaluation>, PositionError> {
-        let channels = self.pressed.layout.sensors().iter().map(|sensor| sensor.channel);
+        let channels = self.pressed.layout().sensors().iter().map(|sensor| sensor.channel);
         let faultless = channels.into_iter().all(|channel| channel == ChannelModel::default());
         let readings = if faultless { 1 } else { readings.div_ceil(self.contacts.len()) };
         let calibration = self.calibration.clone().pressed_at(positions, self.design.repeats);

@@ -92,11 +92,11 @@ pub fn next_press(
     design: &PositionDesign,
     watch: Watch,
 ) -> Result<Advice, PositionError> {
-    let (extent, stop_percent) = (setup.surface.extent(), design.stop_percent);
+    let (extent, stop_percent) = (setup.surface().extent(), design.stop_percent);
     let stop = [("the gain in % that is worth a press", stop_percent)];
     OutOfRange::check("greater than 0 and less than 100", stop, |percent| percent > 0.0 && percent < 100.0)?;
     let contacts = design.weighted_contacts(extent)?;
-    let forward = ForwardModel::from_recording(recording, &setup.layout, extent, setup.force(), watch)?;
+    let forward = ForwardModel::from_recording(recording, setup.layout(), extent, setup.force(), watch)?;
     let mut expected = ExpectedError::new(&forward, &contacts, extent);
     let pressed = recording.distinct_positions();
     let first = expected.places.len();

@@ -67,9 +67,9 @@ fn a_search_keeps_to_its_trials() {
 #[test]
 fn a_bench_is_mirrored_or_not() {
     let setup = paper().setup;
-    let surface = setup.surface.model().unwrap();
-    assert!(reads_mirrored(surface, &setup.layout, 3.0));
-    let mut moved = setup.layout.clone();
+    let surface = setup.surface().model().unwrap();
+    assert!(reads_mirrored(surface, setup.layout(), 3.0));
+    let mut moved = setup.layout().clone();
     moved.edit(|sensors| sensors[0].position.x_m += 1e-3).unwrap();
     assert!(!reads_mirrored(surface, &moved, 3.0));
 }
@@ -115,7 +115,7 @@ fn the_limit_by_learnt_slopes_is_the_limit_by_mechanics() {
 fn the_least_variance_is_less_than_the_even_positions() {
     for (setup, count) in [(noisy().setup, 8), (plate(PlateSpec::DEFAULT_ELEMENTS).setup, 9)] {
         let forward = forward(&setup);
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let contacts = WeightedContacts::from_prior(&ContactPrior::all_over(extent), extent).unwrap();
         let found = variance::least(
             &forward,
@@ -179,7 +179,7 @@ fn what_cannot_be_designed_is_refused() {
     let auto = PositionDesign::default().estimator(Estimator::Auto);
     assert!(refusal(Example { design: auto, ..noisy() }, 5).contains("designed for one estimator"));
     let mut unknown = noisy();
-    unknown.setup.force_n = None;
+    unknown.setup = unknown.setup.unknown_force();
     assert!(refusal(unknown, 5).contains("the force of the presses is not known"));
     let measured = Example { setup: Setup::measured(0.1, &["left", "right"]).unwrap(), ..noisy() };
     assert!(refusal(measured, 5).contains("has no model"));
@@ -225,9 +225,9 @@ fn a_recording_that_tells_too_little_is_refused() {
     assert!(refused(&setup, &recording).contains("3 distinct positions; at least 4"));
     let (mut setup, recording) = begun(&[0.1, 0.2, 0.3, 0.35], 1);
     let perfect = |sensor: &mut Sensor| sensor.channel = ChannelModel::default();
-    setup.layout.edit(|sensors| sensors.iter_mut().for_each(perfect)).unwrap();
+    setup.edit_sensors(|sensors| sensors.iter_mut().for_each(perfect)).unwrap();
     assert!(refused(&setup, &recording).contains("how noisy channel 1 is"));
-    setup.layout.edit(|sensors| drop(sensors.pop())).unwrap();
+    setup.edit_sensors(|sensors| drop(sensors.pop())).unwrap();
     assert!(refused(&setup, &recording).contains("8 channels; the setup has 7"));
-    assert_eq!(setup.layout.kinds()[0], SensorKind::Deflection);
+    assert_eq!(setup.layout().kinds()[0], SensorKind::Deflection);
 }

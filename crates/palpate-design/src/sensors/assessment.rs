@@ -15,6 +15,7 @@ use palpate_estimators::arrangement::cells;
 use palpate_estimators::estimator::{Estimator, FitError};
 use palpate_estimators::evaluation::{Calibration, EvaluationError};
 use palpate_estimators::setup::Setup;
+use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::limit::{Bound, CramerRaoBound, Force, LimitCurve};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
@@ -165,12 +166,8 @@ impl SensorProblem<'_> {
     ) -> Result<Verification, EvaluationError<FitError>> {
         let Sensitivity { contacts, force_n, force, .. } = &self.sensitivity;
         let known = (*force == Force::Known).then_some(*force_n);
-        let setup = Setup {
-            surface: self.setup.surface.clone(),
-            layout: layout.clone(),
-            force_n: known,
-            columns: None,
-        };
+        let setup = Setup::new(self.setup.surface().clone()).with_layout(layout.clone());
+        let setup = setup.map_err(SimulateError::from)?.with_force(known).map_err(SimulateError::from)?;
         let guess = Estimator::contenders(&setup).into_iter().next();
         let estimator = match (estimator, &guess) {
             (Estimator::Influence(_), _) | (_, None) => estimator,
@@ -182,6 +179,7 @@ impl SensorProblem<'_> {
             Extent::Plane { .. } => TRAINING_ALONG_A_PLANE,
         };
         let calibration = Calibration::new(&setup, Some(*force_n))
+            .map_err(SimulateError::from)?
             .pressed_at(&cells(extent, side, side), PRESSES)
             .judged_at(&contacts.positions, READINGS.div_ceil(contacts.len()));
         let mut judged = Vec::new();

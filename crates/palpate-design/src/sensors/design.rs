@@ -162,7 +162,7 @@ impl SensorDesign {
     /// [`LimitError::NoModel`] where no model explains the sensors.
     pub fn for_setup(setup: &Setup) -> Result<Self, DesignError> {
         let mut offers: Vec<SensorOffer> = Vec::new();
-        for sensor in setup.layout.sensors() {
+        for sensor in setup.layout().sensors() {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {
                 let channel = ChannelModel { dead: false, ..sensor.channel };
                 offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0 });
@@ -171,9 +171,9 @@ impl SensorDesign {
         if offers.is_empty() {
             return Err(LimitError::NoModel.into());
         }
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         Ok(Self {
-            count: setup.layout.len(),
+            count: setup.layout().len(),
             offers,
             sites: Sites::Every(spacing(extent, SITES_ALONG_A_LINE, SITES_ALONG_A_PLANE)),
             contacts: ContactPrior::all_over(extent),

@@ -174,7 +174,7 @@ impl SensorProblem<'_> {
 
     /// The setup's own layout.
     fn existing(&self) -> Result<Designed, DesignError> {
-        let layout = self.setup.layout.clone();
+        let layout = self.setup.layout().clone();
         let assessment = self.assess(&layout)?;
         Ok(Designed { method: Method::Existing, layout, assessment })
     }

@@ -80,8 +80,8 @@ impl<'a> SensorProblem<'a> {
     /// [`DesignError`], with the constraint that no layout can keep or the number that is out of its range, or when the watch
     /// stopped it.
     pub fn new(setup: &'a Setup, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
-        let surface = setup.surface.model().ok_or(LimitError::NoModel)?;
-        let force_n = setup.force_n.ok_or(LimitError::NoForce)?;
+        let surface = setup.surface().model().ok_or(LimitError::NoModel)?;
+        let force_n = setup.force_n().ok_or(LimitError::NoForce)?;
         design.check(surface.extent())?;
         let noiseless = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
         if let Some(offer) = noiseless {

@@ -84,7 +84,7 @@ fn random_problem(setup: &Setup, design: &SensorDesign, rng: &mut impl Rng) -> S
     } else {
         vec![kinds[0].clone(), kinds[rng.random_range(1..3)].clone()]
     };
-    let length_m = setup.surface.extent().length_m();
+    let length_m = setup.surface().extent().length_m();
     let sites: Vec<Position> =
         (0..20 / offers.len()).map(|_| Position::along(rng.random_range(0.01..0.99) * length_m)).collect();
     let from = rng.random_range(0.02..0.3) * length_m;
@@ -211,7 +211,7 @@ fn what_cannot_be_met_is_named() {
     // As many as the message says do fit.
     assert!(matches!(refusal(&setup, &spaced), DesignError::Spacing { most: 7, .. }));
     problem(&setup, &SensorDesign { count: 7, ..spaced });
-    let unknown = Setup { force_n: None, ..setup.clone() };
+    let unknown = setup.clone().unknown_force();
     assert_eq!(refusal(&unknown, &base), DesignError::Limit(LimitError::NoForce));
 }
 
@@ -306,7 +306,7 @@ fn plates_are_designed_too() {
         // 11 × 11 sites, of which those on the simply supported edges never move.
         assert_eq!((problem.candidates(), problem.contacts().len()), (81, 81));
         let even = problem.even().unwrap();
-        assert_eq!(even.layout, setup.layout);
+        assert_eq!(&even.layout, setup.layout());
         let designed = exchanged(&problem);
         assert!(designed.assessment.score < even.assessment.score);
     }

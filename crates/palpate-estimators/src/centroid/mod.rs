@@ -83,7 +83,7 @@ impl Fit for Centroid {
 
 /// A locator whose map is still empty.
 fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator, CentroidFitError> {
-    let sensors = setup.layout.sensors();
+    let sensors = setup.layout().sensors();
     let live = sensors.iter().filter(|sensor| !sensor.channel.dead).count();
     if live < 2 {
         return Err(CentroidFitError::TooFewSensors { found: live });
@@ -106,11 +106,11 @@ fn uncalibrated(setup: &Setup, recording: &Recording) -> Result<CentroidLocator,
         Weighing::Positions(sensors.iter().map(|sensor| sensor.position).collect())
     };
     Ok(CentroidLocator {
-        extent: setup.surface.extent(),
+        extent: setup.surface().extent(),
         channel_scales,
         weighing,
         map: Vec::new(),
-        force_n: setup.force_n,
+        force_n: setup.force_n(),
         spread: None,
     })
 }
@@ -244,7 +244,7 @@ impl Locate for CentroidLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        let channels = setup.layout.len();
+        let channels = setup.layout().len();
         LocatorFault::check_count("channel scales", channels, self.channel_scales.len())?;
         let scales = &self.channel_scales;
         LocatorFault::check_numbers("channel scale", scales, |scale| scale >= 0.0, "a number of at least 0")?;

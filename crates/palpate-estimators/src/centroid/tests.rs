@@ -7,10 +7,10 @@ use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
-use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
+use palpate_mechanics::surface::{Beam, Extent};
 
 fn fit(setup: &Setup, rows: Vec<Row>) -> Result<CentroidLocator, CentroidFitError> {
-    let recording = Recording::new(&setup.layout, "test", rows);
+    let recording = Recording::new(setup.layout(), "test", rows);
     let task = FitTask::new(setup, &recording);
     let locator = Centroid.fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));
@@ -24,12 +24,7 @@ fn pad(channels: usize, width_m: Option<f64>) -> Setup {
     let mut layout = Layout::even(SensorKind::Raw, channels, 0.1);
     let name = |(i, sensor): (usize, &mut Sensor)| sensor.name = format!("c{i}");
     layout.edit(|sensors| sensors.iter_mut().enumerate().for_each(name)).unwrap();
-    Setup {
-        surface: SurfaceSpec::Measured(Extent::new(0.1, width_m).unwrap()),
-        layout,
-        force_n: None,
-        columns: None,
-    }
+    Setup::new(Extent::new(0.1, width_m).unwrap()).with_layout(layout).unwrap()
 }
 
 /// Two supports share a force by the lever: their centroid is the contact itself.
@@ -42,7 +37,7 @@ fn scales() -> Setup {
         channel: Default::default(),
     };
     let layout = Layout::new(vec![support("left", 0.0), support("right", 0.4)]).unwrap();
-    Setup { surface: SurfaceSpec::Beam(beam), layout, force_n: None, columns: None }
+    Setup::new(beam).with_layout(layout).unwrap()
 }
 
 fn lever(x_m: f64, force_n: f64) -> Row {
@@ -114,7 +109,7 @@ fn what_does_not_calibrate_is_named() {
         message(&setup, silent),
         "every reaction reading of the recording is 0; a centroid weighs sensors by what they read"
     );
-    setup.layout.set_dead(0, true);
+    setup.set_dead(0, true);
     assert_eq!(
         message(&setup, rows),
         "a centroid needs at least 2 sensors that are not dead; the layout has 1"

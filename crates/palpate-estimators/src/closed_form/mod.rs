@@ -84,15 +84,16 @@ impl Fit for ClosedForm {
     type Error = ClosedFormFitError;
 
     fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
-        if setup.surface.model().is_none() {
+        if setup.surface().model().is_none() {
             return Err(ClosedFormFitError::NoModel);
         }
-        let SurfaceSpec::Beam(beam) = setup.surface else { return Err(ClosedFormFitError::NotABeam) };
-        if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
+        let SurfaceSpec::Beam(beam) = setup.surface() else { return Err(ClosedFormFitError::NotABeam) };
+        if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
             return Err(ClosedFormFitError::NotModelled { kind });
         }
-        let locator = ClosedFormLocator { beam, layout: setup.layout.clone(), force_n: setup.force_n };
-        let (needed, found) = (unknowns(1, setup.force_n), locator.seeing().len());
+        let locator =
+            ClosedFormLocator { beam: *beam, layout: setup.layout().clone(), force_n: setup.force_n() };
+        let (needed, found) = (unknowns(1, setup.force_n()), locator.seeing().len());
         if found < needed { Err(ClosedFormFitError::TooFewSensors { needed, found }) } else { Ok(locator) }
     }
 }
@@ -243,7 +244,7 @@ impl Locate for ClosedFormLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("sensors", setup.layout.len(), self.layout.len())?;
+        LocatorFault::check_count("sensors", setup.layout().len(), self.layout.len())?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;

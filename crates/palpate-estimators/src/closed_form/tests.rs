@@ -9,7 +9,7 @@ use crate::setup::Setup;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, Layout, Sensor, SensorKind, measure};
-use palpate_mechanics::surface::{Beam, Extent, Surface, SurfaceSpec};
+use palpate_mechanics::surface::{Beam, Extent, Surface};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -23,7 +23,7 @@ fn setup(sensors: &[(SensorKind, f64)], noise_sd: f64, force_n: Option<f64>) -> 
         channel: ChannelModel { noise_sd, ..ChannelModel::default() },
     });
     let layout = Layout::new(sensors.collect()).unwrap();
-    Setup { surface: SurfaceSpec::Beam(*BEAM), layout, force_n, columns: None }
+    Setup::new(*BEAM).with_layout(layout).unwrap().with_force(force_n).unwrap()
 }
 
 fn even(kind: SensorKind, count: usize) -> Vec<(SensorKind, f64)> {
@@ -37,9 +37,9 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
         position: Position::along(0.1),
         force_n: None,
         nuisance: None,
-        reading: vec![0.0; setup.layout.len()],
+        reading: vec![0.0; setup.layout().len()],
     };
-    let recording = Recording::new(&setup.layout, "test", vec![row]);
+    let recording = Recording::new(setup.layout(), "test", vec![row]);
     let task = FitTask::new(setup, &recording);
     let locator = ClosedForm.fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));
@@ -48,7 +48,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
 
 fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     let contact = Position::along(x_m);
-    let sensors = setup.layout.sensors().iter();
+    let sensors = setup.layout().sensors().iter();
     sensors.map(|s| force_n * BEAM.influence(s.kind, s.position, contact)).collect()
 }
 
@@ -131,7 +131,7 @@ fn monte_carlo(setup: &Setup, x_m: f64, force_n: f64) -> (f64, f64, f64, f64) {
     let (mut sum, mut squares, mut sd, mut covered) = (0.0, 0.0, 0.0, 0.0);
     let draws = 2000;
     for _ in 0..draws {
-        let reading = measure(&setup.layout, &truth, &ChannelErrors::none(&setup.layout), &mut rng);
+        let reading = measure(setup.layout(), &truth, &ChannelErrors::none(setup.layout()), &mut rng);
         let contact = locator.locate(&reading).contact;
         let (error, uncertainty) = (contact.position.x_m - x_m, contact.uncertainty.unwrap());
         sum += error;
@@ -186,7 +186,7 @@ fn what_no_contact_explains_is_not_located() {
 #[test]
 fn a_dead_channel_is_left_out() {
     let mut deflections = setup(&even(SensorKind::Deflection, 8), 5e-6, None);
-    deflections.layout.set_dead(3, true);
+    deflections.set_dead(3, true);
     let mut reading = clean(&deflections, 0.17, 3.0);
     reading[3] = 0.0;
     let estimate = fit(&deflections).unwrap().locate(&reading);
@@ -197,8 +197,8 @@ fn a_dead_channel_is_left_out() {
 #[test]
 fn what_does_not_suit_is_named() {
     let message = |setup: &Setup| fit(setup).unwrap_err().to_string();
-    let mut measured = setup(&SCALES, 0.0, None);
-    measured.surface = SurfaceSpec::Measured(Extent::line(0.4).unwrap());
+    let layout = setup(&SCALES, 0.0, None).layout().clone();
+    let measured = Setup::new(Extent::line(0.4).unwrap()).with_layout(layout).unwrap();
     assert!(message(&measured).contains("no model"));
     assert_eq!(
         message(&setup(&[(SensorKind::Raw, 0.1)], 0.0, None)),

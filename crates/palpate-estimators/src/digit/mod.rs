@@ -115,12 +115,13 @@ impl Fit for DigitEstimator {
     type Error = DigitFitError;
 
     fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<DigitLocator, DigitFitError> {
-        let SurfaceSpec::Digit(digit) = setup.surface else { return Err(DigitFitError::NotADigit) };
-        if let Some(kind) = setup.layout.kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
+        let SurfaceSpec::Digit(digit) = setup.surface() else { return Err(DigitFitError::NotADigit) };
+        if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind != SensorKind::Strain) {
             return Err(DigitFitError::NotAGauge { kind });
         }
-        let force_n = setup.force_n;
-        let locator = DigitLocator { digit, layout: setup.layout.clone(), force_n, theory: self.theory };
+        let force_n = setup.force_n();
+        let locator =
+            DigitLocator { digit: *digit, layout: setup.layout().clone(), force_n, theory: self.theory };
         let noiseless = |sensor: &Sensor| {
             let sd = sensor.channel.reading_sd();
             !(sensor.channel.dead || sd > 0.0 && sd.is_finite())
@@ -267,7 +268,7 @@ impl Locate for DigitLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("gauges", setup.layout.len(), self.layout.len())?;
+        LocatorFault::check_count("gauges", setup.layout().len(), self.layout.len())?;
         let others = self.layout.kinds().into_iter().filter(|kind| *kind != SensorKind::Strain).count();
         LocatorFault::check_count("sensors that are no gauges", 0, others)?;
         let places = self.layout.sensors().iter().map(|sensor| sensor.position.x_m);
@@ -781,12 +782,12 @@ pub struct LinearTheory<'a> {
 impl<'a> LinearTheory<'a> {
     /// A locator for the bench of a digit; `None` where the linear theory does not suit its sensors.
     pub fn new(setup: &Setup, digit: &'a Digit) -> Option<Self> {
-        let unknown = Setup { force_n: None, ..setup.clone() };
+        let unknown = setup.clone().unknown_force();
         // The estimator learns nothing, but every fit wants a recording.
-        let recording = Recording::new(&setup.layout, "", Vec::new());
+        let recording = Recording::new(setup.layout(), "", Vec::new());
         let task = FitTask::new(&unknown, &recording);
         let locator = DigitEstimator { theory: DigitTheory::Linear }.fit_method(task).ok()?;
-        Some(Self { locator, sensors: CleanSensors::new(digit, &setup.layout) })
+        Some(Self { locator, sensors: CleanSensors::new(digit, setup.layout()) })
     }
 
     /// Errors of position, in metres, and of force, in newtons, of a contact that is read without noise; NaN for a force that is not found.

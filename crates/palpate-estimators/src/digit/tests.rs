@@ -16,12 +16,12 @@ fn example() -> Setup {
 }
 
 fn digit(setup: &Setup) -> Digit {
-    let SurfaceSpec::Digit(digit) = setup.surface else { panic!("{:?}", setup.surface) };
-    digit
+    let SurfaceSpec::Digit(digit) = setup.surface() else { panic!("{:?}", setup.surface()) };
+    *digit
 }
 
 fn locator(setup: &Setup, theory: DigitTheory) -> Locator {
-    let pressed = Setup { force_n: Some(1.0), ..setup.clone() };
+    let pressed = setup.clone().known_force(1.0).unwrap();
     let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
     let config = Estimator::Digit(DigitEstimator { theory });
     config.fit(setup, &recording).unwrap()
@@ -34,7 +34,7 @@ fn method(locator: &Locator) -> &DigitLocator {
 
 fn clean(setup: &Setup, x_m: f64, force_n: f64) -> Vec<f64> {
     let contact = Contact { position: Position::along(x_m), force_n };
-    clean_reading(setup.surface.model().unwrap(), &setup.layout, contact)
+    clean_reading(setup.surface().model().unwrap(), setup.layout(), contact)
 }
 
 /// Results of a locator on contacts between the second gauge and the tip.
@@ -58,7 +58,7 @@ fn tally(setup: &Setup, force_n: f64, from_m: f64, count: usize, seed: u64) -> T
     let share = |i: usize| (i as f64 + 0.5) / count as f64;
     let positions: Vec<Position> =
         (0..count).map(|i| Position::along(from_m + share(i) * (l - from_m))).collect();
-    let pressed = Setup { force_n: Some(force_n), ..setup.clone() };
+    let pressed = setup.clone().known_force(force_n).unwrap();
     let recording = simulate_at(&pressed, &positions, 1, seed).unwrap();
     let (locator, limit) = (locator(setup, DigitTheory::Exact), setup.cramer_rao_bound().unwrap());
     let mut tally = Tally::default();
@@ -137,7 +137,7 @@ fn what_one_gauge_sees_alone_is_ambiguous_unless_the_force_is_known() {
     assert!(low_m < 0.006 && high_m > 0.018 && high_m < 0.021, "{low_m} {high_m}");
     // The moment at the gauge is told, and so force times lever.
     assert!((force_n.unwrap() * (position.x_m - 0.004) / (2.0 * 0.010) - 1.0).abs() < 0.02);
-    let known = Setup { force_n: Some(2.0), ..setup.clone() };
+    let known = setup.clone().known_force(2.0).unwrap();
     let estimate = locator(&known, DigitTheory::Exact).locate(&reading).unwrap();
     assert_eq!(estimate.status, Status::Located);
     assert!((estimate.contact.position.x_m - 0.014).abs() < 1e-9);
@@ -163,8 +163,7 @@ fn readings_that_no_push_explains_say_so() {
 fn dead_and_saturated_gauges_are_left_out() {
     let mut setup = example();
     setup
-        .layout
-        .edit(|sensors| {
+        .edit_sensors(|sensors| {
             sensors.iter_mut().for_each(|sensor| sensor.channel.range = Some((-1500e-6, 1500e-6)));
         })
         .unwrap();
@@ -209,7 +208,7 @@ fn the_shape_has_an_honest_band() {
     let setup = example();
     let locator = locator(&setup, DigitTheory::Exact);
     let truth = Contact { position: Position::along(0.07), force_n: 4.0 };
-    let pressed = Setup { force_n: Some(truth.force_n), ..setup.clone() };
+    let pressed = setup.clone().known_force(truth.force_n).unwrap();
     let recording = simulate_at(&pressed, &[truth.position], 400, 3).unwrap();
     let (mut squares, mut variances) = (0.0, 0.0);
     for row in &recording.rows {
@@ -257,7 +256,7 @@ fn benches_that_do_not_suit_are_refused_in_words() {
     let paper = fixtures::paper(5e-6, 1).setup;
     let good = example();
     let refused = |setup: &Setup| {
-        let pressed = Setup { force_n: Some(1.0), ..setup.clone() };
+        let pressed = setup.clone().known_force(1.0).unwrap();
         let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
         let config = Estimator::Digit(DigitEstimator::default());
         config.fit(setup, &recording).unwrap_err().to_string()
@@ -269,10 +268,10 @@ fn benches_that_do_not_suit_are_refused_in_words() {
     };
     let shown = [
         refused(&paper),
-        with(&|setup| setup.layout.edit(|sensors| sensors[3].kind = SensorKind::Deflection).unwrap()),
-        with(&|setup| setup.layout.edit(|sensors| sensors[3].channel.noise_sd = 0.0).unwrap()),
-        with(&|setup| setup.layout.edit(|sensors| sensors.truncate(1)).unwrap()),
-        with(&|setup| setup.force_n = Some(20.0)),
+        with(&|setup| setup.edit_sensors(|sensors| sensors[3].kind = SensorKind::Deflection).unwrap()),
+        with(&|setup| setup.edit_sensors(|sensors| sensors[3].channel.noise_sd = 0.0).unwrap()),
+        with(&|setup| setup.edit_sensors(|sensors| sensors.truncate(1)).unwrap()),
+        refused(&good.clone().known_force(20.0).unwrap()),
     ];
     insta::assert_snapshot!(shown.join("\n"));
 }

@@ -154,10 +154,10 @@ impl Estimator {
             Self::Influence(Influence::default()),
             Self::GaussianProcess(GaussianProcessEstimator::default()),
         ];
-        if matches!(setup.surface, SurfaceSpec::Beam(_)) {
+        if matches!(setup.surface(), SurfaceSpec::Beam(_)) {
             contenders.push(Self::ClosedForm(ClosedForm));
         }
-        if matches!(setup.surface, SurfaceSpec::Digit(_)) {
+        if matches!(setup.surface(), SurfaceSpec::Digit(_)) {
             contenders.insert(0, Self::Digit(DigitEstimator::default()));
         }
         contenders.extend([
@@ -254,7 +254,7 @@ impl Locator {
     /// # Errors
     /// [`LeaveOutError`] when there is no such channel, or the method needs it.
     pub fn leave_out(&mut self, channel: usize) -> Result<(), LeaveOutError> {
-        let channels = self.setup.layout.len();
+        let channels = self.setup.layout().len();
         if channel >= channels {
             return Err(LeaveOutError::NoChannel { channel: channel + 1, channels });
         }
@@ -275,7 +275,7 @@ impl Locator {
             }
             _ => return Err(LeaveOutError::Needed { kind }),
         }
-        self.setup.layout.set_dead(channel, true);
+        self.setup.set_dead(channel, true);
         Ok(())
     }
 
@@ -386,7 +386,7 @@ impl Locator {
                     let (influence, offset, noise_sd) = channel?;
                     Some(LoadChannel { influence: Arc::new(influence), offset, noise_sd })
                 });
-                Ok(LoadSensors { extent: self.setup.surface.extent(), channels: channels.collect() })
+                Ok(LoadSensors { extent: self.setup.surface().extent(), channels: channels.collect() })
             }
             _ => LoadSensors::from_setup(&self.setup),
         }
@@ -429,7 +429,7 @@ impl Locator {
     /// # Errors
     /// [`NotTrackable`] for a locator whose method has no likelihood, or for a swing of a surface whose modes are not known.
     pub fn tracking(&self, config: &TrackerConfig) -> Result<Tracking, NotTrackable> {
-        if config.swing.is_some() && !matches!(self.setup.surface, SurfaceSpec::Beam(_)) {
+        if config.swing.is_some() && !matches!(self.setup.surface(), SurfaceSpec::Beam(_)) {
             return Err(NotTrackable::Mode);
         }
         match &self.method {

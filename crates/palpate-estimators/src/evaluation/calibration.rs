@@ -1,12 +1,13 @@
 //! Simulated calibrations: press a setup with faulty sensors, fit, touch it, locate.
 
 use super::{Evaluation, EvaluationError, Split};
-use crate::arrangement::{ArrangementError, Training, all_over};
+use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, SeedList};
 use crate::setup::Setup;
 use crate::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::ChannelModel;
+use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
 
 /// A calibration to simulate: where a setup is pressed and how hard, what the locator is told of the force, and the contacts
@@ -58,25 +59,28 @@ pub struct Calibrated<M> {
 impl Calibration {
     /// A calibration by presses of `press_force_n`, or else of the setup's force, nowhere yet. Contacts have the setup's force, or
     /// that of the presses where the setup does not know it; there is one at each position of [`all_over`].
-    pub fn new(setup: &Setup, press_force_n: Option<f64>) -> Self {
-        let with = |force_n| Setup { force_n, ..setup.clone() };
-        let press_force_n = press_force_n.or(setup.force_n);
-        Self {
-            pressed: with(press_force_n),
-            touched: with(setup.force_n.or(press_force_n)),
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a force of the presses that is not greater than 0 and finite.
+    pub fn new(setup: &Setup, press_force_n: Option<f64>) -> Result<Self, OutOfRange> {
+        let with = |force_n| setup.clone().with_force(force_n);
+        let press_force_n = press_force_n.or(setup.force_n());
+        Ok(Self {
+            pressed: with(press_force_n)?,
+            touched: with(setup.force_n().or(press_force_n))?,
             known: setup.clone(),
             presses: Vec::new(),
-            contacts: all_over(setup.surface.extent()),
-        }
+            contacts: all_over(setup.surface().extent()),
+        })
     }
 
     /// A calibration at training positions, with the force of these presses.
     ///
     /// # Errors
-    /// [`ArrangementError`] when the positions cannot be laid out on the surface.
-    pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, ArrangementError> {
-        let positions = training.positions(setup.surface.extent())?;
-        Ok(Self::new(setup, training.force_n).pressed_at(&positions, training.repeats))
+    /// [`SimulateError`] when the positions cannot be laid out on the surface, or for a force out of its range.
+    pub fn from_training(setup: &Setup, training: &Training) -> Result<Self, SimulateError> {
+        let positions = training.positions(setup.surface().extent())?;
+        Ok(Self::new(setup, training.force_n)?.pressed_at(&positions, training.repeats))
     }
 
     /// The same by presses at other positions, `repeats` at each.
@@ -93,9 +97,8 @@ impl Calibration {
 
     /// The same for a locator that is not told the force of its contacts.
     #[must_use]
-    pub fn unknown_force(mut self) -> Self {
-        self.known.force_n = None;
-        self
+    pub fn unknown_force(self) -> Self {
+        Self { known: self.known.unknown_force(), ..self }
     }
 
     /// Positions of the presses, each as often as it is pressed.
@@ -113,7 +116,7 @@ impl Calibration {
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
         let recording = simulate_at(&self.touched, &all, 1, seed)?;
-        let training = if self.pressed.force_n == self.touched.force_n {
+        let training = if self.pressed.force_n() == self.touched.force_n() {
             recording.subset(pressed)
         } else {
             simulate_at(&self.pressed, &self.presses, 1, seed)?
@@ -164,7 +167,7 @@ impl Calibration {
 
     /// Whether every channel reports what its sensor reads.
     fn is_faultless(&self) -> bool {
-        self.pressed.layout.sensors().iter().all(|sensor| sensor.channel == ChannelModel::default())
+        self.pressed.layout().sensors().iter().all(|sensor| sensor.channel == ChannelModel::default())
     }
 }
 

@@ -115,11 +115,11 @@ impl Evaluation {
                 truth: row.position,
                 force_n: row.force_n,
                 estimate: contact.position,
-                covered: covered(&contact, row.position, locator.setup.surface.extent()),
+                covered: covered(&contact, row.position, locator.setup.surface().extent()),
             })
         };
         let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
-        Ok(Self { extent: locator.setup.surface.extent(), located })
+        Ok(Self { extent: locator.setup.surface().extent(), located })
     }
 
     /// The errors within a portion, or everywhere; `None` where nothing was located.
@@ -213,7 +213,7 @@ const LARGE_LIMIT_ON_A_PLANE: f64 = 1.0 / 20.0;
 /// 1/200 of the length, on a plane 1/20.
 pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     let limit = setup.cramer_rao_bound().ok()?;
-    let extent = setup.surface.extent();
+    let extent = setup.surface().extent();
     let within =
         |at_m: f64, size_m: f64| (ENDS * size_m - 1e-9..=(1.0 - ENDS) * size_m + 1e-9).contains(&at_m);
     let is_inner = |at: Position| {
@@ -225,7 +225,7 @@ pub fn limit_ratio(setup: &Setup, evaluation: &Evaluation) -> Option<f64> {
     };
     let (mut error_m, mut bound_m) = (0.0, 0.0);
     for located in &evaluation.located {
-        let Some(force_n) = located.force_n.or(setup.force_n) else { continue };
+        let Some(force_n) = located.force_n.or(setup.force_n()) else { continue };
         let bound = limit.bound_at(Contact { position: located.truth, force_n }, setup.force());
         let Some(bound) = bound.filter(|bound| bound.sd_position_m <= large * extent.length_m()) else {
             continue;
@@ -313,7 +313,7 @@ pub fn evaluate_splits<E: Fit>(
     clock: &dyn Fn() -> f64,
     watch: Watch,
 ) -> Result<TimedEvaluation, EvaluationError<E::Error>> {
-    let mut evaluation = Evaluation { extent: setup.surface.extent(), located: Vec::new() };
+    let mut evaluation = Evaluation { extent: setup.surface().extent(), located: Vec::new() };
     let (mut fitting_s, mut locating_s) = (0.0, 0.0);
     for split in splits {
         let start = clock();

@@ -19,7 +19,7 @@ pub enum FeatureKind {
 impl FeatureKind {
     /// The readings where the force is known, and what the load does not change where it is not.
     pub fn for_setup(setup: &Setup) -> Self {
-        if setup.force_n.is_some() { Self::Readings } else { Self::LoadInvariant }
+        if setup.force_n().is_some() { Self::Readings } else { Self::LoadInvariant }
     }
 }
 

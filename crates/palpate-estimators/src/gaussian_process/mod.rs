@@ -81,7 +81,7 @@ impl Fit for GaussianProcessEstimator {
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let kind = self.features.unwrap_or_else(|| FeatureKind::for_setup(setup));
         let features = Features::fit(kind, recording)?;
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let rows = recording.rows.len();
         let mut coordinates = Array2::zeros((rows, features.len()));
         for (row, mut out) in recording.rows.iter().zip(coordinates.outer_iter_mut()) {
@@ -96,7 +96,7 @@ impl Fit for GaussianProcessEstimator {
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let process = regression.fit(samples, watch)?;
-        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n })
+        Ok(GaussianProcessLocator { features, process, extent, force_n: setup.force_n() })
     }
 }
 
@@ -136,10 +136,10 @@ impl Locate for GaussianProcessLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        self.features.check(setup.layout.len())?;
+        self.features.check(setup.layout().len())?;
         let coordinates = self.process.coordinates();
         LocatorFault::check_count("coordinates of its Gaussian process", self.features.len(), coordinates)?;
-        let outputs = setup.surface.extent().dimensions();
+        let outputs = setup.surface().extent().dimensions();
         LocatorFault::check_count("outputs", outputs, self.process.outputs())?;
         LocatorFault::check_numbers(
             "extent",

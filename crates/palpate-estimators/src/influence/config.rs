@@ -39,7 +39,7 @@ impl Default for Influence {
 impl Influence {
     /// Knowledge of the force, by the setup and the settings.
     pub(super) fn force_belief(&self, setup: &Setup) -> ForceBelief {
-        match (setup.force_n, self.force_sd_n) {
+        match (setup.force_n(), self.force_sd_n) {
             (None, _) => ForceBelief::Unknown,
             (Some(force_n), None) => ForceBelief::Known(force_n),
             (Some(mean_n), Some(sd_n)) => ForceBelief::Normal { mean_n, sd_n },

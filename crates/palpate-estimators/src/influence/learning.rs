@@ -45,8 +45,8 @@ pub(super) fn learn(
     places: &[Position],
     take: &mut dyn FnMut(usize, &LearntInfluence),
 ) -> Result<Channels, InfluenceFitError> {
-    let surface = task.setup.surface.model().ok_or(InfluenceFitError::NoModel)?;
-    let layout = &task.setup.layout;
+    let surface = task.setup.surface().model().ok_or(InfluenceFitError::NoModel)?;
+    let layout = task.setup.layout();
     check_sensors(layout)?;
     let presses = Presses::average(task.recording)?;
     let needed = match (from, surface.extent().dimensions()) {

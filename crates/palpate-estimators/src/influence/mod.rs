@@ -38,12 +38,12 @@ impl Fit for Influence {
     type Error = InfluenceFitError;
 
     fn fit_method(&self, task: FitTask) -> Result<InfluenceLocator, InfluenceFitError> {
-        if task.setup.surface.model().is_none() {
+        if task.setup.surface().model().is_none() {
             self.check_measured()?;
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
-        if let Extent::Plane { .. } = task.setup.surface.extent() {
+        if let Extent::Plane { .. } = task.setup.surface().extent() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));
         }
         Ok(InfluenceLocator::Beam(Box::new(self.fit_beam(task)?)))

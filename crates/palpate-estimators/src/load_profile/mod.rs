@@ -87,7 +87,7 @@ impl<'a> LoadSensors<'a> {
     /// # Errors
     /// [`LoadSensorsError`] for a surface without a model, a live sensor without noise, or when none is alive.
     pub fn from_setup(setup: &'a Setup) -> Result<Self, LoadSensorsError> {
-        Self::new(setup.surface.model().ok_or(LoadSensorsError::NoModel)?, &setup.layout)
+        Self::new(setup.surface().model().ok_or(LoadSensorsError::NoModel)?, setup.layout())
     }
 
     /// The channels that live.

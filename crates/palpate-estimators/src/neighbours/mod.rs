@@ -73,11 +73,11 @@ impl Fit for Neighbours {
         let best = (0..errors.len()).min_by(|a, b| square(&errors[*a]).total_cmp(&square(&errors[*b])));
         let best = best.unwrap_or(0);
         Ok(NeighboursLocator {
-            extent: task.setup.surface.extent(),
+            extent: task.setup.surface().extent(),
             features,
             count: best + 1,
             rows,
-            force_n: task.setup.force_n,
+            force_n: task.setup.force_n(),
             spread: errors.get(best).and_then(|errors| HeldOutErrors::from_errors(errors)),
         })
     }
@@ -139,7 +139,7 @@ impl Locate for NeighboursLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        self.features.check(setup.layout.len())?;
+        self.features.check(setup.layout().len())?;
         LocatorFault::check_numbers("count of neighbours", [self.count as f64], |k| k >= 1.0, "at least 1")?;
         LocatorFault::check_numbers("count of rows", [self.rows.len() as f64], |n| n >= 1.0, "at least 1")?;
         for row in &self.rows {

@@ -11,7 +11,7 @@ use palpate_mechanics::surface::{Extent, SurfaceSpec};
 fn setup(force_n: Option<f64>) -> Setup {
     let layout = Layout::even(SensorKind::Raw, 2, 0.1);
     let surface = SurfaceSpec::Measured(Extent::plane(0.1, 0.1).unwrap());
-    Setup { surface, layout, force_n, columns: None }
+    Setup::new(surface).with_layout(layout).unwrap().with_force(force_n).unwrap()
 }
 
 /// Readings turn with the position and grow with the force.
@@ -32,7 +32,7 @@ fn grid(force_n: f64) -> Vec<Row> {
 }
 
 fn fit(setup: &Setup, rows: Vec<Row>) -> Result<NeighboursLocator, NeighboursFitError> {
-    let recording = Recording::new(&setup.layout, "test", rows);
+    let recording = Recording::new(setup.layout(), "test", rows);
     let task = FitTask::new(setup, &recording);
     let locator = Neighbours::default().fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));

@@ -349,7 +349,7 @@ impl<'a> Coded<'a> {
             return Err(NetworkFitError::TooManyRows { found: rows, most: TrainingSet::MOST });
         }
         let scaling = channel_scaling(config.input_scale, setup, recording)?;
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let scale_m = |size_m| if config.output == OutputCoding::Position { 1.0 } else { size_m };
         let output_scale_m: Vec<f64> = extent.sides_m().map(scale_m).collect();
         let inputs = |row: &Row| -> Vec<f64> {
@@ -387,7 +387,7 @@ fn channel_scaling(
     let column = |c: usize| recording.rows.iter().map(move |row| row.reading[c]);
     let largest = || recording.rows.iter().flat_map(|row| &row.reading).fold(0.0, |m: f64, r| m.max(r.abs()));
     let one = |c: usize| {
-        let (offset, divisor, what) = match (scale, setup.surface.model().zip(setup.force_n)) {
+        let (offset, divisor, what) = match (scale, setup.surface().model().zip(setup.force_n())) {
             (InputScale::DivideBy(divisor), _) => (0.0, divisor, "divisor"),
             (InputScale::FullScale, Some((surface, force_n))) => {
                 (0.0, surface.full_scale(recording.kinds[c]) * force_n, "full scale")
@@ -591,6 +591,6 @@ impl Locate for NetworkLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        self.parts.check_numbers(setup.layout.len())
+        self.parts.check_numbers(setup.layout().len())
     }
 }

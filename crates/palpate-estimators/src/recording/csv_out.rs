@@ -20,7 +20,7 @@ use palpate_mechanics::units::Unit;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let presses = setup.simulate(&Training::even(10), 0)?;
 /// let mut file = Vec::new();
-/// recording::write(&presses, setup.surface.extent(), "simulated", &mut file)?;
+/// recording::write(&presses, setup.surface().extent(), "simulated", &mut file)?;
 /// assert_eq!(setup.read_recording("simulated.csv", &file[..])?.rows, presses.rows);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -78,9 +78,9 @@ pub fn simulate_moving(
     moving: &MovingContacts,
     seed: u64,
 ) -> Result<TimedRecording, SimulateError> {
-    let force_n = setup.force_n.ok_or(SimulateError::NoForce)?;
-    let surface = setup.surface.model().ok_or(SimulateError::NoModel)?;
-    let layout = &setup.layout;
+    let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
+    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    let layout = setup.layout();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::draw(layout, &mut rng);
     let count = (moving.duration_s() * moving.rate_hz).floor() as usize + 1;

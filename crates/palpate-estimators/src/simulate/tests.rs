@@ -15,10 +15,10 @@ fn a_clean_simulation_is_force_times_influence() {
     let rig = paper(0.0, 1);
     let recording = rig.simulate(1);
     assert_eq!(recording.rows.len(), 10);
-    let surface = rig.setup.surface.model().unwrap();
+    let surface = rig.setup.surface().model().unwrap();
     for (i, row) in recording.rows.iter().enumerate() {
         assert_eq!(row.position.x_m, (i as f64 + 0.5) * 0.4 / 10.0);
-        for (sensor, value) in rig.setup.layout.sensors().iter().zip(&row.reading) {
+        for (sensor, value) in rig.setup.layout().sensors().iter().zip(&row.reading) {
             let influence = surface.influence(SensorKind::Deflection, sensor.position, row.position);
             assert_eq!(*value, 3.0 * influence);
         }
@@ -40,7 +40,7 @@ fn a_simulation_survives_its_file_bit_for_bit() {
     let rig = noisy();
     let recording = rig.simulate(7);
     let mut bytes = Vec::new();
-    crate::recording::write(&recording, rig.setup.surface.extent(), "a simulation", &mut bytes).unwrap();
+    crate::recording::write(&recording, rig.setup.surface().extent(), "a simulation", &mut bytes).unwrap();
     assert!(bytes.starts_with(b"# a simulation\nposition_mm,force_n,deflection_1_mm,deflection_2_mm,"));
     assert_eq!(rig.setup.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
 }
@@ -49,7 +49,7 @@ fn a_simulation_survives_its_file_bit_for_bit() {
 fn what_cannot_be_simulated_is_refused_with_the_reason() {
     let measured = strip();
     let mut no_force = paper(5e-6, 1);
-    no_force.setup.force_n = None;
+    no_force.setup = no_force.setup.unknown_force();
     let here = [Position::along(0.1)];
     let messages = [
         simulate_at(&measured, &here, 1, 1).unwrap_err().to_string(),

@@ -69,14 +69,14 @@ struct FalseAlarms {
 
 fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
     let locator = case.estimator.fit(setup, &case.bench.simulate(0)).unwrap();
-    let clean = CleanSensors::new(setup.surface.model().unwrap(), &setup.layout);
-    let (errors, extent) = (ChannelErrors::none(&setup.layout), setup.surface.extent());
-    let (silence, bound) = (vec![0.0; setup.layout.len()], misfit_bound(setup.layout.len()));
+    let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
+    let (errors, extent) = (ChannelErrors::none(setup.layout()), setup.surface().extent());
+    let (silence, bound) = (vec![0.0; setup.layout().len()], misfit_bound(setup.layout().len()));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
-    let force_n = case.bench.pressed_setup().force_n.unwrap();
+    let force_n = case.bench.pressed_setup().force_n().unwrap();
     let mut alarms = FalseAlarms::default();
     for _ in 0..case.readings {
-        let noise = measure(&setup.layout, &silence, &errors, &mut rng);
+        let noise = measure(setup.layout(), &silence, &errors, &mut rng);
         if locator.locate(&noise).unwrap().status != Status::NoContact {
             let whitened = whitened(setup, &noise);
             let is_beyond = whitened.dot(&whitened) > bound;
@@ -85,7 +85,7 @@ fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
         let x_m = rng.random_range(0.0..extent.length_m());
         let y_m = extent.width_m().map_or(0.0, |width_m| rng.random_range(0.0..width_m));
         let contact = Contact { position: Position { x_m, y_m }, force_n };
-        let reading = measure(&setup.layout, &clean.reading(contact), &errors, &mut rng);
+        let reading = measure(setup.layout(), &clean.reading(contact), &errors, &mut rng);
         let status = locator.locate(&reading).unwrap().status;
         alarms.outside_model += usize::from(status == Status::OutsideModel);
     }
@@ -94,7 +94,7 @@ fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
 
 fn whitened(setup: &Setup, reading: &[f64]) -> Array1<f64> {
     setup
-        .layout
+        .layout()
         .sensors()
         .iter()
         .zip(reading)
@@ -128,8 +128,8 @@ fn binomial_bounds(count: usize, rate: f64) -> (usize, usize) {
 /// circumference L₁ and the area L₂ of these readings; on a line L₁ is their length, and L₂ 0.
 fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
     const SIDE: usize = 60;
-    let clean = CleanSensors::new(setup.surface.model().unwrap(), &setup.layout);
-    let extent = setup.surface.extent();
+    let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
+    let extent = setup.surface().extent();
     let rows = if extent.width_m().is_some() { SIDE } else { 1 };
     // The direction of no reading is not a number, and adds nothing to lengths below.
     let direction = |column: usize, row: usize| {
@@ -162,10 +162,10 @@ fn chance_of_contact(setup: &Setup, cost: f64) -> f64 {
 
 /// Measures a case with its force known or not, and says what it found as a row of the table.
 fn check(case: &Case, force_n: Option<f64>) -> String {
-    let setup = Setup { force_n, ..case.bench.setup.clone() };
-    let coordinates = 1 + usize::from(setup.surface.extent().width_m().is_some());
+    let setup = case.bench.setup.clone().with_force(force_n).unwrap();
+    let coordinates = 1 + usize::from(setup.surface().extent().width_m().is_some());
     // A plane has more places, and a contact on it costs more.
-    let cost = contact_cost(unknowns(coordinates, force_n), setup.layout.len(), LINE_PLACES);
+    let cost = contact_cost(unknowns(coordinates, force_n), setup.layout().len(), LINE_PLACES);
     let chance = chance_of_contact(&setup, cost);
     let FalseAlarms { beyond_noise, like_contact, outside_model } = false_alarms(case, &setup);
     let per_thousand = |count: usize| 1e3 * count as f64 / case.readings as f64;
@@ -195,7 +195,7 @@ fn false_alarms_are_as_rare_as_the_rule_says() {
     let cases = cases();
     let rows: Vec<String> = std::thread::scope(|scope| {
         let checks = cases.iter().flat_map(|case| {
-            [case.bench.pressed_setup().force_n, None]
+            [case.bench.pressed_setup().force_n(), None]
                 .map(|force_n| scope.spawn(move || check(case, force_n)))
         });
         let running: Vec<_> = checks.collect();
@@ -210,10 +210,11 @@ fn false_alarms_are_as_rare_as_the_rule_says() {
 #[test]
 fn as_many_readings_as_unknowns_can_be_outside_the_model() {
     let mut bench = paper(5e-6, REPEATS);
-    bench.setup.layout = Setup::new(beam()).sensors(Deflection.evenly(2).noise(5e-6)).unwrap().layout;
-    let setup = Setup { force_n: None, ..bench.setup.clone() };
+    let layout = Setup::new(beam()).sensors(Deflection.evenly(2).noise(5e-6)).unwrap().layout().clone();
+    bench.setup = bench.setup.with_layout(layout).unwrap();
+    let setup = bench.setup.clone().unknown_force();
     let pressed = Contact { position: Position::along(0.2), force_n: 3.0 };
-    let lifted: Vec<f64> = clean_reading(&beam(), &setup.layout, pressed).iter().map(|r| -r).collect();
+    let lifted: Vec<f64> = clean_reading(&beam(), setup.layout(), pressed).iter().map(|r| -r).collect();
     for estimator in [influence(), Estimator::ClosedForm(ClosedForm)] {
         let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
         assert_eq!(locator.locate(&lifted).unwrap().status, Status::OutsideModel);

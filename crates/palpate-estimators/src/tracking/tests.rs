@@ -10,7 +10,6 @@ use crate::fit::FitTask;
 use crate::fixtures::{Example, along_the_beam, moving_beam, swinging_beam, two_moving_loads};
 use crate::influence::{BeamLikelihood, Influence};
 use crate::likelihood::{ContactFit, Likelihood, LineLikelihood};
-use crate::setup::Setup;
 use crate::simulate::{CleanSensors, clean_reading};
 use crate::track_errors::TrackErrors;
 use palpate_mechanics::contact::{Contact, Position};
@@ -25,7 +24,7 @@ fn rig() -> Example {
 
 fn likelihood(rig: &Example, force_n: Option<f64>) -> BeamLikelihood {
     let recording = rig.simulate(1);
-    let setup = Setup { force_n, ..rig.setup.clone() };
+    let setup = rig.setup.clone().with_force(force_n).unwrap();
     let task = FitTask::new(&setup, &recording);
     BeamLikelihood::new(&Influence::default().fit_beam(task).unwrap())
 }
@@ -36,9 +35,9 @@ pub(super) type Timed = (f64, Contact, Vec<f64>);
 /// Contacts along a motion with a force, and readings in balance.
 pub(super) fn timed_readings(rig: &Example, motion: Motion, force_n: f64, seed: u64) -> Vec<Timed> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let layout = &rig.setup.layout;
+    let layout = rig.setup.layout();
     let errors = ChannelErrors::none(layout);
-    let sensors = CleanSensors::new(rig.setup.surface.model().unwrap(), layout);
+    let sensors = CleanSensors::new(rig.setup.surface().model().unwrap(), layout);
     let at = |i: usize| {
         let time_s = i as f64 / RATE_HZ;
         let contact = motion.contact_at(time_s, force_n);
@@ -112,7 +111,7 @@ fn a_beam_that_swings_is_explained_by_its_first_mode() {
     // Bent as by a load in the middle, which has just jumped elsewhere.
     let mut response = swinging_beam().at_rest(1, &[load(0.2)]);
     response.change_loads(&[load(0.1)]);
-    let sensors = &rig.setup.layout.sensors();
+    let sensors = &rig.setup.layout().sensors();
     let reading: Vec<f64> =
         sensors.iter().map(|sensor| response.reading(sensor.kind, sensor.position)).collect();
     let mut whitened = Vec::new();
@@ -157,15 +156,15 @@ pub(super) fn assert_scores_are_slopes<const K: usize>(
 /// Readings in balance under two contacts, each with its force.
 fn two_readings(rig: &Example, motions: [Motion; 2], seed: u64) -> Vec<(f64, [Contact; 2], Vec<f64>)> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let errors = ChannelErrors::none(&rig.setup.layout);
-    let surface = rig.setup.surface.model().unwrap();
+    let errors = ChannelErrors::none(rig.setup.layout());
+    let surface = rig.setup.surface().model().unwrap();
     let duration_s = motions[0].duration_s().max(motions[1].duration_s());
     let at = |i: usize| {
         let time_s = i as f64 / RATE_HZ;
         let contacts = [motions[0].contact_at(time_s, 3.0), motions[1].contact_at(time_s, 2.0)];
-        let [first, second] = contacts.map(|contact| clean_reading(surface, &rig.setup.layout, contact));
+        let [first, second] = contacts.map(|contact| clean_reading(surface, rig.setup.layout(), contact));
         let clean: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
-        (time_s, contacts, measure(&rig.setup.layout, &clean, &errors, &mut rng))
+        (time_s, contacts, measure(rig.setup.layout(), &clean, &errors, &mut rng))
     };
     (0..(duration_s * RATE_HZ) as usize).map(at).collect()
 }
@@ -208,9 +207,9 @@ fn off_m(touching: &[f64], mut found: Vec<f64>) -> Vec<f64> {
 fn readings_out_of_order_are_refused_and_change_nothing() {
     let rig = rig();
     let likelihood = likelihood(&rig, Some(3.0));
-    let surface = rig.setup.surface.model().unwrap();
+    let surface = rig.setup.surface().model().unwrap();
     let contact = Contact { position: Position::along(0.1), force_n: 3.0 };
-    let reading = clean_reading(surface, &rig.setup.layout, contact);
+    let reading = clean_reading(surface, rig.setup.layout(), contact);
     let (mut one, mut other) = (
         Tracker::new(&likelihood, TrackerConfig::default()),
         Tracker::new(&likelihood, TrackerConfig::default()),

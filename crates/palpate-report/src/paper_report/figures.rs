@@ -66,7 +66,7 @@ impl Paper<'_> {
 
     fn training_points(&self) -> Option<Series> {
         let rig = &self.report.arm("position-10")?.rig;
-        let positions = rig.training.as_ref()?.positions(rig.setup.surface.extent()).ok()?;
+        let positions = rig.training.as_ref()?.positions(rig.setup.surface().extent()).ok()?;
         let points = positions.iter().map(|position| (position.x_m * 1e3, position.x_m * 1e3)).collect();
         Some(Series::markers("training positions", 6, points, Marker::Circle))
     }

@@ -42,7 +42,7 @@ struct Paper<'a> {
 impl Paper<'_> {
     fn sections(&self) -> Vec<Section> {
         let setup = self.setup().and_then(|(rig, _, force_n)| {
-            bench_figure("The bench", &rig.setup.surface, &rig.setup.layout, force_n)
+            bench_figure("The bench", rig.setup.surface(), rig.setup.layout(), force_n)
         });
         vec![
             Section::new("sensor", "The sensor").text(self.sensor()).figure(setup),
@@ -147,15 +147,15 @@ impl Paper<'_> {
     /// Rig, beam and force in newtons, where the surface is a beam. All arms of the paper share it.
     fn setup(&self) -> Option<(&Rig, Beam, f64)> {
         let rig = &self.report.study.study.arms.first()?.rig;
-        let SurfaceSpec::Beam(beam) = rig.setup.surface else { return None };
-        Some((rig, beam, rig.setup.force_n?))
+        let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return None };
+        Some((rig, *beam, rig.setup.force_n()?))
     }
 
     /// Distance of neighbouring sensors in mm, where it is the same for all.
     fn sensor_pitch_mm(&self) -> Option<String> {
         let (rig, ..) = self.setup()?;
         let positions: Vec<f64> =
-            rig.setup.layout.sensors().iter().map(|sensor| sensor.position.x_m).collect();
+            rig.setup.layout().sensors().iter().map(|sensor| sensor.position.x_m).collect();
         let pitches: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let first = *pitches.first()?;
         pitches.iter().all(|pitch| (pitch - first).abs() < 1e-6).then(|| number(first * 1e3))
@@ -236,7 +236,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
             "The surface here is a beam, " (mm(beam.length_m())) " mm long, " (mm(beam.width_m())) " mm wide and "
             (mm(beam.thickness_m())) " mm thick, with a Young's modulus of " (stated(beam.youngs_modulus_pa() / 1e9))
             " GPa, on two wedges at its ends. "
-            (counted(rig.setup.layout.len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
+            (counted(rig.setup.layout().len(), "sensor measures", "sensors measure")) " its " (kinds(rig)) " while a load of "
             (stated(force_n)) " N, whose force is known, stands on it. With the load in the middle the beam sags by "
             (number(sag_mm)) " mm there."
         }
@@ -245,7 +245,7 @@ fn bench_in_words(rig: &Rig, beam: Beam, force_n: f64) -> Markup {
 
 /// "deflection", or more where the sensors differ.
 fn kinds(rig: &Rig) -> String {
-    let mut names: Vec<&str> = rig.setup.layout.sensors().iter().map(|sensor| sensor.kind.name()).collect();
+    let mut names: Vec<&str> = rig.setup.layout().sensors().iter().map(|sensor| sensor.kind.name()).collect();
     names.dedup();
     names.join(", ")
 }

@@ -35,7 +35,7 @@ impl Paper<'_> {
             let known = sets.iter_mut().find(|set| set.training == training);
             if let Some(set) = known {
                 set.arms.push(&arm.name);
-            } else if let Ok(positions) = training.positions(arm.rig.setup.surface.extent()) {
+            } else if let Ok(positions) = training.positions(arm.rig.setup.surface().extent()) {
                 sets.push(Set { arms: vec![&arm.name], training, positions });
             }
         }
@@ -423,7 +423,7 @@ fn row(setting: &str, paper: &str, study: impl Into<String>) -> [String; 3] {
 }
 
 fn noise_in_words(rig: &Rig) -> &'static str {
-    if rig.setup.layout.sensors().iter().any(|sensor| sensor.channel != Default::default()) {
+    if rig.setup.layout().sensors().iter().any(|sensor| sensor.channel != Default::default()) {
         "the sensors have faults, as the study's file states"
     } else {
         "none: readings are exact"

@@ -309,8 +309,7 @@ fn errors_are_drawn_against_the_limit_where_there_is_one() {
     for (noise_sd, drawn) in [(um(5.0), true), (0.0, false)] {
         let mut rig = quick_rig(5);
         rig.setup
-            .layout
-            .edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd))
+            .edit_sensors(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd))
             .unwrap();
         let recording = rig.simulate(0).unwrap();
         let report = EvaluationReport {

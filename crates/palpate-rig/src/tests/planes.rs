@@ -28,20 +28,20 @@ fn millimetres(positions: impl IntoIterator<Item = Position>) -> Vec<[f64; 2]> {
 #[test]
 fn grids_and_pairs_lie_where_they_say() {
     let rig = Rig::from_toml(PLANE).unwrap();
-    let sensors = millimetres(rig.setup.layout.sensors().iter().map(|sensor| sensor.position));
+    let sensors = millimetres(rig.setup.layout().sensors().iter().map(|sensor| sensor.position));
     assert_eq!(sensors[..4], [[75.0, 50.0], [150.0, 50.0], [225.0, 50.0], [75.0, 100.0]]);
     let training = rig.training.unwrap();
     assert_eq!((&training.arrangement, training.count), (&Arrangement::Grid { columns: 6, rows: 4 }, 24));
-    let pressed = millimetres(training.positions(rig.setup.surface.extent()).unwrap());
+    let pressed = millimetres(training.positions(rig.setup.surface().extent()).unwrap());
     assert_eq!([pressed[0], pressed[1], pressed[23]], [[25.0, 25.0], [75.0, 25.0], [275.0, 175.0]]);
 
     let pairs = PLANE
         .replace("grid = [3, 3]", "positions = [[\"75 mm\", \"50 mm\"], [\"10 cm\", \"0 mm\"]]")
         .replace("grid = [6, 4]", "positions = [[\"1 mm\", \"2 mm\"]]");
     let rig = Rig::from_toml(&pairs).unwrap();
-    let sensors = millimetres(rig.setup.layout.sensors().iter().map(|sensor| sensor.position));
+    let sensors = millimetres(rig.setup.layout().sensors().iter().map(|sensor| sensor.position));
     assert_eq!(sensors, [[75.0, 50.0], [100.0, 0.0]]);
-    let pressed = rig.training.unwrap().positions(rig.setup.surface.extent()).unwrap();
+    let pressed = rig.training.unwrap().positions(rig.setup.surface().extent()).unwrap();
     assert_eq!(millimetres(pressed), [[1.0, 2.0]]);
 }
 

@@ -31,7 +31,7 @@ force = "5 N"
 
 fn spec(text: &str) -> PlateSpec {
     let rig = Rig::from_toml(text).unwrap_or_else(|error| panic!("{error}"));
-    let SurfaceSpec::Plate(plate) = rig.setup.surface else { panic!("{:?}", rig.setup.surface) };
+    let SurfaceSpec::Plate(plate) = rig.setup.surface() else { panic!("{:?}", rig.setup.surface()) };
     plate.spec().clone()
 }
 
@@ -58,12 +58,15 @@ fn edges_and_supports_are_what_the_rig_says() {
 fn five_newtons_in_the_middle_of_the_examples_plate_deflect_it_by_0_557_mm() {
     let rig = Rig::from_toml(EXAMPLE).unwrap_or_else(|error| panic!("{error}"));
     let training = rig.training.as_ref().unwrap();
-    let positions = training.positions(rig.setup.surface.extent()).unwrap();
-    assert_eq!((rig.setup.layout.len(), positions.len(), training.repeats), (9, 36, 5));
+    let positions = training.positions(rig.setup.surface().extent()).unwrap();
+    assert_eq!((rig.setup.layout().len(), positions.len(), training.repeats), (9, 36, 5));
     let position = Position { x_m: 0.15, y_m: 0.15 };
-    let force_n = rig.setup.force_n.unwrap();
-    let reading =
-        clean_reading(rig.setup.surface.model().unwrap(), &rig.setup.layout, Contact { position, force_n });
+    let force_n = rig.setup.force_n().unwrap();
+    let reading = clean_reading(
+        rig.setup.surface().model().unwrap(),
+        rig.setup.layout(),
+        Contact { position, force_n },
+    );
     assert_eq!(format!("{:.3} mm", reading[4] * 1e3), "-0.557 mm");
 }
 

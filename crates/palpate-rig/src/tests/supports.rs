@@ -26,7 +26,7 @@ force = "3 N"
 "#;
 
 fn spec(text: &str) -> SupportedBeamSpec {
-    match Rig::from_toml(text).unwrap().setup.surface {
+    match Rig::from_toml(text).unwrap().setup.surface() {
         SurfaceSpec::SupportedBeam(beam) => beam.spec().clone(),
         other => panic!("{other:?}"),
     }

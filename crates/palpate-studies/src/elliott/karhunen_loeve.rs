@@ -3,9 +3,11 @@
 use ndarray::{Array1, Array2};
 
 use palpate_estimators::recording::{Recording, Row};
+use palpate_estimators::setup::Setup;
+use palpate_estimators::simulate::SimulateError;
 use palpate_mechanics::limit::Bound;
 use palpate_mechanics::sensing::{Layout, SensorKind};
-use palpate_mechanics::surface::{ResponseGradient, SurfaceSpec};
+use palpate_mechanics::surface::ResponseGradient;
 use palpate_numerics::symmetric_eigen;
 
 /// The components of a recording's readings: with d a reading less the mean m, each channel over its noise, and
@@ -82,7 +84,7 @@ pub(super) fn raw_layout(count: usize) -> Layout {
     Layout::even(SensorKind::Raw, count, 0.0)
 }
 
-/// A surface as one knows it who sees components of readings only: where it ends.
-pub(super) fn without_model(surface: &SurfaceSpec) -> SurfaceSpec {
-    SurfaceSpec::Measured(surface.extent())
+/// A bench as one knows it who sees components of readings only: where its surface ends, and the force.
+pub(super) fn without_model(setup: &Setup, layout: Layout) -> Result<Setup, SimulateError> {
+    Ok(Setup::new(setup.surface().extent()).with_layout(layout)?.with_force(setup.force_n())?)
 }

@@ -163,11 +163,11 @@ impl Elliott {
     /// [`ElliottError`] for a rig without a model, a known force, training positions or a motion, and for components that
     /// are not there.
     pub fn run(&self, watch: Watch) -> Result<ElliottResults, ElliottError> {
-        let sensors = self.rig.setup.layout.len();
+        let sensors = self.rig.setup.layout().len();
         if let Some(&components) = self.components.iter().find(|count| !(1..=sensors).contains(*count)) {
             return Err(ElliottError::Components { components, sensors });
         }
-        let noise_sd: Vec<f64> = self.rig.setup.layout.reading_sds()?.into_iter().flatten().collect();
+        let noise_sd: Vec<f64> = self.rig.setup.layout().reading_sds()?.into_iter().flatten().collect();
         let trials = self.rig.trials(self.calibrations, self.seed)?;
         let mut judged = vec![Vec::new(); self.chains().len()];
         let mut reductions = Vec::new();
@@ -223,12 +223,7 @@ impl Elliott {
                 Split { training: reduce(&setup.trial.training), judged: reduce(&setup.trial.judged) };
             let recording = reduce(&setup.moving.recording);
             let moving = TimedRecording { recording, ..setup.moving.clone() };
-            let reduced = Setup {
-                surface: without_model(&whole.surface),
-                layout: raw_layout(count),
-                force_n: whole.force_n,
-                columns: None,
-            };
+            let reduced = without_model(whole, raw_layout(count)).map_err(RigSimulationError::from)?;
             let setup = TrialSetup { trial: &trial, moving: &moving, ..*setup };
             let locator = setup.fit(&reduced, &network, watch)?;
             judged.push(self.judge_readings(&locator, &setup)?);
@@ -244,7 +239,7 @@ impl Elliott {
     /// A locator's errors, reading by reading.
     fn judge_readings(&self, locator: &Locator, setup: &TrialSetup) -> Result<ChainErrors, ElliottError> {
         let mut pressed = Evaluation::new(locator, &setup.trial.judged)?;
-        let extent = self.rig.setup.surface.extent();
+        let extent = self.rig.setup.surface().extent();
         pressed.located.retain(|located| is_inner(located.truth, extent));
         let moving = Evaluation::new(locator, &setup.moving.recording)?;
         let mean_m = |evaluation: &Evaluation| evaluation.summary(None).map_or(f64::NAN, |sum| sum.average_m);
@@ -257,7 +252,7 @@ impl Elliott {
     /// The errors of a locator's tracker, as readings come and with all of them.
     fn judge_tracks(&self, locator: &Locator, setup: &TrialSetup) -> Result<[ChainErrors; 2], ElliottError> {
         let followed = follow(locator, TrackerConfig::default(), setup.moving)?;
-        let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface.extent());
+        let (truths, extent) = (setup.moving.truths(), self.rig.setup.surface().extent());
         let judge = |tracks: &[Track]| -> Result<ChainErrors, ElliottError> {
             let errors = TrackErrors::new(tracks, &truths, extent).ok_or(ElliottError::NothingTracked)?;
             Ok(ChainErrors { pressed: None, moving_error_m: errors.track_m })
@@ -267,16 +262,17 @@ impl Elliott {
 
     /// The derivatives of all readings at each judged contact.
     fn gradients(&self, trials: &[Split]) -> Result<Vec<Vec<ResponseGradient>>, ElliottError> {
-        let Setup { surface, layout, force_n, .. } = &self.rig.setup;
-        let model = surface.model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
-        let force_n = force_n.ok_or(RigSimulationError::from(SimulateError::NoForce))?;
-        let functions: Vec<_> = layout
+        let setup = &self.rig.setup;
+        let model = setup.surface().model().ok_or(RigSimulationError::from(SimulateError::NoModel))?;
+        let force_n = setup.force_n().ok_or(RigSimulationError::from(SimulateError::NoForce))?;
+        let functions: Vec<_> = setup
+            .layout()
             .sensors()
             .iter()
             .map(|sensor| model.response_function(sensor.kind, sensor.position))
             .collect();
         let judged = trials.first().map_or(&[][..], |trial| &trial.judged.rows);
-        let inner = judged.iter().filter(|row| is_inner(row.position, surface.extent()));
+        let inner = judged.iter().filter(|row| is_inner(row.position, model.extent()));
         let at = |position| functions.iter().map(|f| f.gradient(Contact { position, force_n })).collect();
         Ok(inner.map(|row| at(row.position)).collect())
     }
@@ -293,7 +289,7 @@ impl Elliott {
         };
         let seen = match chain {
             Chain::Components(count) => count,
-            _ => self.rig.setup.layout.len(),
+            _ => self.rig.setup.layout().len(),
         };
         let bounds: Option<Vec<Bound>> =
             contacts.iter().map(|gradients| reduction.bound(gradients, seen)).collect();

@@ -50,9 +50,9 @@ fn components_are_uncorrelated_and_keep_all_that_readings_hold() {
 fn all_components_have_the_limit_of_the_readings_and_fewer_have_more() {
     let (rig, _, reduction) = pressed();
     let limit = rig.setup.cramer_rao_bound().unwrap();
-    let surface = rig.setup.surface.model().unwrap();
+    let surface = rig.setup.surface().model().unwrap();
     let contact = Contact { position: Position { x_m: 0.11, y_m: 0.19 }, force_n: 5.0 };
-    let functions = rig.setup.layout.sensors().iter();
+    let functions = rig.setup.layout().sensors().iter();
     let gradients: Vec<ResponseGradient> = functions
         .map(|sensor| surface.response_function(sensor.kind, sensor.position).gradient(contact))
         .collect();

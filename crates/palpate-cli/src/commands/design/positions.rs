@@ -295,7 +295,7 @@ fn advise(arguments: &Arguments, rig: &Rig, recording: &Recording) -> Result<(),
     if arguments.json {
         return output::say_json(&advice_to_json(arguments, &advice));
     }
-    print_advice(&advice, rig.setup.surface.extent())
+    print_advice(&advice, rig.setup.surface().extent())
 }
 
 /// JSON of the advice on the next presses; standard deviations are averaged over the contacts.

@@ -94,10 +94,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let (rig, written) =
             changed_rig(path, &text, "layout", |rig| place_sensors(rig, &best.layout, extent))?;
-        if rig.setup.layout.len() != best.layout.len() {
+        if rig.setup.layout().len() != best.layout.len() {
             return Err(Complaint::new("the rig does not take the layout").into());
         }
         output::write_file(path, written.as_bytes())?;
@@ -114,8 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The rig's bench and design, with what the command line says.
 fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesign), Failure> {
-    let force_n = arguments.force.or(rig.setup.force_n);
-    let setup = Setup { force_n, ..rig.setup.clone() };
+    let force_n = arguments.force.or(rig.setup.force_n());
+    let setup = rig.setup.clone().with_force(force_n);
+    let setup = setup.map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut design = match &rig.design {
         Some(design) => design.clone(),
         None => SensorDesign::for_setup(&rig.setup).map_err(|error| complaint(&error, &arguments.rig))?,

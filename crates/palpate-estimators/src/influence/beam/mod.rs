@@ -22,7 +22,8 @@ use palpate_mechanics::contact::Position;
 
 /// Fits the influence functions of a line with a model.
 pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
-    let mut table = InfluenceTable::empty(task.setup.layout.len(), task.setup.surface.extent().length_m());
+    let mut table =
+        InfluenceTable::empty(task.setup.layout().len(), task.setup.surface().extent().length_m());
     let around = around_nodes(&table);
     let fill = &mut |s: usize, learnt: &LearntInfluence| {
         for node in 0..table.nodes() {

@@ -24,11 +24,11 @@ fn fit(config: Influence, setup: &Setup, recording: &Recording) -> BeamLocator {
 }
 
 fn clean(setup: &Setup, contacts: &[(f64, f64)]) -> Vec<f64> {
-    let surface: &dyn Surface = setup.surface.model().unwrap();
-    let mut sum = vec![0.0; setup.layout.len()];
+    let surface: &dyn Surface = setup.surface().model().unwrap();
+    let mut sum = vec![0.0; setup.layout().len()];
     for (x_m, force_n) in contacts {
         let contact = Contact { position: Position::along(*x_m), force_n: *force_n };
-        let reading = clean_reading(surface, &setup.layout, contact);
+        let reading = clean_reading(surface, setup.layout(), contact);
         sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
     }
     sum
@@ -36,7 +36,7 @@ fn clean(setup: &Setup, contacts: &[(f64, f64)]) -> Vec<f64> {
 
 /// Readings with the bench's noise.
 fn noisy(setup: &Setup, contacts: &[(f64, f64)], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-    measure(&setup.layout, &clean(setup, contacts), &ChannelErrors::none(&setup.layout), rng)
+    measure(setup.layout(), &clean(setup, contacts), &ChannelErrors::none(setup.layout()), rng)
 }
 
 /// σ_limit of the position for 3 N at `x_m`, by finite differences: the Cramér–Rao bound without the module that has it.
@@ -45,7 +45,7 @@ fn limit_m(setup: &Setup, x_m: f64, force_known: bool) -> f64 {
     let (right, left) = (clean(setup, &[(x_m + h, force_n)]), clean(setup, &[(x_m - h, force_n)]));
     let here = clean(setup, &[(x_m, force_n)]);
     let (mut aa, mut af, mut ff) = (0.0, 0.0, 0.0);
-    for (s, sensor) in setup.layout.sensors().iter().enumerate() {
+    for (s, sensor) in setup.layout().sensors().iter().enumerate() {
         let (noise, dead) = (sensor.channel.noise_sd, sensor.channel.dead);
         let (g, f) = ((right[s] - left[s]) / (2.0 * h * noise), here[s] / (force_n * noise));
         if !dead {
@@ -93,19 +93,19 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
             rig = faulty_paper(channel, 10);
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
-        rig.setup.layout = displaced(&rig.setup.layout, rig.setup.surface.extent(), &mut rng);
-        let errors = ChannelErrors::draw(&rig.setup.layout, &mut rng);
+        let placed = displaced(rig.setup.layout(), rig.setup.surface().extent(), &mut rng);
+        rig.setup = rig.setup.with_layout(placed).unwrap();
+        let errors = ChannelErrors::draw(rig.setup.layout(), &mut rng);
         let mut recording = rig.simulate(seed);
         for row in &mut recording.rows {
             let truth = clean(&rig.setup, &[(row.position.x_m, 3.0)]);
-            row.reading = measure(&rig.setup.layout, &truth, &errors, &mut rng);
+            row.reading = measure(rig.setup.layout(), &truth, &errors, &mut rng);
         }
-        let mut setup = known;
-        setup.force_n = force_known.then_some(3.0);
+        let setup = known.with_force(force_known.then_some(3.0)).unwrap();
         let mut locator = fit(Influence { from, ..Influence::default() }, &setup, &recording);
         if let Some(channel) = faults.dead {
             assert!(locator.leave_out(channel));
-            rig.setup.layout.set_dead(channel, true);
+            rig.setup.set_dead(channel, true);
         }
         for mm in (5..=395).step_by(3) {
             let x_m = f64::from(mm) / 1e3;
@@ -115,7 +115,7 @@ fn ratio_and_coverage(from: InfluenceSource, force_known: bool, faults: Faults) 
             }
             for _ in 0..2 {
                 let truth = clean(&rig.setup, &[(x_m, 3.0)]);
-                let estimate = locator.locate(&measure(&rig.setup.layout, &truth, &errors, &mut rng));
+                let estimate = locator.locate(&measure(rig.setup.layout(), &truth, &errors, &mut rng));
                 let (low, high) = estimate.contact.uncertainty.unwrap().x_95_m;
                 error_m += (estimate.contact.position.x_m - x_m).abs();
                 limit += limit_m * (2.0 / std::f64::consts::PI).sqrt();
@@ -191,7 +191,7 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
     let recording = rig.simulate(3);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(3.0), None] {
-        let setup = Setup { force_n, ..rig.setup.clone() };
+        let setup = rig.setup.clone().with_force(force_n).unwrap();
         let locator = fit(Influence::default(), &setup, &recording);
         for _ in 0..100 {
             let nothing = locator.locate(&noisy(&setup, &[], &mut rng));
@@ -206,7 +206,7 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 fn two_contacts_are_told_apart() {
     let rig = paper(5e-6, 10);
     let config = Influence { contacts: 3, ..Influence::default() };
-    let setup = Setup { force_n: None, ..rig.setup.clone() };
+    let setup = rig.setup.clone().unknown_force();
     let locator = fit(config, &setup, &rig.simulate(3));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
     let (mut right, mut near, mut count) = (0, 0, 0u32);
@@ -230,7 +230,7 @@ fn two_contacts_are_told_apart() {
 
 /// Whether both positions are within 3 × their limits, those of two places and two unknown forces at once.
 fn both_near(setup: &Setup, truth: [(f64, f64); 2], found: [ContactEstimate; 2]) -> bool {
-    let noise = setup.layout.sensors()[0].channel.noise_sd;
+    let noise = setup.layout().sensors()[0].channel.noise_sd;
     let columns: Vec<Vec<f64>> = (0..4)
         .map(|unknown| {
             let at = |side: f64| {

@@ -63,7 +63,7 @@ impl Fit for MeasuredInfluence {
             role,
             nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
-            force_n: setup.force_n,
+            force_n: setup.force_n(),
         };
         locator.residual_limit = residual_limit(&locator, recording);
         Ok(locator)
@@ -132,7 +132,7 @@ impl Presses {
     }
 
     fn axes(&self, process: &GaussianProcess, setup: &Setup) -> [Axis; 3] {
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let lengths = &process.hyperparameters().length_scales;
         let axis = |k: usize, bounds, most| {
             let values = self.coordinates.column(k).to_vec();

@@ -88,7 +88,7 @@ impl Locate for MeasuredLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        let (table, channels) = (&self.table, setup.layout.len());
+        let (table, channels) = (&self.table, setup.layout().len());
         LocatorFault::check_count("whitened channels", channels, self.whitening.channels())?;
         LocatorFault::check_count("whitening weights", channels * channels, self.whitening.matrix.len())?;
         let axes = [table.x, table.y, table.nuisance];

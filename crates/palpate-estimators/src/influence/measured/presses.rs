@@ -27,7 +27,7 @@ pub(super) fn nuisance_coordinate(
         return Ok((NuisanceRole::Other, named));
     }
     // A force that is known, or always the same, shapes nothing.
-    if setup.force_n.is_some() {
+    if setup.force_n().is_some() {
         return Ok((NuisanceRole::None, None));
     }
     let force = all("force", recording.rows.iter().map(|row| row.force_n).collect())?;
@@ -70,7 +70,7 @@ impl Presses {
         for ((i, j), output) in outputs.indexed_iter_mut() {
             *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
         }
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let mut distinct: Vec<Vec<f64>> = Vec::new();
         let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
         let mut places = Vec::with_capacity(rows.len());

@@ -241,7 +241,7 @@ fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
 #[test]
 fn settings_that_need_mechanics_are_refused() {
     let setup = pad();
-    let recording = Recording::new(&setup.layout, "", vec![]);
+    let recording = Recording::new(setup.layout(), "", vec![]);
     let good = Influence::default();
     let refused = |config: Influence| {
         let task = FitTask::new(&setup, &recording);

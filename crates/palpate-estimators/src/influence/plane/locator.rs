@@ -72,7 +72,7 @@ impl Locate for PlaneLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", setup.layout.len(), self.stored.table.sensors)
+        LocatorFault::check_count("channels", setup.layout().len(), self.stored.table.sensors)
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, Infl
     if config.contacts > 1 {
         return Err(InfluenceFitError::NotOnPlane { what: "telling several contacts apart" });
     }
-    let mut table = PlaneTable::empty(task.setup.layout.len(), task.setup.surface.extent());
+    let mut table = PlaneTable::empty(task.setup.layout().len(), task.setup.surface().extent());
     let places: Vec<Position> = (0..table.nodes()).map(|node| table.node(node)).collect();
     let fill = &mut |s: usize, learnt: &LearntInfluence| {
         for node in 0..table.nodes() {

@@ -36,7 +36,7 @@ fn fit(config: Influence, setup: &Setup, recording: &Recording) -> PlaneLocator 
 }
 
 fn sensors(setup: &Setup) -> CleanSensors<'_> {
-    CleanSensors::new(setup.surface.model().unwrap(), &setup.layout)
+    CleanSensors::new(setup.surface().model().unwrap(), setup.layout())
 }
 
 /// The middles of `side` × `side` cells of the inner 90 % of the area: the rectangle about the same centre with sides √0.9
@@ -82,14 +82,14 @@ struct Touch {
 /// Touches of 5 N all over the inner 90 % of the plate.
 fn touches(rig: &Example, locators: &[PlaneLocator], force: Force) -> Vec<Touch> {
     let limit = rig.setup.cramer_rao_bound().unwrap();
-    let (clean, errors) = (sensors(&rig.setup), ChannelErrors::none(&rig.setup.layout));
+    let (clean, errors) = (sensors(&rig.setup), ChannelErrors::none(rig.setup.layout()));
     let mut scratch = PlaneScratch::default();
     let mut touches = Vec::new();
     for (locator, seed) in locators.iter().zip(1000..) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        for position in inner_positions(rig.setup.surface.extent(), SIDE) {
+        for position in inner_positions(rig.setup.surface().extent(), SIDE) {
             let contact = Contact { position, force_n: 5.0 };
-            let reading = measure(&rig.setup.layout, &clean.reading(contact), &errors, &mut rng);
+            let reading = measure(rig.setup.layout(), &clean.reading(contact), &errors, &mut rng);
             let Some(bound) = limit.bound_at(contact, force) else { continue };
             let found = locator.locate_with(&reading, &mut scratch).contact;
             let (dx, dy) = (found.position.x_m - position.x_m, found.position.y_m - position.y_m);
@@ -157,13 +157,13 @@ fn noisy(
     contacts: &[(f64, f64, f64)],
     rng: &mut Xoshiro256PlusPlus,
 ) -> Vec<f64> {
-    let mut sum = vec![0.0; setup.layout.len()];
+    let mut sum = vec![0.0; setup.layout().len()];
     for &(x_mm, y_mm, force_n) in contacts {
         let position = Position { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3 };
         let reading = clean.reading(Contact { position, force_n });
         sum.iter_mut().zip(reading).for_each(|(sum, value)| *sum += value);
     }
-    measure(&setup.layout, &sum, &ChannelErrors::none(&setup.layout), rng)
+    measure(setup.layout(), &sum, &ChannelErrors::none(setup.layout()), rng)
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
     let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     for force_n in [Some(5.0), None] {
-        let setup = Setup { force_n, ..rig.setup.clone() };
+        let setup = rig.setup.clone().with_force(force_n).unwrap();
         let locator = fit(Influence::default(), &setup, &recording);
         let mut false_alarms = 0;
         for _ in 0..50 {
@@ -198,9 +198,13 @@ fn no_contact_and_two_contacts_are_no_single_contact() {
 #[test]
 fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
     let mut rig = rig();
-    rig.setup.layout.edit(|sensors| sensors.truncate(2)).unwrap();
+    rig.setup.edit_sensors(|sensors| sensors.truncate(2)).unwrap();
     let mut places = [0.15, 0.075].map(|y_m| Position { x_m: 0.15, y_m }).into_iter();
-    rig.setup.layout = rig.setup.layout.with_positions(|_| places.next().unwrap());
+    rig.setup
+        .edit_sensors(|sensors| {
+            sensors.iter_mut().for_each(|sensor| sensor.position = places.next().unwrap())
+        })
+        .unwrap();
     let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
     let clean = sensors(&rig.setup);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
@@ -265,25 +269,26 @@ fn faults_that_a_calibration_shows_are_corrected() {
         let Position { x_m, y_m } = sensor.position;
         Position { x_m: x_m + off_m(), y_m: y_m + off_m() }
     };
-    rig.setup.layout = rig.setup.layout.with_positions(beside);
+    let moved = rig.setup.layout().clone().with_positions(beside);
+    rig.setup = rig.setup.with_layout(moved).unwrap();
     let limit = told.cramer_rao_bound().unwrap();
-    let errors = ChannelErrors::draw(&rig.setup.layout, &mut rng);
+    let errors = ChannelErrors::draw(rig.setup.layout(), &mut rng);
     let clean = sensors(&rig.setup);
     let mut recording = rig.simulate(0);
     for row in &mut recording.rows {
         let reading = clean.reading(Contact { position: row.position, force_n: 5.0 });
-        row.reading = measure(&rig.setup.layout, &reading, &errors, &mut rng);
+        row.reading = measure(rig.setup.layout(), &reading, &errors, &mut rng);
     }
     let locator = fit(Influence::default(), &told, &recording);
     let (mut error_m, mut limit_m) = (0.0, 0.0);
-    for position in inner_positions(told.surface.extent(), 12) {
+    for position in inner_positions(told.surface().extent(), 12) {
         let contact = Contact { position, force_n: 5.0 };
         let Some(bound) = limit.bound_at(contact, Force::Known).filter(|bound| bound.sd_position_m < 5e-3)
         else {
             continue;
         };
         for _ in 0..5 {
-            let reading = measure(&rig.setup.layout, &clean.reading(contact), &errors, &mut rng);
+            let reading = measure(rig.setup.layout(), &clean.reading(contact), &errors, &mut rng);
             error_m += locator.locate(&reading).contact.position.distance_m(position);
             limit_m += bound.mean_error_m();
         }

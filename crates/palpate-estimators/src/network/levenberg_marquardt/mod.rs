@@ -107,13 +107,13 @@ impl Fit for LevenbergMarquardt {
             return zero("networks in its ensemble");
         }
         recording.check_distinct_positions(2)?;
-        let inputs = NetworkInputs::fit(&setup.layout, recording)?;
+        let inputs = NetworkInputs::fit(setup.layout(), recording)?;
         if inputs.axes.is_empty() {
             return Err(LevenbergMarquardtFitError::Alike);
         }
         let outputs = outputs(setup, recording);
         let scales: Vec<OutputScale> = outputs.iter().map(|output| OutputScale::fit(output)).collect();
-        let (rows, extent, force_n) = (recording.rows.len(), setup.surface.extent(), setup.force_n);
+        let (rows, extent, force_n) = (recording.rows.len(), setup.surface().extent(), setup.force_n());
         let sizes =
             std::iter::once(inputs.axes.len()).chain(self.hidden.iter().copied()).chain([scales.len()]);
         let topology = Topology {
@@ -164,10 +164,10 @@ impl LevenbergMarquardt {
 fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
     let mut outputs = vec![column(|row| row.position.x_m)];
-    if let Extent::Plane { .. } = setup.surface.extent() {
+    if let Extent::Plane { .. } = setup.surface().extent() {
         outputs.push(column(|row| row.position.y_m));
     }
-    if setup.force_n.is_none() && recording.rows.iter().all(|row| row.force_n.is_some()) {
+    if setup.force_n().is_none() && recording.rows.iter().all(|row| row.force_n.is_some()) {
         outputs.push(column(|row| row.force_n.unwrap_or_default()));
     }
     outputs
@@ -379,7 +379,7 @@ impl Locate for LevenbergMarquardtLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        self.inputs.check(setup.layout.len())?;
+        self.inputs.check(setup.layout().len())?;
         let sizes = &self.topology.sizes;
         let nodes = sizes.iter().map(|n| *n as f64);
         LocatorFault::check_numbers("layer", nodes, |n| n >= 1.0, "at least 1 node")?;

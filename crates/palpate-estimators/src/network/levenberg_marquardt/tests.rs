@@ -13,7 +13,7 @@ use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{ChannelErrors, Layout, SensorKind, measure};
-use palpate_mechanics::surface::{Beam, SurfaceSpec};
+use palpate_mechanics::surface::Beam;
 use palpate_numerics::Cholesky;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -70,15 +70,15 @@ fn setup(noise_sd: f64, force_n: Option<f64>) -> Setup {
     let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9).unwrap();
     let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
     layout.edit(|sensors| sensors.iter_mut().for_each(|sensor| sensor.channel.noise_sd = noise_sd)).unwrap();
-    Setup { surface: SurfaceSpec::Beam(beam), layout, force_n, columns: None }
+    Setup::new(beam).with_layout(layout).unwrap().with_force(force_n).unwrap()
 }
 
 fn reading(setup: &Setup, x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-    let model = setup.surface.model().unwrap();
+    let model = setup.surface().model().unwrap();
     let influence =
         |s: &palpate_mechanics::sensing::Sensor| model.influence(s.kind, s.position, Position::along(x_m));
-    let clean: Vec<f64> = setup.layout.sensors().iter().map(|s| force_n * influence(s)).collect();
-    measure(&setup.layout, &clean, &ChannelErrors::none(&setup.layout), rng)
+    let clean: Vec<f64> = setup.layout().sensors().iter().map(|s| force_n * influence(s)).collect();
+    measure(setup.layout(), &clean, &ChannelErrors::none(setup.layout()), rng)
 }
 
 fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u64) -> Recording {
@@ -89,7 +89,7 @@ fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u6
         nuisance: None,
         reading: reading(setup, x_m, force_n, &mut rng),
     };
-    Recording::new(&setup.layout, "test", contacts.map(row).collect())
+    Recording::new(setup.layout(), "test", contacts.map(row).collect())
 }
 
 fn even(repeats: usize) -> impl Iterator<Item = (f64, f64)> {

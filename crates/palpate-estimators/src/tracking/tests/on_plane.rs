@@ -4,7 +4,6 @@ use crate::fit::{Fit, FitTask};
 use crate::fixtures::{Example, moving_plate, over_the_plate};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource, PlateLikelihood};
 use crate::likelihood::{Likelihood, PlaneLikelihood};
-use crate::setup::Setup;
 use crate::tracking::tests::{
     Timed, assert_closer_than_readings, assert_numbers_after_absurd_readings, assert_scores_are_slopes,
     timed_readings, wrongly_touching,
@@ -22,7 +21,7 @@ fn likelihood(rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
 
 fn likelihood_from(from: InfluenceSource, rig: &Example, force_n: Option<f64>) -> PlateLikelihood {
     let recording = rig.simulate(1);
-    let setup = Setup { force_n, ..rig.setup.clone() };
+    let setup = rig.setup.clone().with_force(force_n).unwrap();
     let task = FitTask::new(&setup, &recording);
     let config = Influence { from, ..Influence::default() };
     match config.fit_method(task).unwrap() {

@@ -36,7 +36,7 @@ fn readings(setup: &Setup) -> Vec<Vec<f64>> {
 /// The paper's bench with what is known of the force, and up to how many contacts.
 fn benches() -> Vec<(Setup, Influence)> {
     let setup = paper(5e-6, 10).setup;
-    let unknown = Setup { force_n: None, ..setup.clone() };
+    let unknown = setup.clone().unknown_force();
     let config = Influence::default();
     vec![
         (setup.clone(), config),

@@ -95,7 +95,7 @@ fn found(search: &Search, reading: &[f64]) -> (Minimum, Vec<f64>) {
 fn the_lowest_misfit_is_found_in_odd_readings() {
     let recording = paper(5e-6, 10).simulate(3);
     let setup = paper(5e-6, 10).setup;
-    let unknown = Setup { force_n: None, ..setup.clone() };
+    let unknown = setup.clone().unknown_force();
     let config = Influence::default();
     let believed = Influence { force_sd_n: Some(0.5), ..config };
     for (setup, config) in [(setup.clone(), config), (unknown, config), (setup, believed)] {
