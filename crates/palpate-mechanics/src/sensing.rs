@@ -71,7 +71,7 @@ impl fmt::Display for SensorKind {
     }
 }
 
-/// One sensor: what it measures, where, and how well.
+/// One sensor: what it measures, where, and how well. Plain data, which [`Layout::new`] checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
     /// Quantity that it measures.
@@ -328,7 +328,8 @@ impl SensorGroup {
 
 /// The faults of one channel, in the SI unit of its sensor (or raw). The default channel is perfect.
 ///
-/// reading = saturate(quantise((1 + g)·value + o + noise)), and 0 always when the channel is dead.
+/// reading = saturate(quantise((1 + g)·value + o + noise)), and 0 always when the channel is dead. Plain data: what takes it
+/// into a layout, [`Layout::new`] and a setup's `sensors`, refuses a number out of its range.
 ///
 /// ```
 /// use palpate_mechanics::sensing::ChannelModel;

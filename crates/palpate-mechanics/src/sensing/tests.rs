@@ -92,3 +92,36 @@ proptest! {
         prop_assert_eq!(errors, ChannelErrors::none(&layout(&[PERFECT])));
     }
 }
+
+#[test]
+fn a_number_of_a_channel_out_of_its_range_is_refused_from_callers_and_from_files() {
+    let good = Layout::even(SensorKind::Deflection, 3, 0.4);
+    let changes: [(fn(&mut ChannelModel), &str); 9] = [
+        (|channel| channel.noise_sd = -1.0, "the noise is -1; it must be at least 0 and finite"),
+        (|channel| channel.noise_sd = f64::NAN, "the noise is NaN; it must be at least 0 and finite"),
+        (|channel| channel.resolution = -1.0, "the resolution is -1; it must be at least 0 and finite"),
+        (|channel| channel.offset_error = -1.0, "the offset error is -1; it must be at least 0 and finite"),
+        (
+            |channel| channel.position_error_m = -1.0,
+            "the position error in metres is -1; it must be at least 0 and finite",
+        ),
+        (|channel| channel.gain_error = 1.0, "the gain error is 1; it must be at least 0 and below 1"),
+        (|channel| channel.gain_error = -0.1, "the gain error is -0.1; it must be at least 0 and below 1"),
+        (
+            |channel| channel.range = Some((0.0, f64::INFINITY)),
+            "the upper end of the range is inf; it must be finite",
+        ),
+        (
+            |channel| channel.range = Some((1.0, 1.0)),
+            "the lower end of the range is 1; it must be finite and below the upper one",
+        ),
+    ];
+    for (change, message) in changes {
+        let mut sensors = good.clone().into_sensors();
+        change(&mut sensors[1].channel);
+        let text = serde_json::json!({ "sensors": sensors }).to_string();
+        let refused = Layout::new(sensors).unwrap_err().to_string();
+        assert_eq!(refused, format!("sensor 2: {message}"));
+        assert!(serde_json::from_str::<Layout>(&text).is_err(), "{text}");
+    }
+}

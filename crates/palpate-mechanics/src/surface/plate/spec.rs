@@ -10,8 +10,8 @@ use crate::surface::{Extent, InsensitiveSensor};
 use crate::units::format_length_mm;
 use palpate_numerics::OutOfRange;
 
-/// A rectangular plate: x runs along its length from the left edge to the right one, y along its width from the bottom edge
-/// to the top one.
+/// A rectangular plate as plain data, which [`Plate::new`](super::Plate::new) checks: x runs along its length from the left
+/// edge to the right one, y along its width from the bottom edge to the top one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlateSpec {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::units::{Dimension, Quantity, format_length_mm};
 use palpate_numerics::OutOfRange;
 
-/// A straight beam of rectangular sections and what holds it.
+/// A straight beam of rectangular sections and what holds it, as plain data, which [`SupportedBeam::new`](super::SupportedBeam::new) checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupportedBeamSpec {
