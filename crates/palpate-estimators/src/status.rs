@@ -38,6 +38,23 @@ pub(crate) fn misfit_bound(freedom: usize) -> f64 {
     KNOWN.get(freedom).map_or_else(bound, |known| *known.get_or_init(bound))
 }
 
+/// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for
+/// normal noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
+pub fn learnt_misfit_bound<'a>(
+    freedom: usize,
+    readings: impl ExactSizeIterator<Item = &'a [f64]>,
+    misfit: impl Fn(&[f64]) -> f64,
+) -> f64 {
+    /// Readings that are tried.
+    const TRIED: usize = 400;
+    let every = readings.len().div_ceil(TRIED).max(1);
+    let mut misfits: Vec<f64> =
+        readings.step_by(every).map(misfit).filter(|misfit| misfit.is_finite()).collect();
+    misfits.sort_by(f64::total_cmp);
+    let usual = misfits.get(misfits.len() * 99 / 100).copied().unwrap_or(0.0);
+    misfit_bound(freedom).max(2.0 * usual)
+}
+
 /// Places along a line that readings tell apart.
 pub(crate) const LINE_PLACES: usize = 33;
 

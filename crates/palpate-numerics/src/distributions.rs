@@ -34,6 +34,31 @@ pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
+/// Part of a standard normal distribution between two ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalPart {
+    /// Its probability.
+    pub share: f64,
+    /// Mean of the distribution that is cut off at both ends.
+    pub mean: f64,
+    /// Its variance.
+    pub variance: f64,
+}
+
+/// The part of a standard normal distribution from `from` to `to`, exact in the tails; one of less than 10⁻¹² is the point next to 0.
+pub fn normal_between(from: f64, to: f64) -> NormalPart {
+    const POINT: f64 = 1e-12;
+    let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let share =
+        if from > 0.0 { normal_cdf(-from) - normal_cdf(-to) } else { normal_cdf(to) - normal_cdf(from) };
+    if share < POINT {
+        return NormalPart { share, mean: if from > 0.0 { from } else { to.min(0.0) }, variance: 0.0 };
+    }
+    let (low, high) = (density(from) / share, density(to) / share);
+    let mean = low - high;
+    NormalPart { share, mean, variance: (1.0 + from * low - to * high - mean * mean).max(0.0) }
+}
+
 /// The z with Φ(z) = `share`, for a share between 0 and 1, by bisection to the last bits.
 pub fn normal_quantile(share: f64) -> f64 {
     bisect((-39.0, 39.0), 80, |z| normal_cdf(z) < share)

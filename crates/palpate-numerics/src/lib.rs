@@ -32,8 +32,8 @@ pub mod watch;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{
-    ELLIPSE_95, NORMAL_95, bisect, chi_squared_critical_value, clamped_interval, normal_cdf,
-    normal_interval_95, normal_quantile,
+    ELLIPSE_95, NORMAL_95, NormalPart, bisect, chi_squared_critical_value, clamped_interval, normal_between,
+    normal_cdf, normal_interval_95, normal_quantile,
 };
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};

@@ -16,6 +16,21 @@ pub struct Influence {
     pub contacts: usize,
     /// Standard deviation of the contact's force about the bench's, in newtons, where it is known only roughly.
     pub force_sd_n: Option<f64>,
+    /// Structure of the readings of a surface without a model.
+    pub structure: Structure,
+}
+
+/// Structure of the readings of a surface without a model, besides that they depend on the position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Structure {
+    /// Force-linear where forces were recorded and the presses do not speak against it; free otherwise.
+    #[default]
+    Auto,
+    /// Offset + force × influence of the position.
+    ForceLinear,
+    /// Any function of the position and of the nuisance coordinate, or of the force.
+    Free,
 }
 
 /// Source of influence functions.
@@ -32,7 +47,7 @@ pub enum InfluenceSource {
 
 impl Default for Influence {
     fn default() -> Self {
-        Self { from: InfluenceSource::Corrected, contacts: 1, force_sd_n: None }
+        Self { from: InfluenceSource::Corrected, contacts: 1, force_sd_n: None, structure: Structure::Auto }
     }
 }
 
@@ -111,6 +126,11 @@ pub enum InfluenceFitError {
         /// The setting.
         what: &'static str,
     },
+    /// Readings are to be linear in forces that the recording does not tell.
+    #[error(
+        "`structure` is \"force-linear\", which needs the force of every row and at least two different forces; rows of force 0 count"
+    )]
+    NoForces,
     /// A setting that a plane does not have.
     #[error("the surface is a plane: {what} works on a line, such as a beam, only")]
     NotOnPlane {

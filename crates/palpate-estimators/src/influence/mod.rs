@@ -4,6 +4,8 @@
 mod beam;
 mod channels;
 mod config;
+mod force_linear;
+mod grid;
 mod learning;
 pub mod measured;
 mod moments;
@@ -11,11 +13,14 @@ mod plane;
 mod prior;
 
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
-pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource};
+pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
+pub use force_linear::ForceLinearLocator;
+pub use grid::Axis;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
+use force_linear::Linearity;
 use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
 use palpate_mechanics::surface::Extent;
@@ -29,7 +34,9 @@ pub enum InfluenceLocator {
     Beam(Box<BeamLocator>),
     /// Of a plane with a model.
     Plane(Box<PlaneLocator>),
-    /// Of a surface without one.
+    /// Of a surface without one, whose readings are linear in the force.
+    ForceLinear(Box<ForceLinearLocator>),
+    /// Of a surface without one, otherwise.
     Measured(Box<MeasuredLocator>),
 }
 
@@ -40,6 +47,9 @@ impl Fit for Influence {
     fn fit_method(&self, task: FitTask) -> Result<InfluenceLocator, InfluenceFitError> {
         if task.setup.surface().model().is_none() {
             self.check_measured()?;
+            if let Some(fitted) = self.fit_force_linear(task)? {
+                return Ok(InfluenceLocator::ForceLinear(Box::new(fitted)));
+            }
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }
@@ -61,6 +71,23 @@ impl Influence {
             }
             Self { force_sd_n: Some(_), .. } => Err(InfluenceFitError::NotOnMeasured { what: "`force_sd`" }),
             _ => Ok(()),
+        }
+    }
+
+    /// Fits offsets and influence functions of a surface without a model; `None` where the setting, the recording or a named
+    /// nuisance coordinate says that readings are no multiple of the force.
+    fn fit_force_linear(&self, task: FitTask) -> Result<Option<ForceLinearLocator>, InfluenceFitError> {
+        let has_nuisance = task.recording.rows.iter().any(|row| row.nuisance.is_some());
+        let linearity = match self.structure {
+            Structure::Free => return Ok(None),
+            Structure::Auto if has_nuisance => return Ok(None),
+            Structure::Auto => Linearity::IfPressesAgree,
+            Structure::ForceLinear => Linearity::Forced,
+        };
+        let fitted = force_linear::fit(task, linearity)?;
+        match (fitted, self.structure) {
+            (None, Structure::ForceLinear) => Err(InfluenceFitError::NoForces),
+            (fitted, _) => Ok(fitted),
         }
     }
 
@@ -88,7 +115,7 @@ impl InfluenceLocator {
         match self {
             Self::Beam(beam) => beam.leave_out(channel),
             Self::Plane(plane) => plane.leave_out(channel),
-            Self::Measured(_) => false,
+            Self::ForceLinear(_) | Self::Measured(_) => false,
         }
     }
 }
@@ -98,6 +125,7 @@ impl Locate for InfluenceLocator {
         match self {
             Self::Beam(beam) => beam.locate(reading),
             Self::Plane(plane) => plane.locate(reading),
+            Self::ForceLinear(linear) => linear.locate(reading),
             Self::Measured(measured) => measured.locate(reading),
         }
     }
@@ -106,6 +134,7 @@ impl Locate for InfluenceLocator {
         match self {
             Self::Beam(beam) => beam.check(setup),
             Self::Plane(plane) => plane.check(setup),
+            Self::ForceLinear(linear) => linear.check(setup),
             Self::Measured(measured) => measured.check(setup),
         }
     }

@@ -11,6 +11,8 @@ pub enum Kernel {
     /// c = (1 + √5·r + 5r²/3)·e^(−√5·r): functions with two derivatives (Rasmussen and Williams, eq. 4.17).
     #[default]
     Matern52,
+    /// c = (1 + √3·r)·e^(−√3·r): functions with one derivative (their eq. 4.17, ν = 3/2).
+    Matern32,
     /// c = e^(−r²/2): functions with every derivative (their eq. 4.9).
     SquaredExponential,
 }
@@ -21,7 +23,7 @@ impl Kernel {
         self.correlation_and_slope(r2).0
     }
 
-    /// c and dc/d(r²), for r² ≥ 0. Both kernels have a finite slope at 0.
+    /// c and dc/d(r²), for r² ≥ 0. All kernels have a finite slope at 0.
     pub fn correlation_and_slope(self, r2: f64) -> (f64, f64) {
         match self {
             Self::Matern52 => {
@@ -29,6 +31,11 @@ impl Kernel {
                 let scaled = (5.0 * r2).sqrt().min(1000.0);
                 let decay = (-scaled).exp();
                 ((1.0 + scaled + scaled * scaled / 3.0) * decay, -5.0 / 6.0 * (1.0 + scaled) * decay)
+            }
+            Self::Matern32 => {
+                let scaled = (3.0 * r2).sqrt().min(1000.0);
+                let decay = (-scaled).exp();
+                ((1.0 + scaled) * decay, -1.5 * decay)
             }
             Self::SquaredExponential => {
                 let c = (-0.5 * r2).exp();

@@ -4,11 +4,12 @@ use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole};
 use super::noise::{Noise, Whitening};
 use super::presses::{Presses, nuisance_coordinate};
-use super::table::{Axis, Table};
+use super::table::Table;
 use crate::fit::{Fit, FitTask};
+use crate::influence::grid::Axis;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::misfit_bound;
+use crate::status::learnt_misfit_bound;
 use ndarray::{Array1, Array2, s};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::{GaussianProcess, Regression, Samples};
@@ -151,24 +152,15 @@ impl Presses {
     }
 }
 
-/// The squared residual beyond which no contact explains a reading: [`misfit_bound`] for normal noise,
-/// and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
+/// The squared residual beyond which no contact explains a reading.
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
-    /// Readings that are tried.
-    const TRIED: usize = 400;
     let table = &locator.table;
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
     let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
-    let every = recording.rows.len().div_ceil(TRIED);
-    let tried = recording.rows.iter().step_by(every);
-    let mut residuals: Vec<f64> = tried
-        .filter_map(|row| locator.whitened(&row.reading))
-        .map(|reading| locator.residual(&reading))
-        .filter(|residual| residual.is_finite())
-        .collect();
-    residuals.sort_by(f64::total_cmp);
-    let usual = residuals.get(residuals.len() * 99 / 100).copied().unwrap_or(0.0);
-    misfit_bound(freedom).max(2.0 * usual)
+    let readings = recording.rows.iter().map(|row| row.reading.as_slice());
+    learnt_misfit_bound(freedom, readings, |reading| {
+        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.residual(&whitened))
+    })
 }
 
 /// Distinct positions from which on some can be held out.

@@ -25,7 +25,7 @@ mod table;
 pub use config::{MeasuredError, MeasuredInfluence, Scale};
 pub use locator::{MeasuredLocator, NuisanceRole};
 pub use noise::Whitening;
-pub use table::{Axis, Table};
+pub use table::Table;
 
 #[cfg(test)]
 mod tests;

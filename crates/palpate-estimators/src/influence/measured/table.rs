@@ -4,60 +4,9 @@
 //! along a straight line through the space of readings: a density across it times a share along it.
 
 use super::noise::Whitening;
-use palpate_mechanics::contact::Position;
-use std::f64::consts::{PI, SQRT_2};
-
-/// Evenly spaced nodes.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Axis {
-    /// The first node.
-    pub start: f64,
-    /// From one node to the next; greater than 0.
-    pub step: f64,
-    /// Nodes; at least 1.
-    pub count: usize,
-}
-
-impl Axis {
-    /// A coordinate that does not vary.
-    pub const NONE: Self = Self { start: 0.0, step: 1.0, count: 1 };
-
-    /// Nodes over the span of `values`, and half their largest gap beyond at either end but not beyond `bounds`; about
-    /// two nodes for every distinct value, and at least `per_length` a `length`, but no more than `most`.
-    pub fn over(mut values: Vec<f64>, bounds: (f64, f64), length: f64, most: usize) -> Self {
-        /// Nodes a length scale: linear and cubic interpolation between them is then better than the noise.
-        const PER_LENGTH: f64 = 8.0;
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        let (Some(first), Some(last)) = (values.first(), values.last()) else { return Self::NONE };
-        let gap = values.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
-        let (from, to) = ((first - 0.5 * gap).max(bounds.0), (last + 0.5 * gap).min(bounds.1));
-        // One value alone, or none that differ by more than rounding.
-        if (to - from).is_nan() || to - from <= 1e-9 * (from.abs() + to.abs()) {
-            return Self { start: *first, ..Self::NONE };
-        }
-        let by_values = 2 * values.len() - 1;
-        let by_length = ((to - from) / length * PER_LENGTH).min(most as f64) as usize + 2;
-        let count = by_values.max(by_length).min(most).max(4);
-        Self { start: from, step: (to - from) / (count - 1) as f64, count }
-    }
-
-    /// The same span with `factor` times the nodes, but no more than `most`; unchanged where that is no more.
-    pub(super) fn finer(self, factor: f64, most: usize) -> Self {
-        let wanted = (self.count as f64 * factor).ceil().min(most as f64) as usize;
-        if self.count < 2 || wanted <= self.count {
-            return self;
-        }
-        let span = self.step * (self.count - 1) as f64;
-        Self { step: span / (wanted - 1) as f64, count: wanted, ..self }
-    }
-
-    /// The coordinate at `place`, in nodes from the first.
-    pub fn value(&self, place: f64) -> f64 {
-        self.start + self.step * place
-    }
-}
+use crate::influence::grid::{Axis, cubic};
+use palpate_numerics::normal_between;
+use std::f64::consts::PI;
 
 /// Whitened mean readings and their relative variance at the nodes of a grid.
 ///
@@ -116,12 +65,6 @@ impl Table {
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.means.iter_mut().chain(&mut self.reaches).for_each(|value| *value /= factor);
         self
-    }
-
-    /// The position in the middle.
-    pub(super) fn middle(&self) -> Position {
-        let middle = |axis: Axis| axis.value(0.5 * (axis.count - 1) as f64);
-        Position { x_m: middle(self.x), y_m: middle(self.y) }
     }
 
     /// Places (x, y).
@@ -210,19 +153,6 @@ pub(super) struct LineBuffer {
     variances: Vec<f64>,
 }
 
-/// Lagrange's weights of four nodes around `place`, or of fewer where there are no four, and the first of them.
-fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
-    let used = count.min(4);
-    let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
-    let at = place - first as f64;
-    let mut weights = [0.0; 4];
-    for (i, weight) in weights[..used].iter_mut().enumerate() {
-        let others = (0..used).filter(|j| *j != i);
-        *weight = others.map(|j| (at - j as f64) / (i as f64 - j as f64)).product();
-    }
-    (first, weights)
-}
-
 /// Nodes of one place along the nuisance coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
@@ -302,8 +232,6 @@ struct Share {
     spread: f64,
 }
 
-/// So small a share of a normal distribution is a point, at the end next to it.
-const FARTHEST: f64 = 1e-12;
 /// Beyond this many halved squares below the reference a stretch has no weight.
 const NEGLIGIBLE: f64 = 60.0;
 /// A stretch shorter than this has the same likelihood all along.
@@ -350,26 +278,11 @@ impl Stretch {
         let middle = self.ad / self.dd;
         let across = (self.aa - self.ad * middle).max(0.0);
         let (from, to) = (-middle * length, (1.0 - middle) * length);
-        let share = normal_share(from, to);
-        let weight = (2.0 * PI).sqrt() / length * share * scale(across);
-        if share < FARTHEST {
-            return Share { weight, middle: foot, spread: 0.0 };
+        let part = normal_between(from, to);
+        Share {
+            weight: (2.0 * PI).sqrt() / length * part.share * scale(across),
+            middle: (middle + part.mean / length).clamp(0.0, 1.0),
+            spread: part.variance / (length * length),
         }
-        // Mean and variance of a normal distribution cut off at both ends.
-        let (low, high) = (normal_density(from) / share, normal_density(to) / share);
-        let moved = low - high;
-        let spread = (1.0 + from * low - to * high - moved * moved).max(0.0) / (length * length);
-        Share { weight, middle: (middle + moved / length).clamp(0.0, 1.0), spread }
     }
-}
-
-/// The standard normal density.
-fn normal_density(n: f64) -> f64 {
-    (-0.5 * n * n).exp() / (2.0 * PI).sqrt()
-}
-
-/// P(from < n < to) for a standard normal n, exact in the tails.
-fn normal_share(from: f64, to: f64) -> f64 {
-    let below = |n: f64| 0.5 * libm::erfc(-n / SQRT_2);
-    if from > 0.0 { below(-from) - below(-to) } else { below(to) - below(from) }
 }

@@ -1,0 +1,92 @@
+//! A surface without a model whose presses have forces: every reading is an offset plus the force times an influence function of
+//! the position, as elastic surfaces are.
+//!
+//! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
+
+mod learning;
+mod locator;
+
+pub use locator::ForceLinearLocator;
+
+use super::grid::Axis;
+use super::measured::MeasuredError;
+use crate::fit::FitTask;
+use learning::{Learnt, Presses};
+use locator::{Channel, Stored};
+use palpate_mechanics::surface::Extent;
+
+/// Most nodes along a line, and along either axis of a plane.
+const MOST_ALONG: usize = 400;
+const MOST_OF_PLANE: usize = 60;
+/// Forces up to this many times the greatest of the calibration are looked for.
+const HARDEST: f64 = 3.0;
+
+/// Whether readings are taken as linear in the force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Linearity {
+    /// Where the presses do not speak against it.
+    IfPressesAgree,
+    /// Whatever the presses say.
+    Forced,
+}
+
+/// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
+/// they have no forces or all the same one, or where they speak against linearity.
+pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLinearLocator>, MeasuredError> {
+    let FitTask { setup, recording, watch, .. } = task;
+    let Some(presses) = Presses::average(setup, recording) else { return Ok(None) };
+    if presses.distinct_forces() < 2 {
+        return Ok(None);
+    }
+    let extent = setup.surface.extent();
+    let learnt = Learnt::new(&presses, extent, watch)?;
+    if linearity == Linearity::IfPressesAgree && learnt.correlation.nonlinearity > 0.0 {
+        return Ok(None);
+    }
+    let axes = axes(&presses, &learnt, extent);
+    let [x, y] = axes;
+    let places_m: Vec<Vec<f64>> = (0..x.count * y.count)
+        .map(|place| {
+            let coordinates = [x.value((place / y.count) as f64), y.value((place % y.count) as f64)];
+            coordinates[..extent.dimensions()].to_vec()
+        })
+        .collect();
+    let mut channels = Vec::with_capacity(recording.channels.len());
+    for c in 0..recording.channels.len() {
+        watch.round()?;
+        channels.push(
+            learnt.channel(c, &places_m).map_or_else(|| Channel::silent(places_m.len()), Channel::from),
+        );
+    }
+    let mut locator = Stored {
+        x,
+        y,
+        channels,
+        known_force_n: setup.force_n,
+        hardest_n: HARDEST * presses.greatest_force_n(),
+        residual_limit: f64::INFINITY,
+        kernel: learnt.correlation.kernel,
+        lengths_m: learnt.correlation.lengths_m.clone(),
+        nonlinearity: learnt.correlation.nonlinearity,
+        presses: learnt.presses(),
+    }
+    .into_locator();
+    locator.limit_residuals(recording);
+    Ok(Some(locator))
+}
+
+/// The grid: the span of the positions that were pressed and half their largest gap beyond.
+fn axes(presses: &Presses, learnt: &Learnt, extent: Extent) -> [Axis; 2] {
+    let positions_m = presses.positions_m();
+    let axis = |k: usize, size_m: f64, most: usize| {
+        let values = positions_m.iter().map(|position_m| position_m[k]).collect();
+        Axis::over(values, (0.0, size_m), learnt.correlation.lengths_m[k], most)
+    };
+    match extent.width_m() {
+        None => [axis(0, extent.length_m(), MOST_ALONG), Axis::NONE],
+        Some(width_m) => [axis(0, extent.length_m(), MOST_OF_PLANE), axis(1, width_m, MOST_OF_PLANE)],
+    }
+}
+
+#[cfg(test)]
+mod tests;

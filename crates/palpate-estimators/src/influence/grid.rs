@@ -1,0 +1,289 @@
+//! A grid of places, and the posterior of a contact over its cells.
+
+use super::moments::Moments;
+use crate::status::OTHER_PLACE;
+use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
+use palpate_mechanics::contact::Position;
+use palpate_numerics::normal_interval_95;
+
+/// Evenly spaced nodes.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// The first node.
+    pub start: f64,
+    /// From one node to the next; greater than 0.
+    pub step: f64,
+    /// Nodes; at least 1.
+    pub count: usize,
+}
+
+impl Axis {
+    /// A coordinate that does not vary.
+    pub const NONE: Self = Self { start: 0.0, step: 1.0, count: 1 };
+
+    /// Nodes over the span of `values`, and half their largest gap beyond at either end but not beyond `bounds`; about
+    /// two nodes for every distinct value, and at least `per_length` a `length`, but no more than `most`.
+    pub fn over(mut values: Vec<f64>, bounds: (f64, f64), length: f64, most: usize) -> Self {
+        /// Nodes a length scale: linear and cubic interpolation between them is then better than the noise.
+        const PER_LENGTH: f64 = 8.0;
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        let (Some(first), Some(last)) = (values.first(), values.last()) else { return Self::NONE };
+        let gap = values.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        let (from, to) = ((first - 0.5 * gap).max(bounds.0), (last + 0.5 * gap).min(bounds.1));
+        // One value alone, or none that differ by more than rounding.
+        if (to - from).is_nan() || to - from <= 1e-9 * (from.abs() + to.abs()) {
+            return Self { start: *first, ..Self::NONE };
+        }
+        let by_values = 2 * values.len() - 1;
+        let by_length = ((to - from) / length * PER_LENGTH).min(most as f64) as usize + 2;
+        let count = by_values.max(by_length).min(most).max(4);
+        Self { start: from, step: (to - from) / (count - 1) as f64, count }
+    }
+
+    /// The same span with `factor` times the nodes, but no more than `most`; unchanged where that is no more.
+    pub(super) fn finer(self, factor: f64, most: usize) -> Self {
+        let wanted = (self.count as f64 * factor).ceil().min(most as f64) as usize;
+        if self.count < 2 || wanted <= self.count {
+            return self;
+        }
+        let span = self.step * (self.count - 1) as f64;
+        Self { step: span / (wanted - 1) as f64, count: wanted, ..self }
+    }
+
+    /// The coordinate at `place`, in nodes from the first.
+    pub fn value(&self, place: f64) -> f64 {
+        self.start + self.step * place
+    }
+}
+
+/// Lagrange's weights of four nodes around `place`, or of fewer where there are no four, and the first of them.
+pub(super) fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
+    let used = count.min(4);
+    let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
+    let at = place - first as f64;
+    let mut weights = [0.0; 4];
+    for (i, weight) in weights[..used].iter_mut().enumerate() {
+        let others = (0..used).filter(|j| *j != i);
+        *weight = others.map(|j| (at - j as f64) / (i as f64 - j as f64)).product();
+    }
+    (first, weights)
+}
+
+/// The position in the middle of a grid.
+pub(super) fn middle([x, y]: [Axis; 2]) -> Position {
+    let middle = |axis: Axis| axis.value(0.5 * (axis.count - 1) as f64);
+    Position { x_m: middle(x), y_m: middle(y) }
+}
+
+/// The middles of the parts of a place's cell, in nodes, where each axis of it is cut into `parts`; what would lie beyond the
+/// grid's edge is left out. Place (x, y) is number x·count_y + y.
+pub(super) fn parts_of(
+    [x, y]: [Axis; 2],
+    parts: usize,
+    place: usize,
+) -> impl Iterator<Item = (f64, f64)> + use<> {
+    let along = cut(place / y.count, x.count, parts);
+    let across = cut(place % y.count, y.count, parts);
+    along.into_iter().flat_map(move |x| across.clone().into_iter().map(move |y| (x, y)))
+}
+
+fn cut(node: usize, count: usize, parts: usize) -> Vec<f64> {
+    if count == 1 {
+        return vec![0.0];
+    }
+    let middles = (0..parts).map(|k| node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5);
+    middles.filter(|place| (0.0..=(count - 1) as f64).contains(place)).collect()
+}
+
+/// Residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
+pub(super) const CUT: f64 = 20.0;
+/// A cell belongs to a mode when its density is at least this share of the greatest.
+const VALLEY: f64 = 0.01;
+
+/// Source of the force of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ToldForce {
+    /// The reading tells it.
+    Estimated,
+    /// It is known, in newtons.
+    Known(f64),
+    /// Nobody knows it.
+    Untold,
+}
+
+/// A part of a cell as a reading sees it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PartOfCell {
+    /// Its posterior density, relative to that of all other parts; 0 where it does not matter.
+    pub weight: f64,
+    /// Mean of the force there, in newtons, and its variance.
+    pub force_n: f64,
+    pub force_variance_n2: f64,
+    /// The least squared residual there.
+    pub residual: f64,
+}
+
+/// A part of a cell that has some probability.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    x_m: f64,
+    y_m: f64,
+    weight: f64,
+}
+
+/// A cell that has some probability.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    place: usize,
+    moments: Moments,
+    /// The greatest weight among its parts.
+    peak: f64,
+}
+
+/// The posterior of one reading over the cells of a grid.
+#[derive(Debug)]
+pub(super) struct GridPosterior {
+    axes: [Axis; 2],
+    /// Into how many parts each cell is cut along each axis.
+    parts_per_cell: usize,
+    force: ToldForce,
+    cells: Vec<Cell>,
+    parts: Vec<Part>,
+    /// The least residual of any part.
+    pub residual: f64,
+}
+
+impl GridPosterior {
+    /// Over a grid whose cells are cut into so many parts along each axis.
+    pub fn new(axes: [Axis; 2], parts_per_cell: usize, force: ToldForce) -> Self {
+        Self { axes, parts_per_cell, force, cells: Vec::new(), parts: Vec::new(), residual: f64::INFINITY }
+    }
+
+    /// Adds the cell of a place; `part` is asked for the part at (x, y), in nodes.
+    pub fn add_cell(&mut self, place: usize, mut part: impl FnMut(f64, f64) -> PartOfCell) {
+        let mut cell = Cell { place, moments: Moments::default(), peak: 0.0 };
+        for (x, y) in parts_of(self.axes, self.parts_per_cell, place) {
+            let PartOfCell { weight, force_n, force_variance_n2, residual } = part(x, y);
+            if weight > 0.0 {
+                self.residual = self.residual.min(residual);
+                let (x_m, y_m) = (self.axes[0].value(x), self.axes[1].value(y));
+                cell.moments.add(weight, [x_m, y_m, force_n]);
+                cell.moments.add_force_variance(weight, force_variance_n2);
+                cell.peak = cell.peak.max(weight);
+                self.parts.push(Part { x_m, y_m, weight });
+            }
+        }
+        if cell.moments.weight > 0.0 {
+            self.cells.push(cell);
+        }
+    }
+
+    /// The posterior's mean and covariance; the most probable mode alone where there are several; `outside_model`
+    /// above the residual limit.
+    pub fn estimate(mut self, residual_limit: f64) -> Estimate {
+        let total = Moments::total(self.cells.iter().map(|cell| cell.moments));
+        if !(total.weight > 0.0 && total.weight.is_finite()) {
+            return Estimate::of_position(middle(self.axes), Status::OutsideModel);
+        }
+        let (x_95_m, y_95_m) = self.intervals(total.weight);
+        let mut contact = self.contact(total);
+        let covariance = contact.uncertainty.unwrap_or_default().covariance;
+        contact.uncertainty = Some(Uncertainty { covariance, x_95_m, y_95_m });
+        if self.residual.is_nan() || self.residual > residual_limit {
+            return Estimate::of_contact(contact, Status::OutsideModel);
+        }
+        let modes = self.modes();
+        let Some((first, others)) = modes.split_first().filter(|(_, others)| !others.is_empty()) else {
+            return Estimate::of_contact(contact, Status::Located);
+        };
+        // The most probable place, with the uncertainty of all.
+        let most_probable = ContactEstimate { uncertainty: contact.uncertainty, ..self.contact(*first) };
+        let mut estimate = Estimate::of_contact(most_probable, Status::Ambiguous);
+        estimate.modes = BoundedList::none(Mode::default());
+        for moments in others {
+            let probability = moments.weight / total.weight;
+            let mode = Mode { contact: self.contact(*moments), probability };
+            if !estimate.modes.push(mode) {
+                break;
+            }
+        }
+        estimate
+    }
+
+    /// The contact that some of the probability describes, its intervals those of a normal distribution.
+    fn contact(&self, moments: Moments) -> ContactEstimate {
+        let ([x_m, y_m, force_n], covariance) = moments.mean_and_covariance();
+        let (force_n, covariance) = match self.force {
+            ToldForce::Estimated => (Some(force_n), covariance),
+            other => {
+                let force_n = if let ToldForce::Known(force_n) = other { Some(force_n) } else { None };
+                (force_n, [covariance[0], covariance[1], 0.0, covariance[3], 0.0, 0.0])
+            }
+        };
+        let uncertainty = Uncertainty {
+            covariance,
+            x_95_m: normal_interval_95(x_m, covariance[0].sqrt()),
+            y_95_m: normal_interval_95(y_m, covariance[3].sqrt()),
+        };
+        ContactEstimate { position: Position { x_m, y_m }, force_n, uncertainty: Some(uncertainty) }
+    }
+
+    /// Connected groups of cells that are dense enough, most probable first; only those that are noticeable.
+    fn modes(&self) -> Vec<Moments> {
+        let peak = self.cells.iter().map(|cell| cell.peak).fold(0.0, f64::max);
+        let mut left: Vec<Cell> = self.cells.iter().filter(|c| c.peak >= VALLEY * peak).copied().collect();
+        let across = self.axes[1].count;
+        let apart =
+            |a: usize, b: usize| (a / across).abs_diff(b / across).max((a % across).abs_diff(b % across));
+        let mut modes = Vec::new();
+        while let Some(seed) = left.pop() {
+            let mut group = vec![seed];
+            let mut grown = 0;
+            while grown < group.len() {
+                let at = group[grown].place;
+                let (near, far) = left.into_iter().partition(|cell| apart(cell.place, at) <= 1);
+                left = far;
+                group.extend::<Vec<Cell>>(near);
+                grown += 1;
+            }
+            modes.push(Moments::total(group.iter().map(|cell| cell.moments)));
+        }
+        modes.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let total: f64 = self.cells.iter().map(|cell| cell.moments.weight).sum();
+        modes.retain(|mode| mode.weight >= OTHER_PLACE * total);
+        modes
+    }
+
+    /// The 95 % intervals along x and y.
+    fn intervals(&mut self, total: f64) -> ((f64, f64), (f64, f64)) {
+        let [x_axis, y_axis] = self.axes;
+        let half = |step: f64| 0.5 * step / self.parts_per_cell as f64;
+        let (half_x, half_y) = (half(x_axis.step), half(y_axis.step));
+        self.parts.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        let x = quantiles(&self.parts, |part| part.x_m, total, half_x);
+        if y_axis.count == 1 {
+            return (x, (0.0, 0.0));
+        }
+        self.parts.sort_by(|a, b| a.y_m.total_cmp(&b.y_m));
+        (x, quantiles(&self.parts, |part| part.y_m, total, half_y))
+    }
+}
+
+/// Quantiles below which 2.5 % and 97.5 % of the weight lie, of parts in rising order whose weight is spread evenly over `half`
+/// to either side.
+fn quantiles(parts: &[Part], coordinate: impl Fn(&Part) -> f64, total: f64, half: f64) -> (f64, f64) {
+    let find = |share: f64| {
+        let (mut below, wanted) = (0.0, share * total);
+        for slice in parts.chunk_by(|a, b| coordinate(b) - coordinate(a) < 0.5 * half) {
+            let weight: f64 = slice.iter().map(|part| part.weight).sum();
+            if below + weight >= wanted {
+                return coordinate(&slice[0]) - half + 2.0 * half * (wanted - below) / weight;
+            }
+            below += weight;
+        }
+        parts.last().map_or(0.0, |part| coordinate(part) + half)
+    };
+    (find(0.025), find(0.975))
+}
