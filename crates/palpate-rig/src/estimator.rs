@@ -7,7 +7,7 @@ use palpate_estimators::closed_form::ClosedForm;
 use palpate_estimators::digit::{DigitEstimator, DigitTheory};
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::gaussian_process::GaussianProcessEstimator;
-use palpate_estimators::influence::{Influence, InfluenceSource};
+use palpate_estimators::influence::{Influence, InfluenceSource, Structure};
 use palpate_estimators::neighbours::Neighbours;
 use palpate_estimators::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, Precision,
@@ -83,6 +83,9 @@ pub(crate) struct InfluenceKeys {
     pub contacts: Option<Count<1, 3>>,
     /// Standard deviation of the contact's force about that of `[contact]`.
     pub force_sd: Option<At<Positive<Force>>>,
+    /// Structure of the readings of a `measured` surface: `auto`, `force-linear`, or `free`.
+    #[serde(default)]
+    pub structure: Structure,
 }
 
 /// The elastica of the finger, or its linearisation.
@@ -181,6 +184,7 @@ impl InfluenceKeys {
             from: self.from.unwrap_or(default.from),
             contacts: self.contacts.map_or(default.contacts, Count::get),
             force_sd_n: self.force_sd.as_ref().map(|force_sd| force_sd.si),
+            structure: self.structure,
         })
     }
 }

@@ -70,6 +70,19 @@ fn measured() -> (Setup, Recording) {
     (setup, presses)
 }
 
+/// A strip of three channels without a model, whose presses have two forces.
+fn force_linear() -> (Setup, Recording) {
+    let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0)).unwrap();
+    let bench = Setup::new(beam).sensors(Deflection.evenly(3).noise(um(5.0))).unwrap();
+    let press = |force, seed| bench.simulate(&Training::even(6).with_force(newtons(force)), seed).unwrap();
+    let (mut presses, hard) = (press(1.0, 1), press(3.0, 2));
+    presses.rows.extend(hard.rows);
+    let setup = Setup::measured(mm(400.0), &["a", "b", "c"]).unwrap();
+    presses.channels = setup.layout.names();
+    presses.kinds = setup.layout.kinds();
+    (setup, presses)
+}
+
 fn digit() -> (Setup, Recording) {
     let digit = Digit::new(mm(120.0), mm(10.0), mm(0.5), gpa(200.0)).unwrap();
     let gauges = Strain.at_x([mm(4.0), mm(40.0), mm(80.0)]).noise(microstrain(1.0));
@@ -88,6 +101,7 @@ fn kinds() -> Vec<(&'static str, Estimator, (Setup, Recording))> {
         ("network-lm", Estimator::NetworkLm(networks), beam()),
         ("influence", Estimator::Influence(Influence::default()), beam()),
         ("influence-measured", Estimator::Influence(Influence::default()), measured()),
+        ("influence-force-linear", Estimator::Influence(Influence::default()), force_linear()),
         ("gaussian-process", Estimator::GaussianProcess(GaussianProcessEstimator::default()), beam()),
         ("closed-form", Estimator::ClosedForm(ClosedForm), beam()),
         ("digit", Estimator::Digit(DigitEstimator::default()), digit()),

@@ -5,14 +5,15 @@ use crate::{input, output};
 use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::Method;
-use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
+use palpate_estimators::influence::{ForceLinearLocator, InfluenceLocator};
 use palpate_estimators::network::Topology;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_mechanics::units::{Dimension, Quantity, format_count, format_length_mm};
+use palpate_numerics::regression::Kernel;
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
@@ -202,6 +203,7 @@ fn method(method: &Method) -> Vec<String> {
             plane.table().columns,
             plane.table().rows
         )],
+        Method::Influence(InfluenceLocator::ForceLinear(linear)) => force_linear(linear),
         Method::Influence(InfluenceLocator::Measured(measured)) => vec![learnt(measured)],
         Method::NetworkLm(networks) => networks
             .members
@@ -237,6 +239,34 @@ fn method(method: &Method) -> Vec<String> {
     }
 }
 
+fn force_linear(linear: &ForceLinearLocator) -> Vec<String> {
+    let (kernel, lengths_m) = linear.correlation();
+    let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
+    let kernel = match kernel {
+        Kernel::Matern32 => "Matérn 3/2",
+        Kernel::Matern52 => "Matérn 5/2",
+        Kernel::SquaredExponential => "squared exponential",
+    };
+    let noise: Vec<String> = linear.noise_sd().map(|(_, sd)| format!("{sd:.2e}")).collect();
+    let linearity = match linear.nonlinearity() {
+        0.0 => "linear in the force, as far as the presses tell".to_owned(),
+        change => format!(
+            "taken as linear in the force, though influences change by some {:.0} % with it",
+            100.0 * change
+        ),
+    };
+    vec![
+        "reading = offset + force × influence(position), learnt from the recording".to_owned(),
+        format!("structure: force-linear; {linearity}"),
+        format!(
+            "influence functions: Gaussian process, {kernel}, length scale {}, from {} presses",
+            lengths.join(" and "),
+            format_count(linear.presses() as u64)
+        ),
+        format!("noise of the channels in use: {}", noise.join(", ")),
+    ]
+}
+
 fn learnt(measured: &MeasuredLocator) -> String {
     let table = &measured.table;
     let counts = [table.x.count, table.y.count, table.nuisance.count];
@@ -247,7 +277,7 @@ fn learnt(measured: &MeasuredLocator) -> String {
         NuisanceRole::Other => " and the nuisance coordinate",
     };
     format!(
-        "influence functions learnt from the recording, over position{nuisance}: {} nodes",
+        "structure: free; readings learnt from the recording as functions of position{nuisance}: {} nodes",
         nodes.join(" × ")
     )
 }

@@ -261,7 +261,7 @@ impl Locator {
         let kind = self.kind();
         match &mut self.method {
             Method::Influence(influence) => {
-                if matches!(influence, InfluenceLocator::Measured(_)) {
+                if matches!(influence, InfluenceLocator::ForceLinear(_) | InfluenceLocator::Measured(_)) {
                     return Err(LeaveOutError::Needed { kind });
                 }
                 if !influence.leave_out(channel) {

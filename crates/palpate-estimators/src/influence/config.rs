@@ -126,6 +126,14 @@ pub enum InfluenceFitError {
         /// The setting.
         what: &'static str,
     },
+    /// A setting that only a surface without a model has.
+    #[error(
+        "the surface has a model, whose readings are linear in the force; {what} is for `measured` surfaces"
+    )]
+    OnlyOnMeasured {
+        /// The setting.
+        what: &'static str,
+    },
     /// Readings are to be linear in forces that the recording does not tell.
     #[error(
         "`structure` is \"force-linear\", which needs the force of every row and at least two different forces; rows of force 0 count"

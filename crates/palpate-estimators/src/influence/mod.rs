@@ -9,6 +9,7 @@ mod grid;
 mod learning;
 pub mod measured;
 mod moments;
+mod noise;
 mod plane;
 mod prior;
 
@@ -16,6 +17,7 @@ pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scr
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
 pub use force_linear::ForceLinearLocator;
 pub use grid::Axis;
+pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
@@ -52,6 +54,9 @@ impl Fit for Influence {
             }
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
+        }
+        if self.structure != Structure::Auto {
+            return Err(InfluenceFitError::OnlyOnMeasured { what: "`structure`" });
         }
         if let Extent::Plane { .. } = task.setup.surface().extent() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));

@@ -6,16 +6,22 @@
 //! ρ_c·s_c². For each k and ρ one factorisation serves all channels, and s_c² follows in closed form; k's kernel and length
 //! scales are those under which the presses of all channels together are the most probable, and ρ_c is the channel's own.
 //!
+//! Influence functions of one surface resemble each other, so what the presses leave open of them does too: between presses all
+//! channels err together. Their covariance there is B·v(a), with v of the median ρ and B = (s_c·s_c′·R_cc′), R being the correlation
+//! of the channels' whitened presses.
+//!
 //! How far readings are from linear in the force is asked of the presses too: a gain that changes smoothly with the force adds
 //! δ²·k(a, a′)·exp(−(F − F′)²/(2·F̄²)) in the place of k, and the δ of the greatest evidence says how much.
 
+use crate::influence::measured::MeasuredError;
+use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use ndarray::{Array1, Array2, Axis as Dimension};
+use ndarray::{Array1, Array2, ArrayViewMut1, Axis as Dimension};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{Cholesky, bisect, mean, root_mean_square};
+use palpate_numerics::{Cholesky, NotPositiveDefinite, bisect, mean, median, root_mean_square};
 use std::cmp::Ordering;
 
 /// Variance of an influence function's mean over that of its changes: far more, so that the presses tell it.
@@ -112,9 +118,36 @@ impl Presses {
         positions
     }
 
+    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least a few.
+    pub fn noise_freedom(&self) -> f64 {
+        const FEW: f64 = 8.0;
+        let rows = self.count.iter().sum::<f64>();
+        (rows - self.positions_m().len() as f64 - 1.0).max(FEW)
+    }
+
     /// The greatest force, in newtons.
     pub fn greatest_force_n(&self) -> f64 {
         self.force_n.iter().fold(0.0, |most, force_n| most.max(force_n.abs()))
+    }
+
+    /// The channels that change by more than rounding, from 0.
+    fn changing_channels(&self) -> Vec<usize> {
+        let changes = |c: &usize| {
+            let most = self.means.column(*c).iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+            most > 1e-12 * self.centre[*c].abs() && most > 0.0
+        };
+        (0..self.centre.len()).filter(changes).collect()
+    }
+
+    /// The same of some channels alone.
+    fn of_channels(&self, channels: &[usize]) -> Self {
+        let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
+        Self {
+            centre: of(&self.centre),
+            scatter: of(&self.scatter),
+            means: self.means.select(Dimension(1), channels),
+            ..self.clone()
+        }
     }
 
     /// Those numbered `kept`.
@@ -187,46 +220,42 @@ struct ChannelFit {
     evidence: f64,
 }
 
-/// Presses of all channels with what their evidence needs.
+impl ChannelFit {
+    fn noise_variance(&self) -> f64 {
+        self.signal * self.log_ratio.exp()
+    }
+}
+
+/// Presses of the channels in use, whose evidence is asked.
 struct Evidence<'a> {
     presses: &'a Presses,
     mean_square_n2: f64,
-    /// Variance below which a channel says nothing but rounding, a value a channel.
-    floors: Vec<f64>,
 }
 
-impl<'a> Evidence<'a> {
-    fn new(presses: &'a Presses, mean_square_n2: f64) -> Self {
-        let floors = presses.means.columns().into_iter().map(|values| {
-            let most = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-            (1e-12 * most).powi(2).max(f64::MIN_POSITIVE)
-        });
-        Self { presses, mean_square_n2, floors: floors.collect() }
-    }
-
+impl Evidence<'_> {
     /// The best ρ of every channel under a correlation.
     fn channels(&self, correlation: &Correlation) -> Vec<ChannelFit> {
         let covariance = correlation.of_presses(self.presses, self.mean_square_n2);
         let tried: Vec<Vec<ChannelFit>> =
             DECADES.map(|decade| self.with_ratio(&covariance, f64::from(decade) * 10f64.ln())).collect();
-        (0..self.floors.len()).map(|c| peak(&tried.iter().map(|fits| fits[c]).collect::<Vec<_>>())).collect()
+        (0..self.presses.centre.len())
+            .map(|c| peak(&tried.iter().map(|fits| fits[c]).collect::<Vec<_>>()))
+            .collect()
     }
 
     /// The evidence of every channel at one ρ, its s² the most probable one.
     fn with_ratio(&self, covariance: &Array2<f64>, log_ratio: f64) -> Vec<ChannelFit> {
-        let (presses, ratio) = (self.presses, log_ratio.exp());
-        let mut covariance = covariance.clone();
-        for (i, count) in presses.count.iter().enumerate() {
-            covariance[[i, i]] += ratio / count;
-        }
+        let presses = self.presses;
         let rows = presses.len() as f64 + presses.freedom;
         let nothing = ChannelFit { log_ratio, signal: 1.0, evidence: f64::NEG_INFINITY };
-        let Ok(cholesky) = Cholesky::factor(covariance) else { return vec![nothing; self.floors.len()] };
+        let Ok(cholesky) = Cholesky::factor(with_noise(covariance, presses, log_ratio)) else {
+            return vec![nothing; presses.centre.len()];
+        };
         let whitened = cholesky.solve_lower_matrix(presses.means.clone());
-        let fits = whitened.columns().into_iter().zip(&presses.scatter).zip(&self.floors);
-        fits.map(|((whitened, scatter), floor)| {
-            let signal = (whitened.dot(&whitened) + scatter / ratio) / rows + floor;
-            let determinant = cholesky.log_determinant() + presses.freedom * log_ratio;
+        let determinant = cholesky.log_determinant() + presses.freedom * log_ratio;
+        let fits = whitened.columns().into_iter().zip(&presses.scatter);
+        fits.map(|(whitened, scatter)| {
+            let signal = (whitened.dot(&whitened) + scatter / log_ratio.exp()) / rows;
             ChannelFit { log_ratio, signal, evidence: -0.5 * (rows * signal.ln() + determinant) }
         })
         .collect()
@@ -260,26 +289,40 @@ fn peak(fits: &[ChannelFit]) -> ChannelFit {
     }
 }
 
-/// Influence functions and offset of one channel at some places, as the presses tell them.
+/// Offsets and influence functions of all channels in use at some places, as the presses tell them.
 #[derive(Clone, Debug)]
-pub(super) struct LearntChannel {
-    /// f at each place, per newton.
-    pub values: Vec<f64>,
-    /// Variance of f at each place.
-    pub variances: Vec<f64>,
-    /// Covariance of f at each place with the offset.
-    pub covariances: Vec<f64>,
+pub(super) struct Functions {
+    pub offsets: Vec<f64>,
+    /// Standard deviation of the noise of each channel.
+    pub noise_sd: Vec<f64>,
+    /// Channels of unit noise, in which what the presses leave open is independent.
+    pub whitening: Whitening,
+    /// f at each place, per newton, a row a place.
+    pub values: Array2<f64>,
+    /// What the presses leave open of the offsets and of f, over B.
+    pub open: OpenVariance,
+}
+
+/// Variances that calibration leaves, over those of the signal.
+#[derive(Clone, Debug)]
+pub(super) struct OpenVariance {
+    /// Of the offset.
     pub offset: f64,
-    pub offset_variance: f64,
-    /// Standard deviation of the noise; 0 where the channel never changes.
-    pub noise_sd: f64,
+    /// Of f at each place, per newton squared.
+    pub influences: Vec<f64>,
+    /// Covariance of f at each place with the offset, per newton.
+    pub covariances: Vec<f64>,
 }
 
 /// What a recording tells of a surface.
 pub(super) struct Learnt {
     presses: Presses,
     pub correlation: Correlation,
+    /// The channels that change, from 0.
+    pub live: Vec<usize>,
+    /// Those of the channels in use.
     fits: Vec<ChannelFit>,
+    whitening: Whitening,
     mean_square_n2: f64,
     /// By what factor the variance of the learnt functions is multiplied, so that positions held out are as far off as it says.
     pub widening: f64,
@@ -287,17 +330,18 @@ pub(super) struct Learnt {
 
 impl Learnt {
     /// Finds the correlation and every channel's noise, and judges them by positions held out.
-    pub fn new(presses: &Presses, extent: Extent, watch: Watch) -> Result<Self, Cancelled> {
+    pub fn new(presses: &Presses, extent: Extent, watch: Watch) -> Result<Self, MeasuredError> {
+        let live = presses.changing_channels();
+        let presses = presses.of_channels(&live);
         let mean_square_n2 = root_mean_square(&presses.force_n).powi(2);
         let searched = presses.thinned(MOST_SEARCHED);
-        let evidence = Evidence::new(&searched, mean_square_n2);
+        let evidence = Evidence { presses: &searched, mean_square_n2 };
         let correlation = most_probable(&evidence, extent, watch)?;
+        let fits = evidence.channels(&correlation);
+        let whitening = whitening(&evidence, &correlation, &fits)?;
         let presses = presses.thinned(MOST_PRESSES);
-        let fits = Evidence::new(&searched, mean_square_n2).channels(&correlation);
-        let mut learnt = Self { presses, correlation, fits, mean_square_n2, widening: 1.0 };
+        let mut learnt = Self { presses, correlation, live, fits, whitening, mean_square_n2, widening: 1.0 };
         learnt.widening = learnt.held_out_widening(watch)?;
-        eprintln!("widening {:.2}", learnt.widening);
-        if let Some(w) = std::env::var("WIDEN").ok().and_then(|s| s.parse::<f64>().ok()) { learnt.widening *= w; }
         Ok(learnt)
     }
 
@@ -306,30 +350,30 @@ impl Learnt {
         self.presses.len()
     }
 
-    /// Channel `c` at `places_m`.
-    pub fn channel(&self, c: usize, places_m: &[Vec<f64>]) -> Option<LearntChannel> {
-        let ChannelFit { log_ratio, signal, .. } = self.fits[c];
-        let posterior = Posterior::new(self, &self.presses, c)?;
-        let [mut values, mut variances, mut covariances] =
-            [(); 3].map(|()| Vec::with_capacity(places_m.len()));
-        for place_m in places_m {
-            let [value, variance, covariance] = posterior.influence(place_m);
-            values.push(value);
-            variances.push(self.widening * variance);
+    /// The functions at `places_m`.
+    pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Functions, MeasuredError> {
+        let posterior = Posterior::new(self, &self.presses)?;
+        let mut values = Array2::zeros((places_m.len(), self.fits.len()));
+        let (mut influences, mut covariances) = (Vec::new(), Vec::new());
+        for (place, (place_m, mut value)) in places_m.iter().zip(values.outer_iter_mut()).enumerate() {
+            if place % 64 == 0 {
+                watch.round()?;
+            }
+            let [variance, covariance] = posterior.influence_into(place_m, &mut value);
+            influences.push(self.widening * variance);
             covariances.push(self.widening * covariance);
         }
-        Some(LearntChannel {
+        Ok(Functions {
+            offsets: self.presses.centre.iter().zip(&posterior.offsets).map(|(a, b)| a + b).collect(),
+            noise_sd: self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect(),
+            whitening: self.whitening.clone(),
             values,
-            variances,
-            covariances,
-            offset: self.presses.centre[c] + posterior.offset,
-            offset_variance: self.widening * posterior.offset_variance,
-            noise_sd: (signal * log_ratio.exp()).sqrt(),
+            open: OpenVariance { offset: self.widening * posterior.offset_variance, influences, covariances },
         })
     }
 
     /// How much larger than said the squared errors are at every fifth position, held out of the same process; at least 1.
-    fn held_out_widening(&self, watch: Watch) -> Result<f64, Cancelled> {
+    fn held_out_widening(&self, watch: Watch) -> Result<f64, MeasuredError> {
         const FOLDS: usize = 5;
         const MOST: f64 = 25.0;
         let positions_m = self.presses.positions_m();
@@ -341,24 +385,28 @@ impl Learnt {
                 positions_m.partition_point(|other| compare(other, &self.presses.positions_m[i]).is_lt());
             (self.presses.force_n[i] != 0.0).then_some(place % FOLDS)
         };
-        // Squared errors with what noise and process say of them.
+        let channels = self.fits.len();
+        let (mut value, mut white) = (Array1::zeros(channels), vec![0.0; channels]);
+        // Squared whitened errors with what noise and process say of them.
         let mut errors: Vec<[f64; 3]> = Vec::new();
         for fold in 0..FOLDS {
             watch.round()?;
             let (held, kept): (Vec<usize>, Vec<usize>) =
                 (0..self.presses.len()).partition(|i| fold_of(*i) == Some(fold));
             let kept = self.presses.select(&kept);
-            for c in 0..self.fits.len() {
-                let Some(posterior) = Posterior::new(self, &kept, c) else { continue };
-                let noise = self.fits[c].signal * self.fits[c].log_ratio.exp();
-                for &i in &held {
-                    let force_n = self.presses.force_n[i];
-                    let [value, variance, covariance] = posterior.influence(&self.presses.positions_m[i]);
-                    let error = self.presses.means[[i, c]] - posterior.offset - force_n * value;
-                    let process =
-                        posterior.offset_variance + force_n * (2.0 * covariance + force_n * variance);
-                    errors.push([error * error, noise / self.presses.count[i], process.max(0.0)]);
-                }
+            let posterior = Posterior::new(self, &kept)?;
+            for &i in &held {
+                let force_n = self.presses.force_n[i];
+                let [variance, covariance] =
+                    posterior.influence_into(&self.presses.positions_m[i], &mut value.view_mut());
+                let open =
+                    (posterior.offset_variance + force_n * (2.0 * covariance + force_n * variance)).max(0.0);
+                let error: Vec<f64> = (0..channels)
+                    .map(|c| self.presses.means[[i, c]] - posterior.offsets[c] - force_n * value[c])
+                    .collect();
+                self.whitening.apply(&error, &mut white);
+                let said = white.iter().zip(&self.whitening.signal);
+                errors.extend(said.map(|(e, signal)| [e * e, 1.0 / self.presses.count[i], signal * open]));
             }
         }
         let too_small = |widening: f64| {
@@ -370,44 +418,76 @@ impl Learnt {
     }
 }
 
-/// The posterior of one channel, given some presses.
+/// Whitening of noise and signal: the noise independent, the signal correlated as the channels' whitened presses are.
+fn whitening(
+    evidence: &Evidence,
+    correlation: &Correlation,
+    fits: &[ChannelFit],
+) -> Result<Whitening, MeasuredError> {
+    let presses = evidence.presses;
+    let covariance = correlation.of_presses(presses, evidence.mean_square_n2);
+    let mut white = Array2::zeros(presses.means.dim());
+    for (c, fit) in fits.iter().enumerate() {
+        let cholesky = Cholesky::factor(with_noise(&covariance, presses, fit.log_ratio))?;
+        let mut column = cholesky.solve_lower(&presses.means.column(c).to_owned());
+        let length = column.dot(&column).sqrt();
+        column *= fit.signal.sqrt() / length;
+        white.column_mut(c).assign(&column);
+    }
+    let noise = Array2::from_diag(&fits.iter().map(ChannelFit::noise_variance).collect::<Array1<f64>>());
+    let noise = Noise { covariance: noise, gain: 0.0 };
+    Ok(Whitening::from_covariances(noise, &white.t().dot(&white))?)
+}
+
+/// The covariance of presses over s², with the noise of each.
+fn with_noise(covariance: &Array2<f64>, presses: &Presses, log_ratio: f64) -> Array2<f64> {
+    let mut covariance = covariance.clone();
+    for (i, count) in presses.count.iter().enumerate() {
+        covariance[[i, i]] += log_ratio.exp() / count;
+    }
+    covariance
+}
+
+/// The posterior of all channels, given some presses.
 struct Posterior<'a> {
     learnt: &'a Learnt,
     presses: &'a Presses,
-    signal: f64,
+    /// What each press weighs in each channel's functions, n × C.
+    weights: Array2<f64>,
+    /// Offset of each channel less its centre.
+    offsets: Vec<f64>,
+    /// Of the median ρ.
     cholesky: Cholesky,
-    weights: Array1<f64>,
-    /// L⁻¹ times the covariance of the presses with the offset.
+    /// L⁻¹ times the covariance of the presses with the offset, and what it leaves of the offset's variance.
     explained_offset: Array1<f64>,
-    offset: f64,
     offset_variance: f64,
 }
 
 impl<'a> Posterior<'a> {
-    /// `None` when the covariance of the presses cannot be factored.
-    fn new(learnt: &'a Learnt, presses: &'a Presses, c: usize) -> Option<Self> {
-        let ChannelFit { log_ratio, signal, .. } = learnt.fits[c];
-        let mut covariance = learnt.correlation.of_presses(presses, learnt.mean_square_n2);
-        for (i, count) in presses.count.iter().enumerate() {
-            covariance[[i, i]] += log_ratio.exp() / count;
+    fn new(learnt: &'a Learnt, presses: &'a Presses) -> Result<Self, NotPositiveDefinite> {
+        let covariance = learnt.correlation.of_presses(presses, learnt.mean_square_n2);
+        let factor = |log_ratio: f64| Cholesky::factor(with_noise(&covariance, presses, log_ratio));
+        let mut weights = Array2::zeros(presses.means.dim());
+        for (c, fit) in learnt.fits.iter().enumerate() {
+            let solved = factor(fit.log_ratio)?.solve(&presses.means.column(c).to_owned());
+            weights.column_mut(c).assign(&solved);
         }
-        let cholesky = Cholesky::factor(covariance).ok()?;
-        let weights = cholesky.solve(&presses.means.column(c).to_owned());
+        let log_ratios = learnt.fits.iter().map(|fit| fit.log_ratio).collect();
+        let cholesky = factor(median(log_ratios).unwrap_or_default())?;
         let explained_offset = cholesky.solve_lower(&Array1::from_elem(presses.len(), OFFSET));
-        Some(Self {
-            offset: OFFSET * weights.sum(),
-            offset_variance: signal * (OFFSET - explained_offset.dot(&explained_offset)).max(0.0),
+        Ok(Self {
+            offsets: weights.columns().into_iter().map(|weights| OFFSET * weights.sum()).collect(),
+            offset_variance: (OFFSET - explained_offset.dot(&explained_offset)).max(0.0),
             learnt,
             presses,
-            signal,
-            cholesky,
             weights,
+            cholesky,
             explained_offset,
         })
     }
 
-    /// f at a place, its variance, and its covariance with the offset.
-    fn influence(&self, place_m: &[f64]) -> [f64; 3] {
+    /// Writes f of every channel at a place; returns its variance over that of the signal, and its covariance with the offset.
+    fn influence_into(&self, place_m: &[f64], values: &mut ArrayViewMut1<f64>) -> [f64; 2] {
         let Learnt { correlation, mean_square_n2, .. } = self.learnt;
         let presses = self.presses.positions_m.iter().zip(&self.presses.force_n);
         let covariance: Array1<f64> = presses
@@ -415,20 +495,19 @@ impl<'a> Posterior<'a> {
                 force_n / mean_square_n2 * (correlation.between(place_m, position_m) + CONSTANT)
             })
             .collect();
+        values.assign(&covariance.dot(&self.weights));
         let explained = self.cholesky.solve_lower(&covariance);
         let before = (1.0 + CONSTANT) / mean_square_n2;
-        [
-            covariance.dot(&self.weights),
-            self.signal * (before - explained.dot(&explained)).max(0.0),
-            -self.signal * explained.dot(&self.explained_offset),
-        ]
+        [(before - explained.dot(&explained)).max(0.0), -explained.dot(&self.explained_offset)]
     }
 }
 
 /// Nonlinearities that are tried.
 const NONLINEARITIES: [f64; 3] = [0.03, 0.1, 0.3];
+/// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
+const LEAST_SMOOTHER: f64 = 10.0;
 /// A nonlinearity is believed from this much more evidence on.
-const LEAST_GAIN: f64 = 3.0;
+const LEAST_GAIN: f64 = 10.0;
 
 /// The correlation under which the presses are the most probable: kernels one after the other, length scales by ever smaller
 /// steps, the nonlinearity last.
@@ -436,18 +515,17 @@ fn most_probable(evidence: &Evidence, extent: Extent, watch: Watch) -> Result<Co
     let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
     let start: Vec<f64> = spans_m.map(|span_m| 0.25 * span_m).collect();
     let mut found: Option<(f64, Correlation)> = None;
-    for kernel in [Kernel::Matern52, Kernel::Matern32] {
-        if std::env::var("ROUGH").is_ok() && kernel == Kernel::Matern52 { continue; }
+    for kernel in [Kernel::Matern32, Kernel::Matern52] {
         let start = found.as_ref().map_or(&start, |(_, correlation)| &correlation.lengths_m).clone();
         let first = Correlation { kernel, lengths_m: start, nonlinearity: 0.0 };
         let climbed = climb_lengths(evidence, first, extent, watch)?;
-        if found.as_ref().is_none_or(|(best, _)| climbed.0 > *best) {
+        if found.as_ref().is_none_or(|(best, _)| climbed.0 > *best + LEAST_SMOOTHER) {
             found = Some(climbed);
         }
     }
     let (mut best, mut correlation) = found.unwrap_or((
         f64::NEG_INFINITY,
-        Correlation { kernel: Kernel::Matern52, lengths_m: start, nonlinearity: 0.0 },
+        Correlation { kernel: Kernel::Matern32, lengths_m: start, nonlinearity: 0.0 },
     ));
     best += LEAST_GAIN;
     for nonlinearity in NONLINEARITIES {

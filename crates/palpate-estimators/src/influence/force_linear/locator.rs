@@ -1,54 +1,57 @@
 //! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form.
 //!
-//! With d the reading less the offsets, at a place with influences f, channel c errs by S_c(F) = σ² + v + 2F·b + F²·u: noise,
-//! variance v of the offset, u of the influence, and their covariance b. For a force F that is as likely as any other between 0 and
-//! the hardest looked for,
+//! With d the reading less the offsets and f the influences at a place, both in channels of unit noise in which what the presses leave
+//! open is independent, channel k errs by S_k(F) = 1 + λ_k·(ω + 2F·β + F²·v): noise, and the variance ω of the offset, v of
+//! the influence and their covariance β, in units of the signal's λ_k. For a force F that is as likely as any other between 0 and the
+//! hardest looked for,
 //!
-//! p(a | d) ∝ ∫ Π S_c^(−½)·exp(−(d_c − F·f_c)²/(2·S_c)) dF,
+//! p(a | d) ∝ ∫ Π S_k^(−½)·exp(−(d_k − F·f_k)²/(2·S_k)) dF,
 //!
-//! S taken at the force of the least misfit. The determinant belongs there: between presses, where u is large, everything would
+//! S taken at the force of the least misfit. The determinant belongs there: between presses, where v is large, everything would
 //! explain a reading otherwise.
 
-use super::super::grid::{Axis, CUT, GridPosterior, PartOfCell, ToldForce, cubic, middle, parts_of};
-use super::learning::LearntChannel;
+use super::learning::{Functions, OpenVariance};
 use crate::fit::{Locate, LocatorFault};
+use crate::influence::grid::{Axis, CUT, GridPosterior, PartOfCell, ToldForce, cubic, parts_of};
+use crate::influence::noise::Whitening;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{LINE_PLACES, contact_cost, learnt_misfit_bound, misfit_bound};
+use crate::status::{FALSE_ALARM_RATE, learnt_misfit_bound, misfit_bound};
 use palpate_core::{Estimate, Status};
-use palpate_numerics::normal_between;
 use palpate_numerics::regression::Kernel;
+use palpate_numerics::{bisect, normal_between, normal_cdf};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
-/// One channel over the grid, in its unit.
+/// Learnt functions of the channels in use, over the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Channel {
-    /// Influence at each place, per newton; place (x, y) is number x·count_y + y.
+pub(super) struct Tables {
+    /// Offset of each channel, in its unit.
+    offsets: Vec<f64>,
+    /// Standard deviation of the noise of each, in its unit.
+    noise_sd: Vec<f64>,
+    /// Channels of unit noise; its signal is λ.
+    whitening: Whitening,
+    /// f of the whitened channels at each place, per newton; place (x, y) is number x·count_y + y.
     values: Vec<f64>,
-    /// Variance of each value.
+    /// v at each place.
     variances: Vec<f64>,
-    /// Covariance of each value with the offset.
+    /// β at each place.
     covariances: Vec<f64>,
-    offset: f64,
+    /// ω.
     offset_variance: f64,
-    /// Standard deviation of the noise; 0 for a channel that never changes, which is left out.
-    noise_sd: f64,
 }
 
-impl Channel {
-    /// A channel that says nothing.
-    pub fn silent(places: usize) -> Self {
-        let nothing = vec![0.0; places];
-        let (values, variances, covariances) = (nothing.clone(), nothing.clone(), nothing);
-        Self { values, variances, covariances, offset: 0.0, offset_variance: 0.0, noise_sd: 0.0 }
-    }
-}
-
-impl From<LearntChannel> for Channel {
-    fn from(learnt: LearntChannel) -> Self {
-        let LearntChannel { values, variances, covariances, offset, offset_variance, noise_sd } = learnt;
-        Self { values, variances, covariances, offset, offset_variance, noise_sd }
+impl From<Functions> for Tables {
+    fn from(functions: Functions) -> Self {
+        let Functions { offsets, noise_sd, whitening, values, open } = functions;
+        let mut white = vec![0.0; values.len()];
+        for (value, white) in values.outer_iter().zip(white.chunks_exact_mut(offsets.len().max(1))) {
+            whitening.apply(&value.to_vec(), white);
+        }
+        let OpenVariance { offset: offset_variance, influences: variances, covariances } = open;
+        Self { offsets, noise_sd, whitening, values: white, variances, covariances, offset_variance }
     }
 }
 
@@ -58,7 +61,10 @@ impl From<LearntChannel> for Channel {
 pub(super) struct Stored {
     pub x: Axis,
     pub y: Axis,
-    pub channels: Vec<Channel>,
+    /// Channels of a reading, and those of them that are in use, from 0.
+    pub channels: usize,
+    pub live: Vec<usize>,
+    pub functions: Tables,
     /// The contact's force in newtons, where it is known.
     pub known_force_n: Option<f64>,
     /// The hardest contact that is looked for, in newtons.
@@ -72,6 +78,8 @@ pub(super) struct Stored {
     pub nonlinearity: f64,
     /// Number of presses that were learnt from.
     pub presses: usize,
+    /// Degrees of freedom that tell each channel's noise.
+    pub noise_freedom: f64,
 }
 
 /// Offsets and influence functions of a surface without a model, ready to be inverted.
@@ -79,16 +87,14 @@ pub(super) struct Stored {
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
     stored: Stored,
-    /// Of the channels in use, from 0.
-    live: Vec<usize>,
-    /// Influences, their variances and their covariances with the offset, all over the noise, place by place and channel by channel.
-    places: Vec<[f64; 3]>,
-    /// Variance of each offset over that of the noise.
-    offset_variances: Vec<f64>,
     /// For each place half the longest way to a neighbour's line, per newton and over the noise.
     reaches: Vec<f64>,
     /// Into how many parts each cell is cut along each axis when a reading is located within it.
     parts: usize,
+    /// The largest square of a whitened reading of noise alone.
+    noise_bound: f64,
+    /// The most that a contact takes off the square of noise alone.
+    detection_bound: f64,
 }
 
 /// A finely cut cell has about this whitened length, so that sums over it are integrals.
@@ -99,31 +105,15 @@ const MOST_PARTS_OF_PLANE: usize = 8;
 
 impl Stored {
     pub fn into_locator(self) -> ForceLinearLocator {
-        let live: Vec<usize> =
-            (0..self.channels.len()).filter(|c| self.channels[*c].noise_sd > 0.0).collect();
-        let over_noise = |c: usize, value: f64, power: i32| value / self.channels[c].noise_sd.powi(power);
-        let places = (0..self.x.count * self.y.count).flat_map(|place| {
-            live.iter().map(move |c| (place, *c)).map(|(place, c)| {
-                let Channel { values, variances, covariances, .. } = &self.channels[c];
-                [
-                    over_noise(c, values[place], 1),
-                    over_noise(c, variances[place], 2),
-                    over_noise(c, covariances[place], 2),
-                ]
-            })
-        });
         let mut locator = ForceLinearLocator {
-            places: places.collect(),
-            offset_variances: live
-                .iter()
-                .map(|c| over_noise(*c, self.channels[*c].offset_variance, 2))
-                .collect(),
-            live,
             stored: self,
             reaches: Vec::new(),
             parts: 1,
+            noise_bound: 0.0,
+            detection_bound: 0.0,
         };
         locator.cut_cells();
+        locator.bound_noise();
         locator
     }
 
@@ -137,19 +127,38 @@ impl Stored {
         numbers("axis start", &axes.map(|axis| axis.start), |_| true, "finite")?;
         numbers("axis step", &axes.map(|axis| axis.step), |step| step > 0.0, "finite and greater than 0")?;
         let places = self.x.count.saturating_mul(self.y.count);
-        for channel in &self.channels {
-            LocatorFault::check_count("influence values", places, channel.values.len())?;
-            LocatorFault::check_count("influence variances", places, channel.variances.len())?;
-            LocatorFault::check_count("influence covariances", places, channel.covariances.len())?;
-            numbers("influence value", &channel.values, |_| true, "a finite number")?;
-            numbers("influence variance", &channel.variances, |v| v >= 0.0, "at least 0")?;
-            numbers("influence covariance", &channel.covariances, |_| true, "a finite number")?;
-            numbers("offset", &[channel.offset], |_| true, "a finite number")?;
-            let spreads = [channel.offset_variance, channel.noise_sd];
-            numbers("offset variance or noise", &spreads, |v| v >= 0.0, "at least 0")?;
+        let Tables { offsets, noise_sd, whitening, values, variances, covariances, offset_variance } =
+            &self.functions;
+        let live = self.live.len();
+        let is_channel = |c: &&usize| **c >= self.channels;
+        if let Some(c) = self.live.iter().find(is_channel) {
+            return Err(LocatorFault::Count { what: "channels", needed: *c + 1, found: self.channels });
         }
+        LocatorFault::check_count("offsets", live, offsets.len())?;
+        LocatorFault::check_count("noises", live, noise_sd.len())?;
+        LocatorFault::check_count("whitened channels", live, whitening.channels())?;
+        LocatorFault::check_count("whitening weights", live * live, whitening.matrix.len())?;
+        LocatorFault::check_count("influence values", places.saturating_mul(live), values.len())?;
+        LocatorFault::check_count("influence variances", places, variances.len())?;
+        LocatorFault::check_count("influence covariances", places, covariances.len())?;
+        numbers("offset", offsets, |_| true, "a finite number")?;
+        numbers("whitening weight", &whitening.matrix, |_| true, "finite")?;
+        numbers("influence value", values, |_| true, "a finite number")?;
+        numbers("influence covariance", covariances, |_| true, "a finite number")?;
+        for (what, list) in
+            [("noise", noise_sd), ("signal variance", &whitening.signal), ("influence variance", variances)]
+        {
+            numbers(what, list, |v| v >= 0.0, "finite and at least 0")?;
+        }
+        numbers("offset variance", &[*offset_variance], |v| v >= 0.0, "at least 0")?;
         let force = [self.hardest_n, self.known_force_n.unwrap_or(1.0)];
         numbers("force", &force, |force| force > 0.0, "greater than 0")?;
+        numbers(
+            "degrees of freedom of the noise",
+            &[self.noise_freedom],
+            |freedom| freedom > 0.0,
+            "greater than 0",
+        )?;
         numbers("residual limit", &[self.residual_limit], |limit| limit > 0.0, "greater than 0")
     }
 }
@@ -169,6 +178,16 @@ impl From<ForceLinearLocator> for Stored {
     }
 }
 
+/// What the table says of a place.
+#[derive(Clone, Copy, Debug)]
+struct Place<'a> {
+    /// f of the whitened channels.
+    values: &'a [f64],
+    /// v and β.
+    variance: f64,
+    covariance: f64,
+}
+
 /// A place as a reading sees it.
 #[derive(Clone, Copy, Debug)]
 struct Explained {
@@ -186,14 +205,25 @@ impl ForceLinearLocator {
         (self.stored.kernel, &self.stored.lengths_m)
     }
 
+    /// How far the presses were found from linear: the relative change of an influence with the force; 0 where they agree.
+    pub fn nonlinearity(&self) -> f64 {
+        self.stored.nonlinearity
+    }
+
     /// Number of presses that were learnt from.
     pub fn presses(&self) -> usize {
         self.stored.presses
     }
 
-    /// Noise of each channel, in its unit; 0 for one that never changes.
-    pub fn noise_sd(&self) -> impl Iterator<Item = f64> {
-        self.stored.channels.iter().map(|channel| channel.noise_sd)
+    /// Offset of a channel in use, by its number among those.
+    #[cfg(test)]
+    pub fn offset(&self, live: usize) -> f64 {
+        self.stored.functions.offsets[live]
+    }
+
+    /// The channels in use, from 0, with the noise of each, in its unit.
+    pub fn noise_sd(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.stored.live.iter().copied().zip(self.stored.functions.noise_sd.iter().copied())
     }
 
     fn axes(&self) -> [Axis; 2] {
@@ -205,8 +235,14 @@ impl ForceLinearLocator {
         positions + usize::from(self.stored.known_force_n.is_none())
     }
 
-    fn place(&self, place: usize) -> &[[f64; 3]] {
-        &self.places[place * self.live.len()..(place + 1) * self.live.len()]
+    fn place(&self, place: usize) -> Place<'_> {
+        let Tables { values, variances, covariances, .. } = &self.stored.functions;
+        let live = self.stored.live.len();
+        Place {
+            values: &values[place * live..(place + 1) * live],
+            variance: variances[place],
+            covariance: covariances[place],
+        }
     }
 
     /// Finds the reaches of the places, and how finely cells must be cut.
@@ -229,15 +265,84 @@ impl ForceLinearLocator {
     /// How far, per newton and over the noise, the influences of one place are from those of another; from any multiple of them
     /// where the force is not known.
     fn way_between(&self, place: usize, other: usize) -> f64 {
-        let pairs = || self.place(place).iter().zip(self.place(other)).map(|([f, ..], [g, ..])| (f, g));
+        let pairs = || self.place(place).values.iter().zip(self.place(other).values);
         let (fg, gg): (f64, f64) = pairs().fold((0.0, 0.0), |(fg, gg), (f, g)| (fg + f * g, gg + g * g));
         let scale = if self.stored.known_force_n.is_none() && gg > 0.0 { fg / gg } else { 1.0 };
         pairs().map(|(f, g)| (f - scale * g).powi(2)).sum::<f64>().sqrt()
     }
 
+    /// Whether noise alone explains a whitened reading: neither its length nor what the best contact takes off its square is more than
+    /// noise reaches at [`FALSE_ALARM_RATE`].
+    fn is_no_contact(&self, whitened: &[f64]) -> bool {
+        let Tables { whitening, offset_variance, .. } = &self.stored.functions;
+        let variance = |signal: &f64| 1.0 + offset_variance * signal;
+        let square: f64 =
+            whitened.iter().zip(&whitening.signal).map(|(d, signal)| d * d / variance(signal)).sum();
+        if square > self.noise_bound {
+            return false;
+        }
+        let taken = |place: usize| {
+            let channels = whitened.iter().zip(self.place(place).values).zip(&whitening.signal);
+            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), signal)| {
+                let scaled = f / variance(signal);
+                (fd + scaled * d, ff + scaled * f)
+            });
+            if fd > 0.0 { fd * fd / ff } else { 0.0 }
+        };
+        (0..self.reaches.len()).all(|place| taken(place) <= self.detection_bound)
+    }
+
+    /// Bounds of noise: of a reading's square, and of what the best contact takes off it.
+    fn bound_noise(&mut self) {
+        let freedom = self.stored.noise_freedom;
+        // Noise that was learnt from few readings is larger than it seems: a χ² over an estimated variance is an F, whose tail is about
+        // that of χ² at ν·(e^(b/ν) − 1) (Wallace, Ann. Math. Statist. 30, 1959, for t²).
+        let learnt = |bound: f64, freedom: f64| freedom * ((bound / freedom).exp() - 1.0);
+        let live = self.stored.live.len();
+        self.noise_bound = learnt(misfit_bound(live), freedom * live as f64);
+        let sizes = self.directions();
+        let exceeded = |u: f64| {
+            let bell = (-0.5 * u * u).exp() / (2.0 * PI);
+            normal_cdf(-u) + bell * (sizes[0] + sizes[1] * u / (2.0 * PI).sqrt()) > FALSE_ALARM_RATE
+        };
+        self.detection_bound = learnt(bisect((0.0, 20.0), 50, exceeded).powi(2), freedom);
+    }
+
+    /// How many directions the readings of contacts have: the length of the curve of f/|f| over a line, or half the length of its
+    /// boundary and its area over a plane. The largest product of noise with a direction exceeds u with the probability
+    /// Φ(−u) + e^(−u²/2)·(length/2π + area·u/(2π)^(3/2)) (S. O. Rice 1944; Adler and Taylor, *Random Fields and Geometry*, 2007,
+    /// chapter 14).
+    fn directions(&self) -> [f64; 2] {
+        let [x, y] = self.axes();
+        let direction = |i: usize, j: usize| {
+            let values = self.place(i * y.count + j).values;
+            let length = values.iter().map(|f| f * f).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            values.iter().map(|f| f / length).collect::<Vec<f64>>()
+        };
+        let step = |from: &[f64], to: &[f64]| from.iter().zip(to).map(|(a, b)| b - a).collect::<Vec<f64>>();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let way = |a: (usize, usize), b: (usize, usize)| {
+            let step = step(&direction(a.0, a.1), &direction(b.0, b.1));
+            product(&step, &step).sqrt()
+        };
+        let along = |j: usize| (1..x.count).map(move |i| way((i - 1, j), (i, j))).sum::<f64>();
+        let across = |i: usize| (1..y.count).map(move |j| way((i, j - 1), (i, j))).sum::<f64>();
+        if y.count == 1 {
+            return [along(0), 0.0];
+        }
+        let boundary = along(0) + along(y.count - 1) + across(0) + across(x.count - 1);
+        let mut area = 0.0;
+        for (i, j) in (1..x.count).flat_map(|i| (1..y.count).map(move |j| (i, j))) {
+            let here = direction(i, j);
+            let (a, b) = (step(&direction(i - 1, j), &here), step(&direction(i, j - 1), &here));
+            area += (product(&a, &a) * product(&b, &b) - product(&a, &b).powi(2)).max(0.0).sqrt();
+        }
+        [0.5 * boundary, area]
+    }
+
     /// Sets the bound of the residual from the recording's own readings.
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
-        let freedom = self.live.len().saturating_sub(self.unknowns());
+        let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let readings = recording.rows.iter().map(|row| row.reading.as_slice());
         self.stored.residual_limit =
             learnt_misfit_bound(freedom, readings, |reading| self.least_misfit(&self.whitened(reading)));
@@ -247,40 +352,45 @@ impl ForceLinearLocator {
         self.posterior(whitened).residual
     }
 
-    /// The reading less the offsets, over the noise, of the channels in use.
+    /// The reading less the offsets, in channels of unit noise.
     fn whitened(&self, reading: &[f64]) -> Vec<f64> {
-        let channel = |c: &usize| {
-            let Channel { offset, noise_sd, .. } = self.stored.channels[*c];
-            (reading[*c] - offset) / noise_sd
-        };
-        self.live.iter().map(channel).collect()
+        let Tables { offsets, whitening, .. } = &self.stored.functions;
+        let less: Vec<f64> =
+            self.stored.live.iter().zip(offsets).map(|(c, offset)| reading[*c] - offset).collect();
+        let mut whitened = vec![0.0; less.len()];
+        whitening.apply(&less, &mut whitened);
+        whitened
     }
 
     /// How a place explains a whitened reading.
-    fn explain(&self, whitened: &[f64], place: &[[f64; 3]]) -> Explained {
+    fn explain(&self, whitened: &[f64], place: Place) -> Explained {
         /// Steps from the weights of one force to those of the next; two leave less than a thousandth.
         const STEPS: usize = 3;
-        let variance = |force_n: f64, [_, u, b]: &[f64; 3], v: f64| {
-            (1.0 + v + force_n * (2.0 * b + force_n * u)).max(1.0)
+        let Tables { whitening, offset_variance, .. } = &self.stored.functions;
+        let open = |force_n: f64| {
+            (offset_variance + force_n * (2.0 * place.covariance + force_n * place.variance)).max(0.0)
         };
-        let channels = || whitened.iter().zip(place).zip(&self.offset_variances);
+        let channels = || whitened.iter().zip(place.values).zip(&whitening.signal);
         // Least squares of the force by the weights of the last one: Σ f·d/S and Σ f²/S.
         let sums = |force_n: f64| {
-            channels().fold((0.0, 0.0), |(fd, ff), ((d, place), v)| {
-                let scaled = place[0] / variance(force_n, place, *v);
-                (fd + scaled * d, ff + scaled * place[0])
+            let open = open(force_n);
+            channels().fold((0.0, 0.0), |(fd, ff), ((d, f), signal)| {
+                let scaled = f / (1.0 + open * signal);
+                (fd + scaled * d, ff + scaled * f)
             })
         };
         let hardest_n = self.stored.hardest_n;
         let held = |(fd, ff): (f64, f64)| if ff > 0.0 { (fd / ff).clamp(0.0, hardest_n) } else { 0.0 };
         let known = self.stored.known_force_n;
         let force_n = known.unwrap_or_else(|| (0..STEPS).fold(0.0, |force_n, _| held(sums(force_n))));
-        let (mut misfit, mut log_determinant) = (0.0, 0.0);
-        for ((d, place), v) in channels() {
-            let variance = variance(force_n, place, *v);
-            misfit += (d - force_n * place[0]).powi(2) / variance;
-            log_determinant += variance.ln();
+        let (mut misfit, mut determinant) = (0.0, 1.0);
+        let open = open(force_n);
+        for ((d, f), signal) in channels() {
+            let variance = 1.0 + open * signal;
+            misfit += (d - force_n * f).powi(2) / variance;
+            determinant *= variance;
         }
+        let log_determinant = determinant.ln();
         let cost = misfit + log_determinant;
         if known.is_some() {
             return Explained { misfit, cost, force_n, force_variance_n2: 0.0 };
@@ -336,38 +446,38 @@ impl ForceLinearLocator {
     }
 
     /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
-    fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Vec<[f64; 3]>) -> &'b [[f64; 3]] {
+    fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Vec<f64>) -> Place<'b> {
         let [x_axis, y_axis] = self.axes();
         buffer.clear();
-        buffer.resize(self.live.len(), [0.0; 3]);
+        buffer.resize(self.stored.live.len(), 0.0);
+        let (mut variance, mut covariance) = (0.0, 0.0);
         let (first_x, weights_x) = cubic(x, x_axis.count);
         let (first_y, weights_y) = cubic(y, y_axis.count);
         for (i, wx) in weights_x.iter().enumerate().filter(|(_, w)| **w != 0.0) {
             for (j, wy) in weights_y.iter().enumerate().filter(|(_, w)| **w != 0.0) {
                 let place = self.place((first_x + i) * y_axis.count + first_y + j);
-                for (sum, value) in buffer.iter_mut().zip(place) {
-                    sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += wx * wy * value);
-                }
+                let weight = wx * wy;
+                buffer.iter_mut().zip(place.values).for_each(|(sum, value)| *sum += weight * value);
+                variance += weight * place.variance;
+                covariance += weight * place.covariance;
             }
         }
-        buffer
+        Place { values: buffer, variance: variance.max(0.0), covariance }
     }
 }
 
 impl Locate for ForceLinearLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let whitened = self.whitened(reading);
-        let posterior = self.posterior(&whitened);
-        let square: f64 = whitened.iter().zip(&self.offset_variances).map(|(d, v)| d * d / (1.0 + v)).sum();
-        let places = if self.stored.y.count > 1 { LINE_PLACES * LINE_PLACES } else { LINE_PLACES };
-        let cost = contact_cost(self.unknowns(), self.live.len().max(1), places);
-        if square <= misfit_bound(self.live.len()) && square <= posterior.residual + cost {
-            return Estimate::of_position(middle(self.axes()), Status::NoContact);
+        let estimate = self.posterior(&whitened).estimate(self.stored.residual_limit);
+        if self.is_no_contact(&whitened) {
+            // The most probable place of a contact that would be too light to be told from noise.
+            return Estimate::of_contact(estimate.contact, Status::NoContact);
         }
-        posterior.estimate(self.stored.residual_limit)
+        estimate
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", setup.layout.len(), self.stored.channels.len())
+        LocatorFault::check_count("channels", setup.layout.len(), self.stored.channels)
     }
 }

@@ -12,9 +12,11 @@ use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
 use learning::{Learnt, Presses};
-use locator::{Channel, Stored};
+use locator::Stored;
 use palpate_mechanics::surface::Extent;
 
+/// Distinct positions without which a reading cannot be a function of anything.
+const LEAST_POSITIONS: usize = 2;
 /// Most nodes along a line, and along either axis of a plane.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 60;
@@ -38,8 +40,12 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
     if presses.distinct_forces() < 2 {
         return Ok(None);
     }
+    recording.check_distinct_positions(LEAST_POSITIONS)?;
     let extent = setup.surface.extent();
     let learnt = Learnt::new(&presses, extent, watch)?;
+    if learnt.live.is_empty() {
+        return Ok(None);
+    }
     if linearity == Linearity::IfPressesAgree && learnt.correlation.nonlinearity > 0.0 {
         return Ok(None);
     }
@@ -51,17 +57,13 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
             coordinates[..extent.dimensions()].to_vec()
         })
         .collect();
-    let mut channels = Vec::with_capacity(recording.channels.len());
-    for c in 0..recording.channels.len() {
-        watch.round()?;
-        channels.push(
-            learnt.channel(c, &places_m).map_or_else(|| Channel::silent(places_m.len()), Channel::from),
-        );
-    }
+    let functions = learnt.functions(&places_m, watch)?;
     let mut locator = Stored {
         x,
         y,
-        channels,
+        channels: recording.channels.len(),
+        live: learnt.live.clone(),
+        functions: functions.into(),
         known_force_n: setup.force_n,
         hardest_n: HARDEST * presses.greatest_force_n(),
         residual_limit: f64::INFINITY,
@@ -69,6 +71,7 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
         lengths_m: learnt.correlation.lengths_m.clone(),
         nonlinearity: learnt.correlation.nonlinearity,
         presses: learnt.presses(),
+        noise_freedom: presses.noise_freedom(),
     }
     .into_locator();
     locator.limit_residuals(recording);

@@ -2,11 +2,11 @@
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole};
-use super::noise::{Noise, Whitening};
 use super::presses::{Presses, nuisance_coordinate};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
 use crate::influence::grid::Axis;
+use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::learnt_misfit_bound;

@@ -1,10 +1,10 @@
 //! The locator of a measured surface: probabilities of places, gathered cell by cell of the table, and the estimate that they give.
 
 use super::config::Scale;
-use super::noise::Whitening;
 use super::table::{Line, LineBuffer, Table};
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{CUT, GridPosterior, PartOfCell, ToldForce, middle, parts_of};
+use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
 

@@ -18,13 +18,11 @@
 mod config;
 mod fitting;
 mod locator;
-mod noise;
 mod presses;
 mod table;
 
 pub use config::{MeasuredError, MeasuredInfluence, Scale};
 pub use locator::{MeasuredLocator, NuisanceRole};
-pub use noise::Whitening;
 pub use table::Table;
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! Along the nuisance coordinate the mean is taken as straight between two nodes, so the integral over it is that of a normal density
 //! along a straight line through the space of readings: a density across it times a share along it.
 
-use super::noise::Whitening;
 use crate::influence::grid::{Axis, cubic};
+use crate::influence::noise::Whitening;
 use palpate_numerics::normal_between;
 use std::f64::consts::PI;
 
