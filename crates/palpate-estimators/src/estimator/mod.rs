@@ -13,6 +13,7 @@ pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 pub use settings::Setting;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
@@ -29,6 +30,7 @@ use crate::network::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
     NetworkLocator, TrainingOutcome,
 };
+use crate::recording::Recording;
 use crate::setup::Setup;
 
 use palpate_mechanics::surface::SurfaceSpec;
@@ -88,6 +90,8 @@ macro_rules! estimators {
             type Error = FitError;
 
             fn fit_method(&self, task: FitTask) -> Result<Method, FitError> {
+                let learnt_from = self.learnt_from(task.recording);
+                let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
                     Self::Auto => choose(task)?.best.fit_method(task),
@@ -95,6 +99,8 @@ macro_rules! estimators {
             }
 
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
+                let learnt_from = self.learnt_from(task.recording);
+                let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
@@ -148,6 +154,14 @@ estimators! {
 }
 
 impl Estimator {
+    /// What of a recording a method learns from: rows without contact teach offset and noise, which only influence functions have.
+    fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
+        match self {
+            Self::Influence(_) | Self::Auto => Cow::Borrowed(recording),
+            _ => recording.touched(),
+        }
+    }
+
     /// Every method that can be asked to locate on a bench, each with its default settings, the best guess first.
     pub fn contenders(setup: &Setup) -> Vec<Self> {
         let mut contenders = vec![

@@ -104,7 +104,7 @@ pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent
 }
 
 impl Evaluation {
-    /// Locates every reading of a recording.
+    /// Locates every reading of a recording in which something touched.
     ///
     /// # Errors
     /// [`ReadingError`] when the recording's channels are not the locator's.
@@ -118,7 +118,7 @@ impl Evaluation {
                 covered: covered(&contact, row.position, locator.setup.surface().extent()),
             })
         };
-        let located = recording.rows.iter().map(locate).collect::<Result<_, _>>()?;
+        let located = recording.rows.iter().filter(|row| row.touches()).map(locate).collect::<Result<_, _>>()?;
         Ok(Self { extent: locator.setup.surface().extent(), located })
     }
 

@@ -52,6 +52,10 @@ impl Fit for Influence {
             if let Some(fitted) = self.fit_force_linear(task)? {
                 return Ok(InfluenceLocator::ForceLinear(Box::new(fitted)));
             }
+        }
+        let touched = task.recording.touched();
+        let task = FitTask { recording: &touched, ..task };
+        if task.setup.surface.model().is_none() {
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }

@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use std::borrow::Cow;
 
 /// Readings with the contacts that caused them.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +38,7 @@ pub struct Recording {
 pub struct Row {
     /// True position of the contact.
     pub position: Position,
-    /// Its force in newtons, positive downward; `None` where nobody measured it.
+    /// Its force in newtons, positive downward; `None` where nobody measured it, 0 where nothing touched.
     pub force_n: Option<f64>,
     /// Something else about the contact that shapes the reading, is known here, and is unknown when a reading is to be
     /// located: the depth of indentation, say. In the SI unit of its column; `None` where the recording has no such column.
@@ -50,6 +51,11 @@ impl Row {
     /// The contact, where its force is known.
     pub fn contact(&self) -> Option<Contact> {
         self.force_n.map(|force_n| Contact { position: self.position, force_n })
+    }
+
+    /// Whether something touched: its force is not 0. The position of a row without contact means nothing.
+    pub fn touches(&self) -> bool {
+        self.force_n != Some(0.0)
     }
 }
 
@@ -105,9 +111,10 @@ impl Recording {
         self
     }
 
-    /// Every position that occurs, once, sorted by x and then y.
+    /// Every position that was touched, once, sorted by x and then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
-        let mut positions: Vec<Position> = self.rows.iter().map(|row| row.position).collect();
+        let touched = self.rows.iter().filter(|row| row.touches());
+        let mut positions: Vec<Position> = touched.map(|row| row.position).collect();
         positions.sort_by(Position::cmp_by_x_then_y);
         positions.dedup_by(|a, b| a.cmp_by_x_then_y(b).is_eq());
         positions
@@ -123,7 +130,7 @@ impl Recording {
     }
 
     /// Splits the rows into `count` folds by position: of the distinct positions, sorted by x and then y, fold k
-    /// holds out those whose index leaves k when divided by `count`, with all their rows.
+    /// holds out those whose index leaves k when divided by `count`, with all their rows. No fold holds out rows without contact.
     ///
     /// ```
     /// use palpate_estimators::{arrangement::Training, setup::Setup};
@@ -147,10 +154,28 @@ impl Recording {
         for (i, row) in self.rows.iter().enumerate() {
             let index = positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
             for (k, fold) in folds.iter_mut().enumerate() {
-                if index % count == k { fold.held_out.push(i) } else { fold.training.push(i) }
+                if row.touches() && index % count == k {
+                    fold.held_out.push(i)
+                } else {
+                    fold.training.push(i)
+                }
             }
         }
         Ok(folds)
+    }
+
+    /// The rows in which something touched, of the same provenance; borrowed where those are all.
+    pub fn touched(&self) -> Cow<'_, Self> {
+        if self.rows.iter().all(Row::touches) {
+            return Cow::Borrowed(self);
+        }
+        let rows = self.rows.iter().filter(|row| row.touches()).cloned().collect();
+        Cow::Owned(Self {
+            channels: self.channels.clone(),
+            kinds: self.kinds.clone(),
+            rows,
+            provenance: self.provenance.clone(),
+        })
     }
 
     /// The recording that consists of `rows`, indices into this one's; those beyond it are left out.

@@ -251,3 +251,17 @@ fn never_panics(bytes: &[u8]) {
     let _ = ReadingParser::new("", &foreign()).parse_line(bytes);
     let _ = ReadingParser::new("", &numbered()).parse_line(bytes);
 }
+
+#[test]
+fn rows_without_contact_are_no_presses() {
+    let mut recording = sweeps(|position, _| position as f64);
+    let mut untouched = recording.rows[0].clone();
+    untouched.position = Position::along(0.0);
+    untouched.force_n = Some(0.0);
+    recording.rows.push(untouched);
+    assert_eq!((recording.distinct_positions().len(), recording.touched().rows.len()), (10, 50));
+    assert_eq!(recording.touched().provenance, recording.provenance);
+    for fold in recording.folds(2).unwrap() {
+        assert!(fold.training.contains(&50) && !fold.held_out.contains(&50));
+    }
+}

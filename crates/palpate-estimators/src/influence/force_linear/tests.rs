@@ -5,7 +5,7 @@ use super::{ForceLinearLocator, Linearity, fit};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
-use crate::recording::{Provenance, Recording, Row};
+use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use ndarray::{Array1, Array2};
 use palpate_core::Status;
@@ -63,7 +63,7 @@ impl Bench {
             Position::along(MARGIN_M + (STRIP_M - 2.0 * MARGIN_M) * share)
         };
         let pressed = (0..presses).map(place).collect();
-        Self::new(Extent::Line { length_m: STRIP_M }, influences, pressed, rng)
+        Self::new(Extent::line(STRIP_M).unwrap(), influences, pressed, rng)
     }
 
     /// A plate on simple edges, over deflection sensors; pressed twice at each of 10 × 8 places.
@@ -94,7 +94,7 @@ impl Bench {
                 y_m: MARGIN_M + (width_m - 2.0 * MARGIN_M) * share(i / 10 % 8, 8),
             }
         };
-        Self::new(Extent::Plane { length_m, width_m }, influences, (0..160).map(place).collect(), rng)
+        Self::new(Extent::plane(length_m, width_m).unwrap(), influences, (0..160).map(place).collect(), rng)
     }
 
     fn new(
@@ -145,17 +145,7 @@ impl Bench {
     }
 
     fn recording(&self) -> Recording {
-        Recording {
-            channels: (0..GAUGES).map(|c| format!("gauge_{c}")).collect(),
-            kinds: vec![SensorKind::Raw; GAUGES],
-            rows: self.presses.clone(),
-            provenance: Provenance {
-                source: "test".into(),
-                rows: self.presses.len(),
-                digests: vec![],
-                seed: None,
-            },
-        }
+        Recording::new(&self.setup().layout, "bench", self.presses.clone())
     }
 
     fn fit_as(&self, structure: Structure) -> InfluenceLocator {
@@ -332,14 +322,14 @@ fn benches(usual: u64) -> u64 {
     std::env::var("PALPATE_BENCHES").ok().and_then(|count| count.parse().ok()).unwrap_or(usual)
 }
 
-/// Strips that are pressed so often, at so many places: the locator, and for comparison the free structure, beside the spline.
-fn compare_strips(presses: usize, places: usize, linear: &dyn Fn(&Bench) -> InfluenceLocator) -> Comparison {
+/// Strips that are pressed so often, at so many places: locators of a structure beside the spline.
+fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Structure) -> Comparison {
     let mut comparison = Comparison::default();
-    for seed in 0..benches(20) {
+    for seed in 0..count {
         let mut bench = Bench::strip(seed, presses, places);
         let touches = bench.touches(100);
         let theirs = Regression::spline(places.min(15)).errors_mm(&bench.presses, &touches);
-        comparison.add(errors_mm(&linear(&bench), &touches), theirs);
+        comparison.add(errors_mm(&bench.fit_as(structure), &touches), theirs);
     }
     comparison
 }
@@ -347,7 +337,7 @@ fn compare_strips(presses: usize, places: usize, linear: &dyn Fn(&Bench) -> Infl
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
     for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
-        let comparison = compare_strips(presses, places, &|bench| bench.fit_as(Structure::Auto));
+        let comparison = compare_strips(benches(20), (presses, places), Structure::Auto);
         comparison.print(&format!("strip, {presses} presses at {places} places"));
         let (medians, means) =
             (Comparison::summary(&comparison.medians), Comparison::summary(&comparison.means));
@@ -359,7 +349,7 @@ fn strips_are_located_better_than_by_a_spline() {
 #[test]
 fn the_structure_of_elastic_surfaces_is_worth_more_than_half_of_the_error() {
     let [linear, free] = [Structure::ForceLinear, Structure::Free]
-        .map(|structure| compare_strips(25, 9, &|bench| bench.fit_as(structure)));
+        .map(|structure| compare_strips(benches(5), (25, 9), structure));
     free.print("strip, 25 presses at 9 places, free structure");
     let mean_mm = |comparison: &Comparison| Comparison::summary(&comparison.means).1[0];
     assert!(mean_mm(&linear) < 0.5 * mean_mm(&free), "{} {}", mean_mm(&linear), mean_mm(&free));
