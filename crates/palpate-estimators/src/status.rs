@@ -40,7 +40,7 @@ pub(crate) fn misfit_bound(freedom: usize) -> f64 {
 
 /// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for
 /// normal noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
-pub fn learnt_misfit_bound<'a>(
+pub(crate) fn learnt_misfit_bound<'a>(
     freedom: usize,
     readings: impl ExactSizeIterator<Item = &'a [f64]>,
     misfit: impl Fn(&[f64]) -> f64,

@@ -16,7 +16,7 @@ use crate::influence::grid::{Axis, CUT, GridPosterior, PartOfCell, ToldForce, cu
 use crate::influence::noise::Whitening;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{FALSE_ALARM_RATE, learnt_misfit_bound, misfit_bound};
+use crate::status::{FALSE_ALARM_RATE, learnt_misfit_bound, misfit_bound, unknowns};
 use palpate_core::{Estimate, Status};
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::{bisect, normal_between, normal_cdf};
@@ -231,8 +231,7 @@ impl ForceLinearLocator {
     }
 
     fn unknowns(&self) -> usize {
-        let positions = if self.stored.y.count > 1 { 2 } else { 1 };
-        positions + usize::from(self.stored.known_force_n.is_none())
+        unknowns(if self.stored.y.count > 1 { 2 } else { 1 }, self.stored.known_force_n)
     }
 
     fn place(&self, place: usize) -> Place<'_> {
