@@ -78,8 +78,8 @@ fn force_linear() -> (Setup, Recording) {
     let (mut presses, hard) = (press(1.0, 1), press(3.0, 2));
     presses.rows.extend(hard.rows);
     let setup = Setup::measured(mm(400.0), &["a", "b", "c"]).unwrap();
-    presses.channels = setup.layout.names();
-    presses.kinds = setup.layout.kinds();
+    presses.channels = setup.layout().names();
+    presses.kinds = setup.layout().kinds();
     (setup, presses)
 }
 

@@ -118,7 +118,8 @@ impl Evaluation {
                 covered: covered(&contact, row.position, locator.setup.surface().extent()),
             })
         };
-        let located = recording.rows.iter().filter(|row| row.touches()).map(locate).collect::<Result<_, _>>()?;
+        let located =
+            recording.rows.iter().filter(|row| row.touches()).map(locate).collect::<Result<_, _>>()?;
         Ok(Self { extent: locator.setup.surface().extent(), located })
     }
 

@@ -55,7 +55,7 @@ impl Fit for Influence {
         }
         let touched = task.recording.touched();
         let task = FitTask { recording: &touched, ..task };
-        if task.setup.surface.model().is_none() {
+        if task.setup.surface().model().is_none() {
             let fitted = MeasuredInfluence::default().fit_method(task)?;
             return Ok(InfluenceLocator::Measured(Box::new(fitted)));
         }

@@ -57,10 +57,10 @@ pub(super) struct Presses {
 impl Presses {
     /// The presses of a recording, in rising order of position; `None` where the force of a row is not known.
     pub fn average(setup: &Setup, recording: &Recording) -> Option<Self> {
-        let extent = setup.surface.extent();
+        let extent = setup.surface().extent();
         let mut rows = Vec::with_capacity(recording.rows.len());
         for row in &recording.rows {
-            let force_n = row.force_n.or(setup.force_n).filter(|force_n| force_n.is_finite())?;
+            let force_n = row.force_n.or(setup.force_n()).filter(|force_n| force_n.is_finite())?;
             // Without a force it does not matter where nothing presses.
             let position_m: Vec<f64> = match force_n {
                 0.0 => vec![0.0; extent.dimensions()],

@@ -477,6 +477,6 @@ impl Locate for ForceLinearLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", setup.layout.len(), self.stored.channels)
+        LocatorFault::check_count("channels", setup.layout().len(), self.stored.channels)
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
         return Ok(None);
     }
     recording.check_distinct_positions(LEAST_POSITIONS)?;
-    let extent = setup.surface.extent();
+    let extent = setup.surface().extent();
     let learnt = Learnt::new(&presses, extent, watch)?;
     if learnt.live.is_empty() {
         return Ok(None);
@@ -64,7 +64,7 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
         channels: recording.channels.len(),
         live: learnt.live.clone(),
         functions: functions.into(),
-        known_force_n: setup.force_n,
+        known_force_n: setup.force_n(),
         hardest_n: HARDEST * presses.greatest_force_n(),
         residual_limit: f64::INFINITY,
         kernel: learnt.correlation.kernel,

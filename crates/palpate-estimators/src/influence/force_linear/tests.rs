@@ -10,12 +10,12 @@ use crate::setup::Setup;
 use ndarray::{Array1, Array2};
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
-use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::plate::{Edge, Edges, PlateSpec};
 use palpate_mechanics::surface::{
     BeamSection, BeamSupport, BeamSupportKind, SupportedBeam, SupportedBeamSpec,
 };
-use palpate_mechanics::surface::{Extent, Plate, Surface, SurfaceSpec};
+use palpate_mechanics::surface::{Extent, Plate, Surface};
 use palpate_numerics::{Cholesky, mean, median};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -140,12 +140,18 @@ impl Bench {
     }
 
     fn setup(&self) -> Setup {
-        let layout = Layout::even(SensorKind::Raw, GAUGES, self.extent.length_m());
-        Setup { surface: SurfaceSpec::Measured(self.extent), layout, force_n: None, columns: None }
+        let names: Vec<String> = (0..GAUGES).map(|c| format!("gauge_{c}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let length_m = self.extent.length_m();
+        match self.extent.width_m() {
+            None => Setup::measured(length_m, &names),
+            Some(width_m) => Setup::measured_plane(length_m, width_m, &names),
+        }
+        .unwrap()
     }
 
     fn recording(&self) -> Recording {
-        Recording::new(&self.setup().layout, "bench", self.presses.clone())
+        Recording::new(self.setup().layout(), "bench", self.presses.clone())
     }
 
     fn fit_as(&self, structure: Structure) -> InfluenceLocator {
