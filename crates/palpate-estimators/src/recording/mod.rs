@@ -154,11 +154,8 @@ impl Recording {
         for (i, row) in self.rows.iter().enumerate() {
             let index = positions.partition_point(|position| position.cmp_by_x_then_y(&row.position).is_lt());
             for (k, fold) in folds.iter_mut().enumerate() {
-                if row.touches() && index % count == k {
-                    fold.held_out.push(i)
-                } else {
-                    fold.training.push(i)
-                }
+                let is_held_out = row.touches() && index % count == k;
+                if is_held_out { fold.held_out.push(i) } else { fold.training.push(i) }
             }
         }
         Ok(folds)

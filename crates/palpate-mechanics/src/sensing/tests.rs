@@ -93,10 +93,12 @@ proptest! {
     }
 }
 
+type Change = fn(&mut ChannelModel);
+
 #[test]
 fn a_number_of_a_channel_out_of_its_range_is_refused_from_callers_and_from_files() {
     let good = Layout::even(SensorKind::Deflection, 3, 0.4);
-    let changes: [(fn(&mut ChannelModel), &str); 9] = [
+    let changes: [(Change, &str); 9] = [
         (|channel| channel.noise_sd = -1.0, "the noise is -1; it must be at least 0 and finite"),
         (|channel| channel.noise_sd = f64::NAN, "the noise is NaN; it must be at least 0 and finite"),
         (|channel| channel.resolution = -1.0, "the resolution is -1; it must be at least 0 and finite"),
