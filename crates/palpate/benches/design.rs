@@ -27,7 +27,7 @@ fn main() {
     by_limit(&rig.setup, &design);
     let SurfaceSpec::Beam(beam) = rig.setup.surface() else { return };
     by_pivoting("sines", &sines());
-    by_pivoting("deflections at 8 contacts, orthonormal", &deflections(&beam));
+    by_pivoting("deflections at 8 contacts, orthonormal", &deflections(beam));
 }
 
 /// The median CPU time of some rounds, and what the last of them gives.

@@ -140,7 +140,7 @@ impl Printer<'_> {
         let resolution = self.profiler.resolution(profile);
         let report = ProfileReport {
             title: &format!("The load on {}", arguments.subject.display()),
-            layout: &self.subject.setup().layout(),
+            layout: self.subject.setup().layout(),
             reading,
             profile,
             limits,

@@ -202,7 +202,7 @@ fn one_sensor_in_the_middle_cannot_tell_the_four_quarters() {
     let mut places = [0.15, 0.075].map(|y_m| Position { x_m: 0.15, y_m }).into_iter();
     rig.setup
         .edit_sensors(|sensors| {
-            sensors.iter_mut().for_each(|sensor| sensor.position = places.next().unwrap())
+            sensors.iter_mut().for_each(|sensor| sensor.position = places.next().unwrap());
         })
         .unwrap();
     let locator = fit(Influence::default(), &rig.setup, &rig.simulate(1));
