@@ -57,7 +57,7 @@ pub fn parse_locator(path: &Path, text: &str) -> Result<Locator, Failure> {
     Locator::from_json(text).map_err(|error| locator_complaint(&error, path, text).into())
 }
 
-/// Whether a file is a rig or a study by its name.
+/// True for a file whose name ends in `.toml`: a rig or a study.
 pub fn is_toml(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }

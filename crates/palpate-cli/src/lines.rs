@@ -80,12 +80,12 @@ impl Readings {
         Ok(None)
     }
 
-    /// Whether not even a header has come.
+    /// True until the columns are known, by a header or by `--no-header`.
     pub fn awaits_columns(&self) -> bool {
         self.parser.awaits_columns()
     }
 
-    /// Whether every line so far was read.
+    /// True while no line has been skipped.
     pub fn is_whole(&self) -> bool {
         self.lost == 0
     }

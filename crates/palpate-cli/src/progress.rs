@@ -20,7 +20,7 @@ pub fn install_interrupt_handler() {
     }
 }
 
-/// Whether somebody pressed Ctrl-C.
+/// True once Ctrl-C was pressed.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }

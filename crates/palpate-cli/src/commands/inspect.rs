@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::{input, output};
 use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::centroid::Weighing;
-use palpate_estimators::estimator::Method;
+use palpate_estimators::estimator::{Locator, Method};
 use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
 use palpate_estimators::influence::{ForceLinearLocator, InfluenceLocator};
 use palpate_estimators::network::Topology;
@@ -164,7 +164,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         provenance.seed
     )];
     lines.extend(setup(&locator.setup));
-    lines.extend(method(&locator.method));
+    lines.extend(method(&locator));
     let recording = &provenance.recording;
     lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
     for digest in &recording.digests {
@@ -173,8 +173,8 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     Ok(lines)
 }
 
-fn method(method: &Method) -> Vec<String> {
-    match method {
+fn method(locator: &Locator) -> Vec<String> {
+    match &locator.method {
         Method::Network(network) => {
             let network = network.parts();
             let outcome = network.outcome;
@@ -203,7 +203,9 @@ fn method(method: &Method) -> Vec<String> {
             plane.table().columns,
             plane.table().rows
         )],
-        Method::Influence(InfluenceLocator::ForceLinear(linear)) => force_linear(linear),
+        Method::Influence(InfluenceLocator::ForceLinear(linear)) => {
+            force_linear(linear, &locator.setup.layout().names())
+        }
         Method::Influence(InfluenceLocator::Measured(measured)) => vec![learnt(measured)],
         Method::NetworkLm(networks) => networks
             .members
@@ -239,7 +241,7 @@ fn method(method: &Method) -> Vec<String> {
     }
 }
 
-fn force_linear(linear: &ForceLinearLocator) -> Vec<String> {
+fn force_linear(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
     let (kernel, lengths_m) = linear.correlation();
     let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
     let kernel = match kernel {
@@ -247,7 +249,8 @@ fn force_linear(linear: &ForceLinearLocator) -> Vec<String> {
         Kernel::Matern52 => "Matérn 5/2",
         Kernel::SquaredExponential => "squared exponential",
     };
-    let noise: Vec<String> = linear.noise_sd().map(|(_, sd)| format!("{sd:.2e}")).collect();
+    let channels =
+        linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));
     let linearity = match linear.nonlinearity() {
         0.0 => "linear in the force, as far as the presses tell".to_owned(),
         change => format!(
@@ -263,7 +266,7 @@ fn force_linear(linear: &ForceLinearLocator) -> Vec<String> {
             lengths.join(" and "),
             format_count(linear.presses() as u64)
         ),
-        format!("noise of the channels in use: {}", noise.join(", ")),
+        format!("offset and noise of the channels in use: {}", channels.collect::<Vec<_>>().join(", ")),
     ]
 }
 

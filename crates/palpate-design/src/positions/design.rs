@@ -152,7 +152,7 @@ pub enum PositionError {
     /// The design was stopped.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),
-    /// Nothing to simulate.
+    /// A surface without a model.
     #[error("a measured surface has no model to simulate calibrations with")]
     NoModel,
     /// The force of the presses is not given.
@@ -199,7 +199,7 @@ pub enum PositionError {
         /// Least number.
         needed: usize,
     },
-    /// Nothing says how noisy a channel is.
+    /// A channel of unknown noise.
     #[error(
         "nothing says how noisy channel {channel} is: no position was pressed twice, and the setup states no noise"
     )]

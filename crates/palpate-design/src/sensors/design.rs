@@ -328,7 +328,7 @@ pub enum DesignError {
         listed: usize,
         /// Sensors that are wanted.
         count: usize,
-        /// Whether mirror images are counted too.
+        /// True where mirror images are counted too.
         mirrored: bool,
     },
     /// A sensor that every layout has, where it would read nothing.

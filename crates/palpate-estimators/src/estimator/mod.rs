@@ -154,7 +154,7 @@ estimators! {
 }
 
 impl Estimator {
-    /// What of a recording a method learns from: rows without contact teach offset and noise, which only influence functions have.
+    /// The rows that a method learns from: those without contact teach offset and noise, which only influence functions have.
     fn learnt_from<'a>(&self, recording: &'a Recording) -> Cow<'a, Recording> {
         match self {
             Self::Influence(_) | Self::Auto => Cow::Borrowed(recording),

@@ -170,7 +170,6 @@ fn a_strip_over_air_is_as_scikit_learn_has_it() {
 
 /// Five exact processes of 3,844 rows take most of a minute.
 #[test]
-#[ignore = "takes a minute"]
 fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     let Some((setup, recording)) = pad_recording() else { return };
     let (errors, _) = five_folds("eflesh", &setup, &recording);

@@ -1,6 +1,7 @@
 //! A grid of places, and the posterior of a contact over its cells.
 
 use super::moments::Moments;
+use crate::fit::LocatorFault;
 use crate::status::OTHER_PLACE;
 use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
@@ -58,8 +59,37 @@ impl Axis {
     }
 }
 
+/// Checks what a file may have got wrong of axes.
+pub(super) fn check_axes(axes: &[Axis]) -> Result<(), LocatorFault> {
+    let counts = axes.iter().map(|axis| axis.count as f64);
+    LocatorFault::check_numbers("axis count", counts, |count| count >= 1.0, "at least 1")?;
+    LocatorFault::check_numbers("axis start", axes.iter().map(|axis| axis.start), |_| true, "finite")?;
+    let steps = axes.iter().map(|axis| axis.step);
+    LocatorFault::check_numbers("axis step", steps, |step| step > 0.0, "finite and greater than 0")
+}
+
+/// The places next to one, diagonally too. Place (x, y) of a grid is number x·count_y + y.
+pub(super) fn neighbours([x, y]: [Axis; 2], place: usize) -> impl Iterator<Item = usize> + use<> {
+    let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    let (columns, rows) = (around(place / y.count, x.count), around(place % y.count, y.count));
+    columns.flat_map(move |i| rows.clone().map(move |j| i * y.count + j)).filter(move |other| *other != place)
+}
+
+/// The places around (x, y), in nodes, with the weight of each in cubic interpolation through four places each way.
+pub(super) fn weights_around(
+    [x_axis, y_axis]: [Axis; 2],
+    (x, y): (f64, f64),
+) -> impl Iterator<Item = (usize, f64)> + use<> {
+    let (first_x, weights_x) = cubic(x, x_axis.count);
+    let (first_y, weights_y) = cubic(y, y_axis.count);
+    let used = |weights: [f64; 4]| (0..4).map(move |i| (i, weights[i])).filter(|(_, weight)| *weight != 0.0);
+    used(weights_x).flat_map(move |(i, wx)| {
+        used(weights_y).map(move |(j, wy)| ((first_x + i) * y_axis.count + first_y + j, wx * wy))
+    })
+}
+
 /// Lagrange's weights of four nodes around `place`, or of fewer where there are no four, and the first of them.
-pub(super) fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
+fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
     let used = count.min(4);
     let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
     let at = place - first as f64;
@@ -78,7 +108,7 @@ pub(super) fn middle([x, y]: [Axis; 2]) -> Position {
 }
 
 /// The middles of the parts of a place's cell, in nodes, where each axis of it is cut into `parts`; what would lie beyond the
-/// grid's edge is left out. Place (x, y) is number x·count_y + y.
+/// grid's edge is left out.
 pub(super) fn parts_of(
     [x, y]: [Axis; 2],
     parts: usize,

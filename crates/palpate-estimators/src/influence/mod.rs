@@ -22,7 +22,6 @@ pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
-use force_linear::Linearity;
 use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
 use palpate_mechanics::surface::Extent;
@@ -86,14 +85,11 @@ impl Influence {
     /// Fits offsets and influence functions of a surface without a model; `None` where the setting, the recording or a named
     /// nuisance coordinate says that readings are no multiple of the force.
     fn fit_force_linear(&self, task: FitTask) -> Result<Option<ForceLinearLocator>, InfluenceFitError> {
-        let has_nuisance = task.recording.rows.iter().any(|row| row.nuisance.is_some());
-        let linearity = match self.structure {
-            Structure::Free => return Ok(None),
-            Structure::Auto if has_nuisance => return Ok(None),
-            Structure::Auto => Linearity::IfPressesAgree,
-            Structure::ForceLinear => Linearity::Forced,
-        };
-        let fitted = force_linear::fit(task, linearity)?;
+        let has_nuisance = || task.recording.rows.iter().any(|row| row.nuisance.is_some());
+        if self.structure == Structure::Free || self.structure == Structure::Auto && has_nuisance() {
+            return Ok(None);
+        }
+        let fitted = force_linear::fit(task, self.structure)?;
         match (fitted, self.structure) {
             (None, Structure::ForceLinear) => Err(InfluenceFitError::NoForces),
             (fitted, _) => Ok(fitted),

@@ -509,24 +509,18 @@ const LEAST_SMOOTHER: f64 = 10.0;
 /// A nonlinearity is believed from this much more evidence on.
 const LEAST_GAIN: f64 = 10.0;
 
-/// The correlation under which the presses are the most probable: kernels one after the other, length scales by ever smaller
+/// The correlation under which the presses are the most probable: the smoother kernel on sufficient evidence, length scales by ever smaller
 /// steps, the nonlinearity last.
 fn most_probable(evidence: &Evidence, extent: Extent, watch: Watch) -> Result<Correlation, Cancelled> {
     let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
     let start: Vec<f64> = spans_m.map(|span_m| 0.25 * span_m).collect();
-    let mut found: Option<(f64, Correlation)> = None;
-    for kernel in [Kernel::Matern32, Kernel::Matern52] {
-        let start = found.as_ref().map_or(&start, |(_, correlation)| &correlation.lengths_m).clone();
-        let first = Correlation { kernel, lengths_m: start, nonlinearity: 0.0 };
-        let climbed = climb_lengths(evidence, first, extent, watch)?;
-        if found.as_ref().is_none_or(|(best, _)| climbed.0 > *best + LEAST_SMOOTHER) {
-            found = Some(climbed);
-        }
+    let rough = Correlation { kernel: Kernel::Matern32, lengths_m: start, nonlinearity: 0.0 };
+    let (mut best, mut correlation) = climb_lengths(evidence, rough, extent, watch)?;
+    let smooth = Correlation { kernel: Kernel::Matern52, ..correlation.clone() };
+    let (smooth_best, smooth) = climb_lengths(evidence, smooth, extent, watch)?;
+    if smooth_best > best + LEAST_SMOOTHER {
+        (best, correlation) = (smooth_best, smooth);
     }
-    let (mut best, mut correlation) = found.unwrap_or((
-        f64::NEG_INFINITY,
-        Correlation { kernel: Kernel::Matern32, lengths_m: start, nonlinearity: 0.0 },
-    ));
     best += LEAST_GAIN;
     for nonlinearity in NONLINEARITIES {
         watch.round()?;

@@ -12,7 +12,9 @@
 
 use super::learning::{Functions, OpenVariance};
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{Axis, CUT, GridPosterior, PartOfCell, ToldForce, cubic, parts_of};
+use crate::influence::grid::{
+    Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
+};
 use crate::influence::noise::Whitening;
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -122,10 +124,7 @@ impl Stored {
         let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
             LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
         };
-        let axes = [self.x, self.y];
-        numbers("axis count", &axes.map(|axis| axis.count as f64), |count| count >= 1.0, "at least 1")?;
-        numbers("axis start", &axes.map(|axis| axis.start), |_| true, "finite")?;
-        numbers("axis step", &axes.map(|axis| axis.step), |step| step > 0.0, "finite and greater than 0")?;
+        check_axes(&[self.x, self.y])?;
         let places = self.x.count.saturating_mul(self.y.count);
         let Tables { offsets, noise_sd, whitening, values, variances, covariances, offset_variance } =
             &self.functions;
@@ -215,15 +214,10 @@ impl ForceLinearLocator {
         self.stored.presses
     }
 
-    /// Offset of a channel in use, by its number among those.
-    #[cfg(test)]
-    pub fn offset(&self, live: usize) -> f64 {
-        self.stored.functions.offsets[live]
-    }
-
-    /// The channels in use, from 0, with the noise of each, in its unit.
-    pub fn noise_sd(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.stored.live.iter().copied().zip(self.stored.functions.noise_sd.iter().copied())
+    /// Number of each channel in use, from 0, with its offset and noise, in its unit.
+    pub fn channels(&self) -> impl Iterator<Item = (usize, f64, f64)> {
+        let Tables { offsets, noise_sd, .. } = &self.stored.functions;
+        self.stored.live.iter().zip(offsets).zip(noise_sd).map(|((c, offset), noise)| (*c, *offset, *noise))
     }
 
     fn axes(&self) -> [Axis; 2] {
@@ -247,11 +241,8 @@ impl ForceLinearLocator {
     /// Finds the reaches of the places, and how finely cells must be cut.
     fn cut_cells(&mut self) {
         let [x, y] = self.axes();
-        let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         let reach = |place: usize| {
-            let neighbours = around(place / y.count, x.count)
-                .flat_map(|i| around(place % y.count, y.count).map(move |j| i * y.count + j));
-            let ways = neighbours.map(|other| self.way_between(place, other));
+            let ways = neighbours([x, y], place).map(|other| self.way_between(place, other));
             0.5 * ways.fold(0.0, f64::max)
         };
         self.reaches = (0..x.count * y.count).map(reach).collect();
@@ -307,7 +298,7 @@ impl ForceLinearLocator {
         self.detection_bound = learnt(bisect((0.0, 20.0), 50, exceeded).powi(2), freedom);
     }
 
-    /// How many directions the readings of contacts have: the length of the curve of f/|f| over a line, or half the length of its
+    /// Extent of the directions f/|f| that readings of contacts have: the length of the curve of f/|f| over a line, or half the length of its
     /// boundary and its area over a plane. The largest product of noise with a direction exceeds u with the probability
     /// Φ(−u) + e^(−u²/2)·(length/2π + area·u/(2π)^(3/2)) (S. O. Rice 1944; Adler and Taylor, *Random Fields and Geometry*, 2007,
     /// chapter 14).
@@ -343,12 +334,9 @@ impl ForceLinearLocator {
     pub(super) fn limit_residuals(&mut self, recording: &Recording) {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let readings = recording.rows.iter().map(|row| row.reading.as_slice());
-        self.stored.residual_limit =
-            learnt_misfit_bound(freedom, readings, |reading| self.least_misfit(&self.whitened(reading)));
-    }
-
-    fn least_misfit(&self, whitened: &[f64]) -> f64 {
-        self.posterior(whitened).residual
+        self.stored.residual_limit = learnt_misfit_bound(freedom, readings, |reading| {
+            self.posterior(&self.whitened(reading)).residual
+        });
     }
 
     /// The reading less the offsets, in channels of unit noise.
@@ -382,14 +370,13 @@ impl ForceLinearLocator {
         let held = |(fd, ff): (f64, f64)| if ff > 0.0 { (fd / ff).clamp(0.0, hardest_n) } else { 0.0 };
         let known = self.stored.known_force_n;
         let force_n = known.unwrap_or_else(|| (0..STEPS).fold(0.0, |force_n, _| held(sums(force_n))));
-        let (mut misfit, mut determinant) = (0.0, 1.0);
+        let (mut misfit, mut log_determinant) = (0.0, 0.0);
         let open = open(force_n);
         for ((d, f), signal) in channels() {
             let variance = 1.0 + open * signal;
             misfit += (d - force_n * f).powi(2) / variance;
-            determinant *= variance;
+            log_determinant += variance.ln();
         }
-        let log_determinant = determinant.ln();
         let cost = misfit + log_determinant;
         if known.is_some() {
             return Explained { misfit, cost, force_n, force_variance_n2: 0.0 };
@@ -446,20 +433,14 @@ impl ForceLinearLocator {
 
     /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
     fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Vec<f64>) -> Place<'b> {
-        let [x_axis, y_axis] = self.axes();
         buffer.clear();
         buffer.resize(self.stored.live.len(), 0.0);
         let (mut variance, mut covariance) = (0.0, 0.0);
-        let (first_x, weights_x) = cubic(x, x_axis.count);
-        let (first_y, weights_y) = cubic(y, y_axis.count);
-        for (i, wx) in weights_x.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            for (j, wy) in weights_y.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-                let place = self.place((first_x + i) * y_axis.count + first_y + j);
-                let weight = wx * wy;
-                buffer.iter_mut().zip(place.values).for_each(|(sum, value)| *sum += weight * value);
-                variance += weight * place.variance;
-                covariance += weight * place.covariance;
-            }
+        for (place, weight) in weights_around(self.axes(), (x, y)) {
+            let place = self.place(place);
+            buffer.iter_mut().zip(place.values).for_each(|(sum, value)| *sum += weight * value);
+            variance += weight * place.variance;
+            covariance += weight * place.covariance;
         }
         Place { values: buffer, variance: variance.max(0.0), covariance }
     }

@@ -8,6 +8,7 @@ mod locator;
 
 pub use locator::ForceLinearLocator;
 
+use super::config::Structure;
 use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
@@ -23,18 +24,9 @@ const MOST_OF_PLANE: usize = 60;
 /// Forces up to this many times the greatest of the calibration are looked for.
 const HARDEST: f64 = 3.0;
 
-/// Whether readings are taken as linear in the force.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Linearity {
-    /// Where the presses do not speak against it.
-    IfPressesAgree,
-    /// Whatever the presses say.
-    Forced,
-}
-
 /// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
-/// they have no forces or all the same one, or where they speak against linearity.
-pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLinearLocator>, MeasuredError> {
+/// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
+pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
     let Some(presses) = Presses::average(setup, recording) else { return Ok(None) };
     if presses.distinct_forces() < 2 {
@@ -46,7 +38,7 @@ pub(super) fn fit(task: FitTask, linearity: Linearity) -> Result<Option<ForceLin
     if learnt.live.is_empty() {
         return Ok(None);
     }
-    if linearity == Linearity::IfPressesAgree && learnt.correlation.nonlinearity > 0.0 {
+    if structure != Structure::ForceLinear && learnt.correlation.nonlinearity > 0.0 {
         return Ok(None);
     }
     let axes = axes(&presses, &learnt, extent);

@@ -1,7 +1,7 @@
 //! Strips with raw gauges, by known physics: a clamped strip under random gauges, gains and offsets, pressed at a few places with recorded
 //! forces and asked with unknown ones; beside it what fifteen lines of SciPy do: offset + force × cubic spline of the position.
 
-use super::{ForceLinearLocator, Linearity, fit};
+use super::{ForceLinearLocator, fit};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
@@ -45,6 +45,10 @@ struct Bench {
 impl Bench {
     /// A strip that is clamped at both ends, over strain gauges.
     fn strip(seed: u64, presses: usize, places: usize) -> Self {
+        Self::strip_over(GAUGES, seed, presses, places)
+    }
+
+    fn strip_over(gauge_count: usize, seed: u64, presses: usize, places: usize) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let clamp = |at_m: f64| BeamSupport { at_m, kind: BeamSupportKind::Clamped };
         let strip = SupportedBeam::new(SupportedBeamSpec {
@@ -53,8 +57,8 @@ impl Bench {
             supports: vec![clamp(0.0), clamp(STRIP_M)],
             sections: vec![BeamSection { to_m: STRIP_M, width_m: 0.03, thickness_m: 1e-3 }],
         });
-        let pitch_m = STRIP_M / GAUGES as f64;
-        let gauges: Vec<Position> = (0..GAUGES)
+        let pitch_m = STRIP_M / gauge_count as f64;
+        let gauges: Vec<Position> = (0..gauge_count)
             .map(|i| Position::along(pitch_m * (i as f64 + 0.5 + rng.random_range(-0.25..0.25))))
             .collect();
         let influences = raw_influences(strip.unwrap(), SensorKind::Strain, gauges, &mut rng);
@@ -63,7 +67,7 @@ impl Bench {
             Position::along(MARGIN_M + (STRIP_M - 2.0 * MARGIN_M) * share)
         };
         let pressed = (0..presses).map(place).collect();
-        Self::new(Extent::line(STRIP_M).unwrap(), influences, pressed, rng)
+        Self::new(Extent::line(STRIP_M).unwrap(), gauge_count, influences, pressed, rng)
     }
 
     /// A plate on simple edges, over deflection sensors; pressed twice at each of 10 × 8 places.
@@ -94,16 +98,23 @@ impl Bench {
                 y_m: MARGIN_M + (width_m - 2.0 * MARGIN_M) * share(i / 10 % 8, 8),
             }
         };
-        Self::new(Extent::plane(length_m, width_m).unwrap(), influences, (0..160).map(place).collect(), rng)
+        Self::new(
+            Extent::plane(length_m, width_m).unwrap(),
+            GAUGES,
+            influences,
+            (0..160).map(place).collect(),
+            rng,
+        )
     }
 
     fn new(
         extent: Extent,
+        gauges: usize,
         influences: Influences,
         pressed: Vec<Position>,
         mut rng: Xoshiro256PlusPlus,
     ) -> Self {
-        let offsets = (0..GAUGES).map(|_| rng.random_range(-500.0..500.0)).collect();
+        let offsets = (0..gauges).map(|_| rng.random_range(-500.0..500.0)).collect();
         let mut bench = Self { extent, influences, offsets, rng, presses: Vec::new() };
         bench.presses = pressed.into_iter().map(|at| bench.touch(at)).collect();
         bench
@@ -140,7 +151,7 @@ impl Bench {
     }
 
     fn setup(&self) -> Setup {
-        let names: Vec<String> = (0..GAUGES).map(|c| format!("gauge_{c}")).collect();
+        let names: Vec<String> = (0..self.offsets.len()).map(|c| format!("gauge_{c}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let length_m = self.extent.length_m();
         match self.extent.width_m() {
@@ -160,9 +171,9 @@ impl Bench {
         config.fit_method(FitTask::new(&setup, &recording)).unwrap()
     }
 
-    fn fit(&self, linearity: Linearity) -> Option<ForceLinearLocator> {
+    fn fit(&self, structure: Structure) -> Option<ForceLinearLocator> {
         let (setup, recording) = (self.setup(), self.recording());
-        fit(FitTask::new(&setup, &recording), linearity).unwrap()
+        fit(FitTask::new(&setup, &recording), structure).unwrap()
     }
 }
 
@@ -391,7 +402,7 @@ fn an_untouched_board_is_no_contact() {
 #[test]
 fn rows_without_force_teach_offset_and_noise() {
     let mut bench = Bench::strip(2, 5, 5);
-    let few = bench.fit(Linearity::Forced).unwrap();
+    let few = bench.fit(Structure::ForceLinear).unwrap();
     for _ in 0..40 {
         let reading = bench.counts(Position::along(0.1), 0.0);
         bench.presses.push(Row {
@@ -401,12 +412,12 @@ fn rows_without_force_teach_offset_and_noise() {
             reading,
         });
     }
-    let more = bench.fit(Linearity::Forced).unwrap();
+    let more = bench.fit(Structure::ForceLinear).unwrap();
     for (c, offset) in bench.offsets.iter().enumerate() {
-        let [few, more] = [&few, &more].map(|locator| (locator.offset(c) - offset).abs());
+        let [few, more] = [&few, &more].map(|locator| (locator.channels().nth(c).unwrap().1 - offset).abs());
         assert!(more < 0.6, "gauge {c}: offset off by {more}, by {few} without rows of force 0");
     }
-    for (_, noise) in more.noise_sd() {
+    for (.., noise) in more.channels() {
         assert!((0.6..1.5).contains(&noise), "{noise}");
     }
 }
@@ -414,14 +425,14 @@ fn rows_without_force_teach_offset_and_noise() {
 #[test]
 fn a_response_that_is_no_multiple_of_the_force_is_left_to_the_free_structure() {
     let mut bench = Bench::strip(3, 60, 15);
-    assert!(bench.fit(Linearity::IfPressesAgree).is_some());
+    assert!(bench.fit(Structure::Auto).is_some());
     for row in &mut bench.presses {
         let force_n = row.force_n.unwrap();
         for (value, offset) in row.reading.iter_mut().zip(&bench.offsets) {
             *value = offset + (*value - offset) * (force_n / 5.0).powf(0.6);
         }
     }
-    assert!(bench.fit(Linearity::IfPressesAgree).is_none());
+    assert!(bench.fit(Structure::Auto).is_none());
     assert!(matches!(bench.fit_as(Structure::Auto), InfluenceLocator::Measured(_)));
     assert!(matches!(bench.fit_as(Structure::ForceLinear), InfluenceLocator::ForceLinear(_)));
 }
@@ -430,7 +441,7 @@ fn a_response_that_is_no_multiple_of_the_force_is_left_to_the_free_structure() {
 fn one_force_alone_tells_no_offset() {
     let mut bench = Bench::strip(4, 30, 10);
     bench.presses.iter_mut().for_each(|row| row.force_n = Some(2.0));
-    assert!(bench.fit(Linearity::IfPressesAgree).is_none());
+    assert!(bench.fit(Structure::Auto).is_none());
     let (setup, recording) = (bench.setup(), bench.recording());
     let forced = Influence { structure: Structure::ForceLinear, ..Influence::default() };
     let error = forced.fit_method(FitTask::new(&setup, &recording)).unwrap_err();
@@ -441,8 +452,8 @@ fn one_force_alone_tells_no_offset() {
 fn a_channel_that_never_changes_is_left_out() {
     let mut bench = Bench::strip(5, 40, 10);
     bench.presses.iter_mut().for_each(|row| row.reading[2] = 7.0);
-    let locator = bench.fit(Linearity::Forced).unwrap();
-    assert_eq!(locator.noise_sd().map(|(c, _)| c).collect::<Vec<_>>(), [0, 1, 3, 4, 5]);
+    let locator = bench.fit(Structure::ForceLinear).unwrap();
+    assert_eq!(locator.channels().map(|(c, ..)| c).collect::<Vec<_>>(), [0, 1, 3, 4, 5]);
     let mut touch = bench.touch(Position::along(0.12));
     touch.reading[2] = -1e6;
     let contact = locator.locate(&touch.reading).contact;
@@ -452,10 +463,24 @@ fn a_channel_that_never_changes_is_left_out() {
 #[test]
 fn a_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let bench = Bench::strip(6, 12, 6);
-    let locator = bench.fit(Linearity::Forced).unwrap();
+    let locator = bench.fit(Structure::ForceLinear).unwrap();
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<ForceLinearLocator>(&json).unwrap(), locator);
     let bad = json.replacen("\"offset_variance\":", "\"offset_variance\":-", 1);
     let error = serde_json::from_str::<ForceLinearLocator>(&bad).unwrap_err().to_string();
     assert!(error.contains("offset variance"), "{error}");
+}
+
+#[test]
+fn the_determinant_of_many_gauges_does_not_overflow() {
+    let mut bench = Bench::strip_over(48, 7, 60, 15);
+    let locator = bench.fit(Structure::ForceLinear).unwrap();
+    let mut file = serde_json::to_value(&locator).unwrap();
+    // As of gauges with next to no noise: the product of their variances is beyond the largest number.
+    file["functions"]["whitening"]["signal"] = serde_json::json!(vec![1e12; 48]);
+    let locator: ForceLinearLocator = serde_json::from_value(file).unwrap();
+    let touch = bench.touch(Position::along(0.1234));
+    let contact = locator.locate(&touch.reading).contact;
+    let (low_m, high_m) = contact.uncertainty.expect("some place explains the reading").x_95_m;
+    assert!(low_m < high_m, "{contact:?}");
 }

@@ -3,7 +3,7 @@
 use super::config::Scale;
 use super::table::{Line, LineBuffer, Table};
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{CUT, GridPosterior, PartOfCell, ToldForce, middle, parts_of};
+use crate::influence::grid::{CUT, GridPosterior, PartOfCell, ToldForce, check_axes, middle, parts_of};
 use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
@@ -92,13 +92,7 @@ impl Locate for MeasuredLocator {
         let (table, channels) = (&self.table, setup.layout().len());
         LocatorFault::check_count("whitened channels", channels, self.whitening.channels())?;
         LocatorFault::check_count("whitening weights", channels * channels, self.whitening.matrix.len())?;
-        let axes = [table.x, table.y, table.nuisance];
-        let counts = axes.iter().map(|axis| axis.count as f64);
-        LocatorFault::check_numbers("axis count", counts, |count| count >= 1.0, "at least 1")?;
-        let starts = axes.iter().map(|axis| axis.start);
-        LocatorFault::check_numbers("axis start", starts, |_| true, "finite")?;
-        let steps = axes.iter().map(|axis| axis.step);
-        LocatorFault::check_numbers("axis step", steps, |step| step > 0.0, "finite and greater than 0")?;
+        check_axes(&[table.x, table.y, table.nuisance])?;
         let places = table.x.count.saturating_mul(table.y.count);
         let nodes = places.saturating_mul(table.nuisance.count);
         LocatorFault::check_count("table variances", nodes, table.variances.len())?;

@@ -36,7 +36,7 @@ pub(super) fn nuisance_coordinate(
 
 /// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinate, are one.
 ///
-/// What of a place repeats itself but is not smooth (the surface's texture, a press a little off) is noise to
+/// Texture of the surface that repeats itself at a place but is not smooth, as a press a little off, is noise to
 /// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
 pub(super) struct Presses {
     pub readings: Scale,

@@ -3,7 +3,7 @@
 //! Along the nuisance coordinate the mean is taken as straight between two nodes, so the integral over it is that of a normal density
 //! along a straight line through the space of readings: a density across it times a share along it.
 
-use crate::influence::grid::{Axis, cubic};
+use crate::influence::grid::{Axis, neighbours, weights_around};
 use crate::influence::noise::Whitening;
 use palpate_numerics::normal_between;
 use std::f64::consts::PI;
@@ -108,31 +108,16 @@ impl Table {
         buffer.means.resize(self.nuisance.count * self.channels(), 0.0);
         buffer.variances.clear();
         buffer.variances.resize(self.nuisance.count, 0.0);
-        let (first_x, weights_x) = cubic(x, self.x.count);
-        let (first_y, weights_y) = cubic(y, self.y.count);
-        for (i, wx) in weights_x.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            for (j, wy) in weights_y.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-                let line = self.line((first_x + i) * self.y.count + first_y + j);
-                let weight = wx * wy;
-                let add = |sums: &mut [f64], values: &[f64]| {
-                    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-                };
-                add(&mut buffer.means, line.means);
-                add(&mut buffer.variances, line.variances);
-            }
+        for (place, weight) in weights_around([self.x, self.y], (x, y)) {
+            let line = self.line(place);
+            let add = |sums: &mut [f64], values: &[f64]| {
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+            };
+            add(&mut buffer.means, line.means);
+            add(&mut buffer.variances, line.variances);
         }
         buffer.variances.iter_mut().for_each(|v| *v = v.max(0.0));
         Line { means: &buffer.means, variances: &buffer.variances }
-    }
-
-    /// The places next to one, diagonally too.
-    fn neighbours(&self, place: usize) -> impl Iterator<Item = usize> {
-        let (x, y) = (place / self.y.count, place % self.y.count);
-        let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-        let (columns, rows, across) = (around(x, self.x.count), around(y, self.y.count), self.y.count);
-        columns
-            .flat_map(move |i| rows.clone().map(move |j| i * across + j))
-            .filter(move |other| *other != place)
     }
 
     fn reach(&self, place: usize, unit: &Whitening) -> f64 {
@@ -141,7 +126,7 @@ impl Table {
         let distances = here
             .means
             .chunks_exact(unit.channels().max(1))
-            .flat_map(|mean| self.neighbours(place).map(move |other| to_line(mean, other)));
+            .flat_map(|mean| neighbours([self.x, self.y], place).map(move |other| to_line(mean, other)));
         0.5 * distances.fold(0.0, f64::max).sqrt()
     }
 }

@@ -233,7 +233,6 @@ fn a_strip_over_oil_beats_scikit_learn() {
 }
 
 #[test]
-#[ignore = "takes a minute"]
 fn a_magnetic_pad_beats_scikit_learn_by_a_tenth() {
     check("eflesh", pad_recording(), (0.312, 0.343), 0.10);
 }
