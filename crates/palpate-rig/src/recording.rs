@@ -37,6 +37,10 @@ pub(crate) struct RecordingKeys {
     /// A coordinate that readings depend on and nobody wants to know.
     pub nuisance: Option<At<ColumnKey>>,
     pub nuisance_unit: Option<At<String>>,
+    /// The time of each row: numbers, or timestamps.
+    pub time: Option<At<ColumnKey>>,
+    /// The unit of times that are numbers; seconds unless said otherwise.
+    pub time_unit: Option<At<String>>,
     /// The file's coordinates of the surface's left end or lower left corner.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
@@ -73,6 +77,8 @@ impl At<RecordingKeys> {
             Some(symbol) => Unit::from_symbol(symbol)
                 .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: symbol.to_string() }))?,
         };
+        let second = Unit::from_symbol("s").unwrap_or(Unit::NONE);
+        let time_unit = unit(&self.time_unit, Dimension::Time, second)?;
         let force = self.value("force", &self.force, &self.force_unit, force_unit)?;
         Ok(Columns {
             header: if self.header { Header::Present } else { Header::Absent },
@@ -82,13 +88,14 @@ impl At<RecordingKeys> {
             channels: self.channels(&layout.kinds(), own.channels)?,
             force: force.map(|values| ForceColumn { values, need: Need::Required }).or(own.force),
             nuisance: self.value("nuisance", &self.nuisance, &self.nuisance_unit, nuisance_unit)?,
+            time: self.value("time", &self.time, &self.time_unit, time_unit)?,
         })
     }
 
     /// Checks that without a header columns are numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
-        let values = [&self.force, &self.nuisance].into_iter().flatten();
+        let values = [&self.force, &self.nuisance, &self.time].into_iter().flatten();
         let channels = self.channels.iter().flat_map(|channels| channels.iter());
         let named = |key: &&At<ColumnKey>| matches!(***key, ColumnKey::Text(_));
         match positions.clone().chain(values).chain(channels).find(named) {

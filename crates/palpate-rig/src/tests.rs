@@ -8,7 +8,7 @@ use palpate_estimators::arrangement::Arrangement;
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::network::{InputScale, Network, OutputCoding};
-use palpate_estimators::recording::{Column, PositionColumns};
+use palpate_estimators::recording::{Column, PositionColumns, ValueColumn};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
@@ -46,6 +46,24 @@ fn the_water_strip_maps_foreign_columns() {
     let columns = rig.setup.columns().unwrap();
     assert_eq!(columns.position, PositionColumns::Along(Column::Name("X".to_owned())));
     assert_eq!(columns.position_unit.symbol(), "mm");
+}
+
+#[test]
+fn the_time_of_rows_is_mapped() {
+    let with = |keys: &str| FSI_WATER.replace("[recording]", &format!("[recording]\n{keys}"));
+    let time = |keys: &str| Rig::from_toml(&with(keys)).unwrap().setup.columns().unwrap().time.clone();
+    let column = Column::Name("Zeit".to_owned());
+    let unit = |symbol: &str| palpate_mechanics::units::Unit::from_symbol(symbol).unwrap();
+    assert_eq!(time(""), None);
+    assert_eq!(time("time = \"Zeit\""), Some(ValueColumn { column: column.clone(), unit: unit("s") }));
+    let milliseconds = time("time = \"Zeit\"\ntime_unit = \"ms\"");
+    assert_eq!(milliseconds, Some(ValueColumn { column, unit: unit("ms") }));
+    let refused = |keys: &str| Rig::from_toml(&with(keys)).unwrap_err().to_string();
+    assert_eq!(
+        refused("time = \"Zeit\"\ntime_unit = \"mm\""),
+        "`time_unit`: wrong unit `mm`; a time is one of us, ms, s"
+    );
+    assert_eq!(refused("time_unit = \"ms\""), "[recording] has no `time`");
 }
 
 #[test]

@@ -264,6 +264,7 @@ impl ArraySensor {
                 position: *position,
                 force_n: self.rig.setup.force_n(),
                 nuisance: None,
+                time_s: None,
                 reading: reading.collect(),
             }
         };

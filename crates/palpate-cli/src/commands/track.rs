@@ -149,7 +149,9 @@ impl Stream<'_> {
                 }
             }
             if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
-                let complaint = Complaint::new(format!("{} has no column `time_s`", self.lines.name));
+                let column =
+                    columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
+                let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name));
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }

@@ -46,6 +46,7 @@ fn lever(x_m: f64, force_n: f64) -> Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
         nuisance: None,
+        time_s: None,
         reading: vec![force_n - right, right],
     }
 }
@@ -70,7 +71,13 @@ fn raw_channels_find_their_positions() {
         let weights = [i as f64, j as f64, (5 - i - j) as f64].map(|w| w / 5.0);
         let along = |axis: usize| (0..3).map(|c| weights[c] * places[c][axis]).sum::<f64>();
         let position = Position { x_m: along(0), y_m: along(1) };
-        Row { position, force_n: None, nuisance: None, reading: weights.iter().map(|w| -3.0 * w).collect() }
+        Row {
+            position,
+            force_n: None,
+            nuisance: None,
+            time_s: None,
+            reading: weights.iter().map(|w| -3.0 * w).collect(),
+        }
     };
     let rows: Vec<Row> = (0..=5).flat_map(|i| (0..=5 - i).map(move |j| row(i, j))).collect();
     let locator = fit(&setup, rows.clone()).unwrap();

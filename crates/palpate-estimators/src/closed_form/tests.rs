@@ -37,6 +37,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
         position: Position::along(0.1),
         force_n: None,
         nuisance: None,
+        time_s: None,
         reading: vec![0.0; setup.layout().len()],
     };
     let recording = Recording::new(setup.layout(), "test", vec![row]);

@@ -446,6 +446,7 @@ mod tests {
             position: Position::along(*x_m),
             force_n: (*force_n > 0.0).then_some(*force_n),
             nuisance: None,
+            time_s: None,
             reading: vec![*value],
         });
         let provenance = Provenance { source: "test".into(), rows: 0, digests: vec![], seed: None };

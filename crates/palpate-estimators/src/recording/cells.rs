@@ -2,6 +2,7 @@
 
 use super::columns::{Column, Header};
 use super::csv_error::{CsvError, CsvProblem};
+use super::timestamp::Clock;
 use palpate_mechanics::units::Unit;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -82,6 +83,14 @@ impl<'a> Cells<'a> {
             None if field.value.is_empty() => Err(self.error(index, CsvProblem::EmptyField)),
             None => Err(self.error(index, CsvProblem::NotANumber { text: field.value.to_string() })),
         }
+    }
+
+    /// The time in field `index`, in seconds.
+    pub fn time(&self, index: usize, unit: Unit, clock: &mut Clock) -> Result<f64, CsvError> {
+        let Some(field) = self.fields.get(index) else {
+            return Err(self.line_error(CsvProblem::RowLength { found: self.width(), expected: index + 1 }));
+        };
+        clock.read(&field.value, unit).map_err(|problem| self.error(index, problem))
     }
 
     /// A problem with field `index`.

@@ -28,6 +28,10 @@ pub struct Columns {
     /// Column of the nuisance coordinate, if there is one; see [`Row::nuisance`](super::Row::nuisance).
     #[serde(default)]
     pub nuisance: Option<ValueColumn>,
+    /// Column of the time, of numbers in this unit or of timestamps; `None` for `time_s`, where the header has that. See
+    /// [`Row::time_s`](super::Row::time_s).
+    #[serde(default)]
+    pub time: Option<ValueColumn>,
 }
 
 /// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
@@ -178,6 +182,7 @@ impl Columns {
             channels,
             force: None,
             nuisance: None,
+            time: None,
         }
     }
 
@@ -194,14 +199,21 @@ impl Columns {
         Self { nuisance: Some(ValueColumn { column: column.into(), unit }), ..self }
     }
 
+    /// The same with the time of each row in this column, in seconds or as timestamps.
+    #[must_use]
+    pub fn time(self, column: impl Into<Column>) -> Self {
+        let unit = Unit::from_symbol("s").unwrap_or(Unit::NONE);
+        Self { time: Some(ValueColumn { column: column.into(), unit }), ..self }
+    }
+
     /// The same with coordinates of the file's own frame.
     #[must_use]
     pub fn in_frame(self, frame: Frame) -> Self {
         Self { frame, ..self }
     }
 
-    /// The columns that palpate itself writes: `position_mm` (or `x_mm`, `y_mm`), `force_n` where it is known, and
-    /// for each channel its name and unit, as in `deflection_1_mm`; a raw channel has just its name.
+    /// The columns that palpate itself writes: `time_s` and `force_n` where they are known, `position_mm` (or `x_mm`, `y_mm`),
+    /// and for each channel its name and unit, as in `deflection_1_mm`; a raw channel has just its name.
     ///
     /// `channels` and `kinds` are the names and kinds of the sensors, one each.
     pub fn own(channels: &[String], kinds: &[SensorKind], extent: Extent) -> Self {
@@ -226,6 +238,7 @@ impl Columns {
             channels: channels.collect(),
             force: Some(ForceColumn { values: force, need: Need::Optional }),
             nuisance: None,
+            time: None,
         }
     }
 }

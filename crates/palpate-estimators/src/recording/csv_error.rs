@@ -109,6 +109,34 @@ pub enum CsvProblem {
         /// The field.
         text: String,
     },
+    /// A field of the time column is neither a number nor a timestamp.
+    #[error(
+        "`{text}` is not a time; write a number, `2026-04-03 14:03:25.120`, `03.04.2026 14:03:25,120` or `14:03:25`"
+    )]
+    NotATime {
+        /// The field.
+        text: String,
+    },
+    /// A time is written in another way than the first row's.
+    #[error("`{text}` is written in another way than the time of the first row; all rows must have one way")]
+    OtherTime {
+        /// The field.
+        text: String,
+    },
+    /// A date with slashes, in which day and month cannot be told apart.
+    #[error("`{text}` may have the day first or the month first; write the date as 2026-04-03 or 03.04.2026")]
+    SlashedDate {
+        /// The field.
+        text: String,
+    },
+    /// A time of day, without a date, goes back by more than half a day.
+    #[error(
+        "`{text}` is half a day or more before the row above; where times go over midnight they need a date"
+    )]
+    Midnight {
+        /// The field.
+        text: String,
+    },
     /// A contact lies off the surface.
     #[error("the position {} is off the surface; it must be within {}", extent.place_in_words(*position), extent.bounds_in_words())]
     OffSurface {

@@ -5,6 +5,7 @@ use std::io::Read;
 use super::cells::Cells;
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns};
 use super::csv_error::{CsvError, CsvProblem};
+use super::timestamp::Clock;
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -32,18 +33,21 @@ pub struct Schema<'a> {
 pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording, CsvError> {
     schema.check(source)?;
     let file = File::read(source, bytes)?;
+    let columns = schema.columns;
     let find = |head: &Cells| {
-        Ok((ContactFields::find(head, schema.columns)?, ChannelFields::find(head, schema.columns)?))
+        let contact = ContactFields::find(head, columns)?;
+        Ok((contact, ChannelFields::find(head, columns)?, TimeField::find(head, columns)?))
     };
-    let rows = file.rows(schema.columns.header, find, |cells, (contact, channels)| {
+    let mut clock = Clock::default();
+    let rows = file.rows(columns.header, find, |cells, (contact, channels, time)| {
         let row = contact.row(cells, schema)?;
-        Ok(Row { reading: channels.reading(cells)?, ..row })
+        Ok(Row { time_s: time.read(cells, &mut clock)?, reading: channels.reading(cells)?, ..row })
     })?;
     Ok(schema.recording(source, rows, vec![file.digest]))
 }
 
-/// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the position and force
-/// columns are those of the second file. `readings` and `contacts` are each a name and its bytes.
+/// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the time column is that of the first
+/// file, the position and force columns are those of the second. `readings` and `contacts` are each a name and its bytes.
 ///
 /// # Errors
 /// [`CsvError`] as for [`read`], and when the files have different numbers of rows.
@@ -58,10 +62,11 @@ pub fn read_pair(
     let contacts = File::read(contacts.0, contacts.1)?;
     let (columns, header) = (schema.columns, schema.columns.header);
 
+    let mut clock = Clock::default();
     let reading_rows = readings.rows(
         header,
-        |head| ChannelFields::find(head, columns),
-        |cells, channels| channels.reading(cells),
+        |head| Ok((ChannelFields::find(head, columns)?, TimeField::find(head, columns)?)),
+        |cells, (channels, time)| Ok((channels.reading(cells)?, time.read(cells, &mut clock)?)),
     )?;
     let contact_rows = contacts.rows(
         header,
@@ -73,7 +78,7 @@ pub fn read_pair(
         return Err(problem.in_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let rows = rows.map(|(reading, contact)| Row { reading, ..contact }).collect();
+    let rows = rows.map(|((reading, time_s), contact)| Row { reading, time_s, ..contact }).collect();
     Ok(schema.recording(&source, rows, vec![readings.digest, contacts.digest]))
 }
 
@@ -115,7 +120,7 @@ impl<'s> File<'s> {
         &self,
         header: Header,
         find: impl Fn(&Cells) -> Result<C, CsvError>,
-        row: impl Fn(&Cells, &C) -> Result<T, CsvError>,
+        mut row: impl FnMut(&Cells, &C) -> Result<T, CsvError>,
     ) -> Result<Vec<T>, CsvError> {
         let (mut lines, mut rows) = (Lines::new(self.source), Vec::new());
         for line in self.text.lines() {
@@ -184,7 +189,29 @@ impl ContactFields {
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let force_n = force_n.or(schema.known_force_n);
-        Ok(Row { position, force_n, nuisance, reading: Vec::new() })
+        Ok(Row { position, force_n, nuisance, time_s: None, reading: Vec::new() })
+    }
+}
+
+/// Field of a row for its time, where the file has one.
+#[derive(Clone, Copy, Debug)]
+struct TimeField(Option<(usize, Unit)>);
+
+impl TimeField {
+    /// The field of the column that is named, which must be there, or of `time_s`, which may be.
+    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
+        Ok(Self(match &columns.time {
+            Some(time) => Some((head.find(&time.column, columns.header)?, time.unit)),
+            None => {
+                let own = Column::Name(TIME.to_owned());
+                let there = columns.header == Header::Present && head.has(&own);
+                there.then(|| head.find(&own, columns.header)).transpose()?.map(|field| (field, Unit::NONE))
+            }
+        }))
+    }
+
+    fn read(self, cells: &Cells, clock: &mut Clock) -> Result<Option<f64>, CsvError> {
+        self.0.map(|(field, unit)| cells.time(field, unit, clock)).transpose()
     }
 }
 
@@ -282,7 +309,7 @@ impl ChannelFields {
     }
 }
 
-/// The column of time, in seconds.
+/// The column of time that palpate itself writes, in seconds.
 pub(super) const TIME: &str = "time_s";
 
 /// The columns of a second contact.
@@ -327,13 +354,14 @@ pub struct TimedReading {
 /// Turns lines of CSV into readings in time; only the channel columns need to be there.
 pub struct TimedParser<'a> {
     lines: Lines<TimedFields>,
+    clock: Clock,
     schema: Schema<'a>,
 }
 
 /// Fields of a row for the time, the contacts and the channels.
 #[derive(Clone, Debug)]
 struct TimedFields {
-    time: Option<usize>,
+    time: TimeField,
     contact: Option<ContactFields>,
     second: Option<(usize, usize)>,
     channels: ChannelFields,
@@ -342,7 +370,7 @@ struct TimedFields {
 impl<'a> TimedParser<'a> {
     /// A parser for the lines of `source`, from the first one.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
-        Self { lines: Lines::new(source), schema }
+        Self { lines: Lines::new(source), clock: Clock::default(), schema }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
@@ -352,7 +380,7 @@ impl<'a> TimedParser<'a> {
 
     /// Whether a column tells the time.
     pub fn has_time(&self) -> bool {
-        self.lines.fields.as_ref().is_some_and(|(fields, _)| fields.time.is_some())
+        self.lines.fields.as_ref().is_some_and(|(fields, _)| fields.time.0.is_some())
     }
 
     /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on
@@ -362,10 +390,10 @@ impl<'a> TimedParser<'a> {
     /// [`CsvError`] with line and column, as [`ReadingParser::parse_line`] has them, and for a time or a contact that is no number, or
     /// a contact off the surface.
     pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
-        let Self { lines, schema } = self;
+        let Self { lines, clock, schema } = self;
         let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
         let Some((cells, fields)) = next else { return Ok(None) };
-        let time_s = fields.time.map(|field| cells.number(field, Unit::NONE)).transpose()?;
+        let time_s = fields.time.read(&cells, clock)?;
         let row = fields.contact.as_ref().map(|contact| contact.row(&cells, schema)).transpose()?;
         // A force that nobody knows is not 0: something touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
@@ -391,7 +419,10 @@ impl TimedFields {
             (named && head.has(&column)).then(|| head.find(&column, columns.header)).transpose()
         };
         Ok(Self {
-            time: field(TIME)?,
+            time: match TimeField::find(head, columns) {
+                Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => TimeField(None),
+                found => found?,
+            },
             contact: if named { ContactFields::find(head, columns).ok() } else { None },
             second: field(SECOND[0])?.zip(field(SECOND[1])?),
             channels: ChannelFields::find(head, columns)?,

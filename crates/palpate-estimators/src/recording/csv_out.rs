@@ -8,8 +8,8 @@ use super::{Recording, Row, TimedRecording};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-/// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the force
-/// column is written where every row has a force, a nuisance coordinate never. `extent` says whether positions have one coordinate or
+/// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the time
+/// and the force are written where every row has one, a nuisance coordinate never. `extent` says whether positions have one coordinate or
 /// two. `comment` says where the recording comes from, in a first line that begins with `#`.
 ///
 /// ```
@@ -31,8 +31,14 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Wri
     let columns = Columns::own(&recording.channels, &recording.kinds, extent);
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
-    let rows = recording.rows.iter().map(|row| record(row, &columns));
-    write_lines(comment, std::iter::once(header(&columns)).chain(rows), out)
+    let times_known = recording.times_s().is_some();
+    let timed = |time: Option<String>, rest: Vec<String>| -> Vec<String> {
+        time.into_iter().filter(|_| times_known).chain(rest).collect()
+    };
+    let heading = timed(Some(TIME.to_owned()), header(&columns));
+    let time = |row: &Row| row.time_s.map(|time_s| Unit::NONE.format_si(time_s));
+    let rows = recording.rows.iter().map(|row| timed(time(row), record(row, &columns)));
+    write_lines(comment, std::iter::once(heading).chain(rows), out)
 }
 
 /// Writes a recording as [`write()`] does, with the time first.

@@ -5,6 +5,7 @@ mod columns;
 mod csv_error;
 mod csv_in;
 mod csv_out;
+mod timestamp;
 mod warnings;
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
@@ -43,6 +44,9 @@ pub struct Row {
     /// Something else about the contact that shapes the reading, is known here, and is unknown when a reading is to be
     /// located: the depth of indentation, say. In the SI unit of its column; `None` where the recording has no such column.
     pub nuisance: Option<f64>,
+    /// Its time in seconds, where the recording has one: since whenever its file counts from, or since its first row where that
+    /// has timestamps.
+    pub time_s: Option<f64>,
     /// One finite value per channel, in the SI unit of its kind (or raw).
     pub reading: Vec<f64>,
 }
@@ -109,6 +113,11 @@ impl Recording {
     pub fn seeded(mut self, seed: u64) -> Self {
         self.provenance.seed = Some(seed);
         self
+    }
+
+    /// The time of every row, in seconds; `None` where some row has none.
+    pub fn times_s(&self) -> Option<Vec<f64>> {
+        self.rows.iter().map(|row| row.time_s).collect()
     }
 
     /// Every position that was touched, once, sorted by x and then y.

@@ -30,6 +30,7 @@ fn foreign() -> Columns {
         }),
         frame: Frame::default(),
         nuisance: None,
+        time: None,
     }
 }
 
@@ -57,12 +58,31 @@ fn columns_are_mapped_and_others_ignored() {
         position: Position::along(x_m),
         force_n: Some(force_n),
         nuisance: None,
+        time_s: None,
         reading: reading.to_vec(),
     };
     assert_eq!(recording.rows, [row(0.01, 1.0, [1.5, 2.5]), row(0.012, 3.0, [1.25, 2.25])]);
     assert_eq!(recording.channels, ["raw_1", "raw_2"]);
     assert_eq!((recording.provenance.source.as_str(), recording.provenance.rows), ("bench.csv", 2));
     assert_eq!(recording.provenance.digests[0].len(), 64);
+}
+
+#[test]
+fn rows_have_times_where_a_column_tells_them() {
+    let times = |columns: &Columns, text: &str| read_as(columns, text.as_bytes()).map(|read| read.times_s());
+    let text =
+        "X,Pl,Pr,F,Zeit,time_s\n10,1,2,3,03.04.2026 14:03:25,5\n12,1,2,3,03.04.2026 14:03:25.250,6.5\n";
+    assert_eq!(times(&foreign().time("Zeit"), text).unwrap(), Some(vec![0.0, 0.25]));
+    assert_eq!(times(&foreign(), text).unwrap(), Some(vec![5.0, 6.5]));
+    assert_eq!(times(&foreign(), "X,Pl,Pr,F\n10,1,2,3\n").unwrap(), None);
+    let milliseconds = ValueColumn { column: named("Zeit"), unit: Unit::from_symbol("ms").unwrap() };
+    let columns = Columns { time: Some(milliseconds), ..foreign() };
+    assert_eq!(times(&columns, "X,Pl,Pr,F,Zeit\n10,1,2,3,1500\n").unwrap(), Some(vec![1.5]));
+
+    let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
+    assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
+    let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
+    assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
 }
 
 #[test]
@@ -177,6 +197,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         position: Position::along(0.01 * (row % 10) as f64),
         force_n: None,
         nuisance: None,
+        time_s: None,
         reading: vec![(row % 10) as f64 + 0.001 * ((row * 7919) % 13) as f64, reading(row % 10, row / 10)],
     });
     let provenance = Provenance { source: "sweeps".to_owned(), rows: 50, digests: Vec::new(), seed: None };
@@ -212,13 +233,15 @@ proptest! {
     #[test]
     fn a_recording_survives_writing_and_reading(
         rows in proptest::collection::vec((0.0..=0.1, number(), [number(), number()]), 1..20),
+        start_s in proptest::option::of(0.0..1e9),
     ) {
         let kind = SensorKind::Deflection;
         let layout = Layout::even(kind, 2, 0.1);
-        let rows = rows.into_iter().map(|(x_m, force_n, reading)| Row {
+        let rows = rows.into_iter().enumerate().map(|(i, (x_m, force_n, reading))| Row {
             position: Position::along(x_m),
             force_n: Some(force_n),
             nuisance: None,
+            time_s: start_s.map(|start_s| start_s + 0.1 * i as f64),
             reading: reading.to_vec(),
         });
         let rows: Vec<Row> = rows.collect();

@@ -44,7 +44,7 @@ fn squeeze(x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let u = x_m / 0.1;
     let clean = [force_n.powf(1.2) * (1.6 - u), force_n.powf(1.1) * (0.4 + u * u)];
     let reading = clean.map(|r| r * (1.0 + 0.01 * noise(rng))).to_vec();
-    Row { position: Position::along(x_m), force_n: Some(force_n), nuisance: None, reading }
+    Row { position: Position::along(x_m), force_n: Some(force_n), nuisance: None, time_s: None, reading }
 }
 
 fn squeezes(seed: u64) -> Recording {
@@ -100,7 +100,7 @@ fn corner(position: Position, gain: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let channel = |(a, b): (f64, f64)| (-(u - a).powi(2) - (v - b).powi(2)).exp() - 0.5;
     let gain = 1.0 + gain * noise(rng);
     let reading = corners.map(|at| gain * channel(at)).map(|clean| clean + 0.002 * noise(rng)).to_vec();
-    Row { position, force_n: None, nuisance: None, reading }
+    Row { position, force_n: None, nuisance: None, time_s: None, reading }
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn two_places_that_read_alike_are_both_told() {
     let rows = (0..123).map(|i| {
         let x_m = 0.0025 * f64::from(i % 41);
         let reading = read(x_m).iter().map(|r| r + 0.01 * noise(&mut rng)).collect();
-        Row { position: Position::along(x_m), force_n: None, nuisance: None, reading }
+        Row { position: Position::along(x_m), force_n: None, nuisance: None, time_s: None, reading }
     });
     let locator = fit(&raw_setup(*STRIP, 2, Some(1.0)), &raw_recording(rows.collect()));
     let estimate = locator.locate(&read(0.08));
@@ -165,6 +165,7 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
         position: Position::along(x_m),
         force_n: None,
         nuisance: None,
+        time_s: None,
         reading: reading.to_vec(),
     };
     let setup = raw_setup(*STRIP, 2, None);

@@ -87,6 +87,7 @@ fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u6
         position: Position::along(x_m),
         force_n: Some(force_n),
         nuisance: None,
+        time_s: None,
         reading: reading(setup, x_m, force_n, &mut rng),
     };
     Recording::new(setup.layout(), "test", contacts.map(row).collect())
