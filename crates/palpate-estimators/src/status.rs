@@ -2,11 +2,13 @@
 //! its channels.
 //!
 //! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
-//!   exceeds more often than [`FALSE_ALARM_RATE`], and the best contact takes no more of it off than a contact costs by the extended
-//!   Bayesian information criterion. Noise alone fails the first at that rate. It fails the second at a rate that the numbers of
-//!   channels and places give, as a cost is no quantile: up to two in a thousand on the benches of docs/at-the-limit.md.
+//!   exceeds more often than the [`FalseAlarmRate`], and the best contact takes no more of it off than a contact costs. Noise alone
+//!   fails the first at that rate. The cost of a contact is that of the extended Bayesian information criterion at 0.1 %, and less by
+//!   2·ln(rate/0.1 %) at another rate, by which the chance that noise exceeds it changes as the rate does. A cost is no quantile:
+//!   noise fails the second at a rate that the numbers of channels and places give, up to twice the one that is set on the benches of
+//!   docs/at-the-limit.md. Force-linear surfaces without a model have [`NoiseBounds`] in its place, which noise fails at the rate itself.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
-//!   [`FALSE_ALARM_RATE`].
+//!   [`OUTSIDE_MODEL_RATE`].
 //! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
 //!
 //! One reading in a thousand is a false alarm that an engineer sees and can live with: a channel read a hundred times a second
@@ -16,26 +18,103 @@
 use palpate_core::{ContactEstimate, Estimate, Status};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::chi_squared_critical_value;
+use palpate_numerics::{OutOfRange, bisect, chi_squared_critical_value, chi_squared_survival, normal_cdf};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// Share of readings whose noise alone exceeds the bound on |d|² of `no_contact`, and of those whose noise makes a contact
-/// `outside_model`.
-pub const FALSE_ALARM_RATE: f64 = 1e-3;
+/// Share of the readings of an untouched surface that may be taken for a contact: 0.0001 % to 10 %.
+///
+/// ```
+/// use palpate_estimators::status::FalseAlarmRate;
+///
+/// assert_eq!(FalseAlarmRate::default(), FalseAlarmRate::new(0.001)?);
+/// assert_eq!(FalseAlarmRate::new(0.01)?.to_string(), "1 %");
+/// let refused = FalseAlarmRate::new(0.5).unwrap_err().to_string();
+/// assert_eq!(refused, "the false-alarm rate is 0.5; it must be at least 0.0001 % and at most 10 %");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct FalseAlarmRate(f64);
+
+impl FalseAlarmRate {
+    /// The range of rates, as shares. Below it the tails of real noise are not normal; above it every other reading is an alarm.
+    pub const RANGE: std::ops::RangeInclusive<f64> = 1e-6..=0.1;
+    /// The range in words.
+    pub const RANGE_IN_WORDS: &'static str = "at least 0.0001 % and at most 10 %";
+    /// One in a thousand.
+    pub const DEFAULT: Self = Self(1e-3);
+
+    /// A rate, as a share of the readings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for a rate that is not in [`FalseAlarmRate::RANGE`].
+    pub fn new(share: f64) -> Result<Self, OutOfRange> {
+        let number = [("the false-alarm rate", share)];
+        OutOfRange::check(Self::RANGE_IN_WORDS, number, |share| Self::RANGE.contains(&share))?;
+        Ok(Self(share))
+    }
+
+    /// The share of the readings.
+    pub const fn share(self) -> f64 {
+        self.0
+    }
+}
+
+impl Default for FalseAlarmRate {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+impl TryFrom<f64> for FalseAlarmRate {
+    type Error = OutOfRange;
+
+    fn try_from(share: f64) -> Result<Self, OutOfRange> {
+        Self::new(share)
+    }
+}
+
+impl From<FalseAlarmRate> for f64 {
+    fn from(rate: FalseAlarmRate) -> Self {
+        rate.0
+    }
+}
+
+impl std::fmt::Display for FalseAlarmRate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // A percentage has no digits that the share has not: 0.07 is 7 %, not 7.000000000000001 %.
+        let percent = (self.0 * 1e14).round() / 1e12;
+        write!(f, "{percent} %")
+    }
+}
+
+/// Share of the readings of contacts whose noise makes them `outside_model`.
+pub const OUTSIDE_MODEL_RATE: f64 = 1e-3;
 
 /// The least share of the posterior probability for another place to make an estimate `ambiguous`: of the readings that are `located`,
 /// fewer than one in a hundred comes from another place than the one that is said.
 pub const OTHER_PLACE: f64 = 0.01;
 
-/// χ² that noise exceeds at [`FALSE_ALARM_RATE`], with `freedom` channels more than unknowns; without any, that of one. Contacts press and
+/// χ² that noise exceeds at [`OUTSIDE_MODEL_RATE`], with `freedom` channels more than unknowns; without any, that of one. Contacts press and
 /// lie on the surface, so that as many readings as unknowns need not have a contact that explains them; what the best leaves then is the
 /// noise of the direction in which an end or a force of 0 held it.
 pub(crate) fn misfit_bound(freedom: usize) -> f64 {
     /// Bounds that were asked for: estimators that weigh their channels anew for each reading ask every time.
     static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
     let freedom = freedom.max(1);
-    let bound = || chi_squared_critical_value(FALSE_ALARM_RATE, freedom);
+    let bound = || chi_squared_critical_value(OUTSIDE_MODEL_RATE, freedom);
     KNOWN.get(freedom).map_or_else(bound, |known| *known.get_or_init(bound))
+}
+
+/// |d|² that noise of so many channels exceeds at a rate.
+fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
+    // The two rates have the same default, whose bounds are kept.
+    if rate.0 == OUTSIDE_MODEL_RATE {
+        return misfit_bound(channels);
+    }
+    chi_squared_critical_value(rate.0, channels.max(1))
 }
 
 /// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for
@@ -77,6 +156,8 @@ pub(crate) struct StatusRule {
     /// Largest |d|² of noise alone.
     noise_bound: f64,
     /// Least |d|² − χ² of a contact.
+    detection_cost: f64,
+    /// What a contact costs beside others.
     contact_cost: f64,
     /// Largest χ² of a contact.
     misfit_bound: f64,
@@ -84,10 +165,12 @@ pub(crate) struct StatusRule {
 
 impl StatusRule {
     /// The rule for `channels` whose noise is known, and a contact of so many unknowns that could be at so many places.
-    pub fn new(channels: usize, unknowns: usize, places: usize) -> Self {
+    pub fn new(channels: usize, unknowns: usize, places: usize, rate: FalseAlarmRate) -> Self {
+        let contact_cost = contact_cost(unknowns, channels, places);
         Self {
-            noise_bound: misfit_bound(channels),
-            contact_cost: contact_cost(unknowns, channels, places),
+            noise_bound: noise_bound(channels, rate),
+            detection_cost: (contact_cost - 2.0 * (rate.0 / FalseAlarmRate::DEFAULT.0).ln()).max(0.0),
+            contact_cost,
             misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
         }
     }
@@ -95,7 +178,7 @@ impl StatusRule {
     /// The rule for a reading of channels whose noise is not known: only zeros are no contact, and the best contact may leave the share
     /// `misfit` of the reading's `square`.
     pub fn without_noise(square: f64, misfit: f64) -> Self {
-        Self { noise_bound: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
+        Self { noise_bound: 0.0, detection_cost: 0.0, contact_cost: 0.0, misfit_bound: misfit * square }
     }
 
     /// Whether noise alone gives readings of length `square` = |d|².
@@ -107,7 +190,7 @@ impl StatusRule {
     /// Whether noise alone explains a reading of length `square` = |d|², and no worse than a contact whose χ² is `misfit`.
     #[inline(always)]
     pub fn is_no_contact(&self, square: f64, misfit: f64) -> bool {
-        square <= misfit + self.contact_cost && self.is_within_noise(square)
+        square <= misfit + self.detection_cost && self.is_within_noise(square)
     }
 
     /// Whether a contact whose χ² is `misfit` explains the reading; otherwise it is `outside_model`.
@@ -116,9 +199,76 @@ impl StatusRule {
         misfit <= self.misfit_bound
     }
 
-    /// χ² that a contact costs.
+    /// χ² that a contact costs beside others, which no false-alarm rate changes.
     pub fn contact_cost(&self) -> f64 {
         self.contact_cost
+    }
+}
+
+/// Extent of the directions f/|f| that readings of contacts have: the length ℓ of their curve over a line and no area; half the length
+/// of their boundary and their area A over a plane.
+///
+/// Noise d of unit variance has a component greater than u along one of them with the probability
+/// Φ(−u) + e^(−u²/2)·(ℓ/2π + A·u/(2π)^(3/2)) (S. O. Rice 1944; Adler and Taylor, *Random Fields and Geometry*, 2007, chapter 14).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Directions {
+    pub length: f64,
+    pub area: f64,
+}
+
+impl Directions {
+    /// Probability that noise has a component greater than `u` along a direction.
+    fn exceeded(self, u: f64) -> f64 {
+        normal_cdf(-u) + (-0.5 * u * u).exp() * (self.length / TAU + self.area * u / TAU.powf(1.5))
+    }
+
+    /// The same, of noise of so many channels whose |d|² is at most `square` besides. Each term of [`Directions::exceeded`] is the integral
+    /// of a density of the component; what is left of |d|² is χ² of the channels that the term does not use.
+    fn exceeded_within(self, u: f64, square: f64, channels: usize) -> f64 {
+        const STEPS: usize = 64;
+        let most = square.sqrt();
+        if u >= most {
+            return 0.0;
+        }
+        let below = |value: f64, freedom: usize| 1.0 - chi_squared_survival(value.max(0.0), freedom);
+        let density = |z: f64| {
+            let (bell, left) = ((-0.5 * z * z).exp(), square - z * z);
+            let along = below(left, channels.saturating_sub(1)) / TAU.sqrt();
+            let across = self.area * (z * z - 1.0) * below(left, channels.saturating_sub(3)) / TAU.powf(1.5);
+            bell * (along + across)
+        };
+        // Simpson's rule.
+        let step = (most - u) / STEPS as f64;
+        let weight = |i: usize| if i == 0 || i == STEPS { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
+        let integral: f64 =
+            (0..=STEPS).map(|i| weight(i) * density(u + i as f64 * step)).sum::<f64>() * step / 3.0;
+        integral + self.length / TAU * (-0.5 * u * u).exp() * below(square - u * u, channels)
+    }
+}
+
+/// Bounds of noise: of |d|², and of what the best contact takes off it. Noise exceeds either alone equally often, and one or the other at
+/// the false-alarm rate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NoiseBounds {
+    /// Largest |d|² of noise alone.
+    pub square: f64,
+    /// The most that a contact takes off it.
+    pub taken: f64,
+}
+
+impl NoiseBounds {
+    /// The bounds for so many channels, by the directions of their contacts.
+    pub fn new(channels: usize, directions: Directions, rate: FalseAlarmRate) -> Self {
+        let of_tail = |tail: f64| {
+            let u = bisect((0.0, 20.0), 50, |u| directions.exceeded(u) > tail);
+            (u, chi_squared_critical_value(tail, channels.max(1)))
+        };
+        let is_rarer = |tail: f64| {
+            let (u, square) = of_tail(tail);
+            tail + directions.exceeded_within(u, square, channels) < rate.0
+        };
+        let (u, square) = of_tail(bisect((0.5 * rate.0, rate.0), 20, is_rarer));
+        Self { square, taken: u * u }
     }
 }
 

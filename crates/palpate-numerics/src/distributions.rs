@@ -64,14 +64,17 @@ pub fn normal_quantile(share: f64) -> f64 {
     bisect((-39.0, 39.0), 80, |z| normal_cdf(z) < share)
 }
 
-/// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0.
+/// The probability that a χ² variable of `freedom` degrees of freedom exceeds `value`, for `value` ≥ 0; one of no freedom is 0.
 ///
 /// With x = value/2 it is Σ e⁻ˣ·xʲ/Γ(j + 1) over j = 0, 1, … < freedom/2 for an even number of degrees, and erfc(√x) plus the
 /// same over j = ½, 3/2, … < freedom/2 for an odd one (Abramowitz and Stegun, 26.4.4 and 26.4.5).
-fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
+pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     let x = 0.5 * value;
     let odd = freedom % 2 == 1;
     let start = if odd { libm::erfc(x.sqrt()) } else { 0.0 };
+    if x <= 0.0 {
+        return if freedom == 0 { 0.0 } else { 1.0 };
+    }
     let terms = (0..freedom / 2).map(|j| if odd { j as f64 + 0.5 } else { j as f64 });
     start + terms.map(|j| (j * x.ln() - x - libm::lgamma(j + 1.0)).exp()).sum::<f64>()
 }

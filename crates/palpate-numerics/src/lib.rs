@@ -6,7 +6,7 @@
 //! [`watch`] carries the progress of long work out and its cancellation in, and [`OutOfRange`] a number and its bound.
 //!
 //! ```
-//! use palpate_numerics::{chi_squared_critical_value, median, normal_interval_95};
+//! use palpate_numerics::{chi_squared_critical_value, chi_squared_survival, median, normal_interval_95};
 //!
 //! assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), Some(2.5));
 //! assert!((normal_interval_95(0.2, 0.001).1 - 0.20196).abs() < 1e-6);
@@ -32,8 +32,8 @@ pub mod watch;
 
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use distributions::{
-    ELLIPSE_95, NORMAL_95, NormalPart, bisect, chi_squared_critical_value, clamped_interval, normal_between,
-    normal_cdf, normal_interval_95, normal_quantile,
+    ELLIPSE_95, NORMAL_95, NormalPart, bisect, chi_squared_critical_value, chi_squared_survival,
+    clamped_interval, normal_between, normal_cdf, normal_interval_95, normal_quantile,
 };
 pub use eigen::symmetric_eigen;
 pub use elliptic::{Jacobi, carlson_rd, carlson_rf};

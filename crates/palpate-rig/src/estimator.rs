@@ -13,11 +13,12 @@ use palpate_estimators::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, Precision,
     PresentationOrder,
 };
+use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::sensing::Layout;
 
 use crate::document::At;
 use crate::error::{RigError, RigProblem};
-use crate::values::{AboveZero, Count, Force, Fraction, Number, Positive, Written};
+use crate::values::{AboveZero, Count, FalseAlarms, Force, Fraction, Number, Positive, Written};
 
 /// The method that locates.
 #[derive(Clone, Debug, Deserialize)]
@@ -32,7 +33,7 @@ pub(crate) enum EstimatorKeys {
     /// Gaussian-process regression of the position.
     GaussianProcess,
     /// The beam's own equations.
-    ClosedForm,
+    ClosedForm(ClosedFormKeys),
     /// The bending finger's own equations.
     Digit(DigitKeys),
     /// Nearest neighbours.
@@ -86,6 +87,16 @@ pub(crate) struct InfluenceKeys {
     /// Structure of the readings of a `measured` surface: `auto`, `force-linear`, or `free`.
     #[serde(default)]
     pub structure: Structure,
+    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    pub false_alarm_rate: Option<FalseAlarms>,
+}
+
+/// Inversion of the beam's own equations.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ClosedFormKeys {
+    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    pub false_alarm_rate: Option<FalseAlarms>,
 }
 
 /// The elastica of the finger, or its linearisation.
@@ -95,6 +106,12 @@ pub(crate) struct DigitKeys {
     /// The theory of bending.
     #[serde(default)]
     pub theory: DigitTheory,
+    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    pub false_alarm_rate: Option<FalseAlarms>,
+}
+
+fn rate(key: Option<FalseAlarms>) -> FalseAlarmRate {
+    key.and_then(|rate| FalseAlarmRate::new(rate.si).ok()).unwrap_or_default()
 }
 
 impl EstimatorKeys {
@@ -104,8 +121,13 @@ impl EstimatorKeys {
             Self::NetworkLm => Estimator::NetworkLm(LevenbergMarquardt::default()),
             Self::Influence(keys) => Estimator::Influence(keys.build(force_n)?),
             Self::GaussianProcess => Estimator::GaussianProcess(GaussianProcessEstimator::default()),
-            Self::ClosedForm => Estimator::ClosedForm(ClosedForm),
-            Self::Digit(DigitKeys { theory }) => Estimator::Digit(DigitEstimator { theory: *theory }),
+            Self::ClosedForm(keys) => {
+                Estimator::ClosedForm(ClosedForm { false_alarm_rate: rate(keys.false_alarm_rate) })
+            }
+            Self::Digit(keys) => Estimator::Digit(DigitEstimator {
+                theory: keys.theory,
+                false_alarm_rate: rate(keys.false_alarm_rate),
+            }),
             Self::Neighbours => Estimator::Neighbours(Neighbours::default()),
             Self::Centroid => Estimator::Centroid(Centroid),
             Self::Auto => Estimator::Auto,
@@ -185,6 +207,7 @@ impl InfluenceKeys {
             contacts: self.contacts.map_or(default.contacts, Count::get),
             force_sd_n: self.force_sd.as_ref().map(|force_sd| force_sd.si),
             structure: self.structure,
+            false_alarm_rate: rate(self.false_alarm_rate),
         })
     }
 }

@@ -235,6 +235,23 @@ fn a_bad_estimator_is_refused_with_a_caret() {
 }
 
 #[test]
+fn a_false_alarm_rate_is_a_share_within_its_range() {
+    let with = |kind: &str, rate: &str| {
+        let estimator = format!("kind = \"{kind}\"\nfalse_alarm_rate = {rate}");
+        BENCH.replace("kind = \"network\"", &estimator)
+    };
+    let rate = |kind: &str, rate: &str| match Rig::from_toml(&with(kind, rate)).unwrap().estimator {
+        Estimator::Influence(influence) => influence.false_alarm_rate.share(),
+        Estimator::ClosedForm(closed_form) => closed_form.false_alarm_rate.share(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!([rate("influence", "\"1 %\""), rate("closed-form", "0.02")], [0.01, 0.02]);
+    let shown = [("\"50 %\""), ("0"), ("\"1 mm\""), ("nan")].map(|rate| pointed(&with("influence", rate)));
+    insta::assert_snapshot!(shown.join("\n\n"));
+    assert!(pointed(&with("neighbours", "0.01")).contains("false_alarm_rate"));
+}
+
+#[test]
 fn a_bad_recording_section_is_refused_with_a_caret() {
     let shown = refused(
         FSI_WATER,

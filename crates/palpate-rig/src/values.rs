@@ -2,6 +2,7 @@
 
 use std::marker::PhantomData;
 
+use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{self, Dimension, UnitError};
@@ -23,6 +24,9 @@ pub(crate) type Positive<D> = Quantity<D, AboveZero>;
 pub(crate) type NotNegative<D> = Quantity<D, AtLeastZero>;
 /// A share or a percentage, at least 0 and below 1.
 pub(crate) type Fraction = Quantity<Ratio, BelowOne>;
+
+/// A false-alarm rate, as a share or a percentage.
+pub(crate) type FalseAlarms = Quantity<Ratio, AlarmRange>;
 
 /// Dimension of a quantity.
 pub(crate) trait Measure {
@@ -66,6 +70,17 @@ bounds! {
     AboveZero: "greater than 0" if |si| si > 0.0;
     AtLeastZero: "at least 0" if |si| si >= 0.0;
     BelowOne: "at least 0 and below 1" if |si| (0.0..1.0).contains(&si);
+}
+
+/// The range of false-alarm rates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum AlarmRange {}
+
+impl Bound for AlarmRange {
+    const WORDS: &'static str = FalseAlarmRate::RANGE_IN_WORDS;
+    fn holds(si: f64) -> bool {
+        FalseAlarmRate::RANGE.contains(&si)
+    }
 }
 
 impl<'de, D: Measure, B: Bound> Deserialize<'de> for Quantity<D, B> {

@@ -103,7 +103,7 @@ fn kinds() -> Vec<(&'static str, Estimator, (Setup, Recording))> {
         ("influence-measured", Estimator::Influence(Influence::default()), measured()),
         ("influence-force-linear", Estimator::Influence(Influence::default()), force_linear()),
         ("gaussian-process", Estimator::GaussianProcess(GaussianProcessEstimator::default()), beam()),
-        ("closed-form", Estimator::ClosedForm(ClosedForm), beam()),
+        ("closed-form", Estimator::ClosedForm(ClosedForm::default()), beam()),
         ("digit", Estimator::Digit(DigitEstimator::default()), digit()),
         ("neighbours", Estimator::Neighbours(Neighbours::default()), beam()),
         ("centroid", Estimator::Centroid(Centroid), beam()),

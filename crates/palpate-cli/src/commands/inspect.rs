@@ -165,6 +165,11 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     )];
     lines.extend(setup(&locator.setup));
     lines.extend(method(&locator));
+    lines.push(match locator.false_alarm_rate() {
+        Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
+        None => "untouched readings are not told from contacts: it does not know what the board reads then"
+            .to_owned(),
+    });
     let recording = &provenance.recording;
     lines.push(format!("fitted to: {}, {} rows", recording.source, recording.rows));
     for digest in &recording.digests {

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
-use crate::status::{LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns};
+use crate::status::{
+    FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
+};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -36,12 +38,15 @@ use polynomial::Polynomial;
 /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
 /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
 /// let presses = setup.simulate(&Training::even(20), 0)?;
-/// let estimate = ClosedForm.fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
+/// let estimate = ClosedForm::default().fit(&setup, &presses)?.locate(&presses.rows[9].reading)?;
 /// assert!((estimate.contact.position.x_m - mm(190.0)).abs() < mm(2.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ClosedForm;
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ClosedForm {
+    /// Share of untouched readings that may be taken for a contact.
+    pub false_alarm_rate: FalseAlarmRate,
+}
 
 /// A bench that the closed form does not suit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -91,8 +96,12 @@ impl Fit for ClosedForm {
         if let Some(kind) = setup.layout().kinds().into_iter().find(|kind| *kind == SensorKind::Raw) {
             return Err(ClosedFormFitError::NotModelled { kind });
         }
-        let locator =
-            ClosedFormLocator { beam: *beam, layout: setup.layout().clone(), force_n: setup.force_n() };
+        let locator = ClosedFormLocator {
+            beam: *beam,
+            layout: setup.layout().clone(),
+            force_n: setup.force_n(),
+            false_alarm_rate: self.false_alarm_rate,
+        };
         let (needed, found) = (unknowns(1, setup.force_n()), locator.seeing().len());
         if found < needed { Err(ClosedFormFitError::TooFewSensors { needed, found }) } else { Ok(locator) }
     }
@@ -108,6 +117,9 @@ pub struct ClosedFormLocator {
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
+    /// Share of untouched readings that may be taken for a contact.
+    #[serde(default)]
+    pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl ClosedFormLocator {
@@ -119,6 +131,11 @@ impl ClosedFormLocator {
             !sensor.channel.dead && quarters.into_iter().any(|contact| influence(contact) != 0.0)
         };
         (0..self.layout.len()).filter(|i| sees(&self.layout.sensors()[*i])).collect()
+    }
+
+    /// Whether the layout says the noise of every channel, by which an untouched reading is told.
+    pub fn knows_noise(&self) -> bool {
+        self.weights(&self.seeing()).1 == Noise::Known
     }
 
     /// Factor of each channel's readings: 1/σ where every noise is known, else 1/full scale.
@@ -219,7 +236,9 @@ impl Locate for ClosedFormLocator {
         let whitened: Vec<f64> = channels.iter().zip(&weights).map(|(i, w)| w * reading[*i]).collect();
         let size: f64 = whitened.iter().map(|r| r * r).sum();
         let rule = match noise {
-            Noise::Known => StatusRule::new(channels.len(), unknowns(1, self.force_n), LINE_PLACES),
+            Noise::Known => {
+                StatusRule::new(channels.len(), unknowns(1, self.force_n), LINE_PLACES, self.false_alarm_rate)
+            }
             Noise::Unknown => StatusRule::without_noise(size, 0.01),
         };
         let scales = self.scales(&channels);

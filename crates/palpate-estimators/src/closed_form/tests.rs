@@ -42,7 +42,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
     };
     let recording = Recording::new(setup.layout(), "test", vec![row]);
     let task = FitTask::new(setup, &recording);
-    let locator = ClosedForm.fit_method(task)?;
+    let locator = ClosedForm::default().fit_method(task)?;
     assert_eq!(locator.check(setup), Ok(()));
     Ok(locator)
 }

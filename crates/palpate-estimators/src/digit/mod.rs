@@ -16,7 +16,7 @@ use crate::likelihood::ContactFit;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::simulate::CleanSensors;
-use crate::status::{LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, unknowns};
+use crate::status::{FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, unknowns};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -43,10 +43,19 @@ use palpate_numerics::{bisect, clamped_interval, normal_cdf, normal_interval_95}
 /// assert!((estimate.contact.position.x_m - mm(95.0)).abs() < mm(0.1));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DigitEstimator {
     /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
+    /// Share of untouched readings that may be taken for a contact.
+    pub false_alarm_rate: FalseAlarmRate,
+}
+
+impl DigitEstimator {
+    /// An estimator by this theory of bending, otherwise as by default.
+    pub const fn of_theory(theory: DigitTheory) -> Self {
+        Self { theory, false_alarm_rate: FalseAlarmRate::DEFAULT }
+    }
 }
 
 /// Theory of bending.
@@ -120,8 +129,13 @@ impl Fit for DigitEstimator {
             return Err(DigitFitError::NotAGauge { kind });
         }
         let force_n = setup.force_n();
-        let locator =
-            DigitLocator { digit: *digit, layout: setup.layout().clone(), force_n, theory: self.theory };
+        let locator = DigitLocator {
+            digit: *digit,
+            layout: setup.layout().clone(),
+            force_n,
+            theory: self.theory,
+            false_alarm_rate: self.false_alarm_rate,
+        };
         let noiseless = |sensor: &Sensor| {
             let sd = sensor.channel.reading_sd();
             !(sensor.channel.dead || sd > 0.0 && sd.is_finite())
@@ -156,6 +170,9 @@ pub struct DigitLocator {
     pub force_n: Option<f64>,
     /// Theory of bending by which the gauges read.
     pub theory: DigitTheory,
+    /// Share of untouched readings that may be taken for a contact.
+    #[serde(default)]
+    pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl DigitLocator {
@@ -251,7 +268,8 @@ impl Locate for DigitLocator {
         let gauges = gauges(&self.layout, reading);
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();
         let none_saturated = gauges.len() == self.living().count();
-        let rule = StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES);
+        let rule =
+            StatusRule::new(gauges.len(), unknowns(1, self.force_n), LINE_PLACES, self.false_alarm_rate);
         let is_no_contact = |misfit: f64| none_saturated && rule.is_no_contact(size, misfit);
         // No contact leaves less than 0, so that most of what is noise needs no search.
         if is_no_contact(0.0) {
@@ -786,7 +804,7 @@ impl<'a> LinearTheory<'a> {
         // The estimator learns nothing, but every fit wants a recording.
         let recording = Recording::new(setup.layout(), "", Vec::new());
         let task = FitTask::new(&unknown, &recording);
-        let locator = DigitEstimator { theory: DigitTheory::Linear }.fit_method(task).ok()?;
+        let locator = DigitEstimator::of_theory(DigitTheory::Linear).fit_method(task).ok()?;
         Some(Self { locator, sensors: CleanSensors::new(digit, setup.layout()) })
     }
 

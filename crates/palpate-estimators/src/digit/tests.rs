@@ -23,7 +23,7 @@ fn digit(setup: &Setup) -> Digit {
 fn locator(setup: &Setup, theory: DigitTheory) -> Locator {
     let pressed = setup.clone().known_force(1.0).unwrap();
     let recording = simulate_at(&pressed, &[Position::along(0.1)], 1, 0).unwrap();
-    let config = Estimator::Digit(DigitEstimator { theory });
+    let config = Estimator::Digit(DigitEstimator::of_theory(theory));
     config.fit(setup, &recording).unwrap()
 }
 

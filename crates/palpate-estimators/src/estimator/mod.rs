@@ -32,6 +32,7 @@ use crate::network::{
 };
 use crate::recording::Recording;
 use crate::setup::Setup;
+use crate::status::FalseAlarmRate;
 
 use palpate_mechanics::surface::SurfaceSpec;
 use palpate_numerics::watch::Cancelled;
@@ -169,7 +170,7 @@ impl Estimator {
             Self::GaussianProcess(GaussianProcessEstimator::default()),
         ];
         if matches!(setup.surface(), SurfaceSpec::Beam(_)) {
-            contenders.push(Self::ClosedForm(ClosedForm));
+            contenders.push(Self::ClosedForm(ClosedForm::default()));
         }
         if matches!(setup.surface(), SurfaceSpec::Digit(_)) {
             contenders.insert(0, Self::Digit(DigitEstimator::default()));
@@ -184,7 +185,7 @@ impl Estimator {
     }
 
     /// A digit's estimator by the linear theory of bending, to be compared with.
-    pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator { theory: DigitTheory::Linear });
+    pub const LINEAR_DIGIT: Self = Self::Digit(DigitEstimator::of_theory(DigitTheory::Linear));
 
     /// Distinct contact positions that a recording must have for fitting.
     pub fn positions_needed(&self) -> usize {
@@ -296,6 +297,18 @@ impl Locator {
     /// The `kind` under which a rig names its estimator.
     pub fn kind(&self) -> &'static str {
         self.method.kind()
+    }
+
+    /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.
+    pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        match &self.method {
+            Method::Influence(influence) => influence.false_alarm_rate(),
+            Method::ClosedForm(closed_form) => {
+                closed_form.knows_noise().then_some(closed_form.false_alarm_rate)
+            }
+            Method::Digit(digit) => Some(digit.false_alarm_rate),
+            _ => None,
+        }
     }
 
     /// The weights of a network; nothing for another method.

@@ -6,6 +6,7 @@ use crate::influence::{Influence, InfluenceSource};
 use crate::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, PresentationOrder,
 };
+use crate::status::FalseAlarmRate;
 use palpate_mechanics::units::format_count;
 
 /// One setting of an estimator.
@@ -31,12 +32,12 @@ impl Estimator {
         match self {
             Self::Network(config) => network(config),
             Self::Influence(config) => influence(*config),
-            Self::Digit(DigitEstimator { theory }) => {
+            Self::Digit(DigitEstimator { theory, false_alarm_rate }) => {
                 let theory = match theory {
                     DigitTheory::Exact => "exact: the finger bends as far as the force bends it",
                     DigitTheory::Linear => "linear: strain is force times lever",
                 };
-                vec![Setting::new("theory", "theory of bending", theory)]
+                vec![Setting::new("theory", "theory of bending", theory), false_alarms(*false_alarm_rate)]
             }
             Self::NetworkLm(LevenbergMarquardt { hidden, ensemble, max_iterations }) => vec![
                 Setting::new("hidden", "nodes in the hidden layers", nodes(hidden)),
@@ -46,10 +47,15 @@ impl Estimator {
             Self::Neighbours(config) => {
                 vec![Setting::new("most_neighbours", "neighbours tried, at most", config.most.to_string())]
             }
+            Self::ClosedForm(config) => vec![false_alarms(config.false_alarm_rate)],
             // They have nothing to set.
-            Self::GaussianProcess(_) | Self::ClosedForm(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
+            Self::GaussianProcess(_) | Self::Centroid(_) | Self::Auto => Vec::new(),
         }
     }
+}
+
+fn false_alarms(rate: FalseAlarmRate) -> Setting {
+    Setting::new("false_alarm_rate", "untouched readings taken for a contact", rate.to_string())
 }
 
 fn nodes(hidden: &[usize]) -> String {
@@ -70,6 +76,7 @@ fn influence(config: Influence) -> Vec<Setting> {
         Setting::new("from", "influence functions from", from),
         Setting::new("contacts", "contacts at once, at most", config.contacts.to_string()),
         Setting::new("force_sd", "contact force", force),
+        false_alarms(config.false_alarm_rate),
     ]
 }
 

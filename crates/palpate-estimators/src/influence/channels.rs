@@ -2,9 +2,11 @@
 
 use super::config::ForceBelief;
 use crate::fit::LocatorFault;
+use crate::status::FalseAlarmRate;
 use serde::{Deserialize, Serialize};
 
-/// Offsets, noise and reference force of the channels, learnt besides their influence functions.
+/// Offsets, noise and reference force of the channels, learnt besides their influence functions, and how rarely their noise is to be
+/// taken for a contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Channels {
@@ -16,6 +18,9 @@ pub(super) struct Channels {
     pub dead: Vec<bool>,
     /// Mean force of the calibration, in newtons.
     pub reference_force_n: f64,
+    /// Share of untouched readings that may be taken for a contact.
+    #[serde(default)]
+    pub false_alarm_rate: FalseAlarmRate,
 }
 
 impl Channels {

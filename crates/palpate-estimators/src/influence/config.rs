@@ -3,6 +3,7 @@
 use super::measured::MeasuredError;
 use crate::fit::ChannelMismatch;
 use crate::setup::Setup;
+use crate::status::FalseAlarmRate;
 use palpate_numerics::NotPositiveDefinite;
 use palpate_numerics::watch::Cancelled;
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,8 @@ pub struct Influence {
     pub force_sd_n: Option<f64>,
     /// Structure of the readings of a surface without a model.
     pub structure: Structure,
+    /// Share of untouched readings that may be taken for a contact.
+    pub false_alarm_rate: FalseAlarmRate,
 }
 
 /// Structure of the readings of a surface without a model, besides that they depend on the position.
@@ -47,7 +50,13 @@ pub enum InfluenceSource {
 
 impl Default for Influence {
     fn default() -> Self {
-        Self { from: InfluenceSource::Corrected, contacts: 1, force_sd_n: None, structure: Structure::Auto }
+        Self {
+            from: InfluenceSource::Corrected,
+            contacts: 1,
+            force_sd_n: None,
+            structure: Structure::Auto,
+            false_alarm_rate: FalseAlarmRate::DEFAULT,
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! probable, and the posterior is asked for mean and variance at the places.
 
 use super::channels::Channels;
-use super::config::{InfluenceFitError, InfluenceSource};
+use super::config::{Influence, InfluenceFitError, InfluenceSource};
 use super::prior::{Hyperparameters, Mean, Parts, Prior, Remainders};
 use crate::fit::FitTask;
 use crate::recording::Recording;
@@ -40,7 +40,7 @@ impl LearntInfluence<'_, '_> {
 
 /// Learns the influence functions of all living sensors at `places`, and hands each, with the sensor's number, to `take`.
 pub(super) fn learn(
-    from: InfluenceSource,
+    Influence { from, false_alarm_rate, .. }: Influence,
     task: FitTask,
     places: &[Position],
     take: &mut dyn FnMut(usize, &LearntInfluence),
@@ -64,6 +64,7 @@ pub(super) fn learn(
         noise_sd: vec![1.0; layout.len()],
         dead: layout.sensors().iter().map(|sensor| sensor.channel.dead).collect(),
         reference_force_n: presses.mean_force_n(),
+        false_alarm_rate,
     };
     let learning = Learning { from, surface, layout, presses: &presses, places };
     for kind in SensorKind::ALL {

@@ -22,6 +22,7 @@ pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::setup::Setup;
+use crate::status::FalseAlarmRate;
 use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
 use palpate_mechanics::surface::Extent;
@@ -92,7 +93,7 @@ impl Influence {
         let fitted = force_linear::fit(task, self.structure)?;
         match (fitted, self.structure) {
             (None, Structure::ForceLinear) => Err(InfluenceFitError::NoForces),
-            (fitted, _) => Ok(fitted),
+            (fitted, _) => Ok(fitted.map(|fitted| fitted.with_false_alarm_rate(self.false_alarm_rate))),
         }
     }
 
@@ -121,6 +122,18 @@ impl InfluenceLocator {
             Self::Beam(beam) => beam.leave_out(channel),
             Self::Plane(plane) => plane.leave_out(channel),
             Self::ForceLinear(_) | Self::Measured(_) => false,
+        }
+    }
+}
+
+impl InfluenceLocator {
+    /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
+    pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        match self {
+            Self::Beam(beam) => Some(beam.false_alarm_rate()),
+            Self::Plane(plane) => Some(plane.false_alarm_rate()),
+            Self::ForceLinear(linear) => Some(linear.false_alarm_rate()),
+            Self::Measured(_) => None,
         }
     }
 }

@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 use crate::fit::ReadingError;
 use crate::setup::Setup;
-use crate::status::{FALSE_ALARM_RATE, misfit_bound};
+use crate::status::{OUTSIDE_MODEL_RATE, misfit_bound};
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
@@ -115,7 +115,7 @@ pub struct Profiler<'a> {
     sensors: LoadSensors<'a>,
     cells: Cells,
     problem: Problem,
-    /// Bound of the misfit, exceeded by noise at [`FALSE_ALARM_RATE`].
+    /// Bound of the misfit, exceeded by noise at [`OUTSIDE_MODEL_RATE`].
     worst_misfit: f64,
 }
 
@@ -145,7 +145,7 @@ pub struct LoadProfile {
     pub residuals: Vec<Option<f64>>,
     /// The least sum of squared residuals that any smoothness leaves.
     pub misfit: f64,
-    /// Bound of the misfit, exceeded by noise in [`FALSE_ALARM_RATE`] of all readings, whatever the load.
+    /// Bound of the misfit, exceeded by noise in [`OUTSIDE_MODEL_RATE`] of all readings, whatever the load.
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
@@ -382,7 +382,7 @@ struct Part {
 /// where there is none, is none.
 fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
-    let least_ratio = normal_quantile(1.0 - FALSE_ALARM_RATE);
+    let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
     let stands_out = |part: &Part| {
         let (force, sd) = force_of(&part.all, forces_n, covariance);
         force > least_ratio * sd

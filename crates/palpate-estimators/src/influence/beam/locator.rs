@@ -20,7 +20,7 @@ use crate::fit::{Locate, LocatorFault};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
-use crate::status::NO_CONTACT;
+use crate::status::{FalseAlarmRate, NO_CONTACT};
 use palpate_core::{Estimate, Status};
 use palpate_numerics::simd::{Array, Eight, InstructionSet, Kernel, Simd};
 use serde::{Deserialize, Serialize};
@@ -106,6 +106,11 @@ impl BeamLocator {
     /// Knowledge of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
+    }
+
+    /// Share of untouched readings that may be taken for a contact.
+    pub fn false_alarm_rate(&self) -> FalseAlarmRate {
+        self.stored.channels.false_alarm_rate
     }
 
     /// The most contacts that it looks for.

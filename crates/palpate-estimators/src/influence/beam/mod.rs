@@ -36,7 +36,7 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<BeamLocator, Influ
             table.variances[at] = learnt.variance(here);
         }
     };
-    let channels = learn(config.from, task, &around, fill)?;
+    let channels = learn(config, task, &around, fill)?;
     Ok(BeamLocator::new(table, channels, config.force_belief(task.setup), config.contacts))
 }
 

@@ -44,7 +44,7 @@ const MOST_STEPS: usize = 32;
 impl Search {
     /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
     pub fn new(table: &InfluenceTable, channels: &Channels, force: ForceBelief) -> Self {
-        let Channels { offsets, noise_sd, reference_force_n, .. } = channels;
+        let Channels { offsets, noise_sd, reference_force_n, false_alarm_rate, .. } = channels;
         let live = channels.live();
         let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
         let table = table.whitened(&live, &inverse_sd);
@@ -55,7 +55,7 @@ impl Search {
             scaling: paired(grouped(&offsets, live.len(), 0.0), grouped(&inverse_sd, live.len(), 0.0)),
             coarse: Coarse::new(&table, &gauss_newton.weights, force),
             gauss_newton,
-            rule: StatusRule::new(live.len(), unknowns(1, force.known_n()), LINE_PLACES),
+            rule: StatusRule::new(live.len(), unknowns(1, force.known_n()), LINE_PLACES, *false_alarm_rate),
             live,
             table,
             force,

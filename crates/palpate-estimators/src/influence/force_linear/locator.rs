@@ -18,12 +18,11 @@ use crate::influence::grid::{
 use crate::influence::noise::Whitening;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{FALSE_ALARM_RATE, learnt_misfit_bound, misfit_bound, unknowns};
+use crate::status::{Directions, FalseAlarmRate, NoiseBounds, learnt_misfit_bound, unknowns};
 use palpate_core::{Estimate, Status};
+use palpate_numerics::normal_between;
 use palpate_numerics::regression::Kernel;
-use palpate_numerics::{bisect, normal_between, normal_cdf};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 
 /// Learnt functions of the channels in use, over the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -82,6 +81,9 @@ pub(super) struct Stored {
     pub presses: usize,
     /// Degrees of freedom that tell each channel's noise.
     pub noise_freedom: f64,
+    /// Share of untouched readings that may be taken for a contact.
+    #[serde(default)]
+    pub false_alarm_rate: FalseAlarmRate,
 }
 
 /// Offsets and influence functions of a surface without a model, ready to be inverted.
@@ -199,6 +201,13 @@ struct Explained {
 }
 
 impl ForceLinearLocator {
+    /// The same, whose noise is taken for a contact at another rate.
+    pub(crate) fn with_false_alarm_rate(mut self, rate: FalseAlarmRate) -> Self {
+        self.stored.false_alarm_rate = rate;
+        self.bound_noise();
+        self
+    }
+
     /// The kernel of the influence functions, and their length scale along each coordinate in metres.
     pub fn correlation(&self) -> (Kernel, &[f64]) {
         (self.stored.kernel, &self.stored.lengths_m)
@@ -207,6 +216,11 @@ impl ForceLinearLocator {
     /// How far the presses were found from linear: the relative change of an influence with the force; 0 where they agree.
     pub fn nonlinearity(&self) -> f64 {
         self.stored.nonlinearity
+    }
+
+    /// Share of untouched readings that may be taken for a contact.
+    pub fn false_alarm_rate(&self) -> FalseAlarmRate {
+        self.stored.false_alarm_rate
     }
 
     /// Number of presses that were learnt from.
@@ -262,7 +276,7 @@ impl ForceLinearLocator {
     }
 
     /// Whether noise alone explains a whitened reading: neither its length nor what the best contact takes off its square is more than
-    /// noise reaches at [`FALSE_ALARM_RATE`].
+    /// noise reaches at the false-alarm rate.
     fn is_no_contact(&self, whitened: &[f64]) -> bool {
         let Tables { whitening, offset_variance, .. } = &self.stored.functions;
         let variance = |signal: &f64| 1.0 + offset_variance * signal;
@@ -289,20 +303,13 @@ impl ForceLinearLocator {
         // that of χ² at ν·(e^(b/ν) − 1) (Wallace, Ann. Math. Statist. 30, 1959, for t²).
         let learnt = |bound: f64, freedom: f64| freedom * ((bound / freedom).exp() - 1.0);
         let live = self.stored.live.len();
-        self.noise_bound = learnt(misfit_bound(live), freedom * live as f64);
-        let sizes = self.directions();
-        let exceeded = |u: f64| {
-            let bell = (-0.5 * u * u).exp() / (2.0 * PI);
-            normal_cdf(-u) + bell * (sizes[0] + sizes[1] * u / (2.0 * PI).sqrt()) > FALSE_ALARM_RATE
-        };
-        self.detection_bound = learnt(bisect((0.0, 20.0), 50, exceeded).powi(2), freedom);
+        let bounds = NoiseBounds::new(live, self.directions(), self.stored.false_alarm_rate);
+        self.noise_bound = learnt(bounds.square, freedom * live as f64);
+        self.detection_bound = learnt(bounds.taken, freedom);
     }
 
-    /// Extent of the directions f/|f| that readings of contacts have: the length of the curve of f/|f| over a line, or half the length of its
-    /// boundary and its area over a plane. The largest product of noise with a direction exceeds u with the probability
-    /// Φ(−u) + e^(−u²/2)·(length/2π + area·u/(2π)^(3/2)) (S. O. Rice 1944; Adler and Taylor, *Random Fields and Geometry*, 2007,
-    /// chapter 14).
-    fn directions(&self) -> [f64; 2] {
+    /// Extent of the directions that readings of contacts have.
+    fn directions(&self) -> Directions {
         let [x, y] = self.axes();
         let direction = |i: usize, j: usize| {
             let values = self.place(i * y.count + j).values;
@@ -318,7 +325,7 @@ impl ForceLinearLocator {
         let along = |j: usize| (1..x.count).map(move |i| way((i - 1, j), (i, j))).sum::<f64>();
         let across = |i: usize| (1..y.count).map(move |j| way((i, j - 1), (i, j))).sum::<f64>();
         if y.count == 1 {
-            return [along(0), 0.0];
+            return Directions { length: along(0), area: 0.0 };
         }
         let boundary = along(0) + along(y.count - 1) + across(0) + across(x.count - 1);
         let mut area = 0.0;
@@ -327,7 +334,7 @@ impl ForceLinearLocator {
             let (a, b) = (step(&direction(i - 1, j), &here), step(&direction(i, j - 1), &here));
             area += (product(&a, &a) * product(&b, &b) - product(&a, &b).powi(2)).max(0.0).sqrt();
         }
-        [0.5 * boundary, area]
+        Directions { length: 0.5 * boundary, area }
     }
 
     /// Sets the bound of the residual from the recording's own readings.

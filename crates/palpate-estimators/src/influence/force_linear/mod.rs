@@ -12,6 +12,7 @@ use super::config::Structure;
 use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
+use crate::status::FalseAlarmRate;
 use learning::{Learnt, Presses};
 use locator::Stored;
 use palpate_mechanics::surface::Extent;
@@ -64,6 +65,7 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
         nonlinearity: learnt.correlation.nonlinearity,
         presses: learnt.presses(),
         noise_freedom: presses.noise_freedom(),
+        false_alarm_rate: FalseAlarmRate::DEFAULT,
     }
     .into_locator();
     locator.limit_residuals(recording);

@@ -7,6 +7,7 @@ use crate::fit::{Locate, LocatorFault};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
+use crate::status::FalseAlarmRate;
 use palpate_core::Estimate;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,11 @@ impl PlaneLocator {
     /// Knowledge of the force.
     pub fn force(&self) -> ForceBelief {
         self.stored.force
+    }
+
+    /// Share of untouched readings that may be taken for a contact.
+    pub fn false_alarm_rate(&self) -> FalseAlarmRate {
+        self.stored.channels.false_alarm_rate
     }
 
     /// Leaves channel `channel` (from 0) out of all sums from now on; false when no channel would be left, and then

@@ -30,7 +30,7 @@ pub(super) fn fit(config: Influence, task: FitTask) -> Result<PlaneLocator, Infl
             table.variances[node * table.sensors + s] = learnt.variance(node);
         }
     };
-    let channels = learn(config.from, task, &places, fill)?;
+    let channels = learn(config, task, &places, fill)?;
     Ok(PlaneLocator::new(table, channels, config.force_belief(task.setup)))
 }
 

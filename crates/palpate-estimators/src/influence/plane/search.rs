@@ -60,7 +60,7 @@ const NEGLIGIBLE: f64 = 24.0;
 impl Search {
     /// Whitens a table by the noise of each channel, and leaves out the channels that are `dead`.
     pub fn new(table: &PlaneTable, channels: &Channels, force: ForceBelief) -> Self {
-        let Channels { offsets, noise_sd, reference_force_n, .. } = channels;
+        let Channels { offsets, noise_sd, reference_force_n, false_alarm_rate, .. } = channels;
         let live = channels.live();
         let inverse_sd: Vec<f64> = live.iter().map(|s| 1.0 / noise_sd[*s]).collect();
         let patches = Patches::new(table, &live, &inverse_sd);
@@ -85,7 +85,12 @@ impl Search {
         let least_weights = (0..coarse.cells()).map(least).collect();
         Self {
             offsets: live.iter().map(|s| offsets[*s]).collect(),
-            rule: StatusRule::new(live.len(), unknowns(2, force.known_n()), coarse.cells()),
+            rule: StatusRule::new(
+                live.len(),
+                unknowns(2, force.known_n()),
+                coarse.cells(),
+                *false_alarm_rate,
+            ),
             size_m: [table.length_m, table.width_m],
             live,
             inverse_sd,
