@@ -1,12 +1,14 @@
 //! `palpate fit`: calibrate an estimator.
 
+use super::inspect::rows;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::{self, Observer};
 use crate::{input, output};
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, Method, choose};
 use palpate_estimators::fit::{Fit, FitTask};
+use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
@@ -55,6 +57,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
         )));
     }
+    let set_aside = match &locator.method {
+        Method::Influence(InfluenceLocator::ForceLinear(linear)) => linear.set_aside(),
+        _ => &[],
+    };
+    if !set_aside.is_empty() {
+        eprintln!("set aside, as no function of the position explains them: {}", rows(set_aside));
+    }
     let json = locator.to_json().map_err(Complaint::new)?;
     output::write_file(&arguments.out, json.as_bytes())?;
     if arguments.json {
@@ -64,6 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "estimator": locator.kind(),
             "seed": arguments.seed,
             "rows": recording.rows.len(),
+            "rows_set_aside": set_aside.iter().map(|row| row + 1).collect::<Vec<_>>(),
             "training"?: training,
         });
     }

@@ -6,7 +6,7 @@ use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::{Locator, Method};
 use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
-use palpate_estimators::influence::{ForceLinearLocator, InfluenceLocator};
+use palpate_estimators::influence::{ForceLinearLocator, InfluenceLocator, Source};
 use palpate_estimators::network::Topology;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -247,32 +247,72 @@ fn method(locator: &Locator) -> Vec<String> {
 }
 
 fn force_linear(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
-    let (kernel, lengths_m) = linear.correlation();
-    let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
-    let kernel = match kernel {
-        Kernel::Matern32 => "Matérn 3/2",
-        Kernel::Matern52 => "Matérn 5/2",
-        Kernel::SquaredExponential => "squared exponential",
-    };
     let channels =
         linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));
-    let linearity = match linear.nonlinearity() {
-        0.0 => "linear in the force, as far as the presses tell".to_owned(),
+    let presses = format_count(linear.presses() as u64);
+    let mut lines = vec![
+        "reading = offset + force × influence(position), learnt from the recording".to_owned(),
+        response(linear),
+        format!("influence functions: {}, from {presses} presses", influences(linear)),
+        format!("offset and noise of the channels in use: {}", channels.collect::<Vec<_>>().join(", ")),
+    ];
+    let drifts: Vec<String> =
+        linear.drifts().into_iter().map(|(c, sd)| format!("{} by {sd:.1}", names[c])).collect();
+    if !drifts.is_empty() {
+        lines.push(format!(
+            "drift over the recording: {}, taken off; the offsets are those at its end",
+            drifts.join(", ")
+        ));
+    }
+    if !linear.set_aside().is_empty() {
+        lines.push(format!(
+            "set aside, as no function of the position explains them: {}",
+            rows(linear.set_aside())
+        ));
+    }
+    lines
+}
+
+/// Rows of a recording, counted from 1.
+pub fn rows(from_0: &[usize]) -> String {
+    let numbers: Vec<String> = from_0.iter().map(|row| (row + 1).to_string()).collect();
+    format!("{} {}", if numbers.len() == 1 { "row" } else { "rows" }, numbers.join(", "))
+}
+
+fn response(linear: &ForceLinearLocator) -> String {
+    if linear.response() != 1.0 {
+        return format!(
+            "structure: force-monotone; readings follow the force to the power of {:.2}",
+            linear.response()
+        );
+    }
+    match linear.nonlinearity() {
+        0.0 => "structure: force-linear; linear in the force, as far as the presses tell".to_owned(),
         change => format!(
-            "taken as linear in the force, though influences change by some {:.0} % with it",
+            "structure: force-linear; taken as linear in the force, though influences change by some {:.0} % with it",
             100.0 * change
         ),
+    }
+}
+
+fn influences(linear: &ForceLinearLocator) -> String {
+    let smooth = linear.correlation().map(|(kernel, lengths_m)| {
+        let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
+        let kernel = match kernel {
+            Kernel::Matern32 => "Matérn 3/2",
+            Kernel::Matern52 => "Matérn 5/2",
+            Kernel::SquaredExponential => "squared exponential",
+        };
+        format!("Gaussian process, {kernel}, length scale {}", lengths.join(" and "))
+    });
+    let Some(source) = linear.source() else { return smooth.unwrap_or_default() };
+    let kind = match source {
+        Source::Strain => "strain",
+        Source::Slope => "slope",
+        Source::Deflection => "deflection",
     };
-    vec![
-        "reading = offset + force × influence(position), learnt from the recording".to_owned(),
-        format!("structure: force-linear; {linearity}"),
-        format!(
-            "influence functions: Gaussian process, {kernel}, length scale {}, from {} presses",
-            lengths.join(" and "),
-            format_count(linear.presses() as u64)
-        ),
-        format!("offset and noise of the channels in use: {}", channels.collect::<Vec<_>>().join(", ")),
-    ]
+    let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
+    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
 }
 
 fn learnt(measured: &MeasuredLocator) -> String {

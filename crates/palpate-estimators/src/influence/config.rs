@@ -32,6 +32,8 @@ pub enum Structure {
     Auto,
     /// Offset + force × influence of the position.
     ForceLinear,
+    /// Offset + a power of the force, the same at all positions, × influence of the position.
+    ForceMonotone,
     /// Any function of the position and of the nuisance coordinate, or of the force.
     Free,
 }

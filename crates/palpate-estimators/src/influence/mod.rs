@@ -15,7 +15,7 @@ mod prior;
 
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
-pub use force_linear::ForceLinearLocator;
+pub use force_linear::{ForceLinearLocator, Source};
 pub use grid::Axis;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
@@ -92,7 +92,7 @@ impl Influence {
         }
         let fitted = force_linear::fit(task, self.structure)?;
         match (fitted, self.structure) {
-            (None, Structure::ForceLinear) => Err(InfluenceFitError::NoForces),
+            (None, Structure::ForceLinear | Structure::ForceMonotone) => Err(InfluenceFitError::NoForces),
             (fitted, _) => Ok(fitted.map(|fitted| fitted.with_false_alarm_rate(self.false_alarm_rate))),
         }
     }

@@ -1,562 +1,493 @@
 //! From presses of recorded force to the influence functions of a surface without a model.
 //!
-//! Channel c reads o_c + F·f_c(a) + e_c for the force F at the position a. The influence f_c is a Gaussian process whose
-//! covariance is s_c²·(k(a, a′) + [`CONSTANT`])/F̄², F̄ being the root mean square force, k a correlation that all channels share
-//! and the constant a mean that is next to unknown; the offset o_c is next to unknown too. The noise e_c has the variance
-//! ρ_c·s_c². For each k and ρ one factorisation serves all channels, and s_c² follows in closed form; k's kernel and length
-//! scales are those under which the presses of all channels together are the most probable, and ρ_c is the channel's own.
-//!
-//! Influence functions of one surface resemble each other, so what the presses leave open of them does too: between presses all
-//! channels err together. Their covariance there is B·v(a), with v of the median ρ and B = (s_c·s_c′·R_cc′), R being the correlation
-//! of the channels' whitened presses.
-//!
-//! How far readings are from linear in the force is asked of the presses too: a gain that changes smoothly with the force adds
-//! δ²·k(a, a′)·exp(−(F − F′)²/(2·F̄²)) in the place of k, and the δ of the greatest evidence says how much.
+//! Two priors are tried: influence functions that are smooth, and those of point sensors at unknown places ([`Prior::source`]). Length
+//! scales and shares of each are those under which the presses are the most probable; between the two, positions held out decide. What
+//! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
+//! aside, and the rest learnt anew.
 
+use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
+use super::posterior::{Functions, functions, of_equal_ratio};
+use super::presses::{Presses, Repeats, compare};
+use super::prior::{Prior, Source};
+use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
-use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use ndarray::{Array1, Array2, ArrayViewMut1, Axis as Dimension};
+use ndarray::{Array1, Array2};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{Cholesky, NotPositiveDefinite, bisect, mean, median, root_mean_square};
-use std::cmp::Ordering;
+use palpate_numerics::{bisect, chi_squared_critical_value};
+use std::cell::Cell;
 
-/// Variance of an influence function's mean over that of its changes: far more, so that the presses tell it.
-const CONSTANT: f64 = 25.0;
-/// Variance of an offset over that of the changes of a reading at the root mean square force.
-const OFFSET: f64 = 400.0;
-/// ln ρ that are tried: 10⁻¹⁰ to 10.
-const DECADES: std::ops::RangeInclusive<i32> = -10..=1;
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
 /// Presses that are learnt from; the time grows with their cube, and so many tell all that there is.
 const MOST_PRESSES: usize = 1000;
 /// Distinct positions from which on every fifth can be held out.
 const LEAST_TO_JUDGE: usize = 6;
-
-/// Presses of recorded force, repeats averaged: rows of the same position and force are one.
-#[derive(Clone, Debug)]
-pub(super) struct Presses {
-    /// Position of each, along and, on a plane, across, in metres.
-    positions_m: Vec<Vec<f64>>,
-    force_n: Vec<f64>,
-    /// Number of rows that were averaged.
-    count: Vec<f64>,
-    /// Mean reading of each channel over the recording.
-    centre: Vec<f64>,
-    /// Mean reading less the centre, a row a press.
-    means: Array2<f64>,
-    /// Sum of squared deviations of repeats from their mean, a value a channel, and how many degrees of freedom it has.
-    scatter: Vec<f64>,
-    freedom: f64,
-}
-
-impl Presses {
-    /// The presses of a recording, in rising order of position; `None` where the force of a row is not known.
-    pub fn average(setup: &Setup, recording: &Recording) -> Option<Self> {
-        let extent = setup.surface().extent();
-        let mut rows = Vec::with_capacity(recording.rows.len());
-        for row in &recording.rows {
-            let force_n = row.force_n.or(setup.force_n()).filter(|force_n| force_n.is_finite())?;
-            // Without a force it does not matter where nothing presses.
-            let position_m: Vec<f64> = match force_n {
-                0.0 => vec![0.0; extent.dimensions()],
-                _ => extent.coordinates_m(row.position).collect(),
-            };
-            rows.push((position_m, force_n, &row.reading));
-        }
-        let order = |a: &(Vec<f64>, f64, &Vec<f64>), b: &(Vec<f64>, f64, &Vec<f64>)| {
-            compare(&a.0, &b.0).then(a.1.total_cmp(&b.1))
-        };
-        rows.sort_by(order);
-        let groups: Vec<_> = rows.chunk_by(|a, b| order(a, b).is_eq()).collect();
-        let channels = recording.channels.len();
-        let centre: Vec<f64> =
-            (0..channels).map(|c| mean(rows.iter().map(|(.., reading)| reading[c]))).collect();
-        let mut means = Array2::zeros((groups.len(), channels));
-        let mut scatter = vec![0.0; channels];
-        for (mut mean, group) in means.outer_iter_mut().zip(&groups) {
-            let count = group.len() as f64;
-            for (c, mean) in mean.iter_mut().enumerate() {
-                *mean = group.iter().map(|(.., reading)| reading[c]).sum::<f64>() / count;
-                scatter[c] += group.iter().map(|(.., reading)| (reading[c] - *mean).powi(2)).sum::<f64>();
-                *mean -= centre[c];
-            }
-        }
-        Some(Self {
-            positions_m: groups.iter().map(|group| group[0].0.clone()).collect(),
-            force_n: groups.iter().map(|group| group[0].1).collect(),
-            count: groups.iter().map(|group| group.len() as f64).collect(),
-            freedom: (rows.len() - groups.len()) as f64,
-            centre,
-            means,
-            scatter,
-        })
-    }
-
-    /// Number of presses.
-    pub fn len(&self) -> usize {
-        self.force_n.len()
-    }
-
-    /// Distinct forces, that of no contact among them.
-    pub fn distinct_forces(&self) -> usize {
-        let mut forces = self.force_n.clone();
-        forces.sort_by(f64::total_cmp);
-        forces.dedup();
-        forces.len()
-    }
-
-    /// Distinct positions that were pressed, in rising order.
-    pub fn positions_m(&self) -> Vec<&[f64]> {
-        let pressed = self.positions_m.iter().zip(&self.force_n).filter(|(_, force_n)| **force_n != 0.0);
-        let mut positions: Vec<&[f64]> = pressed.map(|(position_m, _)| position_m.as_slice()).collect();
-        positions.dedup();
-        positions
-    }
-
-    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least a few.
-    pub fn noise_freedom(&self) -> f64 {
-        const FEW: f64 = 8.0;
-        let rows = self.count.iter().sum::<f64>();
-        (rows - self.positions_m().len() as f64 - 1.0).max(FEW)
-    }
-
-    /// The greatest force, in newtons.
-    pub fn greatest_force_n(&self) -> f64 {
-        self.force_n.iter().fold(0.0, |most, force_n| most.max(force_n.abs()))
-    }
-
-    /// The channels that change by more than rounding, from 0.
-    fn changing_channels(&self) -> Vec<usize> {
-        let changes = |c: &usize| {
-            let most = self.means.column(*c).iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-            most > 1e-12 * self.centre[*c].abs() && most > 0.0
-        };
-        (0..self.centre.len()).filter(changes).collect()
-    }
-
-    /// The same of some channels alone.
-    fn of_channels(&self, channels: &[usize]) -> Self {
-        let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
-        Self {
-            centre: of(&self.centre),
-            scatter: of(&self.scatter),
-            means: self.means.select(Dimension(1), channels),
-            ..self.clone()
-        }
-    }
-
-    /// Those numbered `kept`.
-    fn select(&self, kept: &[usize]) -> Self {
-        let of = |values: &[f64]| kept.iter().map(|i| values[*i]).collect();
-        Self {
-            positions_m: kept.iter().map(|i| self.positions_m[*i].clone()).collect(),
-            force_n: of(&self.force_n),
-            count: of(&self.count),
-            means: self.means.select(Dimension(0), kept),
-            ..self.clone()
-        }
-    }
-
-    /// Evenly picked, no more than `most`.
-    fn thinned(&self, most: usize) -> Self {
-        let step = (self.len() as f64 / most as f64).max(1.0);
-        let kept: Vec<usize> =
-            (0..).map(|i| (f64::from(i) * step) as usize).take_while(|i| *i < self.len()).collect();
-        self.select(&kept)
-    }
-}
-
-fn compare(a: &[f64], b: &[f64]) -> Ordering {
-    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
-}
-
-/// What all channels share: the correlation k, and how far readings are from linear in the force.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Correlation {
-    pub kernel: Kernel,
-    /// Length scale of each coordinate, in metres.
-    pub lengths_m: Vec<f64>,
-    /// δ: the relative change of an influence with the force.
-    pub nonlinearity: f64,
-}
-
-impl Correlation {
-    /// k between two positions.
-    fn between(&self, a_m: &[f64], b_m: &[f64]) -> f64 {
-        let coordinates = a_m.iter().zip(b_m).zip(&self.lengths_m);
-        self.kernel.correlation(coordinates.map(|((a, b), length)| ((a - b) / length).powi(2)).sum())
-    }
-
-    /// Covariance of the presses, over s², but for the noise: n × n.
-    fn of_presses(&self, presses: &Presses, mean_square_n2: f64) -> Array2<f64> {
-        let n = presses.len();
-        let mut covariance = Array2::zeros((n, n));
-        for i in 0..n {
-            for j in 0..=i {
-                let correlation = self.between(&presses.positions_m[i], &presses.positions_m[j]);
-                let (f, g) = (presses.force_n[i], presses.force_n[j]);
-                let changed = self.nonlinearity.powi(2) * (-0.5 * (f - g).powi(2) / mean_square_n2).exp();
-                let influence = correlation * (1.0 + changed) + CONSTANT;
-                covariance[[i, j]] = f * g / mean_square_n2 * influence + OFFSET;
-            }
-        }
-        covariance
-    }
-}
-
-/// Noise and signal of one channel under some correlation.
-#[derive(Clone, Copy, Debug)]
-struct ChannelFit {
-    /// ln ρ.
-    log_ratio: f64,
-    /// s².
-    signal: f64,
-    /// ln of the probability density of the channel's presses, less a constant.
-    evidence: f64,
-}
-
-impl ChannelFit {
-    fn noise_variance(&self) -> f64 {
-        self.signal * self.log_ratio.exp()
-    }
-}
-
-/// Presses of the channels in use, whose evidence is asked.
-struct Evidence<'a> {
-    presses: &'a Presses,
-    mean_square_n2: f64,
-}
-
-impl Evidence<'_> {
-    /// The best ρ of every channel under a correlation.
-    fn channels(&self, correlation: &Correlation) -> Vec<ChannelFit> {
-        let covariance = correlation.of_presses(self.presses, self.mean_square_n2);
-        let tried: Vec<Vec<ChannelFit>> =
-            DECADES.map(|decade| self.with_ratio(&covariance, f64::from(decade) * 10f64.ln())).collect();
-        (0..self.presses.centre.len())
-            .map(|c| peak(&tried.iter().map(|fits| fits[c]).collect::<Vec<_>>()))
-            .collect()
-    }
-
-    /// The evidence of every channel at one ρ, its s² the most probable one.
-    fn with_ratio(&self, covariance: &Array2<f64>, log_ratio: f64) -> Vec<ChannelFit> {
-        let presses = self.presses;
-        let rows = presses.len() as f64 + presses.freedom;
-        let nothing = ChannelFit { log_ratio, signal: 1.0, evidence: f64::NEG_INFINITY };
-        let Ok(cholesky) = Cholesky::factor(with_noise(covariance, presses, log_ratio)) else {
-            return vec![nothing; presses.centre.len()];
-        };
-        let whitened = cholesky.solve_lower_matrix(presses.means.clone());
-        let determinant = cholesky.log_determinant() + presses.freedom * log_ratio;
-        let fits = whitened.columns().into_iter().zip(&presses.scatter);
-        fits.map(|(whitened, scatter)| {
-            let signal = (whitened.dot(&whitened) + scatter / log_ratio.exp()) / rows;
-            ChannelFit { log_ratio, signal, evidence: -0.5 * (rows * signal.ln() + determinant) }
-        })
-        .collect()
-    }
-
-    /// The evidence of all channels together.
-    fn total(&self, correlation: &Correlation) -> f64 {
-        self.channels(correlation).iter().map(|fit| fit.evidence).sum()
-    }
-}
-
-/// The greatest evidence of fits at evenly spaced ln ρ, by a parabola through the best and its neighbours.
-fn peak(fits: &[ChannelFit]) -> ChannelFit {
-    let best = (0..fits.len()).max_by(|a, b| fits[*a].evidence.total_cmp(&fits[*b].evidence)).unwrap_or(0);
-    let (Some(before), Some(behind)) = (best.checked_sub(1).map(|i| fits[i]), fits.get(best + 1)) else {
-        return fits[best];
-    };
-    let here = fits[best];
-    let (rise, bend) =
-        (behind.evidence - before.evidence, 2.0 * here.evidence - before.evidence - behind.evidence);
-    if !(rise.is_finite() && bend > 0.0) {
-        return here;
-    }
-    let shift = (0.5 * rise / bend).clamp(-0.5, 0.5);
-    // Between two decades s² is taken as a power of ρ.
-    let other = if shift > 0.0 { *behind } else { before };
-    ChannelFit {
-        log_ratio: here.log_ratio + shift * (behind.log_ratio - here.log_ratio),
-        signal: here.signal * (other.signal / here.signal).powf(shift.abs()),
-        evidence: here.evidence + 0.25 * rise * shift,
-    }
-}
-
-/// Offsets and influence functions of all channels in use at some places, as the presses tell them.
-#[derive(Clone, Debug)]
-pub(super) struct Functions {
-    pub offsets: Vec<f64>,
-    /// Standard deviation of the noise of each channel.
-    pub noise_sd: Vec<f64>,
-    /// Channels of unit noise, in which what the presses leave open is independent.
-    pub whitening: Whitening,
-    /// f at each place, per newton, a row a place.
-    pub values: Array2<f64>,
-    /// What the presses leave open of the offsets and of f, over B.
-    pub open: OpenVariance,
-}
-
-/// Variances that calibration leaves, over those of the signal.
-#[derive(Clone, Debug)]
-pub(super) struct OpenVariance {
-    /// Of the offset.
-    pub offset: f64,
-    /// Of f at each place, per newton squared.
-    pub influences: Vec<f64>,
-    /// Covariance of f at each place with the offset, per newton.
-    pub covariances: Vec<f64>,
-}
+/// Every fifth position is held out.
+const FOLDS: usize = 5;
 
 /// What a recording tells of a surface.
 pub(super) struct Learnt {
-    presses: Presses,
-    pub correlation: Correlation,
+    pub presses: Presses,
+    pub prior: Prior,
     /// The channels that change, from 0.
     pub live: Vec<usize>,
     /// Those of the channels in use.
     fits: Vec<ChannelFit>,
-    whitening: Whitening,
-    mean_square_n2: f64,
+    /// Where sensors are looked for.
+    sensors_m: Vec<Vec<f64>>,
     /// By what factor the variance of the learnt functions is multiplied, so that positions held out are as far off as it says.
-    pub widening: f64,
+    widening: f64,
+    /// Rows that no function explains, from 0, in rising order.
+    pub set_aside: Vec<usize>,
 }
 
 impl Learnt {
-    /// Finds the correlation and every channel's noise, and judges them by positions held out.
-    pub fn new(presses: &Presses, extent: Extent, watch: Watch) -> Result<Self, MeasuredError> {
-        let live = presses.changing_channels();
-        let presses = presses.of_channels(&live);
-        let mean_square_n2 = root_mean_square(&presses.force_n).powi(2);
-        let searched = presses.thinned(MOST_SEARCHED);
-        let evidence = Evidence { presses: &searched, mean_square_n2 };
-        let correlation = most_probable(&evidence, extent, watch)?;
-        let fits = evidence.channels(&correlation);
-        let whitening = whitening(&evidence, &correlation, &fits)?;
-        let presses = presses.thinned(MOST_PRESSES);
-        let mut learnt = Self { presses, correlation, live, fits, whitening, mean_square_n2, widening: 1.0 };
-        learnt.widening = learnt.held_out_widening(watch)?;
-        Ok(learnt)
-    }
-
-    /// Number of presses that were learnt from.
-    pub fn presses(&self) -> usize {
-        self.presses.len()
-    }
-
-    /// The functions at `places_m`.
-    pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Functions, MeasuredError> {
-        let posterior = Posterior::new(self, &self.presses)?;
-        let mut values = Array2::zeros((places_m.len(), self.fits.len()));
-        let (mut influences, mut covariances) = (Vec::new(), Vec::new());
-        for (place, (place_m, mut value)) in places_m.iter().zip(values.outer_iter_mut()).enumerate() {
-            if place % 64 == 0 {
-                watch.round()?;
+    /// Learns from the presses of a recording; `None` where their forces do not tell influences from offsets, or nothing changes.
+    pub fn new(
+        setup: &Setup,
+        recording: &Recording,
+        structure: Structure,
+        watch: Watch,
+    ) -> Result<Option<Self>, MeasuredError> {
+        /// Rounds in which presses are set aside, and the share of all rows that may be.
+        const ROUNDS: usize = 4;
+        const MOST_SET_ASIDE: f64 = 0.1;
+        let mut set_aside = Vec::new();
+        for _ in 0..ROUNDS {
+            let Some(learnt) = Self::without_rows(setup, recording, structure, &set_aside, watch)? else {
+                return Ok(None);
+            };
+            let outliers = learnt.outliers()?;
+            let most = (MOST_SET_ASIDE * recording.rows.len() as f64) as usize;
+            if outliers.is_empty() || set_aside.len() + outliers.len() > most {
+                return Ok(Some(learnt));
             }
-            let [variance, covariance] = posterior.influence_into(place_m, &mut value);
-            influences.push(self.widening * variance);
-            covariances.push(self.widening * covariance);
+            set_aside.extend(outliers);
+            set_aside.sort_unstable();
         }
-        Ok(Functions {
-            offsets: self.presses.centre.iter().zip(&posterior.offsets).map(|(a, b)| a + b).collect(),
-            noise_sd: self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect(),
-            whitening: self.whitening.clone(),
-            values,
-            open: OpenVariance { offset: self.widening * posterior.offset_variance, influences, covariances },
-        })
+        Self::without_rows(setup, recording, structure, &set_aside, watch)
     }
 
-    /// How much larger than said the squared errors are at every fifth position, held out of the same process; at least 1.
-    fn held_out_widening(&self, watch: Watch) -> Result<f64, MeasuredError> {
-        const FOLDS: usize = 5;
+    fn without_rows(
+        setup: &Setup,
+        recording: &Recording,
+        structure: Structure,
+        set_aside: &[usize],
+        watch: Watch,
+    ) -> Result<Option<Self>, MeasuredError> {
+        let presses_of = |repeats| Presses::of_recording(setup, recording, repeats, set_aside);
+        let Some(presses) = presses_of(Repeats::Consecutive) else { return Ok(None) };
+        let live = presses.changing_channels();
+        if presses.distinct_forces() < 2 || live.is_empty() {
+            return Ok(None);
+        }
+        let presses = presses.of_channels(&live);
+        let searched = presses.thinned(MOST_SEARCHED);
+        let extent = setup.surface().extent();
+        let decades = Cell::new((*ALL_DECADES.start(), *ALL_DECADES.end()));
+        let search = Search { presses: &searched, extent, structure, watch, decades };
+        let smooth = search.smooth()?;
+        // Repeats tell more as one than spread over the recording, but for drift.
+        let presses = match presses_of(Repeats::All) {
+            Some(merged) if presses.len() > MOST_PRESSES && smooth.prior.drift == 0.0 => {
+                merged.of_channels(&live).thinned(MOST_PRESSES)
+            }
+            _ => presses.thinned(MOST_PRESSES),
+        };
+        let mut judged = vec![Judged::new(smooth, &presses, watch)?];
+        if presses.positions_m().len() >= LEAST_TO_JUDGE
+            && let Some(sources) = search.sources(&judged[0].found.prior)?
+        {
+            judged.push(Judged::new(sources, &presses, watch)?);
+        }
+        let best = judged.into_iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let Some(Judged { found: Found { prior, fits, sensors_m }, widening, .. }) = best else {
+            return Ok(None);
+        };
+        let set_aside = set_aside.to_vec();
+        Ok(Some(Self { presses, prior, live, fits, sensors_m, widening, set_aside }))
+    }
+
+    /// Standard deviation of each channel's noise.
+    pub fn noise_sd(&self) -> Vec<f64> {
+        self.fits.iter().map(|fit| fit.noise_variance().sqrt()).collect()
+    }
+
+    /// Offsets, and influences at `places_m` per newton of φ.
+    pub fn functions(&self, places_m: &[Vec<f64>], watch: Watch) -> Result<Vec<Functions>, MeasuredError> {
+        let mut functions =
+            all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
+        let per_newton = 1.0 / self.prior.force_scale_n;
+        for functions in &mut functions {
+            functions.offset_variance *= self.widening;
+            functions.values.iter_mut().for_each(|value| *value *= per_newton);
+            functions.variances.iter_mut().for_each(|v| *v *= self.widening * per_newton * per_newton);
+            functions.covariances.iter_mut().for_each(|c| *c *= self.widening * per_newton);
+        }
+        Ok(functions)
+    }
+
+    /// First rows of presses that are further off what all others say of them than noise is in one of a hundred recordings.
+    ///
+    /// Each press is predicted from the others (Rasmussen and Williams, eq. 5.12), and its error taken over a deviation that it has no
+    /// part in (externally studentized residuals; Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1).
+    fn outliers(&self) -> Result<Vec<usize>, MeasuredError> {
+        const TAIL: f64 = 1e-2;
+        /// The worst are set aside first; others may be none without them.
+        const AT_ONCE: usize = 3;
+        /// Share of the noise's variance in the error of a press, below which it is not judged.
+        const LEAST_TOLD: f64 = 1e-6;
+        let n = self.presses.len();
+        let mut squares = Array2::<f64>::zeros((n, self.fits.len()));
+        let mut freedom = f64::INFINITY;
+        for channels in of_equal_ratio(&self.fits) {
+            let evidence = Evidence::new(&self.presses, &self.prior, &[]);
+            let restricted = evidence.restricted(self.fits[channels[0]].ratio)?;
+            freedom = (n - restricted.effects()) as f64 - 3.0;
+            // M·L⁻¹, whose squared columns sum to the diagonal of the projected inverse.
+            let (projection, _) = restricted.residuals(Array2::eye(n));
+            let (white, _) = restricted.residuals(self.presses.means.clone());
+            for c in channels {
+                let mut left = white.column(c).to_owned();
+                let mut diagonal: Array1<f64> =
+                    projection.columns().into_iter().map(|column| column.dot(&column)).collect();
+                if let Some(source) = self.fits[c].sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
+                {
+                    let place = std::slice::from_ref(&self.sensors_m[source.place]);
+                    let (column, _) = restricted.residuals(self.prior.sources(&self.presses, place));
+                    let column = column.column(0).to_owned();
+                    let share = column.dot(&left) / column.dot(&column);
+                    let seen = projection.t().dot(&column);
+                    diagonal.scaled_add(-1.0 / column.dot(&column), &seen.mapv(|v| v * v));
+                    left.scaled_add(-share, &column);
+                }
+                let errors = projection.t().dot(&left);
+                let signal = self.fits[c].signal;
+                for i in 0..n {
+                    // The others say next to nothing of a press alone at its place.
+                    if diagonal[i] * self.fits[c].ratio < LEAST_TOLD * self.presses.count[i] {
+                        continue;
+                    }
+                    let square = errors[i].powi(2) / (diagonal[i] * signal);
+                    let others = (freedom - square).max(1e-3 * freedom);
+                    squares[[i, c]] = square * (freedom - 1.0) / others;
+                }
+            }
+        }
+        if freedom < 5.0 {
+            return Ok(Vec::new());
+        }
+        let channels = self.fits.len();
+        let bound = |count: usize, tests: usize| {
+            let bound = chi_squared_critical_value(TAIL / tests as f64, count);
+            let freedom = freedom * count as f64;
+            freedom * ((bound / freedom).exp() - 1.0)
+        };
+        let (of_all, of_one) = (bound(channels, 2 * n), bound(1, 2 * n * channels));
+        let excess = |i: usize| {
+            let row = squares.row(i);
+            (row.sum() / of_all).max(row.iter().fold(0.0, |most: f64, square| most.max(*square)) / of_one)
+        };
+        let mut found: Vec<usize> = (0..n).filter(|i| excess(*i) > 1.0).collect();
+        found.sort_by(|a, b| excess(*b).total_cmp(&excess(*a)));
+        Ok(found.into_iter().take(AT_ONCE).map(|i| self.presses.row[i]).collect())
+    }
+}
+
+/// Functions of all channels, in their order.
+fn all_functions(
+    prior: &Prior,
+    presses: &Presses,
+    fits: &[ChannelFit],
+    sensors_m: &[Vec<f64>],
+    places_m: &[Vec<f64>],
+    watch: Watch,
+) -> Result<Vec<Functions>, MeasuredError> {
+    let mut all: Vec<(usize, Functions)> = Vec::with_capacity(fits.len());
+    for channels in of_equal_ratio(fits) {
+        let asked: Vec<_> = channels.iter().map(|c| (*c, &fits[*c])).collect();
+        let found = functions(prior, presses, &asked, sensors_m, places_m, watch)?;
+        all.extend(channels.into_iter().zip(found));
+    }
+    all.sort_by_key(|(c, _)| *c);
+    Ok(all.into_iter().map(|(_, functions)| functions).collect())
+}
+
+/// The most probable of a family of priors.
+struct Found {
+    prior: Prior,
+    fits: Vec<ChannelFit>,
+    /// Where sensors are looked for.
+    sensors_m: Vec<Vec<f64>>,
+}
+
+/// How a prior does at positions held out.
+struct Judged {
+    found: Found,
+    /// ln of the probability density of the presses that were held out.
+    score: f64,
+    widening: f64,
+}
+
+impl Judged {
+    /// Holds out every fifth position in turn; too few positions are not judged.
+    fn new(found: Found, presses: &Presses, watch: Watch) -> Result<Self, MeasuredError> {
         const MOST: f64 = 25.0;
-        let positions_m = self.presses.positions_m();
+        let positions_m = presses.positions_m();
         if positions_m.len() < LEAST_TO_JUDGE {
-            return Ok(1.0);
+            return Ok(Self { found, score: 0.0, widening: 1.0 });
         }
         let fold_of = |i: usize| {
-            let place =
-                positions_m.partition_point(|other| compare(other, &self.presses.positions_m[i]).is_lt());
-            (self.presses.force_n[i] != 0.0).then_some(place % FOLDS)
+            let place = positions_m.partition_point(|other| compare(other, &presses.positions_m[i]).is_lt());
+            (presses.force_n[i] != 0.0).then_some(place % FOLDS)
         };
-        let channels = self.fits.len();
-        let (mut value, mut white) = (Array1::zeros(channels), vec![0.0; channels]);
-        // Squared whitened errors with what noise and process say of them.
+        // Squared errors with the variances of noise and process.
         let mut errors: Vec<[f64; 3]> = Vec::new();
         for fold in 0..FOLDS {
             watch.round()?;
             let (held, kept): (Vec<usize>, Vec<usize>) =
-                (0..self.presses.len()).partition(|i| fold_of(*i) == Some(fold));
-            let kept = self.presses.select(&kept);
-            let posterior = Posterior::new(self, &kept)?;
-            for &i in &held {
-                let force_n = self.presses.force_n[i];
-                let [variance, covariance] =
-                    posterior.influence_into(&self.presses.positions_m[i], &mut value.view_mut());
-                let open =
-                    (posterior.offset_variance + force_n * (2.0 * covariance + force_n * variance)).max(0.0);
-                let error: Vec<f64> = (0..channels)
-                    .map(|c| self.presses.means[[i, c]] - posterior.offsets[c] - force_n * value[c])
-                    .collect();
-                self.whitening.apply(&error, &mut white);
-                let said = white.iter().zip(&self.whitening.signal);
-                errors.extend(said.map(|(e, signal)| [e * e, 1.0 / self.presses.count[i], signal * open]));
-            }
+                (0..presses.len()).partition(|i| fold_of(*i) == Some(fold));
+            found.add_errors(presses, &held, &presses.select(&kept), &mut errors, watch)?;
         }
+        let score = |[square, noise, process]: &[f64; 3]| {
+            let variance = noise + process;
+            -0.5 * (variance.ln() + square / variance)
+        };
+        let score = errors.iter().map(score).sum();
         let too_small = |widening: f64| {
             let standardized =
                 errors.iter().map(|[square, noise, process]| square / (noise + widening * process));
             standardized.sum::<f64>() > errors.len() as f64
         };
-        Ok(bisect((1.0, MOST), 30, too_small))
+        let widening = bisect((1.0, MOST), 30, too_small);
+        Ok(Self { found, score, widening })
     }
 }
 
-/// Whitening of noise and signal: the noise independent, the signal correlated as the channels' whitened presses are.
-fn whitening(
-    evidence: &Evidence,
-    correlation: &Correlation,
-    fits: &[ChannelFit],
-) -> Result<Whitening, MeasuredError> {
-    let presses = evidence.presses;
-    let covariance = correlation.of_presses(presses, evidence.mean_square_n2);
-    let mut white = Array2::zeros(presses.means.dim());
-    for (c, fit) in fits.iter().enumerate() {
-        let cholesky = Cholesky::factor(with_noise(&covariance, presses, fit.log_ratio))?;
-        let mut column = cholesky.solve_lower(&presses.means.column(c).to_owned());
-        let length = column.dot(&column).sqrt();
-        column *= fit.signal.sqrt() / length;
-        white.column_mut(c).assign(&column);
-    }
-    let noise = Array2::from_diag(&fits.iter().map(ChannelFit::noise_variance).collect::<Array1<f64>>());
-    let noise = Noise { covariance: noise, gain: 0.0 };
-    Ok(Whitening::from_covariances(noise, &white.t().dot(&white))?)
-}
-
-/// The covariance of presses over s², with the noise of each.
-fn with_noise(covariance: &Array2<f64>, presses: &Presses, log_ratio: f64) -> Array2<f64> {
-    let mut covariance = covariance.clone();
-    for (i, count) in presses.count.iter().enumerate() {
-        covariance[[i, i]] += log_ratio.exp() / count;
-    }
-    covariance
-}
-
-/// The posterior of all channels, given some presses.
-struct Posterior<'a> {
-    learnt: &'a Learnt,
-    presses: &'a Presses,
-    /// What each press weighs in each channel's functions, n × C.
-    weights: Array2<f64>,
-    /// Offset of each channel less its centre.
-    offsets: Vec<f64>,
-    /// Of the median ρ.
-    cholesky: Cholesky,
-    /// L⁻¹ times the covariance of the presses with the offset, and what it leaves of the offset's variance.
-    explained_offset: Array1<f64>,
-    offset_variance: f64,
-}
-
-impl<'a> Posterior<'a> {
-    fn new(learnt: &'a Learnt, presses: &'a Presses) -> Result<Self, NotPositiveDefinite> {
-        let covariance = learnt.correlation.of_presses(presses, learnt.mean_square_n2);
-        let factor = |log_ratio: f64| Cholesky::factor(with_noise(&covariance, presses, log_ratio));
-        let mut weights = Array2::zeros(presses.means.dim());
-        for (c, fit) in learnt.fits.iter().enumerate() {
-            let solved = factor(fit.log_ratio)?.solve(&presses.means.column(c).to_owned());
-            weights.column_mut(c).assign(&solved);
+impl Found {
+    /// Adds the squared errors of presses `held` out of those `kept`, with what noise and process say of them.
+    fn add_errors(
+        &self,
+        presses: &Presses,
+        held: &[usize],
+        kept: &Presses,
+        errors: &mut Vec<[f64; 3]>,
+        watch: Watch,
+    ) -> Result<(), MeasuredError> {
+        let places_m: Vec<Vec<f64>> = held.iter().map(|i| presses.positions_m[*i].clone()).collect();
+        let functions = all_functions(&self.prior, kept, &self.fits, &self.sensors_m, &places_m, watch)?;
+        for (c, (functions, fit)) in functions.iter().zip(&self.fits).enumerate() {
+            for (k, &i) in held.iter().enumerate() {
+                let phi = self.prior.response_to(presses.force_n[i]);
+                let error =
+                    presses.means[[i, c]] + presses.centre[c] - functions.offset - phi * functions.values[k];
+                let process = functions.offset_variance
+                    + phi * (2.0 * functions.covariances[k] + phi * functions.variances[k]);
+                errors.push([error * error, fit.noise_variance() / presses.count[i], process.max(0.0)]);
+            }
         }
-        let log_ratios = learnt.fits.iter().map(|fit| fit.log_ratio).collect();
-        let cholesky = factor(median(log_ratios).unwrap_or_default())?;
-        let explained_offset = cholesky.solve_lower(&Array1::from_elem(presses.len(), OFFSET));
-        Ok(Self {
-            offsets: weights.columns().into_iter().map(|weights| OFFSET * weights.sum()).collect(),
-            offset_variance: (OFFSET - explained_offset.dot(&explained_offset)).max(0.0),
-            learnt,
-            presses,
-            weights,
-            cholesky,
-            explained_offset,
-        })
-    }
-
-    /// Writes f of every channel at a place; returns its variance over that of the signal, and its covariance with the offset.
-    fn influence_into(&self, place_m: &[f64], values: &mut ArrayViewMut1<f64>) -> [f64; 2] {
-        let Learnt { correlation, mean_square_n2, .. } = self.learnt;
-        let presses = self.presses.positions_m.iter().zip(&self.presses.force_n);
-        let covariance: Array1<f64> = presses
-            .map(|(position_m, force_n)| {
-                force_n / mean_square_n2 * (correlation.between(place_m, position_m) + CONSTANT)
-            })
-            .collect();
-        values.assign(&covariance.dot(&self.weights));
-        let explained = self.cholesky.solve_lower(&covariance);
-        let before = (1.0 + CONSTANT) / mean_square_n2;
-        [(before - explained.dot(&explained)).max(0.0), -explained.dot(&self.explained_offset)]
+        Ok(())
     }
 }
 
 /// Nonlinearities that are tried.
 const NONLINEARITIES: [f64; 3] = [0.03, 0.1, 0.3];
+/// Variances of drift over that of the noise that are tried.
+const DRIFTS: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
+/// Exponents of the response that are tried.
+const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
 /// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
 const LEAST_SMOOTHER: f64 = 10.0;
-/// A nonlinearity is believed from this much more evidence on.
+/// A departure from offset + force × influence is believed from this much more evidence on.
 const LEAST_GAIN: f64 = 10.0;
 
-/// The correlation under which the presses are the most probable: the smoother kernel on sufficient evidence, length scales by ever smaller
-/// steps, the nonlinearity last.
-fn most_probable(evidence: &Evidence, extent: Extent, watch: Watch) -> Result<Correlation, Cancelled> {
-    let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
-    let start: Vec<f64> = spans_m.map(|span_m| 0.25 * span_m).collect();
-    let rough = Correlation { kernel: Kernel::Matern32, lengths_m: start, nonlinearity: 0.0 };
-    let (mut best, mut correlation) = climb_lengths(evidence, rough, extent, watch)?;
-    let smooth = Correlation { kernel: Kernel::Matern52, ..correlation.clone() };
-    let (smooth_best, smooth) = climb_lengths(evidence, smooth, extent, watch)?;
-    if smooth_best > best + LEAST_SMOOTHER {
-        (best, correlation) = (smooth_best, smooth);
-    }
-    best += LEAST_GAIN;
-    for nonlinearity in NONLINEARITIES {
-        watch.round()?;
-        let candidate = Correlation { nonlinearity, ..correlation.clone() };
-        let total = evidence.total(&candidate);
-        if total > best {
-            (best, correlation) = (total, candidate);
-        }
-    }
-    Ok(correlation)
+/// The search for the most probable priors.
+struct Search<'a> {
+    presses: &'a Presses,
+    extent: Extent,
+    structure: Structure,
+    watch: Watch<'a>,
+    /// Powers of ten about those of the noise of the channels, as the last prior told them.
+    decades: Cell<(i32, i32)>,
 }
 
-/// Steps along the logarithm of one length scale at a time while the evidence rises.
-fn climb_lengths(
-    evidence: &Evidence,
-    mut correlation: Correlation,
-    extent: Extent,
-    watch: Watch,
-) -> Result<(f64, Correlation), Cancelled> {
-    let (shortest_m, longest_m) = (1e-3 * extent.length_m(), 10.0 * extent.length_m());
-    let mut best = evidence.total(&correlation);
-    for step in [2.0, std::f64::consts::SQRT_2, 1.2] {
-        for k in 0..correlation.lengths_m.len() {
+impl Search<'_> {
+    /// The evidence of all channels together, their noise about that of the last prior.
+    fn total(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
+        /// How far the noise of a channel moves from one prior to the next, in powers of ten.
+        const ABOUT: i32 = 2;
+        self.watch.round()?;
+        let (from, to) = self.decades.get();
+        let Some(fits) = Evidence::new(self.presses, prior, sensors_m).best_decades(from..=to) else {
+            return Ok(f64::NEG_INFINITY);
+        };
+        let decades = || fits.iter().map(|fit| fit.ratio.log10().round() as i32);
+        let (least, most) = (decades().min().unwrap_or(0), decades().max().unwrap_or(0));
+        self.decades.set(((least - ABOUT).max(*ALL_DECADES.start()), (most + ABOUT).min(*ALL_DECADES.end())));
+        Ok(fits.iter().map(|fit| fit.evidence).sum())
+    }
+
+    /// The same, of a prior whose noise may be of any size.
+    fn total_anew(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
+        self.decades.set((*ALL_DECADES.start(), *ALL_DECADES.end()));
+        self.total(prior, sensors_m)
+    }
+
+    /// The most probable smooth prior: the smoother kernel on sufficient evidence, length scales by ever smaller steps; drift, response and
+    /// nonlinearity last.
+    fn smooth(&self) -> Result<Found, Cancelled> {
+        let rough = Prior::smooth(self.extent, self.presses);
+        self.total_anew(&rough, &[])?;
+        let (mut best, mut prior) = self.climb_lengths(rough)?;
+        let (smooth_best, smooth) =
+            self.climb_lengths(Prior { kernel: Kernel::Matern52, ..prior.clone() })?;
+        if smooth_best > best + LEAST_SMOOTHER {
+            (best, prior) = (smooth_best, smooth);
+        }
+        let drifts = DRIFTS.map(|drift| Prior { drift, ..prior.clone() });
+        let (found, drifting) = self.best_of(drifts)?;
+        if found > best + LEAST_GAIN {
+            (best, prior) = self.climb_lengths(drifting)?;
+        }
+        if self.structure != Structure::ForceLinear {
+            (best, prior) = self.response(best, prior)?;
+        }
+        if self.structure == Structure::Auto {
+            let changed = NONLINEARITIES.map(|nonlinearity| Prior { nonlinearity, ..prior.clone() });
+            let (found, nonlinear) = self.best_of(changed)?;
+            if found > best + LEAST_GAIN {
+                prior = nonlinear;
+            }
+        }
+        Ok(self.found(prior, &[]))
+    }
+
+    fn best_of<const N: usize>(&self, priors: [Prior; N]) -> Result<(f64, Prior), Cancelled> {
+        let mut best = None;
+        for prior in priors {
+            let total = self.total(&prior, &[])?;
+            if best.as_ref().is_none_or(|(most, _)| total > *most) {
+                best = Some((total, prior));
+            }
+        }
+        Ok(best.expect("at least one prior is tried"))
+    }
+
+    /// The response to the force: linear, unless another exponent is more probable by [`LEAST_GAIN`].
+    fn response(&self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
+        let (mut found, mut prior) =
+            self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }))?;
+        if found < best + LEAST_GAIN && self.structure != Structure::ForceMonotone {
+            return Ok((best, linear));
+        }
+        for step in [1.15, 1.05, 1.015] {
             for factor in [step, 1.0 / step] {
                 loop {
-                    watch.round()?;
-                    let mut candidate = correlation.clone();
-                    candidate.lengths_m[k] = (candidate.lengths_m[k] * factor).clamp(shortest_m, longest_m);
-                    let total = evidence.total(&candidate);
-                    if total <= best {
+                    let candidate = Prior { response: prior.response * factor, ..prior.clone() };
+                    let total = self.total(&candidate, &[])?;
+                    if total <= found {
                         break;
                     }
-                    (best, correlation) = (total, candidate);
+                    (found, prior) = (total, candidate);
                 }
             }
         }
+        self.climb_lengths(prior)
     }
-    Ok((best, correlation))
+
+    /// The most probable prior of point sensors: which kind of source, then what share is smooth and over what length; `None` where the
+    /// presses are too few for its polynomials.
+    fn sources(&self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
+        /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
+        const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
+        const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
+        let sensors_m = everywhere(self.extent);
+        let dimensions = self.extent.dimensions();
+        let plane = dimensions == 2;
+        let of_length = |source: Source, share: f64, length: f64| Prior {
+            source: Some(source),
+            kernel: if plane { Kernel::SquaredExponential } else { Kernel::Matern52 },
+            smooth_part: share,
+            lengths_m: vec![length * self.extent.length_m(); dimensions],
+            ..smooth.clone()
+        };
+        let mut best: Option<(f64, Prior)> = None;
+        let mut keep = |total: f64, prior: Prior| {
+            if total.is_finite() && best.as_ref().is_none_or(|(most, _)| total > *most) {
+                best = Some((total, prior));
+            }
+        };
+        let shares = if plane { &SHARES[3..] } else { &SHARES[..] };
+        let mut kinds = Vec::new();
+        for source in Source::all(self.extent) {
+            let prior = of_length(*source, shares[shares.len() / 2], 0.4);
+            let total = self.total_anew(&prior, &sensors_m)?;
+            keep(total, prior);
+            kinds.push((total, *source));
+        }
+        let Some((_, source)) = kinds.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
+        for share in shares {
+            let lengths = if *share == 0.0 { &LENGTHS[..1] } else { &LENGTHS[..] };
+            self.decades.set((*ALL_DECADES.start(), *ALL_DECADES.end()));
+            for length in lengths {
+                let prior = of_length(source, *share, *length);
+                keep(self.total(&prior, &sensors_m)?, prior);
+            }
+        }
+        let Some((_, prior)) = best else { return Ok(None) };
+        Ok(Some(self.found(prior, &sensors_m)))
+    }
+
+    /// The fits under a prior.
+    fn found(&self, prior: Prior, sensors_m: &[Vec<f64>]) -> Found {
+        let evidence = Evidence::new(self.presses, &prior, sensors_m);
+        let fits = evidence.best_decades(ALL_DECADES).map(|fits| evidence.refined(fits)).unwrap_or_default();
+        Found { prior, fits, sensors_m: sensors_m.to_vec() }
+    }
+
+    /// Steps along the logarithm of one length scale at a time while the evidence rises.
+    fn climb_lengths(&self, mut prior: Prior) -> Result<(f64, Prior), Cancelled> {
+        let (shortest_m, longest_m) = (1e-3 * self.extent.length_m(), 10.0 * self.extent.length_m());
+        let mut best = self.total(&prior, &[])?;
+        for step in [2.0, std::f64::consts::SQRT_2, 1.2] {
+            for k in 0..prior.lengths_m.len() {
+                for factor in [step, 1.0 / step] {
+                    loop {
+                        let mut candidate = prior.clone();
+                        candidate.lengths_m[k] =
+                            (candidate.lengths_m[k] * factor).clamp(shortest_m, longest_m);
+                        let total = self.total(&candidate, &[])?;
+                        if total <= best {
+                            break;
+                        }
+                        (best, prior) = (total, candidate);
+                    }
+                }
+            }
+        }
+        Ok((best, prior))
+    }
+}
+
+/// Places all over a surface where sensors are looked for.
+fn everywhere(extent: Extent) -> Vec<Vec<f64>> {
+    /// Along a line, and along the longer side of a plane.
+    const ALONG: usize = 600;
+    const OF_PLANE: usize = 30;
+    let middles =
+        |size_m: f64, count: usize| (0..count).map(move |i| size_m * (i as f64 + 0.5) / count as f64);
+    let length_m = extent.length_m();
+    match extent.width_m() {
+        None => middles(length_m, ALONG).map(|x_m| vec![x_m]).collect(),
+        Some(width_m) => {
+            let longer_m = length_m.max(width_m);
+            let count = |size_m: f64| ((OF_PLANE as f64 * size_m / longer_m).ceil() as usize).max(2);
+            let across = |x_m: f64| middles(width_m, count(width_m)).map(move |y_m| vec![x_m, y_m]);
+            middles(length_m, count(length_m)).flat_map(across).collect()
+        }
+    }
 }

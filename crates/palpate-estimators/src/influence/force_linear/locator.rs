@@ -1,21 +1,21 @@
 //! The locator of a force-linear surface: the posterior of a reading over a grid of places, the force integrated in closed form.
 //!
-//! With d the reading less the offsets and f the influences at a place, both in channels of unit noise in which what the presses leave
-//! open is independent, channel k errs by S_k(F) = 1 + λ_k·(ω + 2F·β + F²·v): noise, and the variance ω of the offset, v of
-//! the influence and their covariance β, in units of the signal's λ_k. For a force F that is as likely as any other between 0 and the
-//! hardest looked for,
+//! With d the reading less the offsets and f the influences at a place, both over the noise, channel k errs by
+//! S_k(F) = 1 + ω_k + 2F·β_k + F²·v_k: noise, and the variances ω of the offset and v of the influence with their covariance β, as the
+//! presses leave them open. For a force F that is as likely as any other between 0 and the hardest looked for,
 //!
 //! p(a | d) ∝ ∫ Π S_k^(−½)·exp(−(d_k − F·f_k)²/(2·S_k)) dF,
 //!
-//! S taken at the force of the least misfit. The determinant belongs there: between presses, where v is large, everything would
+//! S taken at the force of the least misfit. Where the response to the force is not linear, F stands for φ(F), and the estimate is
+//! turned back. The determinant belongs there: between presses, where v is large, everything would
 //! explain a reading otherwise.
 
-use super::learning::{Functions, OpenVariance};
+use super::posterior::Functions;
+use super::prior::Source;
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{
     Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
 };
-use crate::influence::noise::Whitening;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{Directions, FalseAlarmRate, NoiseBounds, learnt_misfit_bound, unknowns};
@@ -30,29 +30,36 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Tables {
     /// Offset of each channel, in its unit.
     offsets: Vec<f64>,
-    /// Standard deviation of the noise of each, in its unit.
+    /// Standard deviation of the noise σ of each, in its unit.
     noise_sd: Vec<f64>,
-    /// Channels of unit noise; its signal is λ.
-    whitening: Whitening,
-    /// f of the whitened channels at each place, per newton; place (x, y) is number x·count_y + y.
+    /// ω of each channel, over σ².
+    offset_variances: Vec<f64>,
+    /// f over σ at each place, per newton: that of channel c at place (x, y) is number (x·count_y + y)·channels + c.
     values: Vec<f64>,
-    /// v at each place.
+    /// v over σ² at each place, per newton squared.
     variances: Vec<f64>,
-    /// β at each place.
+    /// β over σ² at each place, per newton.
     covariances: Vec<f64>,
-    /// ω.
-    offset_variance: f64,
 }
 
-impl From<Functions> for Tables {
-    fn from(functions: Functions) -> Self {
-        let Functions { offsets, noise_sd, whitening, values, open } = functions;
-        let mut white = vec![0.0; values.len()];
-        for (value, white) in values.outer_iter().zip(white.chunks_exact_mut(offsets.len().max(1))) {
-            whitening.apply(&value.to_vec(), white);
+impl Tables {
+    pub fn new(functions: &[Functions], noise_sd: Vec<f64>) -> Self {
+        let places = functions.first().map_or(0, |functions| functions.values.len());
+        let at_places = |of: fn(&Functions) -> &Vec<f64>, power: i32| -> Vec<f64> {
+            let channels = || functions.iter().zip(&noise_sd);
+            (0..places)
+                .flat_map(|place| channels().map(move |(found, noise)| of(found)[place] / noise.powi(power)))
+                .collect()
+        };
+        let offset_variance = |(found, noise): (&Functions, &f64)| found.offset_variance / (noise * noise);
+        Self {
+            offsets: functions.iter().map(|found| found.offset).collect(),
+            offset_variances: functions.iter().zip(&noise_sd).map(offset_variance).collect(),
+            values: at_places(|found| &found.values, 1),
+            variances: at_places(|found| &found.variances, 2),
+            covariances: at_places(|found| &found.covariances, 2),
+            noise_sd,
         }
-        let OpenVariance { offset: offset_variance, influences: variances, covariances } = open;
-        Self { offsets, noise_sd, whitening, values: white, variances, covariances, offset_variance }
     }
 }
 
@@ -68,6 +75,9 @@ pub(super) struct Stored {
     pub functions: Tables,
     /// The contact's force in newtons, where it is known.
     pub known_force_n: Option<f64>,
+    /// Mean and standard deviation of φ of the presses, in newtons.
+    pub mean_force_n: f64,
+    pub force_sd_n: f64,
     /// The hardest contact that is looked for, in newtons.
     pub hardest_n: f64,
     /// The squared residual, in variances, from which on no contact explains a reading.
@@ -75,8 +85,20 @@ pub(super) struct Stored {
     pub kernel: Kernel,
     /// Length scale of the influence functions along each coordinate, in metres.
     pub lengths_m: Vec<f64>,
+    /// Kind of the point sensors whose places were looked for; nothing where the influences are smooth alone.
+    pub source: Option<Source>,
+    /// η²: the share of the influences' smooth part in what is expected of them; 0 where there is none.
+    pub smooth_part: f64,
     /// How far the presses were found from linear: the relative change of an influence with the force.
     pub nonlinearity: f64,
+    /// γ: readings follow this power of the force.
+    pub response: f64,
+    /// Root mean square force of the presses, in newtons.
+    pub force_scale_n: f64,
+    /// κ: the variance of the drift over the recording, over that of the noise.
+    pub drift: f64,
+    /// Rows of the recording that were set aside, from 0.
+    pub set_aside: Vec<usize>,
     /// Number of presses that were learnt from.
     pub presses: usize,
     /// Degrees of freedom that tell each channel's noise.
@@ -91,17 +113,21 @@ pub(super) struct Stored {
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct ForceLinearLocator {
     stored: Stored,
+    /// Expected φ of a contact, and its precision.
+    expected: [f64; 2],
     /// For each place half the longest way to a neighbour's line, per newton and over the noise.
     reaches: Vec<f64>,
     /// Into how many parts each cell is cut along each axis when a reading is located within it.
     parts: usize,
-    /// The largest square of a whitened reading of noise alone.
+    /// The largest square of a relative reading of noise alone.
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
     detection_bound: f64,
 }
 
-/// A finely cut cell has about this whitened length, so that sums over it are integrals.
+/// Contacts are expected to have forces that spread this many times as far as those of the presses.
+const FORCE_SPREAD: f64 = 2.0;
+/// A finely cut cell has about this relative length, so that sums over it are integrals.
 const FINE: f64 = 1.0;
 /// The finest cut along a line, and along each axis of a plane.
 const MOST_PARTS: usize = 24;
@@ -110,6 +136,10 @@ const MOST_PARTS_OF_PLANE: usize = 8;
 impl Stored {
     pub fn into_locator(self) -> ForceLinearLocator {
         let mut locator = ForceLinearLocator {
+            expected: match self.known_force_n {
+                None => [self.mean_force_n, (FORCE_SPREAD * self.force_sd_n).powi(-2)],
+                Some(_) => [0.0; 2],
+            },
             stored: self,
             reaches: Vec::new(),
             parts: 1,
@@ -128,8 +158,7 @@ impl Stored {
         };
         check_axes(&[self.x, self.y])?;
         let places = self.x.count.saturating_mul(self.y.count);
-        let Tables { offsets, noise_sd, whitening, values, variances, covariances, offset_variance } =
-            &self.functions;
+        let Tables { offsets, noise_sd, offset_variances, values, variances, covariances } = &self.functions;
         let live = self.live.len();
         let is_channel = |c: &&usize| **c >= self.channels;
         if let Some(c) = self.live.iter().find(is_channel) {
@@ -137,28 +166,32 @@ impl Stored {
         }
         LocatorFault::check_count("offsets", live, offsets.len())?;
         LocatorFault::check_count("noises", live, noise_sd.len())?;
-        LocatorFault::check_count("whitened channels", live, whitening.channels())?;
-        LocatorFault::check_count("whitening weights", live * live, whitening.matrix.len())?;
-        LocatorFault::check_count("influence values", places.saturating_mul(live), values.len())?;
-        LocatorFault::check_count("influence variances", places, variances.len())?;
-        LocatorFault::check_count("influence covariances", places, covariances.len())?;
+        LocatorFault::check_count("offset variances", live, offset_variances.len())?;
+        for (what, list) in [
+            ("influence values", values),
+            ("influence variances", variances),
+            ("influence covariances", covariances),
+        ] {
+            LocatorFault::check_count(what, places.saturating_mul(live), list.len())?;
+        }
         numbers("offset", offsets, |_| true, "a finite number")?;
-        numbers("whitening weight", &whitening.matrix, |_| true, "finite")?;
+        numbers("mean force", &[self.mean_force_n], |_| true, "a finite number")?;
         numbers("influence value", values, |_| true, "a finite number")?;
         numbers("influence covariance", covariances, |_| true, "a finite number")?;
-        for (what, list) in
-            [("noise", noise_sd), ("signal variance", &whitening.signal), ("influence variance", variances)]
-        {
+        numbers("noise", noise_sd, |sd| sd > 0.0, "finite and greater than 0")?;
+        for (what, list) in [("offset variance", offset_variances), ("influence variance", variances)] {
             numbers(what, list, |v| v >= 0.0, "finite and at least 0")?;
         }
-        numbers("offset variance", &[*offset_variance], |v| v >= 0.0, "at least 0")?;
-        let force = [self.hardest_n, self.known_force_n.unwrap_or(1.0)];
+        numbers("smooth part", &[self.smooth_part], |share| share >= 0.0, "at least 0")?;
+        numbers("drift", &[self.drift], |drift| drift >= 0.0, "at least 0")?;
+        numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
+        let force = [self.hardest_n, self.force_scale_n, self.force_sd_n, self.known_force_n.unwrap_or(1.0)];
         numbers("force", &force, |force| force > 0.0, "greater than 0")?;
         numbers(
             "degrees of freedom of the noise",
             &[self.noise_freedom],
-            |freedom| freedom > 0.0,
-            "greater than 0",
+            |freedom| freedom > 2.0,
+            "greater than 2",
         )?;
         numbers("residual limit", &[self.residual_limit], |limit| limit > 0.0, "greater than 0")
     }
@@ -182,11 +215,10 @@ impl From<ForceLinearLocator> for Stored {
 /// What the table says of a place.
 #[derive(Clone, Copy, Debug)]
 struct Place<'a> {
-    /// f of the whitened channels.
+    /// f, v and β of each channel, over the noise.
     values: &'a [f64],
-    /// v and β.
-    variance: f64,
-    covariance: f64,
+    variances: &'a [f64],
+    covariances: &'a [f64],
 }
 
 /// A place as a reading sees it.
@@ -208,9 +240,10 @@ impl ForceLinearLocator {
         self
     }
 
-    /// The kernel of the influence functions, and their length scale along each coordinate in metres.
-    pub fn correlation(&self) -> (Kernel, &[f64]) {
-        (self.stored.kernel, &self.stored.lengths_m)
+    /// The kernel of the influence functions' smooth part, and its length scale along each coordinate in metres; `None` where they
+    /// have none besides polynomials and point sensors.
+    pub fn correlation(&self) -> Option<(Kernel, &[f64])> {
+        (self.stored.smooth_part > 0.0).then_some((self.stored.kernel, &self.stored.lengths_m))
     }
 
     /// How far the presses were found from linear: the relative change of an influence with the force; 0 where they agree.
@@ -221,6 +254,28 @@ impl ForceLinearLocator {
     /// Share of untouched readings that may be taken for a contact.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.false_alarm_rate
+    }
+
+    /// Kind of the point sensors whose places were looked for; nothing where the influences are smooth alone.
+    pub fn source(&self) -> Option<Source> {
+        self.stored.source
+    }
+
+    /// The power of the force that readings follow; 1 where they are linear in it.
+    pub fn response(&self) -> f64 {
+        self.stored.response
+    }
+
+    /// How far each channel in use, from 0, drifted over the recording: the standard deviation of the change from its first row to its
+    /// last, in its unit; nothing where the presses do not tell a drift.
+    pub fn drifts(&self) -> Vec<(usize, f64)> {
+        let sd = self.stored.drift.sqrt();
+        if sd > 0.0 { self.channels().map(|(c, _, noise)| (c, sd * noise)).collect() } else { Vec::new() }
+    }
+
+    /// Rows of the recording, from 0, that were set aside, as no function of the position explains them.
+    pub fn set_aside(&self) -> &[usize] {
+        &self.stored.set_aside
     }
 
     /// Number of presses that were learnt from.
@@ -245,10 +300,11 @@ impl ForceLinearLocator {
     fn place(&self, place: usize) -> Place<'_> {
         let Tables { values, variances, covariances, .. } = &self.stored.functions;
         let live = self.stored.live.len();
+        let of = place * live..(place + 1) * live;
         Place {
-            values: &values[place * live..(place + 1) * live],
-            variance: variances[place],
-            covariance: covariances[place],
+            values: &values[of.clone()],
+            variances: &variances[of.clone()],
+            covariances: &covariances[of],
         }
     }
 
@@ -275,20 +331,18 @@ impl ForceLinearLocator {
         pairs().map(|(f, g)| (f - scale * g).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Whether noise alone explains a whitened reading: neither its length nor what the best contact takes off its square is more than
+    /// Whether noise alone explains a relative reading: neither its length nor what the best contact takes off its square is more than
     /// noise reaches at the false-alarm rate.
-    fn is_no_contact(&self, whitened: &[f64]) -> bool {
-        let Tables { whitening, offset_variance, .. } = &self.stored.functions;
-        let variance = |signal: &f64| 1.0 + offset_variance * signal;
-        let square: f64 =
-            whitened.iter().zip(&whitening.signal).map(|(d, signal)| d * d / variance(signal)).sum();
+    fn is_no_contact(&self, relative: &[f64]) -> bool {
+        let open = &self.stored.functions.offset_variances;
+        let square: f64 = relative.iter().zip(open).map(|(d, open)| d * d / (1.0 + open)).sum();
         if square > self.noise_bound {
             return false;
         }
         let taken = |place: usize| {
-            let channels = whitened.iter().zip(self.place(place).values).zip(&whitening.signal);
-            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), signal)| {
-                let scaled = f / variance(signal);
+            let channels = relative.iter().zip(self.place(place).values).zip(open);
+            let (fd, ff) = channels.fold((0.0, 0.0), |(fd, ff), ((d, f), open)| {
+                let scaled = f / (1.0 + open);
                 (fd + scaled * d, ff + scaled * f)
             });
             if fd > 0.0 { fd * fd / ff } else { 0.0 }
@@ -342,45 +396,46 @@ impl ForceLinearLocator {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let readings = recording.rows.iter().map(|row| row.reading.as_slice());
         self.stored.residual_limit = learnt_misfit_bound(freedom, readings, |reading| {
-            self.posterior(&self.whitened(reading)).residual
+            self.posterior(&self.relative(reading)).residual
         });
     }
 
-    /// The reading less the offsets, in channels of unit noise.
-    fn whitened(&self, reading: &[f64]) -> Vec<f64> {
-        let Tables { offsets, whitening, .. } = &self.stored.functions;
-        let less: Vec<f64> =
-            self.stored.live.iter().zip(offsets).map(|(c, offset)| reading[*c] - offset).collect();
-        let mut whitened = vec![0.0; less.len()];
-        whitening.apply(&less, &mut whitened);
-        whitened
+    /// The reading less the offsets, over the noise.
+    fn relative(&self, reading: &[f64]) -> Vec<f64> {
+        let Tables { offsets, noise_sd, .. } = &self.stored.functions;
+        let channels = self.stored.live.iter().zip(offsets).zip(noise_sd);
+        channels.map(|((c, offset), noise)| (reading[*c] - offset) / noise).collect()
     }
 
-    /// How a place explains a whitened reading.
-    fn explain(&self, whitened: &[f64], place: Place) -> Explained {
+    /// How a place explains a reading.
+    fn explain(&self, relative: &[f64], place: Place) -> Explained {
         /// Steps from the weights of one force to those of the next; two leave less than a thousandth.
         const STEPS: usize = 3;
-        let Tables { whitening, offset_variance, .. } = &self.stored.functions;
-        let open = |force_n: f64| {
-            (offset_variance + force_n * (2.0 * place.covariance + force_n * place.variance)).max(0.0)
+        let open = &self.stored.functions.offset_variances;
+        let channels = || {
+            let Place { values, variances, covariances } = place;
+            relative.iter().zip(values).zip(variances.iter().zip(covariances).zip(open))
         };
-        let channels = || whitened.iter().zip(place.values).zip(&whitening.signal);
-        // Least squares of the force by the weights of the last one: Σ f·d/S and Σ f²/S.
+        // Noise that was learnt from few readings may be larger than it seems: the variance of Student's t.
+        let noise = self.stored.noise_freedom / (self.stored.noise_freedom - 2.0);
+        let variance = |force_n: f64, ((v, beta), open): ((&f64, &f64), &f64)| {
+            noise + (open + force_n * (2.0 * beta + force_n * v)).max(0.0)
+        };
+        // Least squares of the force by the weights of the last one: Σ f·d/S and Σ f²/S, with what is expected of it.
+        let [expected_n, precision] = self.expected;
         let sums = |force_n: f64| {
-            let open = open(force_n);
-            channels().fold((0.0, 0.0), |(fd, ff), ((d, f), signal)| {
-                let scaled = f / (1.0 + open * signal);
+            channels().fold((expected_n * precision, precision), |(fd, ff), ((d, f), left_open)| {
+                let scaled = f / variance(force_n, left_open);
                 (fd + scaled * d, ff + scaled * f)
             })
         };
         let hardest_n = self.stored.hardest_n;
         let held = |(fd, ff): (f64, f64)| if ff > 0.0 { (fd / ff).clamp(0.0, hardest_n) } else { 0.0 };
-        let known = self.stored.known_force_n;
+        let known = self.known_response_n();
         let force_n = known.unwrap_or_else(|| (0..STEPS).fold(0.0, |force_n, _| held(sums(force_n))));
         let (mut misfit, mut log_determinant) = (0.0, 0.0);
-        let open = open(force_n);
-        for ((d, f), signal) in channels() {
-            let variance = 1.0 + open * signal;
+        for ((d, f), left_open) in channels() {
+            let variance = variance(force_n, left_open);
             misfit += (d - force_n * f).powi(2) / variance;
             log_determinant += variance.ln();
         }
@@ -396,7 +451,8 @@ impl ForceLinearLocator {
         let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
         let part = normal_between((0.0 - free_n) / sd_n, (hardest_n - free_n) / sd_n);
         // The misfit was taken at the force within the bounds; the integral is relative to the free one.
-        let free_misfit = misfit - (force_n - free_n).powi(2) * ff;
+        let with_force = misfit + (force_n - expected_n).powi(2) * precision;
+        let free_misfit = with_force - (force_n - free_n).powi(2) * ff;
         let cost = free_misfit + log_determinant - 2.0 * (part.share * sd_n).ln();
         Explained {
             misfit,
@@ -406,32 +462,46 @@ impl ForceLinearLocator {
         }
     }
 
-    /// The posterior of a whitened reading.
-    fn posterior(&self, whitened: &[f64]) -> GridPosterior {
+    /// φ of the known force.
+    fn known_response_n(&self) -> Option<f64> {
+        let Stored { known_force_n, response, force_scale_n, .. } = self.stored;
+        known_force_n.map(|force_n| force_scale_n * (force_n / force_scale_n).powf(response))
+    }
+
+    /// The force and its variance that belong to φ.
+    fn force_of(&self, response_n: f64, variance_n2: f64) -> (f64, f64) {
+        let Stored { response, force_scale_n, .. } = self.stored;
+        if response == 1.0 || response_n <= 0.0 {
+            return (response_n, variance_n2);
+        }
+        let force_n = force_scale_n * (response_n / force_scale_n).powf(1.0 / response);
+        let slope = force_n / (response * response_n);
+        (force_n, variance_n2 * slope * slope)
+    }
+
+    /// The posterior of a reading, less offsets and over the noise.
+    fn posterior(&self, relative: &[f64]) -> GridPosterior {
         let axes = self.axes();
         let told = self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known);
         let mut posterior = GridPosterior::new(axes, self.parts, told);
         let places = axes[0].count * axes[1].count;
         let explained: Vec<Explained> =
-            (0..places).map(|place| self.explain(whitened, self.place(place))).collect();
+            (0..places).map(|place| self.explain(relative, self.place(place))).collect();
         let best = (0..places).min_by(|a, b| explained[*a].cost.total_cmp(&explained[*b].cost));
         let Some(best) = best else { return posterior };
-        let mut buffer = Vec::new();
+        let mut buffer = Buffer::default();
         let mut least = explained[best].cost;
         for (x, y) in parts_of(axes, self.parts, best) {
-            least = least.min(self.explain(whitened, self.between(x, y, &mut buffer)).cost);
+            least = least.min(self.explain(relative, self.between(x, y, &mut buffer)).cost);
         }
         for (place, found) in explained.iter().enumerate() {
             let closest = (found.misfit.sqrt() - self.reaches[place] * found.force_n).max(0.0);
             if closest * closest + (found.cost - found.misfit) <= least + CUT {
                 posterior.add_cell(place, |x, y| {
-                    let part = self.explain(whitened, self.between(x, y, &mut buffer));
-                    PartOfCell {
-                        weight: (-0.5 * (part.cost - least)).exp(),
-                        force_n: part.force_n,
-                        force_variance_n2: part.force_variance_n2,
-                        residual: part.misfit,
-                    }
+                    let part = self.explain(relative, self.between(x, y, &mut buffer));
+                    let (force_n, force_variance_n2) = self.force_of(part.force_n, part.force_variance_n2);
+                    let weight = (-0.5 * (part.cost - least)).exp();
+                    PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
                 });
             }
         }
@@ -439,25 +509,37 @@ impl ForceLinearLocator {
     }
 
     /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
-    fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Vec<f64>) -> Place<'b> {
-        buffer.clear();
-        buffer.resize(self.stored.live.len(), 0.0);
-        let (mut variance, mut covariance) = (0.0, 0.0);
+    fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Buffer) -> Place<'b> {
+        let live = self.stored.live.len();
+        buffer.0.iter_mut().for_each(|list| {
+            list.clear();
+            list.resize(live, 0.0);
+        });
+        let [values, variances, covariances] = &mut buffer.0;
         for (place, weight) in weights_around(self.axes(), (x, y)) {
             let place = self.place(place);
-            buffer.iter_mut().zip(place.values).for_each(|(sum, value)| *sum += weight * value);
-            variance += weight * place.variance;
-            covariance += weight * place.covariance;
+            for (out, from) in [
+                (&mut *values, place.values),
+                (&mut *variances, place.variances),
+                (&mut *covariances, place.covariances),
+            ] {
+                out.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
+            }
         }
-        Place { values: buffer, variance: variance.max(0.0), covariance }
+        variances.iter_mut().for_each(|variance| *variance = variance.max(0.0));
+        Place { values, variances, covariances }
     }
 }
 
+/// A place between those of the grid: f, v and β of each channel.
+#[derive(Default)]
+struct Buffer([Vec<f64>; 3]);
+
 impl Locate for ForceLinearLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
-        let whitened = self.whitened(reading);
-        let estimate = self.posterior(&whitened).estimate(self.stored.residual_limit);
-        if self.is_no_contact(&whitened) {
+        let relative = self.relative(reading);
+        let estimate = self.posterior(&relative).estimate(self.stored.residual_limit);
+        if self.is_no_contact(&relative) {
             // The most probable place of a contact that would be too light to be told from noise.
             return Estimate::of_contact(estimate.contact, Status::NoContact);
         }

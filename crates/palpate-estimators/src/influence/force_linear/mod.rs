@@ -3,19 +3,27 @@
 //!
 //! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
 
+mod evidence;
 mod learning;
 mod locator;
+mod posterior;
+mod presses;
+mod prior;
 
 pub use locator::ForceLinearLocator;
+pub use prior::Source;
 
 use super::config::Structure;
 use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
 use crate::status::FalseAlarmRate;
-use learning::{Learnt, Presses};
-use locator::Stored;
+use learning::Learnt;
+use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
+use palpate_numerics::mean_and_variance;
+use presses::Presses;
+use prior::Prior;
 
 /// Distinct positions without which a reading cannot be a function of anything.
 const LEAST_POSITIONS: usize = 2;
@@ -29,20 +37,14 @@ const HARDEST: f64 = 3.0;
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
-    let Some(presses) = Presses::average(setup, recording) else { return Ok(None) };
-    if presses.distinct_forces() < 2 {
-        return Ok(None);
-    }
     recording.check_distinct_positions(LEAST_POSITIONS)?;
     let extent = setup.surface().extent();
-    let learnt = Learnt::new(&presses, extent, watch)?;
-    if learnt.live.is_empty() {
+    let Some(learnt) = Learnt::new(setup, recording, structure, watch)? else { return Ok(None) };
+    let (presses, prior) = (&learnt.presses, &learnt.prior);
+    if structure == Structure::Auto && !prior.is_separable() {
         return Ok(None);
     }
-    if structure != Structure::ForceLinear && learnt.correlation.nonlinearity > 0.0 {
-        return Ok(None);
-    }
-    let axes = axes(&presses, &learnt, extent);
+    let axes = axes(presses, prior, extent);
     let [x, y] = axes;
     let places_m: Vec<Vec<f64>> = (0..x.count * y.count)
         .map(|place| {
@@ -51,19 +53,30 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
         })
         .collect();
     let functions = learnt.functions(&places_m, watch)?;
+    let pressed = presses.force_n.iter().filter(|force_n| **force_n != 0.0);
+    let forces = mean_and_variance(pressed.map(|force_n| prior.response_to(*force_n) * prior.force_scale_n));
     let mut locator = Stored {
         x,
         y,
         channels: recording.channels.len(),
         live: learnt.live.clone(),
-        functions: functions.into(),
+        functions: Tables::new(&functions, learnt.noise_sd()),
         known_force_n: setup.force_n(),
-        hardest_n: HARDEST * presses.greatest_force_n(),
+        mean_force_n: forces.0,
+        // Presses of one force alone, beside untouched rows, say nothing of others.
+        force_sd_n: if forces.1 > 0.0 { forces.1.sqrt() } else { forces.0.abs() },
+        hardest_n: prior.response_to(HARDEST * presses.greatest_force_n()) * prior.force_scale_n,
         residual_limit: f64::INFINITY,
-        kernel: learnt.correlation.kernel,
-        lengths_m: learnt.correlation.lengths_m.clone(),
-        nonlinearity: learnt.correlation.nonlinearity,
-        presses: learnt.presses(),
+        kernel: prior.kernel,
+        lengths_m: prior.lengths_m.clone(),
+        smooth_part: prior.smooth_part,
+        nonlinearity: prior.nonlinearity,
+        source: prior.source,
+        response: prior.response,
+        force_scale_n: prior.force_scale_n,
+        drift: prior.drift,
+        set_aside: learnt.set_aside.clone(),
+        presses: presses.len(),
         noise_freedom: presses.noise_freedom(),
         false_alarm_rate: FalseAlarmRate::DEFAULT,
     }
@@ -73,11 +86,13 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
 }
 
 /// The grid: the span of the positions that were pressed and half their largest gap beyond.
-fn axes(presses: &Presses, learnt: &Learnt, extent: Extent) -> [Axis; 2] {
+fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
     let axis = |k: usize, size_m: f64, most: usize| {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();
-        Axis::over(values, (0.0, size_m), learnt.correlation.lengths_m[k], most)
+        // Beside a point sensor influences bend within no length at all.
+        let length_m = if prior.source.is_some() { 0.0 } else { prior.lengths_m[k] };
+        Axis::over(values, (0.0, size_m), length_m, most)
     };
     match extent.width_m() {
         None => [axis(0, extent.length_m(), MOST_ALONG), Axis::NONE],

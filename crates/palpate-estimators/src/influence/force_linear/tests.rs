@@ -1,6 +1,8 @@
 //! Strips with raw gauges, by known physics: a clamped strip under random gauges, gains and offsets, pressed at a few places with recorded
 //! forces and asked with unknown ones; beside it what fifteen lines of SciPy do: offset + force × cubic spline of the position.
 
+use super::locator::{Stored, Tables};
+use super::posterior::Functions;
 use super::{ForceLinearLocator, fit};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
@@ -171,6 +173,28 @@ impl Bench {
         config.fit_method(FitTask::new(&setup, &recording)).unwrap()
     }
 
+    /// The same locator with the true offsets, influence functions and noise.
+    fn with_known_functions(&self, locator: &ForceLinearLocator) -> ForceLinearLocator {
+        let mut stored = Stored::from(locator.clone());
+        let (x, y) = (stored.x, stored.y);
+        let places =
+            (0..x.count).flat_map(|i| (0..y.count).map(move |j| (x.value(i as f64), y.value(j as f64))));
+        let readings: Vec<Vec<f64>> =
+            places.map(|(x_m, y_m)| (self.influences)(Position { x_m, y_m })).collect();
+        let functions: Vec<Functions> = (0..self.offsets.len())
+            .map(|c| Functions {
+                offset: self.offsets[c],
+                values: readings.iter().map(|reading| reading[c]).collect(),
+                offset_variance: 0.0,
+                variances: vec![0.0; readings.len()],
+                covariances: vec![0.0; readings.len()],
+            })
+            .collect();
+        stored.functions = Tables::new(&functions, vec![1.0; functions.len()]);
+        stored.noise_freedom = 1e6;
+        stored.into_locator()
+    }
+
     fn fit(&self, structure: Structure) -> Option<ForceLinearLocator> {
         let (setup, recording) = (self.setup(), self.recording());
         fit(FitTask::new(&setup, &recording), structure).unwrap()
@@ -307,10 +331,18 @@ struct Comparison {
     medians: Vec<[f64; 2]>,
     means: Vec<[f64; 2]>,
     covered: Vec<f64>,
+    /// Mean error of each bench in millimetres where the influence functions are known: the limit.
+    limits: Vec<f64>,
 }
 
 impl Comparison {
-    fn add(&mut self, (ours, covered): (Vec<f64>, f64), theirs: Vec<f64>) {
+    /// Adds a bench: its locator beside errors of a regression.
+    fn add(&mut self, bench: &Bench, locator: &InfluenceLocator, touches: &[Row], theirs: Vec<f64>) {
+        if let InfluenceLocator::ForceLinear(linear) = locator {
+            let (limits, _) = errors_mm(&bench.with_known_functions(linear), touches);
+            self.limits.push(mean(limits));
+        }
+        let (ours, covered) = errors_mm(locator, touches);
         self.means.push([&ours, &theirs].map(|errors| mean(errors.iter().copied())));
         self.medians.push([ours, theirs].map(|errors| median(errors).unwrap()));
         self.covered.push(covered);
@@ -326,9 +358,10 @@ impl Comparison {
         let ((won, [ours, theirs]), (won_mean, [ours_mean, theirs_mean])) =
             (Self::summary(&self.medians), Self::summary(&self.means));
         eprintln!(
-            "{what}: median {ours:.2} against {theirs:.2} mm, no larger on {:.0} %; mean {ours_mean:.2} against {theirs_mean:.2} mm, on {:.0} %; {:.1} % covered",
+            "{what}: median {ours:.2} against {theirs:.2} mm, no larger on {:.0} %; mean {ours_mean:.2} against {theirs_mean:.2} mm, on {:.0} %, {:.2} mm with known functions; {:.1} % covered",
             100.0 * won,
             100.0 * won_mean,
+            mean(self.limits.iter().copied()),
             100.0 * mean(self.covered.iter().copied())
         );
     }
@@ -346,7 +379,7 @@ fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Stru
         let mut bench = Bench::strip(seed, presses, places);
         let touches = bench.touches(100);
         let theirs = Regression::spline(places.min(15)).errors_mm(&bench.presses, &touches);
-        comparison.add(errors_mm(&bench.fit_as(structure), &touches), theirs);
+        comparison.add(&bench, &bench.fit_as(structure), &touches, theirs);
     }
     comparison
 }
@@ -354,19 +387,26 @@ fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Stru
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
     for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
-        let comparison = compare_strips(benches(20), (presses, places), Structure::Auto);
+        let comparison = compare_strips(benches(5), (presses, places), Structure::Auto);
         comparison.print(&format!("strip, {presses} presses at {places} places"));
-        let (medians, means) =
+        let ((won, _), (won_mean, [ours_mm, theirs_mm])) =
             (Comparison::summary(&comparison.medians), Comparison::summary(&comparison.means));
-        assert!(medians.1[0] < medians.1[1] && means.1[0] < 0.9 * means.1[1], "{medians:?} {means:?}");
-        assert!(means.0 >= 0.8, "worse than the spline on too many benches: {means:?}");
+        assert!(won >= 0.9 && won_mean >= 0.9, "worse than the spline on too many benches: {won} {won_mean}");
+        assert!(ours_mm <= 0.8 * theirs_mm, "{ours_mm} {theirs_mm}");
+        let (limit_mm, covered) =
+            (mean(comparison.limits.iter().copied()), mean(comparison.covered.iter().copied()));
+        assert!(
+            presses < 60 || ours_mm <= 1.15 * limit_mm,
+            "{ours_mm} mm, {limit_mm} mm with known functions"
+        );
+        assert!((0.9..0.98).contains(&covered), "{covered}");
     }
 }
 
 #[test]
 fn the_structure_of_elastic_surfaces_is_worth_more_than_half_of_the_error() {
     let [linear, free] = [Structure::ForceLinear, Structure::Free]
-        .map(|structure| compare_strips(benches(5), (25, 9), structure));
+        .map(|structure| compare_strips(benches(3), (25, 9), structure));
     free.print("strip, 25 presses at 9 places, free structure");
     let mean_mm = |comparison: &Comparison| Comparison::summary(&comparison.means).1[0];
     assert!(mean_mm(&linear) < 0.5 * mean_mm(&free), "{} {}", mean_mm(&linear), mean_mm(&free));
@@ -375,15 +415,16 @@ fn the_structure_of_elastic_surfaces_is_worth_more_than_half_of_the_error() {
 #[test]
 fn plates_are_located_better_than_by_radial_basis_functions() {
     let mut comparison = Comparison::default();
-    for seed in 0..benches(3) {
+    for seed in 0..benches(2) {
         let mut bench = Bench::plate(seed);
         let touches = bench.touches(60);
         let theirs = Regression::radial_basis(&bench.presses).errors_mm(&bench.presses, &touches);
-        comparison.add(errors_mm(&bench.fit_as(Structure::Auto), &touches), theirs);
+        comparison.add(&bench, &bench.fit_as(Structure::Auto), &touches, theirs);
     }
     comparison.print("plate, 160 presses at 80 places");
     let (_, [ours_mm, theirs_mm]) = Comparison::summary(&comparison.means);
-    assert!(ours_mm < theirs_mm, "{ours_mm} {theirs_mm}");
+    let limit_mm = mean(comparison.limits.iter().copied());
+    assert!(ours_mm < 0.95 * theirs_mm && ours_mm < 1.1 * limit_mm, "{ours_mm} {theirs_mm} {limit_mm}");
     let covered = mean(comparison.covered.iter().copied());
     assert!((0.9..1.0).contains(&covered), "{covered}");
 }
@@ -423,19 +464,101 @@ fn rows_without_force_teach_offset_and_noise() {
     }
 }
 
-#[test]
-fn a_response_that_is_no_multiple_of_the_force_is_left_to_the_free_structure() {
-    let mut bench = Bench::strip(3, 60, 15);
-    assert!(bench.fit(Structure::Auto).is_some());
+/// Readings that follow a power of the force, which may change from one end of the strip to the other.
+fn bend_response(bench: &mut Bench, powers: [f64; 2]) {
     for row in &mut bench.presses {
         let force_n = row.force_n.unwrap();
+        let power = powers[0] + (powers[1] - powers[0]) * row.position.x_m / STRIP_M;
         for (value, offset) in row.reading.iter_mut().zip(&bench.offsets) {
-            *value = offset + (*value - offset) * (force_n / 5.0).powf(0.6);
+            *value = offset + (*value - offset) * (force_n / 5.0).powf(power - 1.0);
         }
     }
+}
+
+#[test]
+fn a_response_that_all_places_share_is_found() {
+    let mut bench = Bench::strip(3, 60, 15);
+    assert_eq!(bench.fit(Structure::Auto).unwrap().response(), 1.0);
+    bend_response(&mut bench, [1.6, 1.6]);
+    let locator = bench.fit(Structure::Auto).unwrap();
+    assert!((locator.response() - 1.6).abs() < 0.05, "{}", locator.response());
+    let ratio = |row: &Row| locator.locate(&row.reading).contact.force_n.unwrap() / row.force_n.unwrap();
+    let errors = bench.presses.iter().map(|row| ratio(row).ln().abs()).collect();
+    assert!(median(errors).unwrap() < 0.05);
+    assert_eq!(bench.fit(Structure::ForceLinear).unwrap().response(), 1.0);
+}
+
+#[test]
+fn a_response_that_changes_along_the_surface_is_left_to_the_free_structure() {
+    let mut bench = Bench::strip(3, 60, 15);
+    bend_response(&mut bench, [0.7, 2.0]);
     assert!(bench.fit(Structure::Auto).is_none());
     assert!(matches!(bench.fit_as(Structure::Auto), InfluenceLocator::Measured(_)));
     assert!(matches!(bench.fit_as(Structure::ForceLinear), InfluenceLocator::ForceLinear(_)));
+}
+
+/// A random walk of every gauge, of `counts` standard deviation from the first press to the last; gives where each ends.
+fn drift(bench: &mut Bench, counts: f64) -> Vec<f64> {
+    let step = counts / (bench.presses.len() as f64).sqrt();
+    let mut walk = vec![0.0; bench.offsets.len()];
+    for row in &mut bench.presses {
+        for (walk, value) in walk.iter_mut().zip(&mut row.reading) {
+            let normal: f64 = StandardNormal.sample(&mut bench.rng);
+            *walk += step * normal;
+            *value += *walk;
+        }
+    }
+    walk
+}
+
+#[test]
+fn drift_is_found_and_taken_off() {
+    let count = benches(3);
+    let (mut still, mut drifting, mut spline) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 0..count {
+        let mut bench = Bench::strip(seed, 60, 15);
+        let touches = bench.touches(100);
+        let locator = bench.fit(Structure::Auto).unwrap();
+        assert_eq!(locator.drifts(), [], "bench {seed}");
+        still.push(mean(errors_mm(&locator, &touches).0));
+        let walk = drift(&mut bench, 12.0);
+        let locator = bench.fit(Structure::Auto).unwrap();
+        let drifts = locator.drifts();
+        assert_eq!(drifts.len(), GAUGES);
+        assert!(drifts.iter().all(|(_, counts)| (3.0..48.0).contains(counts)), "{drifts:?}");
+        for ((c, offset, _), walk) in locator.channels().zip(&walk) {
+            assert!((offset - bench.offsets[c] - walk).abs() < 6.0, "gauge {c}: {offset}");
+        }
+        // Touches are read after the calibration.
+        let mut later = touches;
+        for row in &mut later {
+            row.reading.iter_mut().zip(&walk).for_each(|(value, walk)| *value += walk);
+        }
+        drifting.push(mean(errors_mm(&locator, &later).0));
+        spline.push(mean(Regression::spline(15).errors_mm(&bench.presses, &later)));
+    }
+    let [still, drifting, spline] = [still, drifting, spline].map(mean);
+    eprintln!(
+        "strip, 60 presses at 15 places: mean {still:.2} mm; {drifting:.2} mm after 12 counts of drift, a spline {spline:.2} mm"
+    );
+    assert!(drifting < 2.0 * still && drifting < 0.7 * spline, "{drifting} mm, {still} mm, {spline} mm");
+}
+
+#[test]
+fn presses_that_nothing_explains_are_set_aside() {
+    for (presses, places) in [(25, 9), (60, 15)] {
+        let mut bench = Bench::strip(8, presses, places);
+        assert_eq!(bench.fit(Structure::Auto).unwrap().set_aside(), [0usize; 0]);
+        let touches = bench.touches(100);
+        let clean = mean(errors_mm(&bench.fit(Structure::Auto).unwrap(), &touches).0);
+        // One was pressed elsewhere, and a gauge of another was read wrong.
+        bench.presses[4].position.x_m += 0.05;
+        bench.presses[16].reading[2] += 60.0;
+        let locator = bench.fit(Structure::Auto).unwrap();
+        assert_eq!(locator.set_aside(), [4, 16]);
+        let mended = mean(errors_mm(&locator, &touches).0);
+        assert!(mended < 1.3 * clean, "{mended} mm, {clean} mm without outliers");
+    }
 }
 
 #[test]
@@ -467,7 +590,7 @@ fn a_file_gives_the_same_locator_and_bad_numbers_are_refused() {
     let locator = bench.fit(Structure::ForceLinear).unwrap();
     let json = serde_json::to_string(&locator).unwrap();
     assert_eq!(serde_json::from_str::<ForceLinearLocator>(&json).unwrap(), locator);
-    let bad = json.replacen("\"offset_variance\":", "\"offset_variance\":-", 1);
+    let bad = json.replacen("\"offset_variances\":[", "\"offset_variances\":[-", 1);
     let error = serde_json::from_str::<ForceLinearLocator>(&bad).unwrap_err().to_string();
     assert!(error.contains("offset variance"), "{error}");
 }
@@ -478,7 +601,7 @@ fn the_determinant_of_many_gauges_does_not_overflow() {
     let locator = bench.fit(Structure::ForceLinear).unwrap();
     let mut file = serde_json::to_value(&locator).unwrap();
     // As of gauges with next to no noise: the product of their variances is beyond the largest number.
-    file["functions"]["whitening"]["signal"] = serde_json::json!(vec![1e12; 48]);
+    file["functions"]["offset_variances"] = serde_json::json!(vec![1e12; 48]);
     let locator: ForceLinearLocator = serde_json::from_value(file).unwrap();
     let touch = bench.touch(Position::along(0.1234));
     let contact = locator.locate(&touch.reading).contact;

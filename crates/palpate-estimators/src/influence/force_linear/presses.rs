@@ -1,0 +1,198 @@
+//! Presses of recorded force, as the learning of influence functions takes them: repeats averaged, readings about their mean.
+
+use crate::recording::Recording;
+use crate::setup::Setup;
+use ndarray::{Array2, Axis as Dimension};
+use palpate_numerics::mean;
+use std::cmp::Ordering;
+
+/// Rows that count as repeats of one press.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Repeats {
+    /// Those of the same position and force that follow each other, which drift has not moved apart.
+    Consecutive,
+    /// All of the same position and force.
+    All,
+}
+
+/// Presses of recorded force.
+#[derive(Clone, Debug)]
+pub(super) struct Presses {
+    /// Position of each, along and, on a plane, across, in metres.
+    pub positions_m: Vec<Vec<f64>>,
+    pub force_n: Vec<f64>,
+    /// Number of rows that were averaged.
+    pub count: Vec<f64>,
+    /// When, as a share of the recording: 0 at its first row, 1 at its last.
+    pub time: Vec<f64>,
+    /// The first row of each, from 0.
+    pub row: Vec<usize>,
+    /// Mean reading of each channel over the recording.
+    pub centre: Vec<f64>,
+    /// Mean reading less the centre, a row a press.
+    pub means: Array2<f64>,
+    /// Sum of squared deviations of repeats from their mean, a value a channel, and how many degrees of freedom it has.
+    pub scatter: Vec<f64>,
+    pub freedom: f64,
+}
+
+/// A row of a recording as a press.
+struct RowPress<'a> {
+    position_m: Vec<f64>,
+    force_n: f64,
+    time: f64,
+    row: usize,
+    reading: &'a [f64],
+}
+
+impl RowPress<'_> {
+    fn order(&self, other: &Self) -> Ordering {
+        compare(&self.position_m, &other.position_m).then(self.force_n.total_cmp(&other.force_n))
+    }
+}
+
+impl Presses {
+    /// The presses of a recording but for rows that are set aside; `None` where the force of a row is not known.
+    pub fn of_recording(
+        setup: &Setup,
+        recording: &Recording,
+        repeats: Repeats,
+        set_aside: &[usize],
+    ) -> Option<Self> {
+        let extent = setup.surface().extent();
+        let times = relative_times(recording);
+        let mut rows = Vec::with_capacity(recording.rows.len());
+        for (row, found) in recording.rows.iter().enumerate() {
+            let force_n = found.force_n.or(setup.force_n()).filter(|force_n| force_n.is_finite())?;
+            // Without a force it does not matter where nothing presses.
+            let position_m: Vec<f64> = match force_n {
+                0.0 => vec![0.0; extent.dimensions()],
+                _ => extent.coordinates_m(found.position).collect(),
+            };
+            if !set_aside.contains(&row) {
+                rows.push(RowPress { position_m, force_n, time: times[row], row, reading: &found.reading });
+            }
+        }
+        if repeats == Repeats::All {
+            rows.sort_by(RowPress::order);
+        }
+        let groups: Vec<_> = rows.chunk_by(|a, b| a.order(b).is_eq()).collect();
+        Some(Self::of_groups(&rows, &groups, recording.channels.len()))
+    }
+
+    fn of_groups(rows: &[RowPress], groups: &[&[RowPress]], channels: usize) -> Self {
+        let centre: Vec<f64> = (0..channels).map(|c| mean(rows.iter().map(|row| row.reading[c]))).collect();
+        let mut means = Array2::zeros((groups.len(), channels));
+        let mut scatter = vec![0.0; channels];
+        for (mut mean, group) in means.outer_iter_mut().zip(groups) {
+            let count = group.len() as f64;
+            for (c, mean) in mean.iter_mut().enumerate() {
+                *mean = group.iter().map(|row| row.reading[c]).sum::<f64>() / count;
+                scatter[c] += group.iter().map(|row| (row.reading[c] - *mean).powi(2)).sum::<f64>();
+                *mean -= centre[c];
+            }
+        }
+        Self {
+            positions_m: groups.iter().map(|group| group[0].position_m.clone()).collect(),
+            force_n: groups.iter().map(|group| group[0].force_n).collect(),
+            count: groups.iter().map(|group| group.len() as f64).collect(),
+            time: groups.iter().map(|group| mean(group.iter().map(|row| row.time))).collect(),
+            row: groups.iter().map(|group| group[0].row).collect(),
+            freedom: (rows.len() - groups.len()) as f64,
+            centre,
+            means,
+            scatter,
+        }
+    }
+
+    /// Number of presses.
+    pub fn len(&self) -> usize {
+        self.force_n.len()
+    }
+
+    /// Distinct forces, that of no contact among them.
+    pub fn distinct_forces(&self) -> usize {
+        let mut forces = self.force_n.clone();
+        forces.sort_by(f64::total_cmp);
+        forces.dedup();
+        forces.len()
+    }
+
+    /// Distinct positions that were pressed, in rising order.
+    pub fn positions_m(&self) -> Vec<&[f64]> {
+        let pressed = self.positions_m.iter().zip(&self.force_n).filter(|(_, force_n)| **force_n != 0.0);
+        let mut positions: Vec<&[f64]> = pressed.map(|(position_m, _)| position_m.as_slice()).collect();
+        positions.sort_by(|a, b| compare(a, b));
+        positions.dedup();
+        positions
+    }
+
+    /// Degrees of freedom that tell the noise of a channel: rows less a value for every position and the offset; at least a few.
+    pub fn noise_freedom(&self) -> f64 {
+        const FEW: f64 = 8.0;
+        let rows = self.count.iter().sum::<f64>();
+        (rows - self.positions_m().len() as f64 - 1.0).max(FEW)
+    }
+
+    /// The greatest force, in newtons.
+    pub fn greatest_force_n(&self) -> f64 {
+        self.force_n.iter().fold(0.0, |most, force_n| most.max(force_n.abs()))
+    }
+
+    /// The channels that change by more than rounding, from 0.
+    pub fn changing_channels(&self) -> Vec<usize> {
+        let changes = |c: &usize| {
+            let most = self.means.column(*c).iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+            most > 1e-12 * self.centre[*c].abs() && most > 0.0
+        };
+        (0..self.centre.len()).filter(changes).collect()
+    }
+
+    /// The same of some channels alone.
+    pub fn of_channels(&self, channels: &[usize]) -> Self {
+        let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
+        Self {
+            centre: of(&self.centre),
+            scatter: of(&self.scatter),
+            means: self.means.select(Dimension(1), channels),
+            ..self.clone()
+        }
+    }
+
+    /// Those numbered `kept`.
+    pub fn select(&self, kept: &[usize]) -> Self {
+        let of = |values: &[f64]| kept.iter().map(|i| values[*i]).collect();
+        Self {
+            positions_m: kept.iter().map(|i| self.positions_m[*i].clone()).collect(),
+            force_n: of(&self.force_n),
+            count: of(&self.count),
+            time: of(&self.time),
+            row: kept.iter().map(|i| self.row[*i]).collect(),
+            means: self.means.select(Dimension(0), kept),
+            ..self.clone()
+        }
+    }
+
+    /// Evenly picked, no more than `most`.
+    pub fn thinned(&self, most: usize) -> Self {
+        let step = (self.len() as f64 / most as f64).max(1.0);
+        let kept: Vec<usize> =
+            (0..).map(|i| (f64::from(i) * step) as usize).take_while(|i| *i < self.len()).collect();
+        self.select(&kept)
+    }
+}
+
+/// The time of each row as a share of the recording's; by the rows' order where it has no times.
+fn relative_times(recording: &Recording) -> Vec<f64> {
+    let by_order = || (0..recording.rows.len()).map(|row| row as f64).collect();
+    let times: Vec<f64> = recording.times_s().unwrap_or_else(by_order);
+    let (first, last) = times
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), time| (first.min(*time), last.max(*time)));
+    let span = if last > first { last - first } else { 1.0 };
+    times.iter().map(|time| (time - first) / span).collect()
+}
+
+pub(super) fn compare(a: &[f64], b: &[f64]) -> Ordering {
+    a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+}

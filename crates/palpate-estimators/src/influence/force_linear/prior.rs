@@ -1,0 +1,229 @@
+//! What is taken of influence functions beforehand: how they may change along the surface, with the force, and in time.
+//!
+//! Channel c reads o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a. All channels share the form of
+//!
+//! f_c(a) = Σ_j β_cj·h_j(a) + α_c·g(a − p_c) + s_c/F̄·η·z(a),
+//!
+//! - h: polynomials, whose coefficients β are as likely as any others (a constant; along a line where the sensors' places are looked
+//!   for, all of the third degree: a beam between its loads bends as a cubic);
+//! - g: what a point sensor at the unknown place p_c sees of a load beside it, the singular part of the Green's function
+//!   ([`Source`]), with an amplitude α that is as likely at any order of magnitude;
+//! - z: a Gaussian process of unit variance with a Matérn or squared exponential correlation k, for all that the others are not.
+//!
+//! φ(F) = F̄·(F/F̄)^γ, F̄ being the root mean square force: γ = 1 but where the presses say that all positions share another
+//! response. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), tells how far the presses are from any of that.
+//! Drift is a random walk of each channel over the recording, of variance κ times the noise's from one end to the other.
+
+use super::presses::Presses;
+use ndarray::{Array1, Array2};
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::regression::Kernel;
+use palpate_numerics::root_mean_square;
+use serde::{Deserialize, Serialize};
+
+/// Singular part of the influence function of a point sensor, d being the way from the sensor to the load and L the surface's length.
+///
+/// Under a load at a distance |d| a beam's deflection has the part |d|³, its slope d·|d| and its curvature, which strain follows, |d|; a
+/// plate's deflection has d²·ln|d| and its curvature ln|d| (Timoshenko and Woinowsky-Krieger, *Theory of Plates and Shells*, 1959,
+/// article 37).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// Of strain.
+    Strain,
+    /// Of slope; along a line only.
+    Slope,
+    /// Of deflection.
+    Deflection,
+}
+
+impl Source {
+    /// Those of a line, and of a plane.
+    pub(super) fn all(extent: Extent) -> &'static [Self] {
+        match extent {
+            Extent::Line { .. } => &[Self::Strain, Self::Slope, Self::Deflection],
+            Extent::Plane { .. } => &[Self::Strain, Self::Deflection],
+        }
+    }
+
+    /// g at a place a load's way from the sensor, in units of the surface's length.
+    fn at(self, way: &[f64]) -> f64 {
+        /// A sensor has a size, within which a plate's curvature does not grow.
+        const SIZE: f64 = 0.01;
+        match (self, way) {
+            (Self::Strain, [d]) => d.abs(),
+            (Self::Slope, [d]) => d * d.abs(),
+            (Self::Deflection, [d]) => d.abs().powi(3),
+            _ => {
+                let square = way.iter().map(|d| d * d).sum::<f64>().max(SIZE * SIZE);
+                let logarithm = 0.5 * square.ln();
+                if self == Self::Strain { logarithm } else { square * logarithm }
+            }
+        }
+    }
+}
+
+/// What all channels share.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Prior {
+    pub extent: Extent,
+    /// F̄.
+    pub force_scale_n: f64,
+    pub kernel: Kernel,
+    /// Length scale of each coordinate, in metres.
+    pub lengths_m: Vec<f64>,
+    /// η².
+    pub smooth_part: f64,
+    pub source: Option<Source>,
+    /// δ: the relative change of an influence with the force.
+    pub nonlinearity: f64,
+    /// γ.
+    pub response: f64,
+    /// κ.
+    pub drift: f64,
+}
+
+impl Prior {
+    /// A smooth function of a quarter of the surface's length, linear in the force, without drift.
+    pub fn smooth(extent: Extent, presses: &Presses) -> Self {
+        let spans_m = [Some(extent.length_m()), extent.width_m()].into_iter().flatten();
+        Self {
+            extent,
+            force_scale_n: root_mean_square(&presses.force_n),
+            kernel: Kernel::Matern32,
+            lengths_m: spans_m.map(|span_m| 0.25 * span_m).collect(),
+            smooth_part: 1.0,
+            source: None,
+            nonlinearity: 0.0,
+            response: 1.0,
+            drift: 0.0,
+        }
+    }
+
+    /// Whether influence functions are one function of the position, whatever the force.
+    pub fn is_separable(&self) -> bool {
+        self.nonlinearity == 0.0
+    }
+
+    /// k between two positions.
+    fn correlation(&self, a_m: &[f64], b_m: &[f64]) -> f64 {
+        let coordinates = a_m.iter().zip(b_m).zip(&self.lengths_m);
+        self.kernel.correlation(coordinates.map(|((a, b), length)| ((a - b) / length).powi(2)).sum())
+    }
+
+    /// φ/F̄.
+    pub fn response_to(&self, force_n: f64) -> f64 {
+        let relative = force_n / self.force_scale_n;
+        if self.response == 1.0 { relative } else { relative.signum() * relative.abs().powf(self.response) }
+    }
+
+    /// φ/F̄ of every press.
+    pub fn responses(&self, presses: &Presses) -> Vec<f64> {
+        presses.force_n.iter().map(|force_n| self.response_to(*force_n)).collect()
+    }
+
+    /// Covariance of the presses over s², but for noise and drift: n × n.
+    pub fn covariance(&self, presses: &Presses) -> Array2<f64> {
+        let n = presses.len();
+        let responses = self.responses(presses);
+        let mut covariance = Array2::zeros((n, n));
+        for i in 0..n {
+            for j in 0..=i {
+                let between = self.correlation(&presses.positions_m[i], &presses.positions_m[j]);
+                let changed = if self.nonlinearity > 0.0 {
+                    let way = (presses.force_n[i] - presses.force_n[j]) / self.force_scale_n;
+                    self.nonlinearity.powi(2) * (-0.5 * way * way).exp()
+                } else {
+                    0.0
+                };
+                covariance[[i, j]] =
+                    responses[i] * responses[j] * self.smooth_part * between * (1.0 + changed);
+            }
+        }
+        covariance
+    }
+
+    /// Adds noise and drift of the ratio ρ to s².
+    pub fn with_noise(&self, covariance: &Array2<f64>, presses: &Presses, ratio: f64) -> Array2<f64> {
+        let mut covariance = covariance.clone();
+        for (i, count) in presses.count.iter().enumerate() {
+            covariance[[i, i]] += ratio / count;
+        }
+        if self.drift > 0.0 {
+            for ((i, j), value) in covariance.indexed_iter_mut() {
+                *value += ratio * self.drift * presses.time[i].min(presses.time[j]);
+            }
+        }
+        covariance
+    }
+
+    /// Covariance of f at a place with the presses, over s² and 1/F̄.
+    pub fn influence_covariance(&self, presses: &Presses, responses: &[f64], place_m: &[f64]) -> Array1<f64> {
+        let positions = presses.positions_m.iter().zip(responses);
+        positions.map(|(at_m, phi)| phi * self.smooth_part * self.correlation(place_m, at_m)).collect()
+    }
+
+    /// Variance of f at a place over s² and 1/F̄², but for polynomials and source.
+    pub fn influence_variance(&self) -> f64 {
+        self.smooth_part
+    }
+
+    /// Number of polynomials h.
+    pub fn polynomials(&self) -> usize {
+        match (self.source, self.extent) {
+            (None, _) => 1,
+            (Some(_), Extent::Line { .. }) => 4,
+            (Some(_), Extent::Plane { .. }) => 3,
+        }
+    }
+
+    /// h at a place.
+    pub fn polynomials_at(&self, place_m: &[f64]) -> Vec<f64> {
+        let unit = |k: usize, size_m: f64| 2.0 * place_m[k] / size_m - 1.0;
+        let x = unit(0, self.extent.length_m());
+        // Legendre's, which hardly depend on each other.
+        let all = match self.extent.width_m() {
+            None => vec![1.0, x, 0.5 * (3.0 * x * x - 1.0), 0.5 * x * (5.0 * x * x - 3.0)],
+            Some(width_m) => vec![1.0, x, unit(1, width_m)],
+        };
+        all[..self.polynomials()].to_vec()
+    }
+
+    /// What presses read of an offset and of each polynomial: n × (1 + polynomials).
+    pub fn effects(&self, presses: &Presses) -> Array2<f64> {
+        let mut effects = Array2::ones((presses.len(), 1 + self.polynomials()));
+        for ((mut row, place_m), phi) in
+            effects.outer_iter_mut().zip(&presses.positions_m).zip(self.responses(presses))
+        {
+            row.iter_mut().skip(1).zip(self.polynomials_at(place_m)).for_each(|(out, h)| *out = phi * h);
+        }
+        effects
+    }
+
+    /// g at a place for sensors at each of `sensors_m`; nothing without a source.
+    pub fn sources_at(&self, place_m: &[f64], sensors_m: &[Vec<f64>]) -> Array1<f64> {
+        let Some(source) = self.source else { return Array1::zeros(0) };
+        let scale = 1.0 / self.extent.length_m();
+        let mut way = vec![0.0; place_m.len()];
+        let at = |sensor_m: &Vec<f64>| {
+            let ways = place_m.iter().zip(sensor_m).map(|(a, p)| (a - p) * scale);
+            way.iter_mut().zip(ways).for_each(|(out, d)| *out = d);
+            source.at(&way)
+        };
+        sensors_m.iter().map(at).collect()
+    }
+
+    /// What presses read of sensors at each of `sensors_m`, a column a sensor.
+    pub fn sources(&self, presses: &Presses, sensors_m: &[Vec<f64>]) -> Array2<f64> {
+        let mut sources =
+            Array2::zeros((presses.len(), if self.source.is_some() { sensors_m.len() } else { 0 }));
+        for ((mut row, place_m), phi) in
+            sources.outer_iter_mut().zip(&presses.positions_m).zip(self.responses(presses))
+        {
+            if phi != 0.0 {
+                row.assign(&(phi * self.sources_at(place_m, sensors_m)));
+            }
+        }
+        sources
+    }
+}
