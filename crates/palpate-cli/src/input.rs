@@ -97,7 +97,7 @@ pub struct RecordingFiles {
 }
 
 impl RecordingFiles {
-    /// The recording of this bench, with its warnings said on stderr; `None` where no file is named.
+    /// The recording of this bench, with its dialect and its warnings said on stderr; `None` where no file is named.
     pub fn read(&self, setup: &Setup) -> Result<Option<Recording>, Failure> {
         let Some(data) = &self.data else { return Ok(None) };
         let Some(contacts) = &self.contacts else { return read_recording(setup, data).map(Some) };
@@ -109,7 +109,7 @@ impl RecordingFiles {
     }
 }
 
-/// A recording of a bench in one file, with its warnings said on stderr.
+/// A recording of a bench in one file, with its dialect and its warnings said on stderr.
 pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> {
     let (bytes, name) = (read_bytes(path)?, path.display().to_string());
     with_warnings(setup.read_recording(&name, bytes.as_slice()), &name)
@@ -117,6 +117,7 @@ pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> 
 
 fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
+    recording.provenance.dialects.iter().for_each(|dialect| eprintln!("{}: {dialect}", dialect.source));
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
     Ok(recording)
 }

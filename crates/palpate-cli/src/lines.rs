@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output, progress};
-use palpate_estimators::recording::{Column, Columns, Header, ReadingParser};
+use palpate_estimators::recording::{Column, Columns, Dialect, Header, ReadingParser};
 use palpate_estimators::setup::Setup;
 use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal};
@@ -46,10 +46,26 @@ impl Lines {
     }
 }
 
+/// What has been said of how a stream writes its table.
+#[derive(Default)]
+pub struct DialectNote(String);
+
+impl DialectNote {
+    /// Says on stderr what is new of the dialect.
+    pub fn say(&mut self, dialect: &Dialect) {
+        let words = if dialect.is_plain() { String::new() } else { dialect.to_string() };
+        if words != self.0 {
+            eprintln!("{}: {words}", dialect.source);
+            self.0 = words;
+        }
+    }
+}
+
 /// The readings of a file, one a line; lines that hold none are said on stderr and counted.
 pub struct Readings {
     pub lines: Lines,
     parser: ReadingParser,
+    note: DialectNote,
     lost: u64,
 }
 
@@ -64,7 +80,12 @@ impl Readings {
             }
         }
         let lines = Lines::open(path)?;
-        Ok(Self { parser: ReadingParser::new(&lines.name, &columns), lines, lost: 0 })
+        Ok(Self {
+            parser: ReadingParser::new(&lines.name, &columns),
+            note: DialectNote::default(),
+            lines,
+            lost: 0,
+        })
     }
 
     /// The next reading.
@@ -72,7 +93,10 @@ impl Readings {
         while let Some(line) = self.lines.next()? {
             match self.parser.parse_line(line) {
                 Ok(None) => {}
-                Ok(Some(reading)) => return Ok(Some(reading)),
+                Ok(Some(reading)) => {
+                    self.note.say(self.parser.dialect());
+                    return Ok(Some(reading));
+                }
                 Err(error) if self.parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => self.lose(&error),
             }

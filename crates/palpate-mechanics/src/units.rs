@@ -250,7 +250,7 @@ fn readable_unit(quantity: Quantity) -> Option<Unit> {
     }
     let chosen = |unit: &Unit| match unit.symbol() {
         "m" => magnitude >= 10.0,
-        symbol => !["cm", "deg", "um/m", "mm/m", "g/cm3"].contains(&symbol),
+        symbol => !["cm", "deg", "um/m", "mm/m", "g/cm3", "min", "h"].contains(&symbol),
     };
     // Units go from the smallest to the largest.
     let fits = |unit: &Unit| magnitude >= unit.factor();
@@ -375,6 +375,8 @@ const UNITS: &[(&str, Dimension, Scale)] = &[
     ("μs", Dimension::Time, Scale::Power(-6)),
     ("ms", Dimension::Time, Scale::Power(-3)),
     ("s", Dimension::Time, Scale::Power(0)),
+    ("min", Dimension::Time, Scale::Factor(60.0)),
+    ("h", Dimension::Time, Scale::Factor(3600.0)),
     ("Hz", Dimension::Frequency, Scale::Power(0)),
     ("kHz", Dimension::Frequency, Scale::Power(3)),
 ];

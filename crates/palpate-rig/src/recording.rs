@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use palpate_estimators::recording::{
-    Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn,
+    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, Separator, ValueColumn,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -21,6 +21,10 @@ pub(crate) struct RecordingKeys {
     /// Whether the first line names the columns.
     #[serde(default = "yes")]
     pub header: bool,
+    /// What stands between fields, where the file itself does not tell: `comma`, `semicolon` or `tab`.
+    pub separator: Option<Separator>,
+    /// What stands before decimals, where the file itself does not tell: `point` or `comma`.
+    pub decimal: Option<Decimal>,
     /// The contact's position along a line.
     pub position: Option<At<ColumnKey>>,
     /// Its position along a plane's length.
@@ -88,6 +92,8 @@ impl At<RecordingKeys> {
             channels: self.channels(&layout.kinds(), own.channels)?,
             force: force.map(|values| ForceColumn { values, need: Need::Required }).or(own.force),
             nuisance: self.value("nuisance", &self.nuisance, &self.nuisance_unit, nuisance_unit)?,
+            separator: self.separator,
+            decimal: self.decimal,
             time: self.value("time", &self.time, &self.time_unit, time_unit)?,
         })
     }

@@ -61,7 +61,7 @@ fn the_time_of_rows_is_mapped() {
     let refused = |keys: &str| Rig::from_toml(&with(keys)).unwrap_err().to_string();
     assert_eq!(
         refused("time = \"Zeit\"\ntime_unit = \"mm\""),
-        "`time_unit`: wrong unit `mm`; a time is one of us, ms, s"
+        "`time_unit`: wrong unit `mm`; a time is one of us, ms, s, min, h"
     );
     assert_eq!(refused("time_unit = \"ms\""), "[recording] has no `time`");
 }

@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
-use crate::lines::Lines;
+use crate::lines::{DialectNote, Lines};
 use crate::output::Table;
 use crate::{input, output};
 use palpate_estimators::estimator::{
@@ -134,6 +134,7 @@ impl Stream<'_> {
     fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
         let columns = locator.setup.recording_columns();
         let mut parser = TimedParser::new(&self.lines.name, locator.setup.schema(&columns));
+        let mut note = DialectNote::default();
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
             output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;
@@ -141,7 +142,10 @@ impl Stream<'_> {
         while let Some(line) = self.lines.next()? {
             match parser.parse_line(line) {
                 Ok(None) => {}
-                Ok(Some(reading)) => self.follow(&reading, &mut out)?,
+                Ok(Some(reading)) => {
+                    note.say(parser.dialect());
+                    self.follow(&reading, &mut out)?;
+                }
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
                 Err(error) => {
                     self.lost += 1;

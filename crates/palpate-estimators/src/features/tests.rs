@@ -19,7 +19,13 @@ fn recording_of(rows: Vec<Row>) -> Recording {
     Recording {
         channels: ["left", "right", "dead", "middle"].map(String::from).to_vec(),
         kinds: vec![Reaction, Reaction, Reaction, Deflection],
-        provenance: Provenance { source: "test".into(), rows: rows.len(), digests: vec![], seed: None },
+        provenance: Provenance {
+            source: "test".into(),
+            rows: rows.len(),
+            digests: vec![],
+            dialects: vec![],
+            seed: None,
+        },
         rows,
     }
 }

@@ -450,7 +450,8 @@ mod tests {
             time_s: None,
             reading: vec![*value],
         });
-        let provenance = Provenance { source: "test".into(), rows: 0, digests: vec![], seed: None };
+        let provenance =
+            Provenance { source: "test".into(), rows: 0, digests: vec![], dialects: vec![], seed: None };
         let kinds = vec![SensorKind::Deflection];
         Recording { channels: vec!["d".into()], kinds, rows: rows.collect(), provenance }
     }

@@ -1,26 +1,28 @@
 //! The fields of one line, found and read with errors that know their place.
 
-use super::columns::{Column, Header};
+use super::columns::{Column, Header, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
+use super::dialect::{Dialect, Separator};
+use super::heading::Heading;
 use super::timestamp::Clock;
-use palpate_mechanics::units::Unit;
+use palpate_mechanics::units::{Dimension, Unit};
 use std::borrow::Cow;
 use std::ops::Range;
 
 /// One line of a CSV file, cut into fields.
 pub(super) struct Cells<'a> {
-    source: &'a str,
     line: usize,
     text: &'a str,
     fields: Vec<Field<'a>>,
+    dialect: &'a mut Dialect,
 }
 
 impl<'a> Cells<'a> {
-    /// Cuts line number `line` of `source`.
-    pub fn parse(source: &'a str, line: usize, text: &'a str) -> Result<Self, CsvError> {
-        match split(text) {
-            Ok(fields) => Ok(Self { source, line, text, fields }),
-            Err(open) => Err(CsvProblem::OpenQuote.in_line(source, line, text.to_owned(), open)),
+    /// Cuts line number `line` of a file of this dialect.
+    pub fn parse(line: usize, text: &'a str, dialect: &'a mut Dialect) -> Result<Self, CsvError> {
+        match split(text, dialect.separator) {
+            Ok(fields) => Ok(Self { line, text, fields, dialect }),
+            Err(open) => Err(CsvProblem::OpenQuote.in_line(&dialect.source, line, text.to_owned(), open)),
         }
     }
 
@@ -29,16 +31,61 @@ impl<'a> Cells<'a> {
         self.fields.len()
     }
 
-    /// Refuses a row that has more or fewer fields than `expected`.
+    /// Whether nothing is in any field.
+    pub fn is_blank(&self) -> bool {
+        self.fields.iter().all(|field| field.value.is_empty())
+    }
+
+    /// Refuses a row that has more or fewer fields than `expected`; empty ones at its end do not count.
     pub fn check_width(&self, expected: usize) -> Result<(), CsvError> {
+        let beyond = self.fields.get(expected..);
         match self.width() {
             found if found == expected => Ok(()),
+            _ if beyond.is_some_and(|beyond| beyond.iter().all(|field| field.value.is_empty())) => Ok(()),
+            found if beyond.is_some() && self.looks_cut_at_decimals() => {
+                Err(self.line_error(CsvProblem::CutDecimals { found, expected }))
+            }
             found => Err(self.line_error(CsvProblem::RowLength { found, expected })),
         }
     }
 
-    /// Index of `column` among the fields of every line, from this first line of the file.
-    pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
+    /// Whether commas between fields have cut numbers at their decimal commas: all that is left are whole numbers.
+    fn looks_cut_at_decimals(&self) -> bool {
+        let whole = |field: &Field| field.value.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
+        self.dialect.separator == Separator::Comma && self.fields.iter().all(whole)
+    }
+
+    /// Index of a column of values among the fields of every line, from this first line of the file, which must not give it another
+    /// unit than the one it is to be read in; `key` says that unit in a rig.
+    pub fn find_values(
+        &mut self,
+        values: &ValueColumn,
+        key: &'static str,
+        header: Header,
+    ) -> Result<usize, CsvError> {
+        let index = self.find(&values.column, header)?;
+        let text = self.fields[index].value.as_ref();
+        let heading = Heading::parse(text);
+        let exact = matches!(&values.column, Column::Name(name) if name == text);
+        let agrees = match (heading.unit, heading.known_unit()) {
+            _ if header == Header::Absent || values.unit == Unit::NONE => true,
+            (None, _) => true,
+            (Some(_), Some(unit)) => {
+                (unit.dimension(), unit.factor()) == (values.unit.dimension(), values.unit.factor())
+            }
+            // What stands elsewhere than in brackets may be anything, and who writes a heading out has seen what it says.
+            (Some(_), None) => exact || !text.ends_with(']') || values.unit.dimension() == Dimension::Time,
+        };
+        if agrees {
+            self.dialect.units_in_header |= heading.unit.is_some() && !exact && header == Header::Present;
+            return Ok(index);
+        }
+        let said = heading.unit.unwrap_or_default().to_owned();
+        Err(self.error(index, CsvProblem::OtherUnit { said, read_as: values.unit, key }))
+    }
+
+    /// Index of `column` among the fields of every line, from this first line of the file: by its heading, or by that without a unit.
+    fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
         let count = self.width();
         let name = match column {
             Column::Number(number) if (1..=count).contains(number) => return Ok(number - 1),
@@ -57,6 +104,20 @@ impl<'a> Cells<'a> {
                 let problem = CsvProblem::DuplicateColumn { name, first: first + 1, second: second + 1 };
                 Err(self.error(second, problem))
             }
+            (None, _) => self.find_without_unit(name),
+        }
+    }
+
+    fn find_without_unit(&self, name: String) -> Result<usize, CsvError> {
+        let named = |i: &usize| Heading::parse(&self.fields[*i].value).name == name.as_str();
+        let mut named = (0..self.width()).filter(named);
+        match (named.next(), named.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(first), Some(second)) => {
+                let example = self.fields[first].value.to_string();
+                let problem = CsvProblem::ManyUnits { name, first: first + 1, second: second + 1, example };
+                Err(self.error(second, problem))
+            }
             (None, _) => {
                 let present = self.fields.iter().map(|field| field.value.clone().into_owned()).collect();
                 Err(self.line_error(CsvProblem::MissingColumn { wanted: name, present }))
@@ -64,33 +125,35 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Whether some field is called `column`, or has its number.
+    /// Whether some field is called `column`, with or without a unit, or has its number.
     pub fn has(&self, column: &Column) -> bool {
         match column {
-            Column::Name(name) => self.fields.iter().any(|field| field.value == name.as_str()),
+            Column::Name(name) => self.fields.iter().any(|field| {
+                field.value == name.as_str() || Heading::parse(&field.value).name == name.as_str()
+            }),
             Column::Number(number) => (1..=self.width()).contains(number),
         }
     }
 
     /// The finite number in field `index`, in SI units.
-    pub fn number(&self, index: usize, unit: Unit) -> Result<f64, CsvError> {
-        let Some(field) = self.fields.get(index) else {
-            return Err(self.line_error(CsvProblem::RowLength { found: self.width(), expected: index + 1 }));
-        };
-        match unit.parse_si(&field.value) {
-            Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(self.error(index, CsvProblem::NotFinite { text: field.value.to_string() })),
-            None if field.value.is_empty() => Err(self.error(index, CsvProblem::EmptyField)),
-            None => Err(self.error(index, CsvProblem::NotANumber { text: field.value.to_string() })),
-        }
+    pub fn number(&mut self, index: usize, unit: Unit) -> Result<f64, CsvError> {
+        self.read(index, |text, dialect| dialect.number(text, unit))
     }
 
     /// The time in field `index`, in seconds.
-    pub fn time(&self, index: usize, unit: Unit, clock: &mut Clock) -> Result<f64, CsvError> {
+    pub fn time(&mut self, index: usize, unit: Unit, clock: &mut Clock) -> Result<f64, CsvError> {
+        self.read(index, |text, dialect| clock.read(text, || dialect.number(text, unit)))
+    }
+
+    fn read(
+        &mut self,
+        index: usize,
+        parse: impl FnOnce(&str, &mut Dialect) -> Result<f64, CsvProblem>,
+    ) -> Result<f64, CsvError> {
         let Some(field) = self.fields.get(index) else {
             return Err(self.line_error(CsvProblem::RowLength { found: self.width(), expected: index + 1 }));
         };
-        clock.read(&field.value, unit).map_err(|problem| self.error(index, problem))
+        parse(&field.value, self.dialect).map_err(|problem| self.error(index, problem))
     }
 
     /// A problem with field `index`.
@@ -104,8 +167,8 @@ impl<'a> Cells<'a> {
     }
 
     /// A problem with the whole line.
-    fn line_error(&self, problem: CsvProblem) -> CsvError {
-        problem.in_line(self.source, self.line, self.text.to_owned(), 0..self.text.len())
+    pub fn line_error(&self, problem: CsvProblem) -> CsvError {
+        problem.in_line(&self.dialect.source, self.line, self.text.to_owned(), 0..self.text.len())
     }
 }
 
@@ -118,18 +181,19 @@ pub(super) struct Field<'a> {
     pub span: Range<usize>,
 }
 
-/// Cuts `line` at its commas, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but
+/// Cuts `line` at its separators, except within double quotes; a doubled quote within quotes is a quote (RFC 4180, but
 /// a field ends with its line, so that every row has one line number). The error is what follows a quote that stays open.
-pub(super) fn split(line: &str) -> Result<Vec<Field<'_>>, Range<usize>> {
-    let bytes = line.as_bytes();
+pub(super) fn split(line: &str, separator: Separator) -> Result<Vec<Field<'_>>, Range<usize>> {
+    let (bytes, separator) = (line.as_bytes(), separator.byte());
+    let is_space = |b: &&u8| matches!(b, b' ' | b'\t') && **b != separator;
     let mut fields = Vec::new();
     let mut start = 0;
     loop {
-        let opening = start + bytes[start..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
+        let opening = start + bytes[start..].iter().take_while(is_space).count();
         let end = if bytes.get(opening) == Some(&b'"') {
-            comma(bytes, closing_quote(bytes, opening).ok_or(opening..bytes.len())?)
+            end_of_field(bytes, closing_quote(bytes, opening).ok_or(opening..bytes.len())?, separator)
         } else {
-            comma(bytes, opening)
+            end_of_field(bytes, opening, separator)
         };
         fields.push(field(line, start..end));
         if end == bytes.len() {
@@ -139,8 +203,8 @@ pub(super) fn split(line: &str) -> Result<Vec<Field<'_>>, Range<usize>> {
     }
 }
 
-fn comma(bytes: &[u8], from: usize) -> usize {
-    from + bytes[from..].iter().take_while(|b| **b != b',').count()
+fn end_of_field(bytes: &[u8], from: usize, separator: u8) -> usize {
+    from + bytes[from..].iter().take_while(|b| **b != separator).count()
 }
 
 /// The first byte after the quoted text that begins at `opening`.

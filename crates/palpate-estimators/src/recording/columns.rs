@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::dialect::{Decimal, Separator};
+
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::Extent;
@@ -32,6 +34,12 @@ pub struct Columns {
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
     pub time: Option<ValueColumn>,
+    /// What stands between fields; `None` for what the first line tells.
+    #[serde(default)]
+    pub separator: Option<Separator>,
+    /// What stands before decimals; `None` for what the first number tells.
+    #[serde(default)]
+    pub decimal: Option<Decimal>,
 }
 
 /// Conversion of a file's coordinates to positions on the surface: rounded, then less the origin.
@@ -183,6 +191,8 @@ impl Columns {
             force: None,
             nuisance: None,
             time: None,
+            separator: None,
+            decimal: None,
         }
     }
 
@@ -239,6 +249,8 @@ impl Columns {
             force: Some(ForceColumn { values: force, need: Need::Optional }),
             nuisance: None,
             time: None,
+            separator: None,
+            decimal: None,
         }
     }
 }

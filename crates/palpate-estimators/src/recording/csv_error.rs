@@ -5,6 +5,9 @@ use std::ops::Range;
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::Unit;
+
+use super::dialect::{Decimal, Separator};
 
 /// A CSV file that cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]
@@ -44,9 +47,19 @@ pub enum CsvProblem {
     /// There is a header but nothing below it.
     #[error("there are 0 rows below the header; a recording has at least 1")]
     NoRows,
-    /// The text is not UTF-8.
-    #[error("the text is not UTF-8")]
-    NotUtf8,
+    /// The text is neither UTF-8 nor Windows-1252.
+    #[error("the bytes are no text in UTF-8 or Windows-1252; save the file as CSV in UTF-8")]
+    NotText,
+    /// Several separators are in the first line, and more than one of them gives the columns.
+    #[error(
+        "fields may be separated by {first} or by {second}; say which as `separator` in [recording], \"comma\", \"semicolon\" or \"tab\""
+    )]
+    ManySeparators {
+        /// A separator that gives the columns.
+        first: Separator,
+        /// Another one.
+        second: Separator,
+    },
     /// A quote stays open to the end of the line.
     #[error("a quoted field does not end on this line")]
     OpenQuote,
@@ -108,6 +121,68 @@ pub enum CsvProblem {
     NotFinite {
         /// The field.
         text: String,
+    },
+    /// A whole number with a separator of thousands, or a number with a decimal comma: nobody can say.
+    #[error(
+        "`{text}` may be {} or {}; say `decimal = \"comma\"` in [recording] for the second, or write it without the comma for the first",
+        text.replace(',', ""),
+        text.replace(',', ".")
+    )]
+    DoubtfulNumber {
+        /// The field.
+        text: String,
+    },
+    /// A number has another decimal mark than those before it.
+    #[error(
+        "`{text}` does not go with the {decimal} of the numbers before it or of the rig; write all numbers in one way"
+    )]
+    OtherDecimal {
+        /// The field.
+        text: String,
+        /// The mark of the others.
+        decimal: Decimal,
+    },
+    /// A number has separators of thousands.
+    #[error("`{text}` has separators of thousands; write it without them")]
+    Thousands {
+        /// The field.
+        text: String,
+    },
+    /// A row of whole numbers has more fields than the header: commas separate fields and decimals alike.
+    #[error(
+        "the row has {found} fields; it must have {expected}: where commas stand before decimals, fields must be separated by semicolons or tabs"
+    )]
+    CutDecimals {
+        /// Number of fields in the row.
+        found: usize,
+        /// Number of fields that it must have.
+        expected: usize,
+    },
+    /// A heading says another unit than its column is to be read in.
+    #[error(
+        "the header says `{said}`, but the column is read in {read_as}; say the unit as `{key}`, or correct the header"
+    )]
+    OtherUnit {
+        /// The unit in the header.
+        said: String,
+        /// The unit of the column's role.
+        read_as: Unit,
+        /// The key that says the unit.
+        key: &'static str,
+    },
+    /// Two columns have the name of one that is needed, but for their units.
+    #[error(
+        "columns {first} and {second} are both `{name}` but for what stands behind it; write out the one that is meant, as in `{example}`"
+    )]
+    ManyUnits {
+        /// The name.
+        name: String,
+        /// The first one's number, from 1.
+        first: usize,
+        /// The second one's number, from 1.
+        second: usize,
+        /// The first one's heading.
+        example: String,
     },
     /// A field of the time column is neither a number nor a timestamp.
     #[error(

@@ -2,9 +2,10 @@
 
 use std::io::Read;
 
-use super::cells::Cells;
-use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns};
+use super::cells::{Cells, split};
+use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
+use super::dialect::{Dialect, Separator, windows_1252};
 use super::timestamp::Clock;
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
@@ -34,16 +35,16 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     schema.check(source)?;
     let file = File::read(source, bytes)?;
     let columns = schema.columns;
-    let find = |head: &Cells| {
+    let find = |head: &mut Cells| {
         let contact = ContactFields::find(head, columns)?;
         Ok((contact, ChannelFields::find(head, columns)?, TimeField::find(head, columns)?))
     };
     let mut clock = Clock::default();
-    let rows = file.rows(columns.header, find, |cells, (contact, channels, time)| {
+    let (rows, dialect) = file.rows(columns, find, |cells, (contact, channels, time)| {
         let row = contact.row(cells, schema)?;
         Ok(Row { time_s: time.read(cells, &mut clock)?, reading: channels.reading(cells)?, ..row })
     })?;
-    Ok(schema.recording(source, rows, vec![file.digest]))
+    Ok(schema.recording(source, rows, vec![file.digest], [dialect]))
 }
 
 /// Reads a recording from two CSV files, of readings and of contacts, that pair row by row; the time column is that of the first
@@ -60,16 +61,15 @@ pub fn read_pair(
     let source = format!("{}, {}", readings.0, contacts.0);
     let readings = File::read(readings.0, readings.1)?;
     let contacts = File::read(contacts.0, contacts.1)?;
-    let (columns, header) = (schema.columns, schema.columns.header);
-
+    let columns = schema.columns;
     let mut clock = Clock::default();
-    let reading_rows = readings.rows(
-        header,
+    let (reading_rows, reading_dialect) = readings.rows(
+        columns,
         |head| Ok((ChannelFields::find(head, columns)?, TimeField::find(head, columns)?)),
         |cells, (channels, time)| Ok((channels.reading(cells)?, time.read(cells, &mut clock)?)),
     )?;
-    let contact_rows = contacts.rows(
-        header,
+    let (contact_rows, contact_dialect) = contacts.rows(
+        columns,
         |head| ContactFields::find(head, columns),
         |cells, contact| contact.row(cells, schema),
     )?;
@@ -79,7 +79,8 @@ pub fn read_pair(
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
     let rows = rows.map(|((reading, time_s), contact)| Row { reading, time_s, ..contact }).collect();
-    Ok(schema.recording(&source, rows, vec![readings.digest, contacts.digest]))
+    let digests = vec![readings.digest, contacts.digest];
+    Ok(schema.recording(&source, rows, digests, [reading_dialect, contact_dialect]))
 }
 
 impl Schema<'_> {
@@ -92,9 +93,16 @@ impl Schema<'_> {
         }
     }
 
-    fn recording(&self, source: &str, rows: Vec<Row>, digests: Vec<String>) -> Recording {
+    fn recording(
+        &self,
+        source: &str,
+        rows: Vec<Row>,
+        digests: Vec<String>,
+        dialects: impl IntoIterator<Item = Dialect>,
+    ) -> Recording {
         let mut recording = Recording::new(self.layout, source, rows);
         recording.provenance.digests = digests;
+        recording.provenance.dialects = dialects.into_iter().filter(|dialect| !dialect.is_plain()).collect();
         recording
     }
 }
@@ -102,7 +110,7 @@ impl Schema<'_> {
 /// A file in memory.
 struct File<'s> {
     source: &'s str,
-    text: String,
+    content: Vec<u8>,
     digest: String,
 }
 
@@ -111,40 +119,28 @@ impl<'s> File<'s> {
         let mut content = Vec::new();
         bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).in_file(source))?;
         let digest = sha256_hex(&content);
-        let text = String::from_utf8(content).map_err(|error| not_utf8(source, &error))?;
-        Ok(Self { source, text, digest })
+        Ok(Self { source, content, digest })
     }
 
-    /// Every row, read by `row`, after `find` has found the columns in the first line.
+    /// Every row, read by `row`, after `find` has found the columns in the first line; and how the table is written.
     fn rows<C, T>(
         &self,
-        header: Header,
-        find: impl Fn(&Cells) -> Result<C, CsvError>,
-        mut row: impl FnMut(&Cells, &C) -> Result<T, CsvError>,
-    ) -> Result<Vec<T>, CsvError> {
-        let (mut lines, mut rows) = (Lines::new(self.source), Vec::new());
-        for line in self.text.lines() {
-            if let Some((cells, columns)) = lines.next(line.as_bytes(), header, &find)? {
-                rows.push(row(&cells, columns)?);
+        columns: &Columns,
+        find: impl Fn(&mut Cells) -> Result<C, CsvError>,
+        mut row: impl FnMut(&mut Cells, &C) -> Result<T, CsvError>,
+    ) -> Result<(Vec<T>, Dialect), CsvError> {
+        let (mut lines, mut rows) = (Lines::new(self.source, columns), Vec::new());
+        for line in self.content.split_inclusive(|byte| *byte == b'\n') {
+            if let Some((mut cells, fields)) = lines.next(line, columns.header, &find)? {
+                rows.push(row(&mut cells, fields)?);
             }
         }
         match lines.fields {
             None => Err(CsvProblem::Empty.in_file(self.source)),
             Some(_) if rows.is_empty() => Err(CsvProblem::NoRows.in_file(self.source)),
-            Some(_) => Ok(rows),
+            Some(_) => Ok((rows, lines.dialect)),
         }
     }
-}
-
-fn not_utf8(source: &str, error: &std::string::FromUtf8Error) -> CsvError {
-    let (good, rest) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
-    let line = 1 + good.iter().filter(|byte| **byte == b'\n').count();
-    let start = good.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-    let before = String::from_utf8_lossy(&good[start..]).into_owned();
-    let after =
-        String::from_utf8_lossy(rest.split(|byte| *byte == b'\n').next().unwrap_or(rest)).into_owned();
-    let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-    CsvProblem::NotUtf8.in_line(source, line, before + &after, mark)
 }
 
 /// Fields of a row for the position, force and nuisance coordinate of the contact.
@@ -159,25 +155,31 @@ struct ContactFields {
 }
 
 impl ContactFields {
-    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
-        let find = |column| head.find(column, columns.header);
+    fn find(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
+        let (header, position_unit) = (columns.header, columns.position_unit);
+        let mut coordinate = |column: &Column| {
+            let values = ValueColumn { column: column.clone(), unit: position_unit };
+            head.find_values(&values, "position_unit", header)
+        };
         let (x, y) = match &columns.position {
-            PositionColumns::Along(x) => (find(x)?, None),
-            PositionColumns::Plane { x, y } => (find(x)?, Some(find(y)?)),
+            PositionColumns::Along(x) => (coordinate(x)?, None),
+            PositionColumns::Plane { x, y } => (coordinate(x)?, Some(coordinate(y)?)),
         };
         let force = match &columns.force {
             Some(force) if force.need == Need::Required || head.has(&force.values.column) => {
-                Some((find(&force.values.column)?, force.values.unit))
+                Some((head.find_values(&force.values, "force_unit", header)?, force.values.unit))
             }
             _ => None,
         };
-        let nuisance = columns.nuisance.as_ref().map(|nuisance| Ok((find(&nuisance.column)?, nuisance.unit)));
-        let (position_unit, frame) = (columns.position_unit, columns.frame);
-        Ok(Self { x, y, position_unit, frame, force, nuisance: nuisance.transpose()? })
+        let mut find = |values: &ValueColumn| -> Result<_, CsvError> {
+            Ok((head.find_values(values, "nuisance_unit", header)?, values.unit))
+        };
+        let nuisance = columns.nuisance.as_ref().map(&mut find).transpose()?;
+        Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisance })
     }
 
     /// The row of a contact, its reading still empty.
-    fn row(&self, cells: &Cells, schema: &Schema) -> Result<Row, CsvError> {
+    fn row(&self, cells: &mut Cells, schema: &Schema) -> Result<Row, CsvError> {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
         let position = self.frame.position(x_m, y_m);
@@ -199,18 +201,18 @@ struct TimeField(Option<(usize, Unit)>);
 
 impl TimeField {
     /// The field of the column that is named, which must be there, or of `time_s`, which may be.
-    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
-        Ok(Self(match &columns.time {
-            Some(time) => Some((head.find(&time.column, columns.header)?, time.unit)),
-            None => {
-                let own = Column::Name(TIME.to_owned());
-                let there = columns.header == Header::Present && head.has(&own);
-                there.then(|| head.find(&own, columns.header)).transpose()?.map(|field| (field, Unit::NONE))
-            }
-        }))
+    fn find(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
+        let own =
+            || Some(Column::from(TIME)).filter(|own| columns.header == Header::Present && head.has(own));
+        let unit = Unit::NONE;
+        let time = columns.time.clone().or_else(|| Some(ValueColumn { column: own()?, unit }));
+        let field = |time: ValueColumn| -> Result<_, CsvError> {
+            Ok((head.find_values(&time, "time_unit", columns.header)?, time.unit))
+        };
+        time.map(field).transpose().map(Self)
     }
 
-    fn read(self, cells: &Cells, clock: &mut Clock) -> Result<Option<f64>, CsvError> {
+    fn read(self, cells: &mut Cells, clock: &mut Clock) -> Result<Option<f64>, CsvError> {
         self.0.map(|(field, unit)| cells.time(field, unit, clock)).transpose()
     }
 }
@@ -218,7 +220,12 @@ impl TimeField {
 /// Lines of CSV as they come, and the fields that the first of them told.
 #[derive(Clone, Debug)]
 struct Lines<F> {
-    source: String,
+    /// What the lines have told of how they are written.
+    dialect: Dialect,
+    /// The separator, where the rig or a line before the header says it.
+    separator: Option<Separator>,
+    /// The text of the last line that was not UTF-8.
+    decoded: String,
     /// Number of lines that have been read.
     count: usize,
     /// The fields, and how many a line has.
@@ -226,8 +233,9 @@ struct Lines<F> {
 }
 
 impl<F> Lines<F> {
-    fn new(source: &str) -> Self {
-        Self { source: source.to_owned(), count: 0, fields: None }
+    fn new(source: &str, columns: &Columns) -> Self {
+        let dialect = Dialect::new(source, columns.decimal);
+        Self { dialect, separator: columns.separator, decoded: String::new(), count: 0, fields: None }
     }
 
     /// The cells of the next line and its fields, which `find` finds in the first one; `None` for the header, a blank line or a
@@ -236,28 +244,93 @@ impl<F> Lines<F> {
         &'a mut self,
         line: &'a [u8],
         header: Header,
-        find: impl FnOnce(&Cells) -> Result<F, CsvError>,
+        find: impl Fn(&mut Cells) -> Result<F, CsvError>,
     ) -> Result<Option<(Cells<'a>, &'a F)>, CsvError> {
         self.count += 1;
-        let text = utf8(&self.source, self.count, line)?;
+        let Self { dialect, separator, decoded, count, fields } = self;
+        let text = text(line, *count, dialect, decoded)?;
         // Some spreadsheets begin a file with a byte-order mark.
-        let text = if self.count == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
+        let text = if *count == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
         if text.trim().is_empty() || text.starts_with('#') {
             return Ok(None);
         }
-        let cells = Cells::parse(&self.source, self.count, text)?;
-        let (fields, width) = match &mut self.fields {
+        if fields.is_none()
+            && let Some(told) = Separator::told(text)
+        {
+            *separator = Some(told);
+            return Ok(None);
+        }
+        let (fields, width) = match fields {
             Some(found) => found,
             none => {
-                let found = none.insert((find(&cells)?, cells.width()));
+                let separators = separator.map_or_else(|| separators(text, header), |told| vec![told]);
+                let Some(found) = first_line(*count, text, &separators, dialect, find)? else {
+                    return Ok(None);
+                };
+                let found = none.insert(found);
                 if header == Header::Present {
                     return Ok(None);
                 }
                 found
             }
         };
+        let cells = Cells::parse(*count, text, dialect)?;
+        if cells.is_blank() {
+            return Ok(None);
+        }
         cells.check_width(*width)?;
         Ok(Some((cells, fields)))
+    }
+}
+
+/// The separators by which the first line of a file may be meant to be cut.
+fn separators(text: &str, header: Header) -> Vec<Separator> {
+    let cuts = |separator: &Separator| split(text, *separator).is_ok_and(|fields| fields.len() > 1);
+    let mut separators: Vec<Separator> = Separator::ALL.into_iter().filter(cuts).collect();
+    // Between numbers, a comma beside semicolons or tabs stands before decimals.
+    if header == Header::Absent && separators.len() > 1 {
+        separators.retain(|separator| *separator != Separator::Comma);
+    }
+    if separators.is_empty() { vec![Separator::Comma] } else { separators }
+}
+
+/// The fields that `find` finds in the first line, and how many a line has, with the one separator that lets it; `None` for a line
+/// of empty fields.
+fn first_line<F>(
+    line: usize,
+    text: &str,
+    separators: &[Separator],
+    dialect: &mut Dialect,
+    find: impl Fn(&mut Cells) -> Result<F, CsvError>,
+) -> Result<Option<(F, usize)>, CsvError> {
+    let mut found: Option<(F, usize, Dialect)> = None;
+    let mut refused: Option<(usize, CsvError)> = None;
+    for separator in separators {
+        let mut dialect = Dialect { separator: *separator, ..dialect.clone() };
+        let mut cells = Cells::parse(line, text, &mut dialect)?;
+        if cells.is_blank() {
+            return Ok(None);
+        }
+        let width = cells.width();
+        match (find(&mut cells), &found) {
+            (Ok(fields), None) => found = Some((fields, width, dialect)),
+            (Ok(_), Some((.., other))) => {
+                let problem = CsvProblem::ManySeparators { first: other.separator, second: *separator };
+                return Err(cells.line_error(problem));
+            }
+            (Err(error), _) if refused.as_ref().is_none_or(|(most, _)| width > *most) => {
+                refused = Some((width, error));
+            }
+            (Err(_), _) => {}
+        }
+    }
+    match (found, refused) {
+        (Some((fields, width, found)), _) => {
+            *dialect = found;
+            Ok(Some((fields, width)))
+        }
+        (None, Some((_, error))) => Err(error),
+        (None, None) => Ok(None),
     }
 }
 
@@ -271,7 +344,7 @@ pub struct ReadingParser {
 impl ReadingParser {
     /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
     pub fn new(source: &str, columns: &Columns) -> Self {
-        Self { lines: Lines::new(source), columns: columns.clone() }
+        Self { lines: Lines::new(source, columns), columns: columns.clone() }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
@@ -289,7 +362,12 @@ impl ReadingParser {
     pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
         let Self { lines, columns } = self;
         let next = lines.next(line, columns.header, |head| ChannelFields::find(head, columns))?;
-        next.map(|(cells, channels)| channels.reading(&cells)).transpose()
+        next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
+    }
+
+    /// How the lines write their table, as far as they have told.
+    pub fn dialect(&self) -> &Dialect {
+        &self.lines.dialect
     }
 }
 
@@ -298,13 +376,14 @@ impl ReadingParser {
 struct ChannelFields(Vec<(usize, Unit)>);
 
 impl ChannelFields {
-    fn find(head: &Cells, columns: &Columns) -> Result<Self, CsvError> {
-        let find =
-            |channel: &super::ValueColumn| Ok((head.find(&channel.column, columns.header)?, channel.unit));
+    fn find(head: &mut Cells, columns: &Columns) -> Result<Self, CsvError> {
+        let find = |channel: &ValueColumn| {
+            Ok((head.find_values(channel, "channel_unit", columns.header)?, channel.unit))
+        };
         columns.channels.iter().map(find).collect::<Result<_, _>>().map(Self)
     }
 
-    fn reading(&self, cells: &Cells) -> Result<Vec<f64>, CsvError> {
+    fn reading(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
         self.0.iter().map(|(index, unit)| cells.number(*index, *unit)).collect()
     }
 }
@@ -370,12 +449,17 @@ struct TimedFields {
 impl<'a> TimedParser<'a> {
     /// A parser for the lines of `source`, from the first one.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
-        Self { lines: Lines::new(source), clock: Clock::default(), schema }
+        Self { lines: Lines::new(source, schema.columns), clock: Clock::default(), schema }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
     pub fn awaits_columns(&self) -> bool {
         self.lines.fields.is_none()
+    }
+
+    /// How the lines write their table, as far as they have told.
+    pub fn dialect(&self) -> &Dialect {
+        &self.lines.dialect
     }
 
     /// Whether a column tells the time.
@@ -392,52 +476,68 @@ impl<'a> TimedParser<'a> {
     pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
         let Self { lines, clock, schema } = self;
         let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
-        let Some((cells, fields)) = next else { return Ok(None) };
-        let time_s = fields.time.read(&cells, clock)?;
-        let row = fields.contact.as_ref().map(|contact| contact.row(&cells, schema)).transpose()?;
+        let Some((mut cells, fields)) = next else { return Ok(None) };
+        let time_s = fields.time.read(&mut cells, clock)?;
+        let row = fields.contact.as_ref().map(|contact| contact.row(&mut cells, schema)).transpose()?;
         // A force that nobody knows is not 0: something touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
             position,
             force_n: force_n.unwrap_or(f64::INFINITY),
         });
-        let second = |(x, force)| -> Result<Contact, CsvError> {
+        let mut second = |(x, force)| -> Result<Contact, CsvError> {
             let position = Position::along(cells.number(x, SensorKind::Deflection.unit())?);
             Ok(Contact { position, force_n: cells.number(force, SensorKind::Reaction.unit())? })
         };
-        let second = fields.second.map(second).transpose()?;
+        let second = fields.second.map(&mut second).transpose()?;
         let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
-        Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&cells)? }))
+        Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&mut cells)? }))
     }
 }
 
 impl TimedFields {
-    fn find(head: &Cells, schema: &Schema) -> Result<Self, CsvError> {
+    fn find(head: &mut Cells, schema: &Schema) -> Result<Self, CsvError> {
         let columns = schema.columns;
         let named = columns.header == Header::Present;
-        let field = |name: &str| {
-            let column = Column::Name(name.to_owned());
-            (named && head.has(&column)).then(|| head.find(&column, columns.header)).transpose()
+        let mut field = |name: &str| {
+            let column = ValueColumn { column: Column::from(name), unit: Unit::NONE };
+            let there = named && head.has(&column.column);
+            there.then(|| head.find_values(&column, "", columns.header)).transpose()
         };
+        let second = field(SECOND[0])?.zip(field(SECOND[1])?);
         Ok(Self {
+            second,
             time: match TimeField::find(head, columns) {
                 Err(CsvError { problem: CsvProblem::MissingColumn { .. }, .. }) => TimeField(None),
                 found => found?,
             },
             contact: if named { ContactFields::find(head, columns).ok() } else { None },
-            second: field(SECOND[0])?.zip(field(SECOND[1])?),
             channels: ChannelFields::find(head, columns)?,
         })
     }
 }
 
-/// `bytes` as text, without the line's end.
-fn utf8<'a>(source: &str, line: usize, bytes: &'a [u8]) -> Result<&'a str, CsvError> {
-    match std::str::from_utf8(bytes) {
-        Ok(text) => Ok(text.trim_end_matches(['\r', '\n'])),
-        Err(_) => {
-            let text = String::from_utf8_lossy(bytes).trim_end_matches(['\r', '\n']).to_owned();
-            let span = 0..text.len();
-            Err(CsvProblem::NotUtf8.in_line(source, line, text, span))
+/// A line of bytes as text, without the line's end; `decoded` holds it where it is not UTF-8.
+fn text<'a>(
+    bytes: &'a [u8],
+    line: usize,
+    dialect: &mut Dialect,
+    decoded: &'a mut String,
+) -> Result<&'a str, CsvError> {
+    let text = match std::str::from_utf8(bytes).map_err(|error| (error, windows_1252(bytes))) {
+        Ok(text) => text,
+        Err((_, Some(text))) => {
+            dialect.windows_1252 = true;
+            *decoded = text;
+            decoded.as_str()
         }
-    }
+        Err((error, None)) => {
+            let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]).into_owned();
+            let after = String::from_utf8_lossy(&bytes[error.valid_up_to()..]).into_owned();
+            let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
+            let text = (before + &after).trim_end_matches(['\r', '\n']).to_owned();
+            let mark = mark.start.min(text.len())..mark.end.min(text.len());
+            return Err(CsvProblem::NotText.in_line(&dialect.source, line, text, mark));
+        }
+    };
+    Ok(text.trim_end_matches(['\r', '\n']))
 }

@@ -127,13 +127,18 @@ fn record(row: &Row, columns: &Columns) -> Vec<String> {
 mod tests {
     use super::csv_row;
     use crate::recording::cells::split;
+    use crate::recording::dialect::Separator;
 
     #[test]
     fn a_field_is_quoted_where_it_must_be() {
         let fields = ["plain", "with, comma", "with \"quotes\"", "", "5 µm", " spaced "];
         let line = csv_row(fields);
         assert_eq!(line, "plain,\"with, comma\",\"with \"\"quotes\"\"\",,5 µm, spaced \n");
-        let read: Vec<_> = split(line.trim_end_matches('\n')).unwrap().into_iter().map(|f| f.value).collect();
+        let read: Vec<_> = split(line.trim_end_matches('\n'), Separator::Comma)
+            .unwrap()
+            .into_iter()
+            .map(|f| f.value)
+            .collect();
         assert_eq!(read, fields.map(str::trim));
         assert_eq!(csv_row(["two\nlines", "b"]), "\"two\nlines\",b\n");
     }

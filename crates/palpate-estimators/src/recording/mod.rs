@@ -5,6 +5,8 @@ mod columns;
 mod csv_error;
 mod csv_in;
 mod csv_out;
+mod dialect;
+mod heading;
 mod timestamp;
 mod warnings;
 
@@ -12,6 +14,8 @@ pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionCol
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read, read_pair};
 pub use csv_out::{csv_row, write, write_timed};
+pub use dialect::{Decimal, Dialect, Separator};
+pub use heading::Heading;
 pub use warnings::Warning;
 
 use serde::{Deserialize, Serialize};
@@ -77,6 +81,9 @@ pub struct Provenance {
     pub rows: usize,
     /// The [`sha256_hex`] of each file that was read; empty for a simulation.
     pub digests: Vec<String>,
+    /// How each file writes its table, where that is not plainly.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dialects: Vec<Dialect>,
     /// The seed of a simulation.
     pub seed: Option<u64>,
 }
@@ -103,8 +110,13 @@ pub struct TooFewPositions {
 impl Recording {
     /// A recording by the sensors of a layout, from a source of this name, without files or a seed.
     pub fn new(layout: &Layout, source: &str, rows: Vec<Row>) -> Self {
-        let provenance =
-            Provenance { source: source.to_owned(), rows: rows.len(), digests: Vec::new(), seed: None };
+        let provenance = Provenance {
+            source: source.to_owned(),
+            rows: rows.len(),
+            digests: Vec::new(),
+            dialects: Vec::new(),
+            seed: None,
+        };
         Self { channels: layout.names(), kinds: layout.kinds(), rows, provenance }
     }
 

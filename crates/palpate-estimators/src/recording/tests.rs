@@ -31,6 +31,8 @@ fn foreign() -> Columns {
         frame: Frame::default(),
         nuisance: None,
         time: None,
+        separator: None,
+        decimal: None,
     }
 }
 
@@ -83,6 +85,93 @@ fn rows_have_times_where_a_column_tells_them() {
     assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
+}
+
+/// A spreadsheet's export of a bench with `foreign` columns, and the same numbers as plain CSV.
+const EXPORT: &str = "\u{feff}\"X [mm]\";\"Pl / mV\";\"Pr (mV)\";\"F [N]\";Zeit\r\n\
+     10,5;0,1;-2,5e-3;1;03.04.2026 14:03:25,120\r\n\
+     \"12\";1;3;2,25;03.04.2026 14:03:25,370\r\n;;;;\r\n;;;;\r\n";
+const PLAIN: &str = "X,Pl,Pr,F,Zeit\n10.5,0.1,-2.5e-3,1,0\n12,1,3,2.25,0.25\n";
+
+#[test]
+fn a_spreadsheets_export_is_read_to_the_last_bit() {
+    let columns = foreign().time("Zeit");
+    let (export, plain) =
+        (read_as(&columns, EXPORT.as_bytes()).unwrap(), read_as(&columns, PLAIN.as_bytes()).unwrap());
+    assert_eq!(export.rows, plain.rows);
+    assert_eq!(plain.provenance.dialects, []);
+    let said = |recording: &Recording| recording.provenance.dialects[0].to_string();
+    assert_eq!(said(&export), "semicolons, decimal commas, units in the header");
+
+    let tabs = EXPORT.replace(';', "\t");
+    let tabs = read_as(&columns, tabs.as_bytes()).unwrap();
+    assert_eq!(
+        (said(&tabs).as_str(), &tabs.rows),
+        ("tabs, decimal commas, units in the header", &plain.rows)
+    );
+
+    let mut parser = ReadingParser::new("stdin", &foreign());
+    let readings: Vec<_> =
+        EXPORT.split_inclusive('\n').map(|line| parser.parse_line(line.as_bytes()).unwrap()).collect();
+    let row = |i: usize| Some(plain.rows[i].reading.clone());
+    assert_eq!(readings, [None, row(0), row(1), None, None]);
+    assert_eq!(parser.dialect().to_string(), "semicolons, decimal commas, units in the header");
+}
+
+#[test]
+fn files_as_people_have_them_are_read() {
+    let first = |text: &[u8]| {
+        let recording = read_as(&foreign(), text).unwrap();
+        let said = recording.provenance.dialects.first().map_or_else(String::new, Dialect::to_string);
+        (recording.rows[0].position.x_m, recording.rows[0].reading.clone(), said)
+    };
+    let plain = |said: &str| (0.01, vec![1.5, 2.0], said.to_owned());
+    assert_eq!(first(b"sep=;\r\nX;Pl;Pr;F\r\n10;1,5;2;3\r\n"), plain("semicolons, decimal commas"));
+    assert_eq!(first(b";;;\nX;Pl;Pr;F;\n10;1.5;2;3;\n"), plain("semicolons"));
+    assert_eq!(first(b"X,Pl,Pr,F\n10,\"1,5\",2,3,,\n"), plain("decimal commas"));
+    assert_eq!(first(b"X,Pl,Pr,F\n10,1.5,2,3\n,,,\n"), plain(""));
+    let old = b"Stra\xdfe;X, mm;Pl;Pr;F in N\n1;10;1,5;2;3\n";
+    assert_eq!(first(old), plain("semicolons, decimal commas, units in the header, Windows-1252 text"));
+    // Without a header.
+    let layout = Layout::even(SensorKind::Raw, 2, 0.1);
+    let extent = Extent::plane(0.1, 0.1).unwrap();
+    let columns = numbered();
+    let schema = Schema { columns: &columns, layout: &layout, extent, known_force_n: None };
+    let rows = read("", &b"0,5;1,5;2;3\n"[..], &schema).unwrap().rows;
+    assert_eq!((rows[0].position.x_m, rows[0].reading.as_slice()), (0.0015, &[1.5, 3.0][..]));
+}
+
+#[test]
+fn what_no_rule_can_tell_is_refused_at_the_place() {
+    let with = |separator, decimal| Columns { separator, decimal, ..foreign() };
+    let cases: [(Columns, &[u8]); 15] = [
+        (foreign(), b"X [cm],Pl,Pr,F\n1,2,3,4\n"),
+        (foreign(), b"X,Pl,Pr,F [kg]\n1,2,3,4\n"),
+        (foreign(), b"X (left),X (right),Pl,Pr,F\n1,1,2,3,4\n"),
+        (foreign(), b"X,Pl,Pr,F,;X;Pl;Pr;F\n1,2,3,4\n"),
+        (foreign(), b"X;Pl;Pr;F,G\n1;2;3;4\n"),
+        (foreign(), b"X,Pl,Pr,F\n10,\"1,234\",2,3\n"),
+        (foreign(), b"X,Pl,Pr,F\n10,5,1,25,2,5,3,0\n"),
+        (foreign(), b"X;Pl;Pr;F\n10;1,5;2;3\n10;1.5;2;3\n"),
+        (foreign(), b"X;Pl;Pr;F\n10;1.234;2;3\n10;1,5;2;3\n"),
+        (foreign(), b"X;Pl;Pr;F\n10;1.234,5;2;3\n"),
+        (foreign(), b"X,Pl,Pr,F\n10,\x81,2,3\n"),
+        (foreign(), b"\xff\xfeX\0,\0P\0l\0\n\0"),
+        (with(None, Some(Decimal::Point)), b"X;Pl;Pr;F\n10;1,5;2;3\n"),
+        (with(None, Some(Decimal::Comma)), b"X;Pl;Pr;F\n10;1.5;2;3\n"),
+        (with(Some(Separator::Comma), None), b"X;Pl;Pr;F\n10;1,5;2;3\n"),
+    ];
+    let messages = cases.map(|(columns, text)| pointed(&read_as(&columns, text).unwrap_err()));
+    insta::assert_snapshot!(messages.join("\n"));
+
+    // What the rig says lifts the doubt.
+    let said = with(Some(Separator::Comma), Some(Decimal::Comma));
+    let rows = read_as(&said, b"X,Pl,Pr,F\n10,\"1,234\",2,3\n").unwrap().rows;
+    assert_eq!(rows[0].reading, [1.234, 2.0]);
+    // In millimetres as the rig says, spelt otherwise; parentheses may hold anything, and so may a heading that is written out.
+    assert!(read_as(&foreign(), b"X / mm,Pl (left),Pr [V],F (front)\n1,2,3,4\n").is_ok());
+    let written_out = Columns { position: PositionColumns::Along(named("X [div]")), ..foreign() };
+    assert!(read_as(&written_out, b"X [div],Pl,Pr,F\n1,2,3,4\n").is_ok());
 }
 
 #[test]
@@ -200,7 +289,13 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
         time_s: None,
         reading: vec![(row % 10) as f64 + 0.001 * ((row * 7919) % 13) as f64, reading(row % 10, row / 10)],
     });
-    let provenance = Provenance { source: "sweeps".to_owned(), rows: 50, digests: Vec::new(), seed: None };
+    let provenance = Provenance {
+        source: "sweeps".to_owned(),
+        rows: 50,
+        digests: Vec::new(),
+        dialects: Vec::new(),
+        seed: None,
+    };
     Recording {
         channels: vec!["good".to_owned(), "bad".to_owned()],
         kinds: vec![SensorKind::Raw; 2],

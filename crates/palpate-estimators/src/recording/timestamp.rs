@@ -1,7 +1,6 @@
 //! Times of rows: numbers, or timestamps, which count from the first of them.
 
 use super::csv_error::CsvProblem;
-use palpate_mechanics::units::Unit;
 
 /// Reads the times of one file's rows.
 #[derive(Clone, Debug, Default)]
@@ -24,23 +23,28 @@ enum Start {
 const DAY_NS: i64 = 86_400_000_000_000;
 
 impl Clock {
-    /// The time in `text`, in seconds: a number of `unit` as it is, a timestamp since the first.
+    /// The time in `text`, in seconds: a `number` as it is, a timestamp since the first.
     ///
     /// # Errors
     /// A text that is neither, or not what the first row has; a time of day that goes back over midnight.
-    pub fn read(&mut self, text: &str, unit: Unit) -> Result<f64, CsvProblem> {
-        if let Some(value) = unit.parse_si(text) {
+    pub fn read(
+        &mut self,
+        text: &str,
+        number: impl FnOnce() -> Result<f64, CsvProblem>,
+    ) -> Result<f64, CsvProblem> {
+        // Whatever has a colon is no number.
+        if !text.contains(':') {
+            let value = number().map_err(|problem| match problem {
+                CsvProblem::NotANumber { text } => CsvProblem::NotATime { text },
+                other => other,
+            })?;
             return match self.start {
                 Some(Start::Timestamp { .. }) => Err(CsvProblem::OtherTime { text: text.to_owned() }),
-                _ if !value.is_finite() => Err(CsvProblem::NotFinite { text: text.to_owned() }),
                 _ => {
                     self.start = Some(Start::Number);
                     Ok(value)
                 }
             };
-        }
-        if text.is_empty() {
-            return Err(CsvProblem::EmptyField);
         }
         let now = Timestamp::parse(text)?.ok_or_else(|| CsvProblem::NotATime { text: text.to_owned() })?;
         let (first, previous) = match self.start {
@@ -196,11 +200,14 @@ fn offset_ns(offset: &str) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::dialect::Dialect;
+    use palpate_mechanics::units::Unit;
     use proptest::prelude::*;
 
     fn times(texts: &[&str]) -> Vec<Result<f64, String>> {
-        let mut clock = Clock::default();
-        texts.iter().map(|text| clock.read(text, Unit::NONE).map_err(|error| error.to_string())).collect()
+        let (mut clock, mut dialect) = (Clock::default(), Dialect::default());
+        let mut read = |text: &&str| clock.read(text, || dialect.number(text, Unit::NONE));
+        texts.iter().map(|text| read(text).map_err(|error| error.to_string())).collect()
     }
 
     fn good(texts: &[&str]) -> Vec<f64> {
@@ -260,7 +267,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_text_panics(text in "[0-9T:.,/Z +µ-]{0,30}") {
-            let _ = Clock::default().read(&text, Unit::NONE);
+            let _ = times(&[&text, &text]);
         }
     }
 }

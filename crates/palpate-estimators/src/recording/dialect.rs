@@ -1,0 +1,286 @@
+//! How a file writes its table: what stands between fields, what before decimals.
+//!
+//! A plain file has commas between fields and decimal points. Spreadsheets of half the world write semicolons and decimal commas instead.
+//! The first line tells the separator, the first number with a comma or a point tells the decimal mark, and from there on both hold:
+//! a stream is read by the same rules as a file. What no rule can tell is refused.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::csv_error::CsvProblem;
+use palpate_mechanics::units::Unit;
+
+/// What stands between the fields of a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Separator {
+    /// `a,b`
+    #[default]
+    Comma,
+    /// `a;b`
+    Semicolon,
+    /// A tabulator.
+    Tab,
+}
+
+impl Separator {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
+
+    /// The character.
+    pub const fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+        }
+    }
+
+    /// The separator in a line `sep=;`, by which some spreadsheets begin a file.
+    pub(super) fn told(line: &str) -> Option<Self> {
+        let told = line.trim_matches([' ', '"']).strip_prefix("sep=")?;
+        Self::ALL.into_iter().find(|separator| told.as_bytes() == [separator.byte()])
+    }
+}
+
+impl fmt::Display for Separator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Comma => "commas",
+            Self::Semicolon => "semicolons",
+            Self::Tab => "tabs",
+        })
+    }
+}
+
+/// What stands before the decimals of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decimal {
+    /// `1.5`
+    Point,
+    /// `1,5`
+    Comma,
+}
+
+impl fmt::Display for Decimal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Point => "decimal points",
+            Self::Comma => "decimal commas",
+        })
+    }
+}
+
+/// How a file writes its table, as far as its lines have told.
+///
+/// Displayed in a few words, such as `semicolons, decimal commas, units in the header`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dialect {
+    /// The name of the file.
+    pub source: String,
+    /// What stands between fields.
+    pub separator: Separator,
+    /// What stands before decimals; `None` while all numbers are whole.
+    pub decimal: Option<Decimal>,
+    /// The number that has told the decimal mark, where others would read its mark as one of thousands.
+    pub doubtful: Option<String>,
+    /// Whether columns were found by their names without the units behind them.
+    pub units_in_header: bool,
+    /// Whether some text was Windows-1252, not UTF-8.
+    pub windows_1252: bool,
+}
+
+impl Dialect {
+    /// The dialect of a file of which nothing has been read: `decimal` is what the rig says.
+    pub(super) fn new(source: &str, decimal: Option<Decimal>) -> Self {
+        Self { source: source.to_owned(), decimal, ..Self::default() }
+    }
+
+    /// Whether there is nothing to say of it.
+    pub fn is_plain(&self) -> bool {
+        let plain = Self {
+            source: self.source.clone(),
+            decimal: self.decimal.filter(|decimal| *decimal == Decimal::Point),
+            ..Self::default()
+        };
+        *self == plain
+    }
+
+    /// The finite number that `text` is, in SI units.
+    pub(super) fn number(&mut self, text: &str, unit: Unit) -> Result<f64, CsvProblem> {
+        let commas = text.bytes().filter(|byte| *byte == b',').count();
+        let parsed = match commas {
+            0 => unit.parse_si(text),
+            1 if !text.contains('.') => unit.parse_si(&text.replace(',', ".")),
+            _ => None,
+        };
+        let text_of = || text.to_owned();
+        match parsed {
+            Some(value) if value.is_finite() => {
+                if commas == 1 {
+                    self.see(Decimal::Comma, text)?;
+                } else if (self.decimal, &self.doubtful) != (Some(Decimal::Point), &None)
+                    && text.contains('.')
+                {
+                    self.see(Decimal::Point, text)?;
+                }
+                Ok(value)
+            }
+            Some(_) => Err(CsvProblem::NotFinite { text: text_of() }),
+            None if text.is_empty() => Err(CsvProblem::EmptyField),
+            None if has_thousands(text) => Err(CsvProblem::Thousands { text: text_of() }),
+            None => Err(CsvProblem::NotANumber { text: text_of() }),
+        }
+    }
+
+    /// Takes the mark of a number for that of the file, or refuses it beside the file's.
+    fn see(&mut self, mark: Decimal, text: &str) -> Result<(), CsvProblem> {
+        let doubtful = looks_grouped(text);
+        match self.decimal {
+            Some(decimal) if decimal != mark => {
+                return Err(CsvProblem::OtherDecimal { text: text.to_owned(), decimal });
+            }
+            Some(_) if doubtful => return Ok(()),
+            Some(_) => {}
+            // Between commas, whoever quotes a number for its comma may well mean thousands.
+            None if doubtful && mark == Decimal::Comma && self.separator == Separator::Comma => {
+                return Err(CsvProblem::DoubtfulNumber { text: text.to_owned() });
+            }
+            None => self.decimal = Some(mark),
+        }
+        // Points are what a plain file has; beside semicolons they may be thousands.
+        let doubtful = doubtful && (mark == Decimal::Comma || self.separator == Separator::Semicolon);
+        self.doubtful = doubtful.then(|| text.to_owned());
+        Ok(())
+    }
+}
+
+impl fmt::Display for Dialect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut words = Vec::new();
+        if self.separator != Separator::Comma {
+            words.push(self.separator.to_string());
+        }
+        match (self.decimal, &self.doubtful) {
+            (Some(decimal), Some(text)) => {
+                let (number, whole) = (text.replace(',', "."), text.replace([',', '.'], ""));
+                words.push(format!("{decimal} ({text} is {number}, not {whole})"));
+            }
+            (Some(Decimal::Comma), None) => words.push(Decimal::Comma.to_string()),
+            _ => {}
+        }
+        if self.units_in_header {
+            words.push("units in the header".to_owned());
+        }
+        if self.windows_1252 {
+            words.push("Windows-1252 text".to_owned());
+        }
+        f.write_str(&words.join(", "))
+    }
+}
+
+/// Whether a number with one mark, a point or a comma, may be a whole number with a separator of thousands: `1,234`, not `0,234`.
+fn looks_grouped(number: &str) -> bool {
+    let digits = number.trim_start_matches(['+', '-']);
+    let all_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    digits.split_once([',', '.']).is_some_and(|(whole, rest)| {
+        (1..=3).contains(&whole.len())
+            && !whole.starts_with('0')
+            && rest.len() == 3
+            && all_digits(whole)
+            && all_digits(rest)
+    })
+}
+
+/// Whether a text is a number but for several points or commas.
+fn has_thousands(text: &str) -> bool {
+    let number: String = text.chars().filter(|c| !matches!(c, ',' | '.')).collect();
+    let marks = text.len() - number.len();
+    marks > 1
+        && number.parse::<f64>().is_ok_and(f64::is_finite)
+        && text.starts_with(|c: char| !",.".contains(c))
+}
+
+/// The text of a line that is not UTF-8, as Windows-1252; `None` where it has bytes that mean nothing there, or none that a text has.
+pub(super) fn windows_1252(bytes: &[u8]) -> Option<String> {
+    /// Characters of the bytes 0x80 to 0x9F; the space marks those that have none.
+    const HIGH: &str = "€ ‚ƒ„…†‡ˆ‰Š‹Œ Ž  ‘’“”•–—˜™š›œ žŸ";
+    bytes
+        .iter()
+        .map(|byte| match byte {
+            0 => None,
+            0x80..=0x9F => HIGH.chars().nth(usize::from(byte - 0x80)).filter(|c| *c != ' '),
+            _ => Some(char::from(*byte)),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said after numbers have been read, or the first refusal.
+    fn said(separator: Separator, texts: &[&str]) -> String {
+        let mut dialect = Dialect { separator, ..Dialect::default() };
+        let numbers: Result<Vec<f64>, _> =
+            texts.iter().map(|text| dialect.number(text, Unit::NONE)).collect();
+        match numbers {
+            Ok(numbers) => format!("{numbers:?} {dialect}"),
+            Err(problem) => problem.to_string(),
+        }
+    }
+
+    #[test]
+    fn the_first_mark_holds() {
+        use Separator::{Comma, Semicolon, Tab};
+        let lines = [
+            said(Comma, &["1", "1.234", "-2.5e-3"]),
+            said(Semicolon, &["1", "1,5", "0,234"]),
+            said(Semicolon, &["1,234"]),
+            said(Semicolon, &["1,234", "1,5"]),
+            said(Semicolon, &["0,234"]),
+            said(Semicolon, &["1.234"]),
+            said(Semicolon, &["1.234", "1.5"]),
+            said(Tab, &["1.234"]),
+            said(Tab, &["1,5", "1.5"]),
+            said(Semicolon, &["1.234", "1,5"]),
+            said(Semicolon, &["1.234,5"]),
+            said(Semicolon, &["1,234,567"]),
+            said(Comma, &["1,5", "-12,25e3"]),
+            said(Comma, &["1,234"]),
+            said(Comma, &["one"]),
+            said(Comma, &["1,2,x"]),
+            said(Semicolon, &["1e999"]),
+            said(Semicolon, &[","]),
+            said(Semicolon, &[""]),
+        ];
+        insta::assert_snapshot!(lines.join("\n"));
+    }
+
+    #[test]
+    fn numbers_with_commas_are_those_with_points_to_the_last_bit() {
+        let mm = Unit::from_symbol("mm").unwrap();
+        for number in ["0.1", "123.456789012345678", "-7.000000000000001e-12", "3.", ".5"] {
+            let plain = mm.parse_si(number).unwrap();
+            let mut dialect = Dialect { separator: Separator::Semicolon, ..Dialect::default() };
+            assert_eq!(dialect.number(&number.replace('.', ","), mm).unwrap().to_bits(), plain.to_bits());
+        }
+    }
+
+    #[test]
+    fn a_line_before_the_header_may_tell_the_separator() {
+        assert_eq!(Separator::told("sep=;"), Some(Separator::Semicolon));
+        assert_eq!(Separator::told("\"sep=\t\""), Some(Separator::Tab));
+        assert_eq!(Separator::told("sep,Pl"), None);
+    }
+
+    #[test]
+    fn text_of_older_windows_is_read() {
+        assert_eq!(windows_1252(b"Stra\xdfe, 5 \xb5m, \x80").as_deref(), Some("Straße, 5 µm, €"));
+        assert_eq!(windows_1252(b"\x9fa\x81"), None);
+        assert_eq!(windows_1252(b"\xff\0a\0"), None);
+        assert_eq!(windows_1252(b"\x80\x8e\x91\x9e\x9f").as_deref(), Some("€Ž‘žŸ"));
+    }
+}

@@ -1,0 +1,67 @@
+//! Names of columns, with the units that stand behind them.
+
+use palpate_mechanics::units::Unit;
+
+/// A column's name and its unit: `Position [mm]`, `Kraft (N)`, `X / mm`, `Kraft in N`, `Force, N`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heading<'a> {
+    /// The name without the unit.
+    pub name: &'a str,
+    /// What stands in the place of the unit.
+    pub unit: Option<&'a str>,
+}
+
+impl<'a> Heading<'a> {
+    /// The parts of a heading. What stands in brackets or parentheses, or as one word behind a slash between spaces, is taken for the
+    /// unit whatever it says; what follows a bare slash, a comma or `in` only where it is a unit.
+    pub fn parse(text: &'a str) -> Self {
+        let text = text.trim();
+        let parts = Self::enclosed(text, '[', ']').or_else(|| Self::enclosed(text, '(', ')'));
+        let parts = parts.or_else(|| text.split_once(" / ").filter(|(_, unit)| !unit.contains(' ')));
+        let parts = parts.or_else(|| {
+            ["/", ", ", " in "].into_iter().find_map(|mark| {
+                let (name, unit) = text.split_once(mark)?;
+                Unit::from_symbol(unit.trim()).filter(|unit| *unit != Unit::NONE).map(|_| (name, unit))
+            })
+        });
+        match parts.map(|(name, unit)| (name.trim(), unit.trim())) {
+            Some((name, unit)) if !name.is_empty() && !unit.is_empty() => Self { name, unit: Some(unit) },
+            _ => Self { name: text, unit: None },
+        }
+    }
+
+    /// The unit, where palpate knows it.
+    pub fn known_unit(&self) -> Option<Unit> {
+        self.unit.and_then(Unit::from_symbol)
+    }
+
+    fn enclosed(text: &'a str, open: char, close: char) -> Option<(&'a str, &'a str)> {
+        text.strip_suffix(close)?.rsplit_once(open)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_cut_off() {
+        let parts = |text| {
+            let heading = Heading::parse(text);
+            (heading.name, heading.unit)
+        };
+        assert_eq!(parts("Position [mm]"), ("Position", Some("mm")));
+        assert_eq!(parts(" Kraft(N) "), ("Kraft", Some("N")));
+        assert_eq!(parts("X / mm"), ("X", Some("mm")));
+        assert_eq!(parts("U1 / mV"), ("U1", Some("mV")));
+        assert_eq!(parts("v/mm/s"), ("v", Some("mm/s")));
+        assert_eq!(parts("Kraft in kN"), ("Kraft", Some("kN")));
+        assert_eq!(parts("Force, N"), ("Force", Some("N")));
+        assert_eq!(parts("Kanal 1 [counts]"), ("Kanal 1", Some("counts")));
+        for whole in
+            ["left/right", "a / b or c", "Pl", "", "[mm]", "a []", "in mm", "Signal in counts", "a, b", "mm"]
+        {
+            assert_eq!(parts(whole), (whole.trim(), None));
+        }
+    }
+}
