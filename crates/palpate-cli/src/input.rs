@@ -117,9 +117,14 @@ pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> 
 
 fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
-    recording.provenance.dialects.iter().for_each(|dialect| eprintln!("{}: {dialect}", dialect.source));
+    say_dialects(&recording);
     recording.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
     Ok(recording)
+}
+
+/// Says on stderr how the files of a recording write their tables, where that is not plainly.
+pub fn say_dialects(recording: &Recording) {
+    recording.provenance.dialects.iter().for_each(|dialect| eprintln!("{}: {dialect}", dialect.source));
 }
 
 /// A length in metres, from a command line argument.
@@ -173,12 +178,15 @@ fn locator_complaint(error: &LocatorFileError, path: &Path, text: &str) -> Compl
 }
 
 /// The complaint about a recording.
-pub fn csv_complaint(error: &CsvError) -> Failure {
+pub fn csv_complaint(error: &CsvError) -> Complaint {
     match &error.place {
         // The caret's heading says the place.
-        Some(place) => Complaint::new(&error.problem)
-            .at_line(&error.source_name, place.line, &place.text, place.span.clone())
-            .into(),
-        None => Complaint::new(error).into(),
+        Some(place) => Complaint::new(&error.problem).at_line(
+            &error.source_name,
+            place.line,
+            &place.text,
+            place.span.clone(),
+        ),
+        None => Complaint::new(error),
     }
 }

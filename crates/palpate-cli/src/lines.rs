@@ -97,7 +97,7 @@ impl Readings {
                     self.note.say(self.parser.dialect());
                     return Ok(Some(reading));
                 }
-                Err(error) if self.parser.awaits_columns() => return Err(input::csv_complaint(&error)),
+                Err(error) if self.parser.awaits_columns() => return Err(input::csv_complaint(&error).into()),
                 Err(error) => self.lose(&error),
             }
         }

@@ -31,6 +31,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Study(commands::study::Arguments),
+    Init(commands::init::Arguments),
     Simulate(commands::simulate::Arguments),
     Fit(commands::fit::Arguments),
     Evaluate(commands::evaluate::Arguments),
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
     progress::install_interrupt_handler();
     let result = match Arguments::parse().command {
         Command::Study(arguments) => commands::study::run(&arguments),
+        Command::Init(arguments) => commands::init::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
         Command::Fit(arguments) => commands::fit::run(&arguments),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments),

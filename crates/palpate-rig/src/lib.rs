@@ -48,6 +48,7 @@ mod design;
 mod document;
 mod error;
 mod estimator;
+mod first_rig;
 mod motion;
 mod recording;
 mod rig;
@@ -58,6 +59,7 @@ mod training;
 mod values;
 
 pub use error::{RigError, RigProblem};
+pub use first_rig::{FirstRig, FirstRigError, Hints};
 pub use rig::{Rig, RigSimulationError};
 pub use study::{Arm, AskedLayout, Judging, Study};
 

@@ -4,6 +4,7 @@ pub mod compare;
 pub mod design;
 pub mod evaluate;
 pub mod fit;
+pub mod init;
 pub mod inspect;
 pub mod limit;
 pub mod locate;

@@ -146,7 +146,7 @@ impl Stream<'_> {
                     note.say(parser.dialect());
                     self.follow(&reading, &mut out)?;
                 }
-                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error)),
+                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error).into()),
                 Err(error) => {
                     self.lost += 1;
                     eprintln!("palpate: skipped: {error}");

@@ -6,6 +6,7 @@ mod browser;
 mod compare;
 mod design;
 mod digit;
+mod init;
 mod limit;
 mod plane;
 mod positions;

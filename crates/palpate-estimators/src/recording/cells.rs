@@ -31,6 +31,11 @@ impl<'a> Cells<'a> {
         self.fields.len()
     }
 
+    /// What is in each field.
+    pub fn texts(&self) -> impl Iterator<Item = &str> {
+        self.fields.iter().map(|field| field.value.as_ref())
+    }
+
     /// Whether nothing is in any field.
     pub fn is_blank(&self) -> bool {
         self.fields.iter().all(|field| field.value.is_empty())

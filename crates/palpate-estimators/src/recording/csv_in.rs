@@ -5,7 +5,7 @@ use std::io::Read;
 use super::cells::{Cells, split};
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
-use super::dialect::{Dialect, Separator, windows_1252};
+use super::dialect::{Decimal, Dialect, Separator, windows_1252};
 use super::timestamp::Clock;
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
@@ -108,18 +108,23 @@ impl Schema<'_> {
 }
 
 /// A file in memory.
-struct File<'s> {
-    source: &'s str,
+pub(super) struct File<'s> {
+    pub source: &'s str,
     content: Vec<u8>,
     digest: String,
 }
 
 impl<'s> File<'s> {
-    fn read(source: &'s str, mut bytes: impl Read) -> Result<Self, CsvError> {
+    pub fn read(source: &'s str, mut bytes: impl Read) -> Result<Self, CsvError> {
         let mut content = Vec::new();
         bytes.read_to_end(&mut content).map_err(|error| CsvProblem::Unreadable(error).in_file(source))?;
         let digest = sha256_hex(&content);
         Ok(Self { source, content, digest })
+    }
+
+    /// Its lines, with their ends.
+    pub fn lines(&self) -> impl Iterator<Item = &[u8]> {
+        self.content.split_inclusive(|byte| *byte == b'\n')
     }
 
     /// Every row, read by `row`, after `find` has found the columns in the first line; and how the table is written.
@@ -129,8 +134,8 @@ impl<'s> File<'s> {
         find: impl Fn(&mut Cells) -> Result<C, CsvError>,
         mut row: impl FnMut(&mut Cells, &C) -> Result<T, CsvError>,
     ) -> Result<(Vec<T>, Dialect), CsvError> {
-        let (mut lines, mut rows) = (Lines::new(self.source, columns), Vec::new());
-        for line in self.content.split_inclusive(|byte| *byte == b'\n') {
+        let (mut lines, mut rows) = (Lines::new(self.source, columns.separator, columns.decimal), Vec::new());
+        for line in self.lines() {
             if let Some((mut cells, fields)) = lines.next(line, columns.header, &find)? {
                 rows.push(row(&mut cells, fields)?);
             }
@@ -219,7 +224,7 @@ impl TimeField {
 
 /// Lines of CSV as they come, and the fields that the first of them told.
 #[derive(Clone, Debug)]
-struct Lines<F> {
+pub(super) struct Lines<F> {
     /// What the lines have told of how they are written.
     dialect: Dialect,
     /// The separator, where the rig or a line before the header says it.
@@ -233,14 +238,15 @@ struct Lines<F> {
 }
 
 impl<F> Lines<F> {
-    fn new(source: &str, columns: &Columns) -> Self {
-        let dialect = Dialect::new(source, columns.decimal);
-        Self { dialect, separator: columns.separator, decoded: String::new(), count: 0, fields: None }
+    /// The lines of `source` from the first one, with the separator and the decimal mark that are said.
+    pub fn new(source: &str, separator: Option<Separator>, decimal: Option<Decimal>) -> Self {
+        let dialect = Dialect::new(source, decimal);
+        Self { dialect, separator, decoded: String::new(), count: 0, fields: None }
     }
 
     /// The cells of the next line and its fields, which `find` finds in the first one; `None` for the header, a blank line or a
     /// comment (`#`).
-    fn next<'a>(
+    pub fn next<'a>(
         &'a mut self,
         line: &'a [u8],
         header: Header,
@@ -248,12 +254,7 @@ impl<F> Lines<F> {
     ) -> Result<Option<(Cells<'a>, &'a F)>, CsvError> {
         self.count += 1;
         let Self { dialect, separator, decoded, count, fields } = self;
-        let text = text(line, *count, dialect, decoded)?;
-        // Some spreadsheets begin a file with a byte-order mark.
-        let text = if *count == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
-        if text.trim().is_empty() || text.starts_with('#') {
-            return Ok(None);
-        }
+        let Some(text) = written(line, *count, dialect, decoded)? else { return Ok(None) };
         if fields.is_none()
             && let Some(told) = Separator::told(text)
         {
@@ -280,6 +281,33 @@ impl<F> Lines<F> {
         }
         cells.check_width(*width)?;
         Ok(Some((cells, fields)))
+    }
+
+    /// The text of the next line, uncut; `None` where nothing is in it but separators, or a comment.
+    pub fn text<'a>(&'a mut self, line: &'a [u8]) -> Result<Option<&'a str>, CsvError> {
+        self.count += 1;
+        let text = written(line, self.count, &mut self.dialect, &mut self.decoded)?;
+        if let Some(told) = text.and_then(Separator::told) {
+            self.separator = Some(told);
+            return Ok(None);
+        }
+        let nothing = |c: char| c.is_whitespace() || matches!(c, '"' | ',' | ';');
+        Ok(text.filter(|text| !text.chars().all(nothing)))
+    }
+
+    /// Number of lines that have been read.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The separator that was said, or that a line before the header has told.
+    pub fn separator(&self) -> Option<Separator> {
+        self.separator
+    }
+
+    /// The fields that the first line has told.
+    pub fn fields(&self) -> Option<&F> {
+        self.fields.as_ref().map(|(fields, _)| fields)
     }
 }
 
@@ -344,7 +372,7 @@ pub struct ReadingParser {
 impl ReadingParser {
     /// A parser for the lines of `source`, from the first one; the position and force columns need not be there.
     pub fn new(source: &str, columns: &Columns) -> Self {
-        Self { lines: Lines::new(source, columns), columns: columns.clone() }
+        Self { lines: Lines::new(source, columns.separator, columns.decimal), columns: columns.clone() }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
@@ -449,7 +477,8 @@ struct TimedFields {
 impl<'a> TimedParser<'a> {
     /// A parser for the lines of `source`, from the first one.
     pub fn new(source: &str, schema: Schema<'a>) -> Self {
-        Self { lines: Lines::new(source, schema.columns), clock: Clock::default(), schema }
+        let Columns { separator, decimal, .. } = schema.columns;
+        Self { lines: Lines::new(source, *separator, *decimal), clock: Clock::default(), schema }
     }
 
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
@@ -516,13 +545,14 @@ impl TimedFields {
     }
 }
 
-/// A line of bytes as text, without the line's end; `decoded` holds it where it is not UTF-8.
-fn text<'a>(
+/// What is written in a line of bytes, without its end; `None` for a blank line or a comment. `decoded` holds the text where it is not
+/// UTF-8.
+fn written<'a>(
     bytes: &'a [u8],
     line: usize,
     dialect: &mut Dialect,
     decoded: &'a mut String,
-) -> Result<&'a str, CsvError> {
+) -> Result<Option<&'a str>, CsvError> {
     let text = match std::str::from_utf8(bytes).map_err(|error| (error, windows_1252(bytes))) {
         Ok(text) => text,
         Err((_, Some(text))) => {
@@ -531,13 +561,14 @@ fn text<'a>(
             decoded.as_str()
         }
         Err((error, None)) => {
-            let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]).into_owned();
-            let after = String::from_utf8_lossy(&bytes[error.valid_up_to()..]).into_owned();
+            let (good, bad) = bytes.split_at(error.valid_up_to());
+            let [before, after] = [good, bad].map(|part| String::from_utf8_lossy(part).into_owned());
             let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-            let text = (before + &after).trim_end_matches(['\r', '\n']).to_owned();
-            let mark = mark.start.min(text.len())..mark.end.min(text.len());
-            return Err(CsvProblem::NotText.in_line(&dialect.source, line, text, mark));
+            return Err(CsvProblem::NotText.in_line(&dialect.source, line, before + after.trim_end(), mark));
         }
     };
-    Ok(text.trim_end_matches(['\r', '\n']))
+    let text = text.trim_end_matches(['\r', '\n']);
+    // Some spreadsheets begin a file with a byte-order mark.
+    let text = if line == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
+    Ok(Some(text).filter(|text| !text.trim().is_empty() && !text.starts_with('#')))
 }

@@ -28,6 +28,15 @@ impl Separator {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
 
+    /// The word for it in rigs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Comma => "comma",
+            Self::Semicolon => "semicolon",
+            Self::Tab => "tab",
+        }
+    }
+
     /// The character.
     pub const fn byte(self) -> u8 {
         match self {
@@ -62,6 +71,19 @@ pub enum Decimal {
     Point,
     /// `1,5`
     Comma,
+}
+
+impl Decimal {
+    /// Both of them.
+    pub const ALL: [Self; 2] = [Self::Point, Self::Comma];
+
+    /// The word for it in rigs.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Comma => "comma",
+        }
+    }
 }
 
 impl fmt::Display for Decimal {

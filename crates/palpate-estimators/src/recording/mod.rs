@@ -7,6 +7,7 @@ mod csv_in;
 mod csv_out;
 mod dialect;
 mod heading;
+mod table;
 mod timestamp;
 mod warnings;
 
@@ -16,6 +17,7 @@ pub use csv_in::{ReadingParser, Schema, TimedParser, TimedReading, TimedRecordin
 pub use csv_out::{csv_row, write, write_timed};
 pub use dialect::{Decimal, Dialect, Separator};
 pub use heading::Heading;
+pub use table::{Content, Table, TableColumn};
 pub use warnings::Warning;
 
 use serde::{Deserialize, Serialize};

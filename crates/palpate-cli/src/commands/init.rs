@@ -1,0 +1,115 @@
+//! `palpate init`: a first rig for somebody's own recording.
+
+use crate::failure::{Complaint, Failure};
+use crate::{input, output};
+use palpate_estimators::recording::{Decimal, Separator};
+use palpate_rig::{FirstRig, FirstRigError, Hints, Rig};
+use std::path::PathBuf;
+
+/// Look at a recording and write a first rig for it, its guesses as comments.
+///
+/// A column is named by its heading, with or without the unit behind it, or by its number where the file has no header.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The recording: positions, channels, and forces where they were measured
+    recording: PathBuf,
+    /// The rig to write [default: print it]
+    #[arg(short, long, value_name = "RIG.toml")]
+    out: Option<PathBuf>,
+    /// Write over a rig that is there
+    #[arg(long, requires = "out")]
+    overwrite: bool,
+    /// Column of the position along a line
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y"])]
+    position: Option<String>,
+    /// Column of the position along a plane
+    #[arg(long, value_name = "NAME", requires = "y")]
+    x: Option<String>,
+    /// Column of the position across a plane
+    #[arg(long, value_name = "NAME", requires = "x")]
+    y: Option<String>,
+    /// Column of the force
+    #[arg(long, value_name = "NAME")]
+    force: Option<String>,
+    /// Column of the time
+    #[arg(long, value_name = "NAME")]
+    time: Option<String>,
+    /// Column of a coordinate that readings depend on and that is unknown in use
+    #[arg(long, value_name = "NAME")]
+    nuisance: Option<String>,
+    /// Column of a channel; may be repeated
+    #[arg(long, value_name = "NAME")]
+    channel: Vec<String>,
+    /// What stands between fields: comma, semicolon or tab [default: what the file tells]
+    #[arg(long, value_name = "WORD", value_parser = separator)]
+    separator: Option<Separator>,
+    /// What stands before decimals: point or comma [default: what the file tells]
+    #[arg(long, value_name = "WORD", value_parser = decimal)]
+    decimal: Option<Decimal>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(out) = &arguments.out {
+        output::check_writable(out)?;
+        if out.exists() && !arguments.overwrite {
+            let complaint = Complaint::new(format!("{} is there already", out.display()));
+            return Err(complaint.help("name another file, or write over it with --overwrite").into());
+        }
+    }
+    let name = arguments.recording.display().to_string();
+    let bytes = input::read_bytes(&arguments.recording)?;
+    let first =
+        FirstRig::guess(&name, &bytes, &arguments.hints()).map_err(|error| complaint(&error, &name))?;
+    let rig_name = arguments.out.as_ref().map_or("RIG.toml".to_owned(), |out| out.display().to_string());
+    let text = first.to_toml(&rig_name);
+    // Read as every later command will: what it has to say of file and channels is said now.
+    let rig = Rig::from_toml(&text).map_err(Complaint::new)?;
+    let recording = rig.setup.read_recording(&name, bytes.as_slice());
+    let recording = recording.map_err(|error| input::csv_complaint(&error))?;
+    input::say_dialects(&recording);
+    first.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
+    let Some(out) = &arguments.out else {
+        return output::print(&mut std::io::stdout().lock(), text.as_bytes());
+    };
+    output::write_file(out, text.as_bytes())?;
+    output::say(format!("{rig_name}: {}", first.summary()))?;
+    output::say("Check what is marked as a guess there; then:")?;
+    first.next_commands(&rig_name).iter().try_for_each(|command| output::say(format!("  {command}")))
+}
+
+impl Arguments {
+    fn hints(&self) -> Hints {
+        Hints {
+            position: self.position.clone(),
+            x: self.x.clone(),
+            y: self.y.clone(),
+            force: self.force.clone(),
+            time: self.time.clone(),
+            nuisance: self.nuisance.clone(),
+            channels: self.channel.clone(),
+            separator: self.separator,
+            decimal: self.decimal,
+        }
+    }
+}
+
+fn complaint(error: &FirstRigError, name: &str) -> Failure {
+    let complaint = match error {
+        FirstRigError::Csv(error) => input::csv_complaint(error),
+        _ => Complaint::new(format!("{name}: {error}")),
+    };
+    match error.help() {
+        Some(help) => complaint.help(help).into(),
+        None => complaint.into(),
+    }
+}
+
+fn separator(text: &str) -> Result<Separator, String> {
+    let found = Separator::ALL.into_iter().find(|separator| separator.name() == text);
+    found.ok_or_else(|| format!("`{text}` is none of comma, semicolon, tab"))
+}
+
+fn decimal(text: &str) -> Result<Decimal, String> {
+    let found = Decimal::ALL.into_iter().find(|decimal| decimal.name() == text);
+    found.ok_or_else(|| format!("`{text}` is none of point, comma"))
+}

@@ -1,0 +1,562 @@
+//! A first rig for somebody's own recording, its guesses as comments.
+
+mod roles;
+
+use std::fmt::Write;
+
+use palpate_estimators::recording::{
+    Content, CsvError, CsvProblem, Decimal, Header, Heading, Recording, Separator, Table, TableColumn,
+};
+use palpate_mechanics::units::{Dimension, Unit, format_length_mm};
+
+use crate::error::RigError;
+use crate::rig::Rig;
+use roles::{Left, PositionRole, Roles, range, suffixed};
+
+/// What is known of a recording beforehand: columns by their headings, with or without units, or by their numbers from 1 where there is
+/// no header.
+#[derive(Clone, Debug, Default)]
+pub struct Hints {
+    /// The position along a line.
+    pub position: Option<String>,
+    /// The position along a plane.
+    pub x: Option<String>,
+    /// The position across a plane.
+    pub y: Option<String>,
+    /// The force.
+    pub force: Option<String>,
+    /// The time.
+    pub time: Option<String>,
+    /// The nuisance coordinate.
+    pub nuisance: Option<String>,
+    /// The channels; those that are guessed where there are none.
+    pub channels: Vec<String>,
+    /// What stands between fields.
+    pub separator: Option<Separator>,
+    /// What stands before decimals.
+    pub decimal: Option<Decimal>,
+}
+
+/// A recording that no rig can be guessed for.
+#[derive(Debug, thiserror::Error)]
+pub enum FirstRigError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// No column has the name of a position.
+    #[error("no column has the name of a position; the columns are {columns}")]
+    NoPosition {
+        /// The columns and their contents.
+        columns: String,
+    },
+    /// Several columns have the name of a position.
+    #[error("more than one column may be the position: {candidates}")]
+    ManyPositions {
+        /// Their headings.
+        candidates: String,
+    },
+    /// No column is left for a channel.
+    #[error(
+        "no column is left that may be a channel: a channel has a number in every row, and not always the same; the columns are {columns}"
+    )]
+    NoChannels {
+        /// The columns and their contents.
+        columns: String,
+    },
+    /// A hint names a column that is not there, or not the only one.
+    #[error("{flag}: there is no one column `{name}`; the columns are {columns}")]
+    NoSuchColumn {
+        /// The flag of the hint.
+        flag: &'static str,
+        /// The name.
+        name: String,
+        /// The columns and their contents.
+        columns: String,
+    },
+    /// A hint names a column with words in it.
+    #[error("{flag}: column `{column}` has `{text}` on line {line}; every row must have a number")]
+    NotNumbers {
+        /// The flag of the hint.
+        flag: &'static str,
+        /// The heading.
+        column: String,
+        /// The first field that is no number.
+        text: String,
+        /// Its line.
+        line: usize,
+    },
+    /// A hint names a column without numbers.
+    #[error("{flag}: column `{column}` has no numbers")]
+    NoNumbers {
+        /// The flag of the hint.
+        flag: &'static str,
+        /// The heading.
+        column: String,
+    },
+    /// All presses are at one place.
+    #[error("column `{column}` is {value} in every row; a rig needs presses at 2 positions or more")]
+    OnePosition {
+        /// The heading of the position.
+        column: String,
+        /// Its value.
+        value: f64,
+    },
+    /// The heading of a column says a unit in which its role is not read.
+    #[error("column `{column}` is in `{unit}`; {} is one of {}", wanted.noun(), symbols(*wanted))]
+    ForeignUnit {
+        /// The heading.
+        column: String,
+        /// Its unit.
+        unit: String,
+        /// What the column should measure.
+        wanted: Dimension,
+    },
+    /// The rig that was guessed cannot be used.
+    #[error("the rig that was guessed from the file cannot be used: {0}")]
+    Refused(RigError),
+}
+
+fn symbols(dimension: Dimension) -> String {
+    dimension.units().map(|unit| unit.symbol()).collect::<Vec<_>>().join(", ")
+}
+
+impl FirstRigError {
+    /// The flags of `palpate init` that say what could not be guessed.
+    pub fn help(&self) -> Option<&'static str> {
+        match self {
+            Self::NoPosition { .. } | Self::ManyPositions { .. } => Some(
+                "name the columns: --position NAME, or --x NAME --y NAME on a plane; --force NAME, --time NAME and --channel NAME where they are \
+                 not guessed either",
+            ),
+            Self::NoChannels { .. } => Some("name the channels, each with --channel NAME"),
+            Self::ForeignUnit { .. } => Some("convert the column, or name another one"),
+            Self::Csv(CsvError { problem: CsvProblem::ManySeparators { .. }, .. }) => {
+                Some("--separator says which")
+            }
+            Self::Csv(CsvError { problem: CsvProblem::DoubtfulNumber { .. }, .. }) => {
+                Some("--decimal comma takes it for the second")
+            }
+            _ => None,
+        }
+    }
+}
+
+/// A rig that was guessed from a recording.
+///
+/// ```
+/// use palpate_rig::{FirstRig, Hints, Rig};
+///
+/// let presses = "Ort [mm];Kraft [N];S1;S2\n10,5;1;100;20\n60;2;120;250\n95;1;20;130\n";
+/// let first = FirstRig::guess("presses.csv", presses.as_bytes(), &Hints::default())?;
+/// let rig = Rig::from_toml(&first.to_toml("rig.toml"))?;
+/// assert_eq!(rig.setup.surface().extent().length_m(), 0.11);
+/// assert_eq!(rig.setup.read_recording("presses.csv", presses.as_bytes())?.rows[0].force_n, Some(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FirstRig {
+    source: String,
+    table: Table,
+    hints: Hints,
+    roles: Roles,
+    /// Start and end of the surface by coordinate, and those of the presses.
+    sides: Vec<Side>,
+    warnings: Vec<String>,
+}
+
+impl FirstRig {
+    /// The rig of a recording; `source` is the name of its file.
+    ///
+    /// # Errors
+    /// [`FirstRigError`] for a file that cannot be read, and for one of which the columns cannot be told.
+    pub fn guess(source: &str, bytes: &[u8], hints: &Hints) -> Result<Self, FirstRigError> {
+        let table = Table::read(source, bytes, hints.separator, hints.decimal)?;
+        let roles = Roles::guess(&table, hints)?;
+        let mut first = Self {
+            source: source.to_owned(),
+            hints: hints.clone(),
+            sides: Vec::new(),
+            warnings: Vec::new(),
+            table,
+            roles,
+        };
+        for column in first.roles.position.columns() {
+            first.sides.push(first.side(column)?);
+        }
+        let checked = [(first.roles.force, Dimension::Force), (first.roles.time, Dimension::Time)];
+        for (column, wanted) in checked.into_iter().filter_map(|(column, wanted)| Some((column?, wanted))) {
+            first.unit(column, wanted)?;
+        }
+        let rig = Rig::from_toml(&first.to_toml("rig.toml")).map_err(FirstRigError::Refused)?;
+        let recording = rig.setup.read_recording(source, bytes)?;
+        first.warnings = first.looked_at(&recording);
+        Ok(first)
+    }
+
+    /// What the bench's owner should look at.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// What was taken for what, in one line.
+    pub fn summary(&self) -> String {
+        let name = |column: usize| format!("`{}`", self.table.columns[column].heading);
+        let position: Vec<String> = self.roles.position.columns().into_iter().map(name).collect();
+        let mut words = vec![format!("position {}", position.join(" and "))];
+        words.extend(self.roles.force.map(|column| format!("force {}", name(column))));
+        words.extend(self.roles.time.map(|column| format!("time {}", name(column))));
+        words.extend(self.roles.nuisance.map(|column| format!("nuisance {}", name(column))));
+        let channels = &self.roles.channels;
+        let ends = match channels.as_slice() {
+            [only] => name(*only),
+            [first, second] => format!("{} and {}", name(*first), name(*second)),
+            [first, .., last] => format!("{} to {}", name(*first), name(*last)),
+            [] => String::new(),
+        };
+        words.push(format!(
+            "{} channel{} {ends}",
+            channels.len(),
+            if channels.len() == 1 { "" } else { "s" }
+        ));
+        words.join(", ")
+    }
+
+    /// The commands to type next, where the rig is in the file `rig`.
+    pub fn next_commands(&self, rig: &str) -> [String; 3] {
+        let [rig, data] = [rig, &self.source].map(shell_word);
+        [
+            format!("palpate fit {rig} --data {data} -o locator.json"),
+            format!("palpate evaluate {rig} --data {data}"),
+            "palpate locate locator.json READINGS.csv".to_owned(),
+        ]
+    }
+
+    /// The rig file; `name` is the name that it will have.
+    pub fn to_toml(&self, name: &str) -> String {
+        let mut toml = Toml::default();
+        let rows = self.table.rows;
+        toml.comment(&format!(
+            "A first rig for {}, guessed from its {rows} rows by palpate init.",
+            self.source
+        ));
+        toml.comment("Guesses are marked; correct them where they are wrong.");
+        self.warnings.iter().for_each(|warning| toml.comment(&format!("Warning: {warning}")));
+        self.write_surface(&mut toml);
+        toml.section("sensors");
+        toml.line("measure = \"raw\"", "whatever the channels read: counts, volts");
+        self.write_recording(&mut toml);
+        toml.section("estimator");
+        toml.line(
+            "kind = \"influence\"",
+            "or \"auto\": whichever estimator locates best at positions held out",
+        );
+        toml.text.push('\n');
+        toml.comment("Next:");
+        self.next_commands(name).iter().for_each(|command| toml.comment(&format!("  {command}")));
+        toml.text
+    }
+
+    fn write_surface(&self, toml: &mut Toml) {
+        toml.section("surface");
+        toml.line("kind = \"measured\"", "no model: all is learnt from the presses");
+        for (key, side) in ["length", "width"].into_iter().zip(&self.sides) {
+            let guess = format!(
+                "a guess: presses lie between {} and {}; write the real {key}",
+                format_length_mm(side.pressed_m.0),
+                format_length_mm(side.pressed_m.1)
+            );
+            toml.line(&format!("{key} = \"{}\"", side.size), &guess);
+        }
+        if self.roles.force.is_none() {
+            toml.text.push('\n');
+            toml.comment("[contact]");
+            toml.comment(
+                "force = \"3 N\"                   # where every contact, also in use, has one known force",
+            );
+        }
+    }
+
+    fn write_recording(&self, toml: &mut Toml) {
+        let roles = &self.roles;
+        toml.section("recording");
+        if self.table.header == Header::Absent {
+            toml.line("header = false", "columns by their numbers");
+        }
+        if let Some(separator) = self.hints.separator {
+            toml.line(&format!("separator = \"{}\"", separator.name()), "as was said");
+        }
+        if let Some(decimal) = self.hints.decimal {
+            toml.line(&format!("decimal = \"{}\"", decimal.name()), "as was said");
+        }
+        let keys: &[&str] = match roles.position {
+            PositionRole::Along(_) => &["position"],
+            PositionRole::Plane(..) => &["x", "y"],
+        };
+        for (key, column) in keys.iter().zip(roles.position.columns()) {
+            self.write_column(toml, key, column);
+        }
+        self.write_unit(toml, "position_unit", roles.position.columns()[0], Dimension::Length);
+        if self.sides.iter().any(|side| side.origin != "0 mm") {
+            let origins: Vec<String> = self.sides.iter().map(|side| quoted(&side.origin)).collect();
+            let place = if origins.len() == 1 { "left end" } else { "lower left corner" };
+            let comment = format!("a guess: the file's coordinates of the surface's {place}");
+            toml.line(&format!("origin = [{}]", origins.join(", ")), &comment);
+        }
+        if let Some(force) = roles.force {
+            self.write_column(toml, "force", force);
+            self.write_unit(toml, "force_unit", force, Dimension::Force);
+        }
+        if let Some(time) = roles.time {
+            self.write_column(toml, "time", time);
+            if let Content::Numbers(_) = self.table.columns[time].content {
+                self.write_unit(toml, "time_unit", time, Dimension::Time);
+            }
+        }
+        if let Some(nuisance) = roles.nuisance {
+            self.write_column(toml, "nuisance", nuisance);
+            if let Some(unit) = own_unit(&self.table.columns[nuisance]) {
+                toml.line(&format!("nuisance_unit = \"{unit}\""), "");
+            }
+        }
+        let channels: Vec<String> = roles.channels.iter().map(|column| self.key(*column)).collect();
+        toml.line(&format!("channels = [{}]", channels.join(", ")), "");
+        for (column, left) in &roles.left {
+            toml.comment(&format!("Left alone: {}", self.left_in_words(*column, left)));
+        }
+    }
+
+    fn write_column(&self, toml: &mut Toml, key: &str, column: usize) {
+        let heading = &self.table.columns[column].heading;
+        let name = self.key(column);
+        let comment = if name == quoted(heading) { String::new() } else { format!("`{heading}`") };
+        let comment = if self.table.header == Header::Absent { String::new() } else { comment };
+        toml.line(&format!("{key} = {name}"), &comment);
+    }
+
+    fn write_unit(&self, toml: &mut Toml, key: &str, column: usize, wanted: Dimension) {
+        let unit = own_unit(&self.table.columns[column]);
+        let comment = if unit.is_some() { "" } else { "a guess: the header does not say" };
+        let unit = unit.unwrap_or_else(|| usual_unit(wanted));
+        toml.line(&format!("{key} = \"{unit}\""), comment);
+    }
+
+    /// The column as a rig names it: without its unit where that is clear, by its number where there is no header.
+    fn key(&self, column: usize) -> String {
+        let heading = &self.table.columns[column].heading;
+        if self.table.header == Header::Absent {
+            return heading.clone();
+        }
+        let name = Heading::parse(heading).name;
+        let same =
+            |other: &&TableColumn| other.heading == name || Heading::parse(&other.heading).name == name;
+        let clear = self.table.columns.iter().filter(same).count() == 1;
+        quoted(if clear { name } else { heading })
+    }
+
+    fn left_in_words(&self, column: usize, left: &Left) -> String {
+        let heading = &self.table.columns[column].heading;
+        let reason = match left {
+            Left::Empty => "there is nothing in it".to_owned(),
+            Left::Words => "there are words in it".to_owned(),
+            Left::Word { line, text } => format!("`{text}` on line {line} is no number"),
+            Left::Unnamed => "it has no name of its own".to_owned(),
+            Left::Constant(value) => format!("it is {value} in every row"),
+            Left::Dead(value) => format!("it is {value} in every row, which teaches a channel nothing"),
+            Left::Counter => "it numbers the rows".to_owned(),
+            Left::Circumstance => {
+                let unit = own_unit(&self.table.columns[column]);
+                let unit = unit.map_or(String::new(), |unit| format!(" and nuisance_unit = \"{unit}\""));
+                format!(
+                    "if readings depend on it and it is unknown in use, say nuisance = {}{unit}",
+                    self.key(column)
+                )
+            }
+            Left::Single => {
+                "if it is a channel, add it to them; if readings depend on it, say it as `nuisance`"
+                    .to_owned()
+            }
+            Left::Second => "another column has the role that its name says".to_owned(),
+            Left::Unit(unit) => format!("palpate does not read it in `{unit}`; convert it"),
+        };
+        format!("`{heading}`: {reason}.")
+    }
+
+    /// The unit of a column, refused where it is another quantity's.
+    fn unit(&self, column: usize, wanted: Dimension) -> Result<Unit, FirstRigError> {
+        let TableColumn { heading, .. } = &self.table.columns[column];
+        let foreign = |unit: &str| FirstRigError::ForeignUnit {
+            column: heading.clone(),
+            unit: unit.to_owned(),
+            wanted,
+        };
+        match (own_unit(&self.table.columns[column]), Heading::parse(heading).unit) {
+            (Some(unit), _) if unit.dimension() == wanted => Ok(unit),
+            (Some(unit), _) => Err(foreign(unit.symbol())),
+            (None, Some(unit)) if heading.ends_with(']') && wanted != Dimension::Time => Err(foreign(unit)),
+            (None, _) => Ok(usual_unit(wanted)),
+        }
+    }
+
+    /// The stretch of a coordinate that the presses cover, and a surface's that holds it.
+    fn side(&self, column: usize) -> Result<Side, FirstRigError> {
+        let unit = self.unit(column, Dimension::Length)?;
+        let TableColumn { heading, content } = &self.table.columns[column];
+        let Content::Numbers(numbers) = content else {
+            return Err(FirstRigError::NoNumbers { flag: "--position", column: heading.clone() });
+        };
+        let (low, high) = range(numbers);
+        if low == high {
+            return Err(FirstRigError::OnePosition { column: heading.clone(), value: low });
+        }
+        let metres = |value: f64| unit.parse_si(&value.to_string()).unwrap_or(value);
+        Ok(Side::around(metres(low), metres(high)))
+    }
+
+    fn looked_at(&self, recording: &Recording) -> Vec<String> {
+        let left = |(column, left): &(usize, Left)| {
+            let heading = &self.table.columns[*column].heading;
+            match left {
+                Left::Dead(value) => Some(format!(
+                    "column `{heading}` is {value} in every row and was left out: is it a channel, and is it connected?"
+                )),
+                Left::Word { line, text } => {
+                    Some(format!("column `{heading}` was left out: `{text}` on line {line} is no number"))
+                }
+                Left::Unit(unit) => Some(format!(
+                    "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"
+                )),
+                _ => None,
+            }
+        };
+        let mut warnings: Vec<String> = self.roles.left.iter().filter_map(left).collect();
+        warnings.extend(recording.warnings().iter().map(ToString::to_string));
+        let positions = recording.distinct_positions().len();
+        let enough = if self.sides.len() == 1 { 5 } else { 9 };
+        if positions < enough {
+            warnings.push(format!(
+                "there are presses at {positions} positions only; between them an estimator can but guess: press at {enough} or more"
+            ));
+        }
+        if recording.rows.iter().all(|row| !row.touches()) {
+            warnings.push("the force is 0 in every row: nothing touched".to_owned());
+        }
+        warnings
+    }
+}
+
+/// The unit that a heading says.
+fn own_unit(column: &TableColumn) -> Option<Unit> {
+    let heading = Heading::parse(&column.heading);
+    let suffix = || suffixed(heading.name).filter(|_| heading.unit.is_none()).map(|(_, unit)| unit);
+    heading.known_unit().or_else(suffix)
+}
+
+/// The unit that numbers of a dimension are in where nothing is said.
+fn usual_unit(dimension: Dimension) -> Unit {
+    let symbol = match dimension {
+        Dimension::Length => "mm",
+        Dimension::Force => "N",
+        _ => "s",
+    };
+    Unit::from_symbol(symbol).unwrap_or(Unit::NONE)
+}
+
+/// One coordinate of a surface around its presses.
+#[derive(Clone, Debug, PartialEq)]
+struct Side {
+    /// The file's coordinate of the surface's start, as a rig says it.
+    origin: String,
+    /// The surface's length or width, as a rig says it.
+    size: String,
+    /// The first and the last press.
+    pressed_m: (f64, f64),
+}
+
+impl Side {
+    /// A surface that begins at 0 where presses lie on the one side of it not far away, and ends as far beyond the last of them as the
+    /// first is from its start, at the next round number.
+    fn around(low_m: f64, high_m: f64) -> Self {
+        let span_m = high_m - low_m;
+        let (digit, exponent) = round_step(span_m / 20.0);
+        let step_m = decimal(digit, exponent);
+        let first = if low_m < 0.0 || low_m > span_m { (low_m / step_m + 1e-9).floor() } else { 0.0 };
+        let margin_m = low_m - first * step_m;
+        let last = ((high_m + margin_m) / step_m - 1e-9).ceil().max(first + 1.0);
+        let said = |steps: f64| {
+            let millimetre = usual_unit(Dimension::Length);
+            format!(
+                "{} {millimetre}",
+                millimetre.format_si(decimal(digit.saturating_mul(steps as i64), exponent))
+            )
+        };
+        Self { origin: said(first), size: said(last - first), pressed_m: (low_m, high_m) }
+    }
+}
+
+/// 1, 2 or 5 and a power of ten: the least such number that is no smaller than `value`.
+fn round_step(value: f64) -> (i64, i32) {
+    let exponent = value.log10().floor();
+    let mantissa = value / 10f64.powf(exponent);
+    let digit = [1, 2, 5].into_iter().find(|digit| mantissa <= *digit as f64 * (1.0 + 1e-9));
+    digit.map_or((1, exponent as i32 + 1), |digit| (digit, exponent as i32))
+}
+
+/// `digits` · 10^`exponent`, rounded once.
+fn decimal(digits: i64, exponent: i32) -> f64 {
+    format!("{digits}e{exponent}").parse().unwrap_or(f64::NAN)
+}
+
+/// The text of a rig, with comments in a column.
+#[derive(Default)]
+struct Toml {
+    text: String,
+}
+
+impl Toml {
+    fn section(&mut self, name: &str) {
+        let _ = write!(self.text, "\n[{name}]\n");
+    }
+
+    fn line(&mut self, code: &str, comment: &str) {
+        self.text += code;
+        if !comment.is_empty() {
+            let gap = 34usize.saturating_sub(code.chars().count()).max(2);
+            let _ = write!(self.text, "{}# {}", " ".repeat(gap), printable(comment));
+        }
+        self.text.push('\n');
+    }
+
+    fn comment(&mut self, text: &str) {
+        let _ = writeln!(self.text, "# {}", printable(text));
+    }
+}
+
+/// A text without the characters that a comment cannot hold.
+fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+}
+
+/// A text as TOML writes it.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04X}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// A file's name as a shell takes it.
+fn shell_word(name: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "._-/\\:".contains(c);
+    if !name.is_empty() && name.chars().all(plain) { name.to_owned() } else { format!("\"{name}\"") }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,525 @@
+//! Guesses which column of a table is what, by names in English and German, by units, and by what is in the columns.
+
+use palpate_estimators::recording::{Content, Header, Heading, Table};
+use palpate_mechanics::units::{Dimension, Unit};
+
+use super::{FirstRigError, Hints};
+
+/// Names of a position along a surface.
+const PLACE: &[&str] = &[
+    "position",
+    "pos",
+    "ort",
+    "stelle",
+    "lage",
+    "place",
+    "location",
+    "coordinate",
+    "coord",
+    "koordinate",
+    "messort",
+    "druckort",
+    "kontaktort",
+    "messstelle",
+    "druckstelle",
+    "kontaktposition",
+];
+/// Names that may be those of a position where there is no better one.
+const DISTANCE: &[&str] = &["distance", "abstand", "weg", "strecke"];
+const FORCE: &[&str] = &[
+    "force",
+    "kraft",
+    "f",
+    "fz",
+    "fn",
+    "load",
+    "last",
+    "belastung",
+    "normalkraft",
+    "druckkraft",
+    "presskraft",
+    "anpresskraft",
+];
+const TIME: &[&str] = &[
+    "time",
+    "zeit",
+    "t",
+    "timestamp",
+    "zeitstempel",
+    "datetime",
+    "date",
+    "datum",
+    "uhrzeit",
+    "messzeit",
+    "zeitpunkt",
+    "elapsed",
+    "seconds",
+    "sekunden",
+];
+/// Words that may stand beside one of the others and say nothing of their own.
+const FILLERS: &[&str] = &[
+    "true", "actual", "measured", "ist", "soll", "contact", "kontakt", "press", "applied", "normal", "axis",
+    "achse", "achsen", "richtung", "der", "des", "of", "the", "und", "and", "in", "am", "z",
+];
+/// Names of columns that number rows.
+const COUNTERS: &[&str] = &[
+    "nr",
+    "no",
+    "num",
+    "number",
+    "nummer",
+    "index",
+    "idx",
+    "id",
+    "i",
+    "n",
+    "row",
+    "zeile",
+    "sample",
+    "messung",
+    "measurement",
+    "press",
+    "versuch",
+    "trial",
+    "run",
+    "lauf",
+    "repeat",
+    "repetition",
+    "wiederholung",
+    "wdh",
+    "rep",
+    "cycle",
+    "zyklus",
+    "sweep",
+    "count",
+    "punkt",
+    "point",
+    "frame",
+    "step",
+    "schritt",
+];
+/// Names of what else may be known of a press.
+const CIRCUMSTANCES: &[&str] = &[
+    "depth",
+    "tiefe",
+    "eindrucktiefe",
+    "eindringtiefe",
+    "indentation",
+    "angle",
+    "winkel",
+    "speed",
+    "geschwindigkeit",
+    "velocity",
+    "temperature",
+    "temperatur",
+    "temp",
+    "humidity",
+    "feuchte",
+    "luftfeuchte",
+    "luftfeuchtigkeit",
+    "z",
+    "radius",
+    "diameter",
+    "durchmesser",
+    "height",
+    "hoehe",
+    "höhe",
+];
+
+/// Roles of the columns of a table, by their indices.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Roles {
+    pub position: PositionRole,
+    pub force: Option<usize>,
+    pub time: Option<usize>,
+    pub nuisance: Option<usize>,
+    pub channels: Vec<usize>,
+    /// The columns without a role, and why they have none.
+    pub left: Vec<(usize, Left)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PositionRole {
+    Along(usize),
+    Plane(usize, usize),
+}
+
+/// The reason that a column has no role.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Left {
+    Empty,
+    /// No field is a number.
+    Words,
+    /// A field is no number.
+    Word {
+        line: usize,
+        text: String,
+    },
+    /// The name is that of another column, or there is none.
+    Unnamed,
+    /// A circumstance that is always the same.
+    Constant(f64),
+    /// What may be a channel, always the same.
+    Dead(f64),
+    Counter,
+    /// Something else about the press.
+    Circumstance,
+    /// Not one of a numbered row of channels.
+    Single,
+    /// Another column has the role that its name suggests.
+    Second,
+    /// Of a unit in which the role that its name suggests is not read.
+    Unit(String),
+}
+
+impl PositionRole {
+    /// One column or two.
+    pub fn columns(self) -> Vec<usize> {
+        match self {
+            Self::Along(x) => vec![x],
+            Self::Plane(x, y) => vec![x, y],
+        }
+    }
+}
+
+impl Roles {
+    /// The roles that are said, and the most likely others.
+    ///
+    /// # Errors
+    /// [`FirstRigError`] where no column, or more than one, may be the position, or none a channel, or where a hint names none.
+    pub fn guess(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
+        let names: Vec<Name> = (0..table.columns.len()).map(|i| Name::new(table, i)).collect();
+        let guess = Guess { table, names: &names };
+        let told = Told::find(table, hints)?;
+        let position = match told.position {
+            Some(position) => position,
+            None => guess.position(&told)?,
+        };
+        let mut taken = position.columns();
+        taken.extend(told.force.iter().chain(&told.time).chain(&told.nuisance).chain(&told.channels));
+        let force = told.force.or_else(|| guess.force(&taken));
+        taken.extend(force);
+        let time = told.time.or_else(|| guess.time(&taken));
+        taken.extend(time);
+        let channels = if told.channels.is_empty() { guess.channels(&taken) } else { told.channels };
+        if channels.is_empty() {
+            return Err(FirstRigError::NoChannels { columns: described(table) });
+        }
+        let roles = position.columns().into_iter().chain(force).chain(time).chain(told.nuisance);
+        let roles: Vec<usize> = roles.chain(channels.iter().copied()).collect();
+        // Separators at the ends of lines make columns that are no columns.
+        let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
+        let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
+        let left = left.map(|i| (i, guess.reason(i, force.is_some()))).collect();
+        Ok(Self { position, force, time, nuisance: told.nuisance, channels, left })
+    }
+}
+
+/// The columns of the hints.
+struct Told {
+    position: Option<PositionRole>,
+    force: Option<usize>,
+    time: Option<usize>,
+    nuisance: Option<usize>,
+    channels: Vec<usize>,
+}
+
+impl Told {
+    fn find(table: &Table, hints: &Hints) -> Result<Self, FirstRigError> {
+        let find = |flag: &'static str, name: &Option<String>| {
+            name.as_ref().map(|name| find(table, flag, name)).transpose()
+        };
+        let numbers = |flag: &'static str, name: &Option<String>| {
+            let found = find(flag, name)?;
+            found.map(|i| checked(table, flag, i)).transpose()
+        };
+        let along = numbers("--position", &hints.position)?;
+        let position = match (along, numbers("--x", &hints.x)?, numbers("--y", &hints.y)?) {
+            (Some(x), _, _) => Some(PositionRole::Along(x)),
+            (None, Some(x), Some(y)) => Some(PositionRole::Plane(x, y)),
+            (None, Some(x), None) | (None, None, Some(x)) => Some(PositionRole::Along(x)),
+            (None, None, None) => None,
+        };
+        let channels = hints.channels.iter();
+        let channels =
+            channels.map(|name| checked(table, "--channel", self::find(table, "--channel", name)?));
+        Ok(Self {
+            position,
+            force: numbers("--force", &hints.force)?,
+            time: find("--time", &hints.time)?,
+            nuisance: numbers("--nuisance", &hints.nuisance)?,
+            channels: channels.collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+/// The column of this heading, or of this name but for the unit.
+fn find(table: &Table, flag: &'static str, name: &str) -> Result<usize, FirstRigError> {
+    let name = name.trim();
+    let exact = |heading: &str| heading == name;
+    let without_unit = |heading: &str| Heading::parse(heading).name == name;
+    let all = |fits: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        (0..table.columns.len()).filter(|i| fits(&table.columns[*i].heading)).collect()
+    };
+    match (all(&exact).as_slice(), all(&without_unit).as_slice()) {
+        ([only], _) | ([], [only]) => Ok(*only),
+        _ => Err(FirstRigError::NoSuchColumn { flag, name: name.to_owned(), columns: described(table) }),
+    }
+}
+
+fn checked(table: &Table, flag: &'static str, column: usize) -> Result<usize, FirstRigError> {
+    let heading = || table.columns[column].heading.clone();
+    match &table.columns[column].content {
+        Content::Numbers(_) => Ok(column),
+        Content::Other { line, text, .. } => {
+            Err(FirstRigError::NotNumbers { flag, column: heading(), text: text.clone(), line: *line })
+        }
+        Content::Empty | Content::Times => Err(FirstRigError::NoNumbers { flag, column: heading() }),
+    }
+}
+
+/// Every column with what is in it, in words.
+pub(super) fn described(table: &Table) -> String {
+    let words = table.columns.iter().map(|column| {
+        let content = match &column.content {
+            Content::Empty => "empty".to_owned(),
+            Content::Times => "timestamps".to_owned(),
+            Content::Numbers(numbers) => {
+                let (low, high) = range(numbers);
+                format!("{low} to {high}")
+            }
+            Content::Other { numbers: 0, .. } => "words".to_owned(),
+            Content::Other { line, text, .. } => format!("numbers, but `{text}` on line {line}"),
+        };
+        format!("`{}` ({content})", column.heading)
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// The least and the greatest of some numbers.
+pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
+    let low = numbers.iter().copied().fold(f64::INFINITY, f64::min);
+    (low, numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// A heading taken apart.
+struct Name {
+    /// Its words in small letters, the unit left out.
+    words: Vec<String>,
+    /// What is left of it without the number at its end, and whether there is one.
+    stem: (String, bool),
+    unit: Option<Unit>,
+    /// What stands in the place of the unit and is none.
+    foreign_unit: Option<String>,
+    /// Whether a rig can name the column.
+    can_be_named: bool,
+}
+
+impl Name {
+    fn new(table: &Table, index: usize) -> Self {
+        let text = &table.columns[index].heading;
+        let heading = Heading::parse(text);
+        // As in `position_mm`.
+        let (name, unit) = match suffixed(heading.name).filter(|_| heading.unit.is_none()) {
+            Some((name, unit)) => (name, Some(unit)),
+            None => (heading.name, heading.known_unit()),
+        };
+        let foreign_unit = heading.unit.filter(|_| unit.is_none()).map(str::to_owned);
+        let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let same = table.columns.iter().filter(|column| column.heading == *text).count();
+        Self {
+            words: words.map(str::to_lowercase).collect(),
+            stem: (stem.trim().to_lowercase(), stem.len() < name.len()),
+            unit,
+            foreign_unit,
+            can_be_named: table.header == Header::Absent || (same == 1 && !text.is_empty()),
+        }
+    }
+
+    /// Whether some word is one of these, and all others are fillers.
+    fn is(&self, names: &[&str], beside: &[&[&str]]) -> bool {
+        let among = |word: &String, lists: &[&[&str]]| lists.iter().any(|list| list.contains(&word.as_str()));
+        let others = |word: &String| among(word, &[names, FILLERS]) || among(word, beside);
+        self.words.iter().any(|word| names.contains(&word.as_str())) && self.words.iter().all(others)
+    }
+
+    /// Whether its values can be read as ones of this dimension.
+    fn measures(&self, dimension: Dimension) -> bool {
+        match (&self.unit, &self.foreign_unit) {
+            (Some(unit), _) => unit.dimension() == dimension,
+            (None, foreign) => foreign.is_none(),
+        }
+    }
+}
+
+struct Guess<'a> {
+    table: &'a Table,
+    names: &'a [Name],
+}
+
+impl Guess<'_> {
+    /// The columns of numbers, or of timestamps, that `fit`.
+    fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
+        let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].can_be_named);
+        free.filter(|i| fit(&self.names[*i])).collect()
+    }
+
+    fn numbers(&self, column: usize) -> Option<&[f64]> {
+        match &self.table.columns[column].content {
+            Content::Numbers(numbers) => Some(numbers),
+            _ => None,
+        }
+    }
+
+    fn varies(&self, column: usize) -> bool {
+        self.numbers(column).map(range).is_some_and(|(low, high)| low < high)
+    }
+
+    fn position(&self, told: &Told) -> Result<PositionRole, FirstRigError> {
+        let taken: Vec<usize> = [told.force, told.time, told.nuisance].into_iter().flatten().collect();
+        let taken = [taken.as_slice(), told.channels.as_slice()].concat();
+        let of = |fit: &dyn Fn(&Name) -> bool| {
+            let length = |name: &Name| fit(name) && name.measures(Dimension::Length);
+            let mut columns = self.columns(&taken, length);
+            columns.retain(|i| self.varies(*i));
+            columns
+        };
+        let x = of(&|name| name.is(&["x"], &[PLACE]));
+        let y = of(&|name| name.is(&["y"], &[PLACE]));
+        let in_lengths = |name: &Name| name.unit.is_some() && !self.in_family(name);
+        let circumstance = |name: &Name| name.is(CIRCUMSTANCES, &[]) || name.is(COUNTERS, &[]);
+        let ranks = [
+            of(&|name| name.is(PLACE, &[])),
+            [x.as_slice(), y.as_slice()].concat(),
+            of(&|name| name.is(DISTANCE, &[PLACE])),
+            of(&|name| in_lengths(name) && !circumstance(name)),
+        ];
+        match ranks.iter().find(|columns| !columns.is_empty()).map(Vec::as_slice) {
+            Some([only]) => Ok(PositionRole::Along(*only)),
+            Some(_) if ranks[0].is_empty() && x.len() == 1 && y.len() == 1 => {
+                Ok(PositionRole::Plane(x[0], y[0]))
+            }
+            Some(many) => {
+                let names: Vec<String> =
+                    many.iter().map(|i| format!("`{}`", self.table.columns[*i].heading)).collect();
+                Err(FirstRigError::ManyPositions { candidates: names.join(", ") })
+            }
+            None => Err(self.no_position(&taken)),
+        }
+    }
+
+    /// The reason that no column is the position: that whose name is one's is in a unit that is no length's.
+    fn no_position(&self, taken: &[usize]) -> FirstRigError {
+        let place = |name: &Name| {
+            let named = name.is(PLACE, &[]) || name.is(&["x", "y"], &[PLACE]);
+            named && name.foreign_unit.is_some()
+        };
+        match self.columns(taken, place).first() {
+            Some(column) => FirstRigError::ForeignUnit {
+                column: self.table.columns[*column].heading.clone(),
+                unit: self.names[*column].foreign_unit.clone().unwrap_or_default(),
+                wanted: Dimension::Length,
+            },
+            None => FirstRigError::NoPosition { columns: described(self.table) },
+        }
+    }
+
+    fn force(&self, taken: &[usize]) -> Option<usize> {
+        let named = self.columns(taken, |name| name.is(FORCE, &[]) && name.measures(Dimension::Force));
+        let by_unit = || {
+            let newtons = |name: &Name| name.unit.is_some_and(|unit| unit.dimension() == Dimension::Force);
+            self.columns(taken, |name| newtons(name) && !self.in_family(name))
+        };
+        let columns = if named.is_empty() { by_unit() } else { named };
+        let columns: Vec<usize> = columns.into_iter().filter(|i| self.numbers(*i).is_some()).collect();
+        match columns.as_slice() {
+            [only] => Some(*only),
+            _ => None,
+        }
+    }
+
+    fn time(&self, taken: &[usize]) -> Option<usize> {
+        let stamps = self.columns(taken, |_| true);
+        let stamps = stamps.into_iter().find(|i| self.table.columns[*i].content == Content::Times);
+        let named = || self.columns(taken, |name| name.is(TIME, &[]) && name.measures(Dimension::Time));
+        stamps.or_else(|| named().into_iter().find(|i| self.numbers(*i).is_some()))
+    }
+
+    /// The columns of numbers that vary and have no other name: where some are numbered alike, those.
+    fn channels(&self, taken: &[usize]) -> Vec<usize> {
+        let mut columns = self.columns(taken, |name| !is_no_channel(name));
+        columns.retain(|i| self.varies(*i) && !self.counts(*i));
+        let families: Vec<usize> =
+            columns.iter().copied().filter(|i| self.in_family(&self.names[*i])).collect();
+        if families.is_empty() {
+            // A length, a force or a time beside raw channels is something else.
+            columns.retain(|i| self.names[*i].unit.is_none() || columns_agree(self.names, *i));
+            return columns;
+        }
+        families
+    }
+
+    /// Whether the column has consecutive whole numbers, and enough of them that a channel would not.
+    fn counts(&self, column: usize) -> bool {
+        self.numbers(column).is_some_and(|numbers| {
+            numbers.len() >= 10
+                && numbers[0].fract() == 0.0
+                && numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+        })
+    }
+
+    /// Whether another column has the same name but for the number at its end.
+    fn in_family(&self, name: &Name) -> bool {
+        name.stem.1 && self.names.iter().filter(|other| other.stem == name.stem).count() > 1
+    }
+
+    /// Why a column has no role.
+    fn reason(&self, column: usize, has_force: bool) -> Left {
+        let name = &self.names[column];
+        let foreign = |name: &Name| {
+            let symbol = name.unit.map(|unit| unit.symbol().to_owned());
+            Left::Unit(name.foreign_unit.clone().or(symbol).unwrap_or_default())
+        };
+        match &self.table.columns[column].content {
+            Content::Empty => Left::Empty,
+            Content::Other { numbers: 0, .. } => Left::Words,
+            Content::Other { line, text, .. } => Left::Word { line: *line, text: text.clone() },
+            _ if !name.can_be_named => Left::Unnamed,
+            Content::Times => Left::Second,
+            Content::Numbers(numbers) if range(numbers).0 == range(numbers).1 => {
+                let other = is_no_channel(name);
+                if other { Left::Constant(numbers[0]) } else { Left::Dead(numbers[0]) }
+            }
+            Content::Numbers(_) if name.is(FORCE, &[]) && !has_force && !name.measures(Dimension::Force) => {
+                foreign(name)
+            }
+            Content::Numbers(_) if name.is(TIME, &[]) && !name.measures(Dimension::Time) => foreign(name),
+            Content::Numbers(_) if name.is(COUNTERS, &[]) || self.counts(column) => Left::Counter,
+            Content::Numbers(_) if name.is(CIRCUMSTANCES, &[]) => Left::Circumstance,
+            Content::Numbers(_) if [PLACE, FORCE, TIME].iter().any(|names| name.is(names, &[])) => {
+                Left::Second
+            }
+            Content::Numbers(_) => Left::Single,
+        }
+    }
+}
+
+/// The parts of a name with a unit behind it, as palpate itself writes them: `position_mm`, `force_n`.
+pub(super) fn suffixed(name: &str) -> Option<(&str, Unit)> {
+    let (name, unit) = name.rsplit_once('_').filter(|(name, _)| !name.is_empty())?;
+    let unit = Unit::from_symbol(if unit == "n" { "N" } else { unit })?;
+    (unit != Unit::NONE).then_some((name, unit))
+}
+
+/// Whether the name is that of something else than a channel.
+fn is_no_channel(name: &Name) -> bool {
+    let others = [COUNTERS, CIRCUMSTANCES, TIME, PLACE, FORCE].iter().any(|names| name.is(names, &[]));
+    others || name.is(&["x", "y"], &[PLACE])
+}
+
+/// Whether another column is in the unit of this one, as sensors of one kind are.
+fn columns_agree(names: &[Name], column: usize) -> bool {
+    let same = |other: &&Name| other.unit == names[column].unit;
+    names.iter().filter(same).count() > 1
+}
