@@ -1,9 +1,10 @@
-//! The project's chores: `cargo xtask test | tidy | bench | fuzz`.
+//! The project's chores: `cargo xtask test | tidy | rig-keys | bench | fuzz`.
 #![forbid(unsafe_code)]
 
 mod counts;
 mod fuzz;
 mod needs;
+mod rig_keys;
 mod run;
 mod skipped;
 mod test;
@@ -31,6 +32,8 @@ enum Chore {
         #[arg(long)]
         strict: bool,
     },
+    /// Write docs/rig-keys.md from the types that rig and study files are read into
+    RigKeys,
     /// Check the rules that a program can check: dependencies, import circles, links
     Tidy,
     /// Run the benchmarks of the whole workspace
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         Chore::Test { strict } => {
             test::run(&root, if strict { test::Skips::Fail } else { test::Skips::Pass })
         }
+        Chore::RigKeys => rig_keys::run(&root),
         Chore::Tidy => tidy::run(&root),
         Chore::Bench { for_cargo, for_benches } => {
             let mut bench = Command::new("cargo");

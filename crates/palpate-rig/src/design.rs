@@ -34,11 +34,11 @@ pub(crate) struct DesignKeys {
     pub contacts: Option<At<ContactsKeys>>,
     /// Whether the contact's force will be known; as in `[contact]` unless said otherwise.
     pub force: Option<Force>,
-    /// Criterion that scores a layout.
+    /// Criterion that scores a layout; `mean-limit` unless said otherwise.
     pub criterion: Option<DesignCriterion>,
-    /// A limit up to this is good enough.
+    /// A limit up to this is good enough; 2 mm unless said otherwise.
     pub tolerance: Option<Positive<Length>>,
-    /// Least distance of two sensors.
+    /// Least distance of two sensors; 0 unless said otherwise.
     pub spacing: Option<NotNegative<Length>>,
     /// Parts of the surface where no sensor may sit.
     #[serde(default)]
@@ -48,7 +48,7 @@ pub(crate) struct DesignKeys {
     pub must_have: Vec<At<MustHaveKeys>>,
     /// Greatest cost of all sensors together.
     pub budget: Option<NotNegative<Number>>,
-    /// Whether layouts are to be their own mirror image.
+    /// Whether layouts are to be their own mirror image; `any` unless said otherwise.
     pub symmetry: Option<Symmetry>,
 }
 

@@ -48,29 +48,29 @@ pub(crate) enum EstimatorKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NetworkKeys {
-    /// Nodes of each hidden layer, input side first.
+    /// Nodes of each hidden layer, input side first; [10] unless said otherwise.
     pub hidden: Option<At<Vec<Count<1, 1000>>>>,
-    /// Activation of the hidden layers.
+    /// Activation of the hidden layers; `logistic` unless said otherwise.
     pub hidden_activation: Option<Activation>,
-    /// Activation of the output layer.
+    /// Activation of the output layer; `logistic` unless said otherwise.
     pub output_activation: Option<Activation>,
-    /// Whether every node has a bias.
+    /// Whether every node has a bias; `true` unless said otherwise.
     pub biases: Option<bool>,
-    /// Coding of the output.
+    /// Coding of the output; `normalized` unless said otherwise.
     pub output: Option<OutputCoding>,
-    /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by.
+    /// Scaling of readings to inputs: `full-scale`, `standardized`, or a reading to divide by; `full-scale` unless said otherwise.
     pub input_scale: Option<At<Written>>,
-    /// The step along the gradient.
+    /// The step along the gradient; 0.7 unless said otherwise.
     pub learning_rate: Option<Positive<Number>>,
-    /// The share of the previous step that is repeated.
+    /// The share of the previous step that is repeated; 0.9 unless said otherwise.
     pub momentum: Option<Fraction>,
-    /// Training converges when the sum of squared output errors over an epoch is at most this.
+    /// Training converges when the sum of squared output errors over an epoch is at most this; 1e-5 unless said otherwise.
     pub aggregate_error: Option<Positive<Number>>,
-    /// Training is capped after this many epochs.
+    /// Training is capped after this many epochs; 1000000 unless said otherwise.
     pub max_epochs: Option<Count<1, { u32::MAX as i64 }>>,
-    /// Order in which patterns are presented.
+    /// Order in which patterns are presented; `shuffled` unless said otherwise.
     pub order: Option<PresentationOrder>,
-    /// Weights start uniform within ± this.
+    /// Weights start uniform within ± this; 0.5 unless said otherwise.
     pub initial_weights: Option<Positive<Number>>,
 }
 
@@ -78,16 +78,16 @@ pub(crate) struct NetworkKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct InfluenceKeys {
-    /// Source of the influence functions.
+    /// Source of the influence functions; `corrected` unless said otherwise.
     pub from: Option<InfluenceSource>,
-    /// The most contacts that may touch at once.
+    /// The most contacts that may touch at once, more than one only on a line with a model; 1 unless said otherwise.
     pub contacts: Option<Count<1, 3>>,
-    /// Standard deviation of the contact's force about that of `[contact]`.
+    /// Standard deviation of the contact's force about that of `[contact]`; 0 unless said otherwise.
     pub force_sd: Option<At<Positive<Force>>>,
     /// Structure of the readings of a `measured` surface: `auto`, `force-linear`, or `free`.
     #[serde(default)]
     pub structure: Structure,
-    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 
@@ -95,7 +95,7 @@ pub(crate) struct InfluenceKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ClosedFormKeys {
-    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 
@@ -106,7 +106,7 @@ pub(crate) struct DigitKeys {
     /// The theory of bending.
     #[serde(default)]
     pub theory: DigitTheory,
-    /// Share of untouched readings that may be taken for a contact: "0.1 %".
+    /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
     pub false_alarm_rate: Option<FalseAlarms>,
 }
 

@@ -31,9 +31,9 @@ pub(crate) struct MotionKeys {
     pub touch: Option<At<Positive<Time>>>,
     /// Its force, where that is neither known nor the one of the calibration's presses.
     pub force: Option<At<Positive<Force>>>,
-    /// Readings a second.
+    /// Readings a second; said by the first of two.
     pub rate: Option<At<Positive<Frequency>>>,
-    /// Damping ratio of the beam's modes.
+    /// Damping ratio of the beam's modes; 1 % unless said otherwise.
     pub damping: Option<At<Fraction>>,
 }
 

@@ -18,34 +18,38 @@ use crate::values::{Count, Length, Positive, Quantity};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RecordingKeys {
-    /// Whether the first line names the columns.
+    /// Whether the first line names the columns; without it columns are numbers, from 1.
     #[serde(default = "yes")]
     pub header: bool,
-    /// What stands between fields, where the file itself does not tell: `comma`, `semicolon` or `tab`.
+    /// What stands between fields; what the first line tells unless said otherwise.
     pub separator: Option<Separator>,
-    /// What stands before decimals, where the file itself does not tell: `point` or `comma`.
+    /// What stands before decimals; what the first number tells unless said otherwise.
     pub decimal: Option<Decimal>,
-    /// The contact's position along a line.
+    /// Column of the contact's position along a line; `position_mm` unless said otherwise.
     pub position: Option<At<ColumnKey>>,
-    /// Its position along a plane's length.
+    /// Column of its position along a plane's length; `x_mm` unless said otherwise.
     pub x: Option<At<ColumnKey>>,
-    /// Its position across a plane's width.
+    /// Column of its position across a plane's width; `y_mm` unless said otherwise.
     pub y: Option<At<ColumnKey>>,
+    /// The unit of positions; mm unless said otherwise.
     pub position_unit: Option<At<String>>,
-    /// Each sensor's readings.
+    /// Columns of the sensors' readings, which also name raw sensors; the sensors' names with their units unless said otherwise.
     pub channels: Option<At<Vec<At<ColumnKey>>>>,
-    /// The unit of readings, or that of each channel.
+    /// The unit of readings, or that of each channel; mm, rad, m/m, N, or none of raw channels unless said otherwise.
     pub channel_unit: Option<At<ChannelUnitKeys>>,
+    /// Column of the contact's force, positive downward, 0 where nothing touches; `force_n`, where the file has it, unless said otherwise.
     pub force: Option<At<ColumnKey>>,
+    /// The unit of forces; N unless said otherwise.
     pub force_unit: Option<At<String>>,
-    /// A coordinate that readings depend on and nobody wants to know.
+    /// Column of a coordinate that readings depend on, is known here, and is unknown in use.
     pub nuisance: Option<At<ColumnKey>>,
+    /// The unit of the nuisance coordinate; none unless said otherwise.
     pub nuisance_unit: Option<At<String>>,
-    /// The time of each row: numbers, or timestamps.
+    /// Column of the time of each row, as numbers or timestamps; `time_s`, where the file has it, unless said otherwise.
     pub time: Option<At<ColumnKey>>,
-    /// The unit of times that are numbers; seconds unless said otherwise.
+    /// The unit of times that are numbers; s unless said otherwise.
     pub time_unit: Option<At<String>>,
-    /// The file's coordinates of the surface's left end or lower left corner.
+    /// The file's coordinates of the surface's left end or lower left corner; 0 unless said otherwise.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
     pub round: Option<Positive<Length>>,

@@ -161,9 +161,9 @@ const MOST_VALUES: usize = 100_000_000;
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigFile {
-    /// The elastic body that is touched.
+    /// The elastic body that is touched; every rig has it.
     pub surface: Option<At<SurfaceKeys>>,
-    /// Sensors.
+    /// The sensors; every rig has some.
     pub sensors: Option<At<OneOrMany<SensorsKeys>>>,
     /// The contacts to be located.
     pub contact: Option<ContactKeys>,

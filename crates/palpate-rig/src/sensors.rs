@@ -20,25 +20,26 @@ const MOST: i64 = 10_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorsKeys {
-    /// Their kind.
+    /// Their kind; of a measured surface `raw`, of a digit `strain`.
     pub measure: At<SensorKind>,
-    /// Number of sensors, evenly along the length: the i-th at i·l/(count + 1).
+    /// Number of sensors, evenly along the length: the i-th at i·l/(count + 1). Raw channels need none of `count`, `grid` and `positions`
+    /// where [recording] lists them.
     pub count: Option<At<Count<1, MOST>>>,
     /// Columns and rows, evenly on a plane.
     pub grid: Option<At<Grid<MOST>>>,
     /// Their positions, one by one.
     pub positions: Option<At<Vec<At<Point>>>>,
-    /// Standard deviation of a reading's noise.
+    /// Standard deviation of a reading's noise; 0 unless said otherwise.
     pub noise: Option<At<Written>>,
-    /// Step to which a reading is rounded.
+    /// Step to which a reading is rounded; 0 unless said otherwise.
     pub resolution: Option<At<Written>>,
-    /// Standard deviation of the gain's error.
+    /// Standard deviation of the gain's error; 0 unless said otherwise.
     pub gain_error: Option<Fraction>,
-    /// Standard deviation of the offset.
+    /// Standard deviation of the offset; 0 unless said otherwise.
     pub offset_error: Option<At<Written>>,
-    /// Standard deviation of the distance between a sensor and where it is said to be.
+    /// Standard deviation of the distance between a sensor and where it is said to be; 0 unless said otherwise.
     pub position_error: Option<At<NotNegative<Length>>>,
-    /// The lowest and highest reading.
+    /// The lowest and highest reading; unlimited unless said otherwise.
     pub range: Option<At<RangeKeys>>,
     /// The numbers of sensors that always read 0, from 1.
     #[serde(default)]

@@ -82,13 +82,14 @@ pub struct Judging {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyFile {
+    /// Its name, of letters, digits, `-` and `_`.
     name: At<String>,
     /// Seeds that each arm is fitted from; 100 unless said otherwise.
     seeds: Option<Count<1, 1_000_000>>,
     /// The arithmetic of training networks.
     #[serde(default)]
     precision: Precision,
-    /// The surface of every arm.
+    /// The surface of every arm, which every study has.
     surface: Option<At<SurfaceKeys>>,
     /// The sensors of arms that have none of their own.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
@@ -96,13 +97,15 @@ struct StudyFile {
     contact: Option<ContactKeys>,
     /// The calibration of arms that have none of their own.
     training: Option<At<TrainingKeys>>,
-    /// The estimator; its keys hold for arms that do not say the same keys. Read by [`estimator`].
+    /// The estimator; its keys hold for arms that do not say the same keys.
+    // Read by [`estimator`].
     #[serde(rename = "estimator")]
     _estimator: Option<IgnoredAny>,
     /// Candidates for layouts that are asked for by method.
     design: Option<At<DesignKeys>>,
-    /// Positions and tolerance by which locators are judged.
+    /// Positions and tolerance by which locators are judged; 399 positions, 5 readings at each unless said otherwise.
     evaluation: Option<EvaluationKeys>,
+    /// The arms: one row each, with sections of its own in the place of the study's.
     #[serde(default)]
     arm: Vec<ArmKeys>,
 }
@@ -137,15 +140,20 @@ struct PortionKeys(Positive<Length>, Positive<Length>);
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ArmKeys {
+    /// Its name, unique in the study, of letters, digits, `-`, `_`, and `.` between them.
     name: At<String>,
-    /// The title of a figure that it shares with other arms.
+    /// The title of a figure that it shares with other arms; a figure of its own unless said otherwise.
     figure: Option<String>,
     /// The method that places its sensors.
     layout: Option<At<Method>>,
+    /// Its sensors; the study's unless said otherwise.
     sensors: Option<At<OneOrMany<SensorsKeys>>>,
+    /// Its contact; the study's unless said otherwise.
     contact: Option<ContactKeys>,
+    /// Its calibration; the study's unless said otherwise.
     training: Option<At<TrainingKeys>>,
-    /// Its own keys of the estimator. Read by [`estimator`].
+    /// Its own keys of the estimator, beside those of the study's.
+    // Read by [`estimator`].
     #[serde(rename = "estimator")]
     _estimator: Option<IgnoredAny>,
 }
@@ -213,7 +221,7 @@ fn estimator(document: &DeValue, arm: usize) -> Result<Option<EstimatorKeys>, Ri
 impl ArmKeys {
     /// The base's sections; those of the arm take their place.
     fn build(&self, base: &StudyFile, estimator: Option<EstimatorKeys>) -> Result<Arm, RigError> {
-        let name = checked_name(&self.name)?;
+        let name = checked_arm_name(&self.name)?;
         let rig = RigFile {
             surface: base.surface.clone(),
             sensors: self.sensors.as_ref().or(base.sensors.as_ref()).cloned(),
@@ -246,12 +254,25 @@ impl ArmKeys {
     }
 }
 
+/// The name of a study, which is that of its folder.
 fn checked_name(name: &At<String>) -> Result<String, RigError> {
-    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if name.is_empty() || !name.chars().all(fits) {
+    if name.is_empty() || !name.chars().all(in_any_name) {
         return Err(name.place.refuse("of letters, digits, `-` and `_`"));
     }
     Ok((**name).clone())
+}
+
+/// The name of an arm, which may stand in that of a file: points are within it only, so that it is neither hidden nor a folder.
+fn checked_arm_name(name: &At<String>) -> Result<String, RigError> {
+    let fits = |c: char| in_any_name(c) || c == '.';
+    if name.is_empty() || !name.chars().all(fits) || name.starts_with('.') || name.ends_with('.') {
+        return Err(name.place.refuse("of letters, digits, `-`, `_`, and `.` between them"));
+    }
+    Ok((**name).clone())
+}
+
+fn in_any_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '-' || c == '_'
 }
 
 impl StudyFile {

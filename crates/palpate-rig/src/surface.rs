@@ -31,13 +31,15 @@ pub(crate) enum SurfaceKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BeamKeys {
+    /// Length.
     pub length: Positive<Length>,
     /// Width of the section; that of `sections` which have none of their own.
     pub width: Option<Positive<Length>>,
     /// Thickness of the section; that of `sections` which have none of their own.
     pub thickness: Option<Positive<Length>>,
+    /// Young's modulus of its material.
     pub youngs_modulus: Positive<Modulus>,
-    /// The beam's supports.
+    /// The beam's supports; `simple`, at both ends, unless said otherwise.
     pub supports: Option<At<BeamSupportsKeys>>,
     /// Stretches of one section each, from left to right.
     pub sections: Option<At<Vec<At<SectionKeys>>>>,
@@ -71,15 +73,28 @@ pub(crate) enum EndsKeys {
 )]
 pub(crate) enum BeamSupportKeys {
     /// No deflection, free to turn.
-    Simple { at: At<Quantity<Length>> },
+    Simple {
+        /// Its position.
+        at: At<Quantity<Length>>,
+    },
     /// Neither deflection nor slope.
-    Clamped { at: At<Quantity<Length>> },
+    Clamped {
+        /// Its position.
+        at: At<Quantity<Length>>,
+    },
     /// No support: a free end, said so.
-    Free { at: At<Quantity<Length>> },
+    Free {
+        /// Its position, an end of the beam.
+        at: At<Quantity<Length>>,
+    },
     /// No slope, free to deflect.
-    Guided { at: At<Quantity<Length>> },
+    Guided {
+        /// Its position.
+        at: At<Quantity<Length>>,
+    },
     /// A spring.
     Elastic {
+        /// Its position.
         at: At<Quantity<Length>>,
         /// Upward force per downward deflection.
         stiffness: Positive<Stiffness>,
@@ -104,16 +119,21 @@ pub(crate) struct SectionKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlateKeys {
+    /// Length, along x.
     pub length: Positive<Length>,
+    /// Width, along y.
     pub width: Positive<Length>,
+    /// Thickness.
     pub thickness: Positive<Length>,
+    /// Young's modulus of its material.
     pub youngs_modulus: Positive<Modulus>,
+    /// Poisson's ratio of its material.
     pub poissons_ratio: At<Quantity<Number>>,
-    /// Support of its edges; free unless said otherwise.
+    /// Support of its edges; `free` unless said otherwise.
     pub edges: Option<At<EdgesKeys>>,
     /// Its supports at points.
     pub supports: Option<At<PointSupportsKeys>>,
-    /// Elements along the longer side.
+    /// Elements along the longer side; 128 unless said otherwise.
     pub elements: Option<At<Count<1, { i64::MAX }>>>,
 }
 
@@ -144,9 +164,13 @@ pub(crate) enum PointSupportsKeys {
 )]
 pub(crate) enum PointSupportKeys {
     /// No deflection; the plate can turn on it.
-    Simple { at: At<Point> },
+    Simple {
+        /// Its position.
+        at: At<Point>,
+    },
     /// A spring.
     Elastic {
+        /// Its position.
         at: At<Point>,
         /// Upward force per downward deflection.
         stiffness: Positive<Stiffness>,
@@ -157,9 +181,13 @@ pub(crate) enum PointSupportKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DigitKeys {
+    /// Length from the clamp to the tip.
     pub length: Positive<Length>,
+    /// Width of the section.
     pub width: Positive<Length>,
+    /// Thickness of the section.
     pub thickness: Positive<Length>,
+    /// Young's modulus of its material.
     pub youngs_modulus: Positive<Modulus>,
     /// Direction of a contact's force.
     pub direction: ForceDirection,
@@ -169,8 +197,9 @@ pub(crate) struct DigitKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredKeys {
+    /// Length.
     pub length: Positive<Length>,
-    /// Width, if it is touched along and across.
+    /// Width of a plane, which is touched along and across; without it the surface is a line.
     pub width: Option<Positive<Length>>,
 }
 

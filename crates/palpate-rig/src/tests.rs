@@ -359,3 +359,19 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn arms_may_have_points_in_their_names() {
+    let study = |name: &str| {
+        let arm = format!("[[arm]]\nname = \"{name}\"\n");
+        Study::from_toml(&format!("name = \"s\"\n{}\n{arm}", PAPER.replace("[recording]", "[design]")))
+    };
+    assert_eq!(study("noise-0.5").unwrap().arms[0].name, "noise-0.5");
+    for name in ["", ".", "..", ".a", "a.", "a/b", "a b", "ü"] {
+        let error = study(name).unwrap_err().to_string();
+        assert!(
+            error.ends_with("it must be of letters, digits, `-`, `_`, and `.` between them"),
+            "{name}: {error}"
+        );
+    }
+}

@@ -16,7 +16,7 @@ const MOST: i64 = 100_000;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactKeys {
-    /// Their force, where it is known.
+    /// Their force, where it is known and one for all; unknown unless said otherwise.
     pub force: Option<At<Positive<Force>>>,
 }
 
@@ -24,21 +24,22 @@ pub(crate) struct ContactKeys {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TrainingKeys {
-    /// The rule that places them; `explicit` or `grid` where there are `positions` or a `grid`, and otherwise `even`.
+    /// The rule that places them; `explicit` where there are `positions`, `grid` where there is a `grid`, else `even` unless said otherwise.
     pub arrangement: Option<Rule>,
-    /// Number of positions.
+    /// Number of positions; needed on a line by all rules but `explicit`.
     pub count: Option<At<Count<1, MOST>>>,
-    /// Columns and rows of a `grid`.
+    /// Columns and rows of a `grid`, on a plane.
     pub grid: Option<At<Grid<MOST>>>,
     /// Number of positions of `edge-dense` in the middle portion.
     pub middle: Option<At<Count<2, MOST>>>,
-    /// Start and end of the middle portion of `edge-dense`, or of what `even` covers, as shares of the length.
+    /// Start and end of the middle portion of `edge-dense`, or of what `even` covers, as shares of the length; for `edge-dense` 25 % and
+    /// 75 % unless said otherwise.
     pub portion: Option<At<PortionKeys>>,
     /// The positions of `explicit`.
     pub positions: Option<At<Vec<At<Point>>>>,
     /// Presses at each position; 1 unless said otherwise.
     pub repeats: Option<Count<1, MOST>>,
-    /// The force, where it is not that of the contacts to be located.
+    /// The force of the presses; that of [contact] unless said otherwise.
     pub force: Option<At<Positive<Force>>>,
 }
 
@@ -70,6 +71,7 @@ pub(crate) struct LoadKeys {
     pub from: At<Point>,
     /// The right end, or upper right corner.
     pub to: At<Point>,
+    /// The whole force.
     pub force: Positive<Force>,
 }
 

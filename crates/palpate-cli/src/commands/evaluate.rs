@@ -13,6 +13,7 @@ use palpate_estimators::fit::FitTask;
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::surface::Extent;
+use palpate_mechanics::units::{Dimension, Quantity};
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
@@ -30,7 +31,7 @@ pub struct Arguments {
     /// An error up to this is good enough for the effective length or area
     #[arg(long, value_name = "LENGTH", default_value = "2 mm", value_parser = input::length)]
     tolerance: f64,
-    /// A portion that is also judged by itself, as in `--portion "60 mm..300 mm"`; may be repeated
+    /// A portion that is also judged by itself, as in `--portion "0 mm..100 mm"` or `--portion "0..100 mm"`; may be repeated
     #[arg(long, value_name = "FROM..TO", value_parser = portion)]
     portion: Vec<Portion>,
     /// Seed of simulation and fits
@@ -167,11 +168,27 @@ fn warn_of_training_data(locator: &Locator, recording: &Recording) {
     }
 }
 
+/// `60 mm..300 mm`, with spaces about the dots or without, or `60..300 mm`.
 fn portion(text: &str) -> Result<Portion, String> {
-    let (from, to) =
-        text.split_once("..").ok_or_else(|| format!("`{text}` has no `..` between two lengths"))?;
-    let portion = Portion { from_m: input::length(from.trim())?, to_m: input::length(to.trim())? };
-    if portion.from_m < portion.to_m { Ok(portion) } else { Err(format!("`{text}` does not rise")) }
+    const EXAMPLE: &str = "write it as in `0 mm..100 mm` or `0..100 mm`";
+    let (from, to) = text.split_once("..").ok_or_else(|| format!("`{text}` has no `..`; {EXAMPLE}"))?;
+    let (from, to) = (from.trim(), to.trim());
+    if from.is_empty() || to.is_empty() {
+        return Err(format!("`{text}` needs a length on either side of `..`; {EXAMPLE}"));
+    }
+    let to_m = Quantity::parse_as(to, Dimension::Length).map_err(|error| format!("{error}; {EXAMPLE}"))?;
+    // The unit behind the end holds for both.
+    let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
+    let from = if from.parse::<f64>().is_ok() { format!("{from} {unit}") } else { from.to_owned() };
+    let from_m =
+        Quantity::parse_as(&from, Dimension::Length).map_err(|error| format!("{error}; {EXAMPLE}"))?;
+    match (from_m, to_m) {
+        (from_m, _) if from_m < 0.0 => {
+            Err(format!("`{text}` begins at {from}; it must begin at 0 or beyond"))
+        }
+        (from_m, to_m) if from_m < to_m => Ok(Portion { from_m, to_m }),
+        _ => Err(format!("`{text}` must end beyond where it begins")),
+    }
 }
 
 fn errors_by_portion(arguments: &Arguments, answers: &Answers) -> Result<Vec<PortionErrors>, Failure> {
@@ -227,4 +244,38 @@ fn print(
     };
     output::say(format!("\n{what}: {share:.1} % of the contacts within {tolerance} mm"))?;
     output::say_report("", arguments.out.as_deref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn portions_are_read_as_people_write_them() {
+        let read = |text: &str| portion(text).map(|portion| (portion.from_m, portion.to_m));
+        for text in [
+            "0 mm..100 mm",
+            "0..100 mm",
+            "0 mm .. 100 mm",
+            "0mm..100mm",
+            " 0 .. 0.1 m ",
+            "0..10 cm",
+            "0 m..1e2 mm",
+        ] {
+            assert_eq!(read(text), Ok((0.0, 0.1)), "{text}");
+        }
+        assert_eq!(read("2.5..7.5 mm"), Ok((0.0025, 0.0075)));
+        let refused = [
+            "100 mm",
+            "0..100",
+            "0 N..100 mm",
+            "0..100 N",
+            "-1..5 mm",
+            "5..5 mm",
+            "9 mm..1 mm",
+            "..5 mm",
+            "5 mm..",
+        ];
+        insta::assert_snapshot!(refused.map(|text| read(text).unwrap_err()).join("\n"));
+    }
 }

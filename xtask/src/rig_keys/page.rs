@@ -1,0 +1,295 @@
+//! The page of keys, in Markdown.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use super::source::{Field, Item, Shape, Types, attribute};
+
+const HEAD: &str = "# Keys of rigs and studies
+
+A rig is one TOML file that says what is on the bench, a study a set of experiments over rigs (docs/studies.md). Here is every key, with what
+can be its value. Lengths, forces and all other quantities are texts with units: `\"400 mm\"`, `\"3 N\"`, `\"200 GPa\"`, `\"5 um\"`; shares are
+numbers or percentages, `0.05` or `\"5 %\"`. A key that is not here is an error that names the place.
+
+This page is written by `cargo xtask rig-keys` from the types that the files are read into; a test holds it to them.
+";
+
+/// The page.
+pub fn page(root: &Path) -> Result<String> {
+    let types = Types::read(root)?;
+    let folder = root.join("crates/palpate-rig/src");
+    let find = |file: &str, name: &str| {
+        types.find(&folder.join(file), name).with_context(|| format!("there is no {name} in {file}"))
+    };
+    let mut page = Page { types: &types, text: HEAD.to_owned(), told: BTreeMap::new() };
+    page.sections("The rig", find("rig.rs", "RigFile")?);
+    page.sections("The study", find("study.rs", "StudyFile")?);
+    Ok(page.text.trim_end().to_owned() + "\n")
+}
+
+struct Page<'a> {
+    types: &'a Types,
+    text: String,
+    /// Types that have been explained, and under which heading.
+    told: BTreeMap<(PathBuf, String), String>,
+}
+
+impl<'a> Page<'a> {
+    /// A whole file: its own keys and sections.
+    fn sections(&mut self, title: &str, file: &'a Item) {
+        let _ = write!(self.text, "\n## {title}\n\n{}\n", file.docs);
+        let Shape::Struct(fields) = &file.shape else { return };
+        self.table(fields, &file.file);
+        for field in fields {
+            let name = key(field);
+            let path = if field.type_text.starts_with("Vec<") {
+                format!("`[[{name}]]`")
+            } else {
+                format!("`[{name}]`")
+            };
+            self.explain(&file.file, &field.type_text, &path, 3);
+        }
+    }
+
+    /// What stands in a value of this type, where that is more than a cell can say.
+    fn explain(&mut self, file: &Path, type_text: &str, path: &str, level: usize) {
+        let Some(item) = self.item(file, type_text) else { return };
+        if !self.is_table(item) && !self.has_words(item) {
+            return;
+        }
+        let place = (item.file.clone(), item.name.clone());
+        if let Some(heading) = self.told.get(&place) {
+            if self.is_table(item) {
+                let _ = write!(self.text, "\n{} {path}\n\nAs {heading} of the rig.\n", "#".repeat(level));
+            }
+            return;
+        }
+        self.told.insert(place, path.to_owned());
+        match &item.shape {
+            Shape::Struct(fields) => {
+                let _ = write!(self.text, "\n{} {path}\n\n{}\n", "#".repeat(level), item.docs);
+                self.table(fields, &item.file);
+                self.explain_fields(fields, &item.file, path, level);
+            }
+            Shape::Tuple => {}
+            Shape::Enum(variants) if is_by(item, "shape") => {
+                for held in variants.iter().filter_map(|variant| variant.holds.as_ref()) {
+                    self.explain(&item.file, held, path, level);
+                }
+            }
+            Shape::Enum(_) if is_by(item, "kind") => self.kinds(item, path, level),
+            Shape::Enum(variants) => {
+                let _ = write!(self.text, "\nWords of {path}:\n\n");
+                for variant in variants {
+                    let _ = writeln!(self.text, "- `{}`: {}", item.word(variant), lower(&variant.docs));
+                }
+            }
+        }
+    }
+
+    /// Tables that are told by the key `kind`.
+    fn kinds(&mut self, item: &'a Item, path: &str, level: usize) {
+        let Shape::Enum(variants) = &item.shape else { return };
+        let _ = write!(self.text, "\n{} {path}\n\n{}", "#".repeat(level), item.docs);
+        let words: Vec<String> = variants.iter().map(|variant| format!("`{}`", item.word(variant))).collect();
+        let without =
+            item.attribute("rename").and_then(|by| by.split_once(" or ").map(|(_, word)| word.to_owned()));
+        let without = without.map_or(String::new(), |word| format!("; `{word}` where it is not said"));
+        let _ = writeln!(self.text, " Its `kind` is one of {}{without}.", words.join(", "));
+        for variant in variants {
+            let kind = format!("{path}, `kind = \"{}\"`", item.word(variant));
+            let held = variant.holds.as_ref().and_then(|held| self.types.find(&item.file, held));
+            let (fields, file): (&[Field], &Path) = match held.map(|held| (&held.shape, &held.file)) {
+                Some((Shape::Struct(fields), file)) => (fields, file),
+                _ => (&variant.fields, &item.file),
+            };
+            let docs = held.map_or(&variant.docs, |held| &held.docs);
+            let _ = write!(self.text, "\n{} {kind}\n\n{docs}\n", "#".repeat(level + 1));
+            if fields.is_empty() {
+                self.text += "It has no further keys.\n";
+            } else {
+                self.table(fields, file);
+                self.explain_fields(fields, file, &kind, level + 1);
+            }
+        }
+    }
+
+    fn explain_fields(&mut self, fields: &[Field], file: &Path, path: &str, level: usize) {
+        for field in fields {
+            self.explain(file, &field.type_text, &format!("`{}` of {path}", key(field)), level + 1);
+        }
+    }
+
+    fn table(&mut self, fields: &[Field], file: &Path) {
+        self.text += "\n| key | value | where it is not said | meaning |\n|---|---|---|---|\n";
+        for field in fields {
+            let (meaning, default) = split_default(&field.docs);
+            let default = default.unwrap_or_else(|| self.default(field, file));
+            let value = self.value(file, &field.type_text);
+            let cells =
+                [format!("`{}`", key(field)), value, default, meaning].map(|cell| cell.replace('|', "\\|"));
+            let _ = writeln!(self.text, "| {} |", cells.join(" | "));
+        }
+    }
+
+    /// What holds where a key is not said and its comment is silent.
+    fn default(&self, field: &Field, file: &Path) -> String {
+        let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
+        let all_default =
+            self.types.all().find(fields_of).is_some_and(|item| item.serde.contains("(default,"));
+        let is_optional = field.type_text.starts_with("Option<");
+        match attribute(&field.serde, "default") {
+            Some(function) if function == "yes" => "`true`".to_owned(),
+            _ if is_optional => "–".to_owned(),
+            _ if !field.serde.contains("default") && !all_default => "must be said".to_owned(),
+            _ if field.type_text == "bool" => "`false`".to_owned(),
+            _ => match self.item(file, &field.type_text).map(|item| (item, &item.shape)) {
+                Some((item, Shape::Enum(variants))) => {
+                    let default = variants.iter().find(|variant| variant.is_default);
+                    default.map_or("–".to_owned(), |variant| format!("`{}`", item.word(variant)))
+                }
+                _ => "–".to_owned(),
+            },
+        }
+    }
+
+    /// What can be written, in words.
+    fn value(&self, file: &Path, type_text: &str) -> String {
+        let text = type_text.trim();
+        let (name, inner) = match text.split_once('<') {
+            Some((name, rest)) => (name, rest.strip_suffix('>').unwrap_or(rest)),
+            None => (text, ""),
+        };
+        match name {
+            "Option" | "At" => self.value(file, inner),
+            "Vec" => format!("list: {}", self.value(file, inner)),
+            "OneOrMany" => "table, or several".to_owned(),
+            "Positive" => format!("{} greater than 0", quantity(inner)),
+            "NotNegative" => format!("{} of at least 0", quantity(inner)),
+            "Quantity" => quantity(inner).to_owned(),
+            "Fraction" => "share, at least 0 and below 1".to_owned(),
+            "FalseAlarms" => {
+                let bound = self.types.bound("AlarmRange").unwrap_or_default();
+                format!("share, {bound}")
+            }
+            "Count" => {
+                let (least, most) = inner.split_once(", ").unwrap_or((inner, ""));
+                let most = most.trim_matches(['{', '}', ' ']);
+                match self.types.constant(file, most).as_deref().unwrap_or(most) {
+                    "i64::MAX" => format!("whole number of at least {least}"),
+                    "u32::MAX as i64" => format!("whole number, {least} to {}", u32::MAX),
+                    most => format!("whole number, {least} to {}", most.replace('_', "")),
+                }
+            }
+            "Grid" => "list: columns and rows".to_owned(),
+            "Point" => "length; on a plane a list: along and across".to_owned(),
+            "Written" => "quantity that the sensors measure".to_owned(),
+            "bool" => "`true` or `false`".to_owned(),
+            "String" => "text".to_owned(),
+            "i64" => "whole number".to_owned(),
+            "IgnoredAny" => "table".to_owned(),
+            _ => self.item(file, text).map_or_else(|| text.to_owned(), |item| self.named(item)),
+        }
+    }
+
+    fn named(&self, item: &Item) -> String {
+        match (&item.shape, item.attribute("expecting")) {
+            (_, Some(expecting)) => expecting.strip_prefix("a ").unwrap_or(&expecting).to_owned(),
+            (Shape::Enum(variants), None) if !is_by(item, "kind") => {
+                let words: Vec<String> =
+                    variants.iter().map(|variant| format!("`{}`", item.word(variant))).collect();
+                words.join(", ")
+            }
+            _ => "table".to_owned(),
+        }
+    }
+
+    /// The type that is left when all that wraps it is taken away.
+    fn item(&self, file: &Path, type_text: &str) -> Option<&'a Item> {
+        let mut text = type_text.trim();
+        while let Some((name, rest)) = text.split_once('<') {
+            if !["Option", "At", "Vec", "OneOrMany"].contains(&name) {
+                return None;
+            }
+            text = rest.strip_suffix('>')?;
+        }
+        self.types.find(file, text)
+    }
+
+    /// Whether keys stand in it.
+    fn is_table(&self, item: &Item) -> bool {
+        match &item.shape {
+            Shape::Struct(_) => true,
+            Shape::Tuple => false,
+            Shape::Enum(_) if is_by(item, "kind") => true,
+            Shape::Enum(variants) => variants
+                .iter()
+                .filter_map(|variant| variant.holds.as_ref())
+                .any(|held| self.item(&item.file, held).is_some_and(|held| self.is_table(held))),
+        }
+    }
+
+    /// Whether it is one of several words that have meanings.
+    fn has_words(&self, item: &Item) -> bool {
+        match &item.shape {
+            Shape::Enum(variants) if is_by(item, "shape") => variants
+                .iter()
+                .filter_map(|variant| variant.holds.as_ref())
+                .any(|held| self.item(&item.file, held).is_some_and(|held| self.has_words(held))),
+            Shape::Enum(_) => !is_by(item, "kind"),
+            _ => false,
+        }
+    }
+}
+
+/// The name of a key.
+pub fn key(field: &Field) -> String {
+    attribute(&field.serde, "rename").unwrap_or_else(|| field.name.clone())
+}
+
+fn is_by(item: &Item, what: &str) -> bool {
+    item.attribute("rename").is_some_and(|name| name.starts_with(&format!("by {what}")))
+}
+
+fn quantity(dimension: &str) -> &str {
+    match dimension.split(',').next().unwrap_or(dimension) {
+        "Number" => "number",
+        "Length" => "length",
+        "Force" => "force",
+        "Modulus" => "modulus",
+        "Ratio" => "share",
+        "Density" => "density",
+        "Stiffness" => "stiffness",
+        "RotationalStiffness" => "rotational stiffness",
+        "Speed" => "speed",
+        "Time" => "time",
+        "Frequency" => "frequency",
+        other => other,
+    }
+}
+
+/// A comment without "; … unless said otherwise", and what that says.
+pub fn split_default(docs: &str) -> (String, Option<String>) {
+    let Some((before, after)) = docs.split_once(" unless said otherwise") else {
+        return (docs.to_owned(), None);
+    };
+    match before.rsplit_once("; ") {
+        Some((meaning, default)) => {
+            (format!("{meaning}{after}"), Some(default.trim_end_matches(',').to_owned()))
+        }
+        None => (docs.to_owned(), None),
+    }
+}
+
+/// A sentence as it goes on after a colon.
+fn lower(sentence: &str) -> String {
+    if sentence.chars().nth(1).is_none_or(|second| second.is_uppercase()) {
+        return sentence.to_owned();
+    }
+    let mut characters = sentence.chars();
+    let first = characters.next().map(|first| first.to_lowercase().to_string()).unwrap_or_default();
+    first + characters.as_str()
+}
