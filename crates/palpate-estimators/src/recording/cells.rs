@@ -2,8 +2,9 @@
 
 use super::columns::{Column, Header, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
-use super::dialect::{Dialect, Separator};
+use super::dialect::Dialect;
 use super::heading::Heading;
+use super::marks::Separator;
 use super::timestamp::Clock;
 use palpate_mechanics::units::{Dimension, Unit};
 use std::borrow::Cow;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::dialect::{Decimal, Separator};
+use super::marks::{Decimal, Separator};
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;

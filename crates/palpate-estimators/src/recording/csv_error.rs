@@ -7,7 +7,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
-use super::dialect::{Decimal, Separator};
+use super::marks::{Decimal, Separator};
 
 /// A CSV file that cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]

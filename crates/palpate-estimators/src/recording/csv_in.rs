@@ -5,7 +5,8 @@ use std::io::Read;
 use super::cells::{Cells, split};
 use super::columns::{Column, Columns, Frame, Header, Need, PositionColumns, ValueColumn};
 use super::csv_error::{CsvError, CsvProblem};
-use super::dialect::{Decimal, Dialect, Separator, windows_1252};
+use super::dialect::{Dialect, windows_1252};
+use super::marks::{Decimal, Separator};
 use super::timestamp::Clock;
 use super::{Recording, Row, sha256_hex};
 use palpate_mechanics::contact::{Contact, Position};
@@ -562,9 +563,10 @@ fn written<'a>(
         }
         Err((error, None)) => {
             let (good, bad) = bytes.split_at(error.valid_up_to());
-            let [before, after] = [good, bad].map(|part| String::from_utf8_lossy(part).into_owned());
+            let shown = |part| String::from_utf8_lossy(part).trim_end().replace(char::is_control, "\u{fffd}");
+            let (before, after) = (shown(good), shown(bad));
             let mark = before.len()..before.len() + after.chars().next().map_or(0, char::len_utf8);
-            return Err(CsvProblem::NotText.in_line(&dialect.source, line, before + after.trim_end(), mark));
+            return Err(CsvProblem::NotText.in_line(&dialect.source, line, before + &after, mark));
         }
     };
     let text = text.trim_end_matches(['\r', '\n']);

@@ -127,7 +127,7 @@ fn record(row: &Row, columns: &Columns) -> Vec<String> {
 mod tests {
     use super::csv_row;
     use crate::recording::cells::split;
-    use crate::recording::dialect::Separator;
+    use crate::recording::marks::Separator;
 
     #[test]
     fn a_field_is_quoted_where_it_must_be() {

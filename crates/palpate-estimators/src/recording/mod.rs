@@ -7,6 +7,7 @@ mod csv_in;
 mod csv_out;
 mod dialect;
 mod heading;
+mod marks;
 mod table;
 mod timestamp;
 mod warnings;
@@ -15,8 +16,9 @@ pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionCol
 pub use csv_error::{CsvError, CsvProblem, Place};
 pub use csv_in::{ReadingParser, Schema, TimedParser, TimedReading, TimedRecording, read, read_pair};
 pub use csv_out::{csv_row, write, write_timed};
-pub use dialect::{Decimal, Dialect, Separator};
+pub use dialect::Dialect;
 pub use heading::Heading;
+pub use marks::{Decimal, Separator};
 pub use table::{Content, Table, TableColumn};
 pub use warnings::Warning;
 

@@ -6,7 +6,8 @@ use super::cells::split;
 use super::columns::Header;
 use super::csv_error::{CsvError, CsvProblem};
 use super::csv_in::{File, Lines};
-use super::dialect::{Decimal, Dialect, Separator};
+use super::dialect::Dialect;
+use super::marks::{Decimal, Separator};
 use super::timestamp::Clock;
 use palpate_mechanics::units::Unit;
 
