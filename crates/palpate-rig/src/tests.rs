@@ -8,7 +8,7 @@ use palpate_estimators::arrangement::Arrangement;
 use palpate_estimators::arrangement::Training;
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::network::{InputScale, Network, OutputCoding};
-use palpate_estimators::recording::{Column, PositionColumns, ValueColumn};
+use palpate_estimators::recording::{Column, Decimal, PositionColumns, Separator, ValueColumn};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::sensing::SensorKind;
 use palpate_mechanics::surface::{Beam, Extent, SurfaceSpec};
@@ -49,7 +49,7 @@ fn the_water_strip_maps_foreign_columns() {
 }
 
 #[test]
-fn the_time_of_rows_is_mapped() {
+fn the_time_of_rows_and_the_dialect_are_mapped() {
     let with = |keys: &str| FSI_WATER.replace("[recording]", &format!("[recording]\n{keys}"));
     let time = |keys: &str| Rig::from_toml(&with(keys)).unwrap().setup.columns().unwrap().time.clone();
     let column = Column::Name("Zeit".to_owned());
@@ -64,6 +64,11 @@ fn the_time_of_rows_is_mapped() {
         "`time_unit`: wrong unit `mm`; a time is one of us, ms, s, min, h"
     );
     assert_eq!(refused("time_unit = \"ms\""), "[recording] has no `time`");
+
+    let said = Rig::from_toml(&with("separator = \"semicolon\"\ndecimal = \"comma\"")).unwrap();
+    let columns = said.setup.columns().unwrap();
+    assert_eq!((columns.separator, columns.decimal), (Some(Separator::Semicolon), Some(Decimal::Comma)));
+    assert_eq!(refused("decimal = \"dot\""), "`decimal` is `dot`; known are point, comma");
 }
 
 #[test]

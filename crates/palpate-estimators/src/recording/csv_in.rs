@@ -123,9 +123,10 @@ impl<'s> File<'s> {
         Ok(Self { source, content, digest })
     }
 
-    /// Its lines, with their ends.
+    /// Its lines, with their ends, which some older spreadsheets write as carriage returns alone.
     pub fn lines(&self) -> impl Iterator<Item = &[u8]> {
-        self.content.split_inclusive(|byte| *byte == b'\n')
+        let end = if self.content.contains(&b'\n') { b'\n' } else { b'\r' };
+        self.content.split_inclusive(move |byte| *byte == end)
     }
 
     /// Every row, read by `row`, after `find` has found the columns in the first line; and how the table is written.
@@ -572,5 +573,7 @@ fn written<'a>(
     let text = text.trim_end_matches(['\r', '\n']);
     // Some spreadsheets begin a file with a byte-order mark.
     let text = if line == 1 { text.strip_prefix('\u{feff}').unwrap_or(text) } else { text };
-    Ok(Some(text).filter(|text| !text.trim().is_empty() && !text.starts_with('#')))
+    // A heading may be `#`, for the number of the row.
+    let is_comment = text.strip_prefix('#').is_some_and(|rest| !rest.starts_with([',', ';', '\t']));
+    Ok(Some(text).filter(|text| !text.trim().is_empty() && !is_comment))
 }

@@ -80,6 +80,7 @@ fn rows_have_times_where_a_column_tells_them() {
     let milliseconds = ValueColumn { column: named("Zeit"), unit: Unit::from_symbol("ms").unwrap() };
     let columns = Columns { time: Some(milliseconds), ..foreign() };
     assert_eq!(times(&columns, "X,Pl,Pr,F,Zeit\n10,1,2,3,1500\n").unwrap(), Some(vec![1.5]));
+    assert_eq!(times(&columns, "X;Pl;Pr;F;Zeit [ms]\n10;1;2;3;2,5\n").unwrap(), Some(vec![0.0025]));
 
     let missing = times(&foreign().time("Zeit"), "X,Pl,Pr,F\n10,1,2,3\n").unwrap_err().to_string();
     assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
@@ -130,6 +131,7 @@ fn files_as_people_have_them_are_read() {
     assert_eq!(first(b";;;\nX;Pl;Pr;F;\n10;1.5;2;3;\n"), plain("semicolons"));
     assert_eq!(first(b"X,Pl,Pr,F\n10,\"1,5\",2,3,,\n"), plain("decimal commas"));
     assert_eq!(first(b"X,Pl,Pr,F\n10,1.5,2,3\n,,,\n"), plain(""));
+    assert_eq!(first(b"# made\r#,X,Pl,Pr,F\r1,10,1.5,2,3\r"), plain(""));
     let old = b"Stra\xdfe;X, mm;Pl;Pr;F in N\n1;10;1,5;2;3\n";
     assert_eq!(first(old), plain("semicolons, decimal commas, units in the header, Windows-1252 text"));
     // Without a header.
