@@ -84,7 +84,7 @@ pub(crate) struct InfluenceKeys {
     pub contacts: Option<Count<1, 3>>,
     /// Standard deviation of the contact's force about that of `[contact]`; 0 unless said otherwise.
     pub force_sd: Option<At<Positive<Force>>>,
-    /// Structure of the readings of a `measured` surface: `auto`, `force-linear`, or `free`.
+    /// Structure of the readings of a `measured` surface.
     #[serde(default)]
     pub structure: Structure,
     /// Share of untouched readings that may be taken for a contact; 0.1 % unless said otherwise.
