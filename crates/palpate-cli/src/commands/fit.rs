@@ -6,7 +6,7 @@ use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::{self, Observer};
 use crate::{input, output};
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, Method, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, Method, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
@@ -15,6 +15,7 @@ use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Calibrate: fit the rig's estimator to a recording, or to the simulation when there is none.
 #[derive(clap::Args)]
@@ -29,6 +30,9 @@ pub struct Arguments {
     /// Seed of the fit, and of the simulation
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Seconds that the choice of `auto` may take; an estimator that is not done by then is left out
+    #[arg(long, value_name = "SECONDS", default_value_t = 300.0)]
+    auto_seconds: f64,
     /// Print the outcome as JSON
     #[arg(long)]
     json: bool,
@@ -91,19 +95,25 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     if rig.estimator != Estimator::Auto {
         return Ok(rig);
     }
+    let start = Instant::now();
+    let clock = || start.elapsed().as_secs_f64();
+    let limit = TimeLimit { clock: &clock, seconds: arguments.auto_seconds };
     let go_on = |_| !progress::interrupted();
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
-    let choice = choose(task).map_err(|error| Failure::from_error(&error))?;
-    let errors: Vec<String> = choice
-        .mean_errors_m
-        .iter()
-        .map(|(kind, error_m)| format!("{kind} {}", format_length_mm(*error_m)))
-        .collect();
+    let choice = choose(task, Some(limit)).map_err(|error| Failure::from_error(&error))?;
     eprintln!(
-        "auto: {} has the least mean error at positions held out ({CHOICE_FOLDS} folds): {}",
-        choice.best.kind(),
-        errors.join(", ")
+        "auto: {}, with the least mean error × interval score at positions held out ({CHOICE_FOLDS} folds)",
+        choice.best.kind()
     );
+    eprintln!("{:<20} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
+    for Tried { kind, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
+        let covers = coverage_percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"));
+        let [error, score] = [mean_error_m, interval_score_m].map(|length_m| format_length_mm(*length_m));
+        eprintln!("{kind:<20} {error:>12} {score:>20} {covers:>14}");
+    }
+    for (kind, reason) in &choice.left_out {
+        eprintln!("{kind:<20} left out: {reason}");
+    }
     rig.estimator = choice.best;
     Ok(rig)
 }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
-use crate::evaluation::{EvaluationError, Split, TimedEvaluation, evaluate_splits};
+use crate::evaluation::{Evaluation, EvaluationError, Split, TimedEvaluation, evaluate_splits};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
@@ -35,7 +35,7 @@ use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 
 use palpate_mechanics::surface::SurfaceSpec;
-use palpate_numerics::watch::Cancelled;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Makes of the one list of estimators the types that are any of them.
 macro_rules! estimators {
@@ -95,7 +95,7 @@ macro_rules! estimators {
                 let task = FitTask { recording: &learnt_from, ..task };
                 match self {
                     $(Self::$variant(estimator) => Ok(estimator.fit_method(task)?.into()),)*
-                    Self::Auto => choose(task)?.best.fit_method(task),
+                    Self::Auto => choose(task, None)?.best.fit_method(task),
                 }
             }
 
@@ -107,7 +107,7 @@ macro_rules! estimators {
                         let map = |_, locator: Fitted<$method>| locator.into_locator();
                         Ok(estimator.fit_many(task, &mut Mapped { queue, map })?)
                     })*
-                    Self::Auto => choose(task)?.best.fit_many(task, queue),
+                    Self::Auto => choose(task, None)?.best.fit_many(task, queue),
                 }
             }
         }
@@ -355,49 +355,97 @@ pub fn contenders(setup: &Setup, own: &Estimator, rows: usize) -> Vec<Estimator>
     contenders
 }
 
-/// Choice of `auto`, and the mean error in metres of each estimator in cross-validation, best first.
+/// Choice of `auto`, and how each estimator did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The estimator with the least mean error.
+    /// The estimator with the least [`Tried::score_m`].
     pub best: Estimator,
-    /// Kinds with their mean errors in metres, best first; those that do not suit the recording are left out.
-    pub mean_errors_m: Vec<(&'static str, f64)>,
+    /// Estimators that were tried, best first.
+    pub tried: Vec<Tried>,
+    /// Kinds that were not, with the reason.
+    pub left_out: Vec<(&'static str, String)>,
+}
+
+/// How an estimator does at positions held out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tried {
+    /// Its kind.
+    pub kind: &'static str,
+    /// Mean error in metres.
+    pub mean_error_m: f64,
+    /// Mean score of its 95 % intervals in metres: [`Evaluation::interval_score_m`].
+    pub interval_score_m: f64,
+    /// Share of its 95 % regions that hold the contact, in %, where it has them.
+    pub coverage_percent: Option<f64>,
+}
+
+impl Tried {
+    /// Geometric mean of mean error and interval score in metres: an estimator must be near and know how near.
+    pub fn score_m(&self) -> f64 {
+        (self.mean_error_m * self.interval_score_m).sqrt()
+    }
+
+    fn of_evaluation(kind: &'static str, evaluation: &Evaluation) -> Option<Self> {
+        Some(Self {
+            kind,
+            mean_error_m: evaluation.summary(None)?.average_m,
+            interval_score_m: evaluation.interval_score_m()?,
+            coverage_percent: evaluation.coverage_percent(),
+        })
+    }
+}
+
+/// The time that the choice of an estimator may take.
+#[derive(Clone, Copy)]
+pub struct TimeLimit<'a> {
+    /// Tells seconds since any fixed moment.
+    pub clock: &'a (dyn Fn() -> f64 + Sync),
+    /// How long, in seconds; an estimator that is not done by then is left out.
+    pub seconds: f64,
 }
 
 /// Folds of the cross-validation that chooses.
 pub const CHOICE_FOLDS: usize = 5;
 
-/// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds.
+/// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
+/// and interval score. Estimators are tried from the one that is best on most recordings on.
 ///
 /// # Errors
 /// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason; and
 /// [`FitError::Cancelled`] when the watch stopped it.
-pub fn choose(task: FitTask) -> Result<Choice, FitError> {
+pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitError> {
     let FitTask { setup, recording, seed, watch } = task;
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
     let splits =
         Split::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
-    let mut tried = Vec::new();
-    let mut last = None;
+    let start_s = limit.map_or(0.0, |limit| (limit.clock)());
+    let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s > limit.seconds);
+    let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
     for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
-        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, watch) {
+        let kind = estimator.kind();
+        let go_on = |progress| watch.report(progress).is_ok() && (tried.is_empty() || !is_over());
+        match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, Watch::new(&go_on)) {
             Ok(one) => {
-                if let Some(summary) = one.evaluation.summary(None) {
-                    tried.push((estimator, summary.average_m));
+                if let Some(outcome) = Tried::of_evaluation(kind, &one.evaluation) {
+                    tried.push((estimator, outcome));
                 }
             }
-            Err(error) if Cancelled::caused(&error) => return Err(Cancelled.into()),
-            Err(error) => last = Some(error),
+            Err(error) if Cancelled::caused(&error) => {
+                watch.round()?;
+                left_out.push((kind, "it was not done in time".to_owned()));
+            }
+            Err(error) => {
+                left_out.push((kind, error.to_string()));
+                last = Some(error);
+            }
         }
     }
-    tried.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mean_errors_m = tried.iter().map(|(estimator, error_m)| (estimator.kind(), *error_m)).collect();
-    match (tried.into_iter().next(), last) {
-        (Some((best, _)), _) => Ok(Choice { best, mean_errors_m }),
-        (None, Some(error)) => Err(unsuited(error)),
-        (None, None) => Err(Cancelled.into()),
-    }
+    tried.sort_by(|a, b| a.1.score_m().total_cmp(&b.1.score_m()));
+    let Some(best) = tried.first().map(|(estimator, _)| estimator.clone()) else {
+        return Err(last.map_or_else(|| Cancelled.into(), unsuited));
+    };
+    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out })
 }
 
 impl Locator {

@@ -28,6 +28,8 @@ pub struct Located {
     pub estimate: Position,
     /// Whether the locator's 95 % region held it, where the locator has one.
     pub covered: Option<bool>,
+    /// Score of the locator's 95 % intervals in metres, where it has them: see [`Evaluation::interval_score_m`].
+    pub interval_score_m: Option<f64>,
 }
 
 impl Located {
@@ -103,6 +105,22 @@ pub(crate) fn covered(contact: &ContactEstimate, truth: Position, extent: Extent
     Some(factors.is_some_and(|factors| factors.quadratic([dx, dy]) <= ELLIPSE_95))
 }
 
+/// Interval score of a contact's 95 % intervals, averaged over its coordinates.
+fn interval_score_m(contact: &ContactEstimate, truth: Position, extent: Extent) -> Option<f64> {
+    let uncertainty = contact.uncertainty?;
+    let x = score_of_interval(uncertainty.x_95_m, truth.x_m);
+    Some(match extent {
+        Extent::Line { .. } => x,
+        Extent::Plane { .. } => 0.5 * (x + score_of_interval(uncertainty.y_95_m, truth.y_m)),
+    })
+}
+
+/// u − l + 2/α·(l − x)⁺ + 2/α·(x − u)⁺ of the interval (l, u) that should hold x with the probability 1 − α = 0.95.
+fn score_of_interval((low, high): (f64, f64), truth: f64) -> f64 {
+    const ALPHA: f64 = 0.05;
+    high - low + 2.0 / ALPHA * ((low - truth).max(0.0) + (truth - high).max(0.0))
+}
+
 impl Evaluation {
     /// Locates every reading of a recording in which something touched.
     ///
@@ -116,6 +134,7 @@ impl Evaluation {
                 force_n: row.force_n,
                 estimate: contact.position,
                 covered: covered(&contact, row.position, locator.setup.surface().extent()),
+                interval_score_m: interval_score_m(&contact, row.position, locator.setup.surface().extent()),
             })
         };
         let located =
@@ -149,6 +168,21 @@ impl Evaluation {
         let told: Vec<bool> = self.located.iter().filter_map(|located| located.covered).collect();
         let held = told.iter().filter(|covered| **covered).count();
         (!told.is_empty()).then(|| 100.0 * held as f64 / told.len() as f64)
+    }
+
+    /// Mean interval score of the 95 % intervals, in metres: narrow intervals that hold the contact are good ones, and the score is least on
+    /// average for the true quantiles (Gneiting and Raftery, J. Am. Stat. Assoc. 102, 2007, eq. 43).
+    ///
+    /// A locator that gives no intervals is judged by the best that can be done of its estimates with one width everywhere: the 95th percentile
+    /// of its errors to either side. `None` where nothing was located.
+    pub fn interval_score_m(&self) -> Option<f64> {
+        let told: Vec<f64> = self.located.iter().filter_map(|located| located.interval_score_m).collect();
+        if !told.is_empty() && told.len() == self.located.len() {
+            return Some(mean(told));
+        }
+        let half_m = percentile(&sorted_errors_m(&self.located), 95.0)?;
+        let scores = self.located.iter().map(|located| score_of_interval((-half_m, half_m), located.error_m()));
+        Some(mean(scores))
     }
 
     /// The median error of the contacts in each cell, in metres; NaN where there is none.

@@ -14,12 +14,23 @@ pub enum FeatureKind {
     /// r/‖r‖ and ln ‖r‖. Where readings are proportional to the force, r/‖r‖ does not change with it, and ln ‖r‖ says
     /// how much there is of it.
     LoadInvariant,
+    /// ln r of every channel, where all readings are greater than 0: channels that grow as different powers of the force or the depth, such
+    /// as times beside pressures, then differ by sums.
+    Logarithms,
 }
 
 impl FeatureKind {
     /// The readings where the force is known, and what the load does not change where it is not.
     pub fn for_setup(setup: &Setup) -> Self {
         if setup.force_n().is_some() { Self::Readings } else { Self::LoadInvariant }
+    }
+
+    /// The kinds that suit a recording of a setup: that of [`FeatureKind::for_setup`], and logarithms where all readings have one.
+    pub fn candidates(setup: &Setup, recording: &Recording) -> Vec<Self> {
+        let usual = Self::for_setup(setup);
+        let mut readings = recording.rows.iter().flat_map(|row| &row.reading);
+        let logarithms = usual == Self::LoadInvariant && readings.all(|value| *value > 0.0);
+        if logarithms { vec![usual, Self::Logarithms] } else { vec![usual] }
     }
 }
 
@@ -74,13 +85,13 @@ pub struct Feature {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FeatureSource {
-    /// One of [`Features::channels`], from 0: r, or r/‖r‖ where features are load-invariant.
+    /// One of [`Features::channels`], from 0: r, r/‖r‖ where features are load-invariant, or ln r.
     Channel(usize),
     /// ln ‖r‖.
     LogNorm,
 }
 
-/// A norm below this share of the least in the recording counts as this.
+/// A norm, or a reading whose logarithm is taken, below this share of the least in the recording counts as this.
 const LEAST_NORM: f64 = 1e-3;
 /// A spread below this share of the largest magnitude is rounding.
 const ROUNDING: f64 = 1e-12;
@@ -159,7 +170,11 @@ impl Features {
         let FeatureSource::Channel(i) = source else { return norm.ln() };
         let ChannelScale { channel, divisor } = self.channels[i];
         let scaled = value(reading, channel) / divisor;
-        if self.kind == FeatureKind::LoadInvariant { scaled / norm } else { scaled }
+        match self.kind {
+            FeatureKind::Readings => scaled,
+            FeatureKind::LoadInvariant => scaled / norm,
+            FeatureKind::Logarithms => scaled.max(self.least_norm).ln(),
+        }
     }
 
     /// The feature made of `source`, unless it never changes.

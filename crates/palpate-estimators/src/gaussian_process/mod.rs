@@ -8,7 +8,7 @@ use ndarray::Array2;
 
 use crate::features::{FeatureKind, Features, NoFeatures};
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
-use crate::recording::TooFewPositions;
+use crate::recording::{Recording, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::on_surface;
 use palpate_core::{ContactEstimate, Estimate, Uncertainty};
@@ -16,7 +16,7 @@ use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::normal_interval_95;
 use palpate_numerics::regression::{GaussianProcess, Kernel, Regression, RegressionError, Samples, Trend};
-use palpate_numerics::watch::Cancelled;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// Gaussian-process regression of the contact's position.
 ///
@@ -33,7 +33,7 @@ use palpate_numerics::watch::Cancelled;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for [`FeatureKind::for_setup`].
+    /// Features of a reading; `None` for those of [`FeatureKind::candidates`] under which the positions are the most probable.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
@@ -79,7 +79,28 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let kind = self.features.unwrap_or_else(|| FeatureKind::for_setup(setup));
+        let kinds = self.features.map_or_else(|| FeatureKind::candidates(setup, recording), |kind| vec![kind]);
+        let mut best: Option<GaussianProcessLocator> = None;
+        for kind in kinds {
+            let fitted = self.with_features(kind, setup, recording, seed, watch)?;
+            let evidence = |locator: &GaussianProcessLocator| locator.process.log_evidence();
+            if best.as_ref().is_none_or(|best| evidence(&fitted) > evidence(best)) {
+                best = Some(fitted);
+            }
+        }
+        best.ok_or(GaussianProcessError::Features(NoFeatures { channels: recording.channels.len(), rows: 0 }))
+    }
+}
+
+impl GaussianProcessEstimator {
+    fn with_features(
+        &self,
+        kind: FeatureKind,
+        setup: &Setup,
+        recording: &Recording,
+        seed: u64,
+        watch: Watch,
+    ) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let features = Features::fit(kind, recording)?;
         let extent = setup.surface().extent();
         let rows = recording.rows.len();
