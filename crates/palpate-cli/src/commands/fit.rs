@@ -31,8 +31,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Seconds that the choice of `auto` may take; an estimator that is not done by then is left out
-    #[arg(long, value_name = "SECONDS", default_value_t = 300.0)]
-    auto_seconds: f64,
+    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
+    auto_seconds: u32,
     /// Print the outcome as JSON
     #[arg(long)]
     json: bool,
@@ -97,7 +97,7 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     }
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let limit = TimeLimit { clock: &clock, seconds: arguments.auto_seconds };
+    let limit = TimeLimit { clock: &clock, seconds: f64::from(arguments.auto_seconds) };
     let go_on = |_| !progress::interrupted();
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
     let choice = choose(task, Some(limit)).map_err(|error| Failure::from_error(&error))?;

@@ -91,20 +91,26 @@ fn auto_takes_the_best_and_says_why() {
     with_estimator(folder.path(), "auto");
     let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]);
     let why = String::from_utf8(fitted.stderr.clone()).unwrap();
-    let (_, errors) = why.split_once("(5 folds): ").unwrap();
-    let errors: Vec<(&str, f64)> = errors
-        .trim()
-        .split(", ")
-        .map(|error| {
-            let mut words = error.split(' ');
-            (words.next().unwrap(), words.next().unwrap().parse().unwrap())
-        })
-        .collect();
-    assert!(errors.len() == 7 && errors.is_sorted_by(|a, b| a.1 <= b.1), "{why}");
-    let (best, error_mm) = errors[0];
+    let rows: Vec<Vec<&str>> = why.lines().skip(2).map(|line| line.split_whitespace().collect()).collect();
+    let number = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
+    let scores: Vec<f64> = rows.iter().map(|row| number(row, 1) * number(row, 3)).collect();
+    assert!(rows.len() == 7 && scores.is_sorted_by(|a, b| a <= &(b * 1.001)), "{why}");
+    let (best, error_mm) = (rows[0][0], number(&rows[0], 1));
     assert!(["influence", "closed-form"].contains(&best) && error_mm < 0.3, "{why}");
-    assert!(why.contains(&format!("auto: {best} has the least mean error at positions held out")), "{why}");
+    assert!(why.starts_with(&format!("auto: {best}, with the least mean error × interval score")), "{why}");
     assert!(said(&fitted).starts_with(&format!("{best} fitted to 20 rows")), "{why}");
+}
+
+#[test]
+fn auto_leaves_out_what_is_not_done_in_time() {
+    let folder = folder(Toml::parse(NOISY_BEAM).set("training.repeats", 2));
+    with_estimator(folder.path(), "auto");
+    let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "0"]);
+    let why = String::from_utf8(fitted.stderr.clone()).unwrap();
+    assert!(why.starts_with("auto: influence,"), "{why}");
+    assert!(why.contains("network              left out: it was not done in time"), "{why}");
+    let refused = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "-1"]);
+    assert_eq!(refused.status.code(), Some(2));
 }
 
 #[test]

@@ -404,6 +404,9 @@ pub struct TimeLimit<'a> {
     pub seconds: f64,
 }
 
+/// Reason of an estimator that [`TimeLimit`] leaves out.
+const NOT_IN_TIME: &str = "it was not done in time";
+
 /// Folds of the cross-validation that chooses.
 pub const CHOICE_FOLDS: usize = 5;
 
@@ -424,6 +427,10 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
     for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
         let kind = estimator.kind();
+        if !tried.is_empty() && is_over() {
+            left_out.push((kind, NOT_IN_TIME.to_owned()));
+            continue;
+        }
         let go_on = |progress| watch.report(progress).is_ok() && (tried.is_empty() || !is_over());
         match evaluate_splits(setup, &estimator, &splits, seed, &|| 0.0, Watch::new(&go_on)) {
             Ok(one) => {
@@ -433,7 +440,7 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
             }
             Err(error) if Cancelled::caused(&error) => {
                 watch.round()?;
-                left_out.push((kind, "it was not done in time".to_owned()));
+                left_out.push((kind, NOT_IN_TIME.to_owned()));
             }
             Err(error) => {
                 left_out.push((kind, error.to_string()));

@@ -181,7 +181,8 @@ impl Evaluation {
             return Some(mean(told));
         }
         let half_m = percentile(&sorted_errors_m(&self.located), 95.0)?;
-        let scores = self.located.iter().map(|located| score_of_interval((-half_m, half_m), located.error_m()));
+        let scores =
+            self.located.iter().map(|located| score_of_interval((-half_m, half_m), located.error_m()));
         Some(mean(scores))
     }
 

@@ -79,7 +79,8 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let kinds = self.features.map_or_else(|| FeatureKind::candidates(setup, recording), |kind| vec![kind]);
+        let kinds =
+            self.features.map_or_else(|| FeatureKind::candidates(setup, recording), |kind| vec![kind]);
         let mut best: Option<GaussianProcessLocator> = None;
         for kind in kinds {
             let fitted = self.with_features(kind, setup, recording, seed, watch)?;

@@ -9,6 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::evaluation::{ErrorSummary, cross_validate};
+use crate::features::FeatureKind;
 use crate::fit::{Fit, FitTask, Locate};
 use crate::fixtures::{pad_recording, raw_recording, raw_setup, strip_recording};
 use crate::recording::{Recording, Row};
@@ -180,4 +181,33 @@ fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     let Some((setup, recording)) = pad_recording() else { return };
     let (errors, _) = five_folds("eflesh", &setup, &recording);
     assert!(errors.median_m <= SLACK * mm(0.312) && errors.average_m <= SLACK * mm(0.343), "{errors:?}");
+}
+
+#[test]
+fn channels_that_follow_different_powers_of_the_force_are_taken_by_their_logarithms() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+    let rows = (0..150).map(|_| {
+        let (x_m, force_n): (f64, f64) = (rng.random_range(0.0..0.4), rng.random_range(0.5..5.0));
+        let noise = |rng: &mut Xoshiro256PlusPlus| -> f64 {
+            let error: f64 = StandardNormal.sample(rng);
+            (0.01 * error).exp()
+        };
+        let powers = [(3.0, 1.0), (-3.0, 2.0), (1.0, -0.5)];
+        let reading =
+            powers.map(|(slope, power)| (slope * x_m).exp() * force_n.powf(power) * noise(&mut rng));
+        Row {
+            position: Position::along(x_m),
+            force_n: None,
+            nuisance: None,
+            time_s: None,
+            reading: reading.to_vec(),
+        }
+    });
+    let recording = raw_recording(rows.collect());
+    let setup = raw_setup(*EXTENT, 3, None);
+    assert_eq!(fit(&setup, &recording).unwrap().features.kind, FeatureKind::Logarithms);
+    // A channel that may be negative has none.
+    let mut signed = recording;
+    signed.rows[3].reading[1] = -0.1;
+    assert_eq!(fit(&setup, &signed).unwrap().features.kind, FeatureKind::LoadInvariant);
 }

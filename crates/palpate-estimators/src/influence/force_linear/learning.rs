@@ -295,7 +295,7 @@ impl Found {
 }
 
 /// Nonlinearities that are tried.
-const NONLINEARITIES: [f64; 3] = [0.03, 0.1, 0.3];
+const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
 /// Variances of drift over that of the noise that are tried.
 const DRIFTS: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
 /// Exponents of the response that are tried.
