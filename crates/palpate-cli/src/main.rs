@@ -14,6 +14,7 @@ mod json;
 mod lines;
 mod output;
 mod progress;
+mod tare;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -28,8 +28,10 @@ mod activation;
 mod contact;
 mod estimate;
 mod network;
+mod tare;
 
 pub use activation::{Activation, Logistic};
 pub use contact::{Contact, Position};
 pub use estimate::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 pub use network::{BufferMismatch, Network};
+pub use tare::{Tare, TareError};

@@ -218,6 +218,9 @@ pub struct Fitted<M> {
     pub provenance: LocatorProvenance,
     /// The method and what it learnt.
     pub method: M,
+    /// Mean reading of the recording's rows without contact, where it has some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub untouched: Option<Vec<f64>>,
 }
 
 /// Provenance of a locator.
@@ -240,12 +243,14 @@ impl<M> Fitted<M> {
             seed: task.seed,
             recording: task.recording.provenance.clone(),
         };
-        Self { setup: task.setup.clone(), provenance, method }
+        let untouched = task.recording.untouched_mean();
+        Self { setup: task.setup.clone(), provenance, method, untouched }
     }
 
     /// The same locator with its method as another type.
     pub fn map<N>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
-        Fitted { setup: self.setup, provenance: self.provenance, method: convert(self.method) }
+        let Self { setup, provenance, method, untouched } = self;
+        Fitted { setup, provenance, method: convert(method), untouched }
     }
 
     /// The sensors, a channel of a reading each.
@@ -269,6 +274,10 @@ impl<M: Locate> Fitted<M> {
     /// # Errors
     /// [`LocatorFault`], naming what does not fit together.
     pub fn check(&self) -> Result<(), LocatorFault> {
+        if let Some(untouched) = &self.untouched {
+            LocatorFault::check_count("untouched channels", self.setup.layout().len(), untouched.len())?;
+            LocatorFault::check_numbers("untouched reading", untouched, |_| true, "a finite number")?;
+        }
         self.method.check(&self.setup)
     }
 }

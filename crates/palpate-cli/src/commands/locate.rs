@@ -3,12 +3,14 @@
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
 use crate::lines::Readings;
+use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
-use palpate_estimators::estimator::{ContactEstimate, Estimate, Mode, Uncertainty};
+use palpate_estimators::estimator::{ContactEstimate, Estimate, Locator, Mode, Uncertainty};
 use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
+use std::error::Error;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +27,8 @@ pub struct Arguments {
     /// Leave a dead channel out, by its number from 1; may be repeated
     #[arg(long, value_name = "CHANNEL")]
     dead: Vec<usize>,
+    #[command(flatten)]
+    tare: TareOption,
     /// Print one JSON object a line instead of CSV
     #[arg(long)]
     json: bool,
@@ -45,25 +49,31 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Complaint::new(complaint).help("only the `digit` estimator does").into());
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
+    let mut taring = Taring::new(&arguments.tare, &locator, arguments.no_header)?;
     let mut readings = Readings::open(path, &locator.setup, arguments.no_header)?;
     let extent = locator.setup.surface().extent();
     let mut out = std::io::stdout().lock();
     if !arguments.json {
         output::print(&mut out, heading(extent).as_bytes())?;
     }
-    while let Some(reading) = readings.next()? {
-        let estimate = match locator.locate(&reading) {
+    while let Some(mut reading) = readings.next()? {
+        let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
             Ok(estimate) => estimate,
             Err(error) => {
                 readings.lose(&error);
                 continue;
             }
         };
-        let text = if arguments.json {
-            let shape = arguments.shape.and_then(|points| locator.shape(&estimate, usize::from(points) - 1));
-            json(&estimate, readings.lines.count, extent, shape.as_ref())?
-        } else {
-            csv(&estimate, extent)
+        let line = readings.lines.count;
+        let text = match &estimate {
+            None if arguments.json => untouched_json(line)?,
+            None => untouched_csv(extent),
+            Some(estimate) if arguments.json => {
+                let shape =
+                    arguments.shape.and_then(|points| locator.shape(estimate, usize::from(points) - 1));
+                json(estimate, line, extent, shape.as_ref())?
+            }
+            Some(estimate) => csv(estimate, extent),
         };
         output::print(&mut out, text.as_bytes())?;
         // A reader at the other end of a pipe wants each estimate now.
@@ -73,7 +83,36 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }
+    if let Some(taring) = &taring {
+        taring.finish(&readings.lines.name)?;
+    }
     readings.finish("estimate")
+}
+
+/// The estimate of a reading; `None` of one that is taken for an untouched one.
+fn locate(
+    locator: &Locator,
+    taring: Option<&mut Taring>,
+    reading: &mut [f64],
+) -> Result<Option<Estimate>, Box<dyn Error>> {
+    if let Some(taring) = taring
+        && taring.take(reading)? == Taken::Baseline
+    {
+        return Ok(None);
+    }
+    Ok(Some(locator.locate(reading)?))
+}
+
+/// The status of a reading that is taken for an untouched one, and is not located.
+const TARE: &str = "tare";
+
+fn untouched_csv(extent: Extent) -> String {
+    let empty = heading(extent).matches(',').count();
+    csv_row(std::iter::repeat_n(String::new(), empty).chain([TARE.to_owned()]))
+}
+
+fn untouched_json(line: u64) -> Result<String, Failure> {
+    json_line(&object! { "line": line, "status": TARE })
 }
 
 /// The columns of [`csv`].
@@ -121,7 +160,11 @@ fn json(
         "further"?: Some(further).filter(|further| !further.is_empty()),
         "shape"?: shape.map(|shape| shape.points.iter().map(shape_point).collect::<Vec<_>>()),
     };
-    serde_json::to_string(&object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
+    json_line(&object)
+}
+
+fn json_line(object: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string(object).map(|line| line + "\n").map_err(|error| Complaint::new(error).into())
 }
 
 /// A point of the bent finger's centre line: how far along it, where, and how sure.

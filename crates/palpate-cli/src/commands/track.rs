@@ -4,6 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
 use crate::lines::{DialectNote, Lines};
 use crate::output::Table;
+use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::estimator::{
     Across, Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig,
@@ -43,6 +44,8 @@ pub struct Arguments {
     /// Seed of the simulations with other speeds
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    tare: TareOption,
     /// Print one JSON object a line instead of CSV
     #[arg(long)]
     json: bool,
@@ -74,8 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         Follower::Filter(Tracker::new(tracking.likelihood(), config))
     };
+    let taring = Taring::new(&arguments.tare, &locator, false)?;
     let mut stream = Stream {
         arguments,
+        taring,
         follower,
         extent,
         columns,
@@ -113,6 +118,7 @@ enum Follower<'a> {
 
 struct Stream<'a> {
     arguments: &'a Arguments,
+    taring: Option<Taring<'a>>,
     follower: Follower<'a>,
     extent: Extent,
     /// Columns of the CSV.
@@ -144,7 +150,7 @@ impl Stream<'_> {
                 Ok(None) => {}
                 Ok(Some(reading)) => {
                     note.say(parser.dialect());
-                    self.follow(&reading, &mut out)?;
+                    self.follow(reading, &mut out)?;
                 }
                 Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error).into()),
                 Err(error) => {
@@ -163,13 +169,21 @@ impl Stream<'_> {
             let complaint = Complaint::new(format!("{} holds no reading", self.lines.name));
             return Err(complaint.help("it must begin with a header").into());
         }
-        Ok(())
+        self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(&self.lines.name))
     }
 
-    fn follow(&mut self, reading: &TimedReading, out: &mut impl Write) -> Result<(), Failure> {
+    fn follow(&mut self, mut reading: TimedReading, out: &mut impl Write) -> Result<(), Failure> {
         let rate_s = |rate_hz: f64| self.times as f64 / rate_hz;
         let time_s = reading.time_s.or(self.arguments.rate.map(rate_s)).unwrap_or(0.0);
         self.times += 1;
+        match self.taring.as_mut().map_or(Ok(Taken::Tared), |taring| taring.take(&mut reading.reading)) {
+            Ok(Taken::Tared) => {}
+            Ok(Taken::Baseline) => return Ok(()),
+            Err(error) => {
+                self.lose(&error);
+                return Ok(());
+            }
+        }
         let track = match &mut self.follower {
             Follower::Filter(tracker) => tracker.follow(time_s, &reading.reading).map(Some),
             Follower::Smoother(tracker) => tracker.follow(time_s, &reading.reading).map(|()| None),
@@ -177,8 +191,7 @@ impl Stream<'_> {
         let track = match track {
             Ok(track) => track,
             Err(error) => {
-                self.lost += 1;
-                eprintln!("palpate: skipped line {}: {error}", self.lines.count);
+                self.lose(&error);
                 return Ok(());
             }
         };
@@ -193,6 +206,11 @@ impl Stream<'_> {
         }
         // A reader at the other end of a pipe wants each estimate now.
         out.flush().map_err(|_| Failure::NobodyReads)
+    }
+
+    fn lose(&mut self, error: &dyn std::fmt::Display) {
+        self.lost += 1;
+        eprintln!("palpate: skipped line {}: {error}", self.lines.count);
     }
 
     /// The filter's tracks and the smoother's, and prints those that were kept back.

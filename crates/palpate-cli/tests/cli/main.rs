@@ -16,5 +16,6 @@ mod report_page;
 mod study;
 mod support;
 mod supported_beams;
+mod tare;
 mod track;
 mod verbs;

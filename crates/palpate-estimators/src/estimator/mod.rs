@@ -10,7 +10,7 @@ pub use crate::load_profile::{
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
-pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
+pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
 pub use settings::Setting;
 
 use std::borrow::Cow;
@@ -233,6 +233,16 @@ where
     }
 }
 
+/// A locator that does not know what its surface reads untouched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a locator of kind `{kind}`, fitted to a recording without rows of force 0, does not know what its surface reads untouched"
+)]
+pub struct NoBaseline {
+    /// The locator's kind.
+    pub kind: &'static str,
+}
+
 /// A channel that cannot be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LeaveOutError {
@@ -297,6 +307,50 @@ impl Locator {
     /// The `kind` under which a rig names its estimator.
     pub fn kind(&self) -> &'static str {
         self.method.kind()
+    }
+
+    /// What each channel reads untouched, as calibration left it: the offsets that influence functions were learnt with, the mean of the
+    /// recording's rows without contact, or nothing at all where a model says what a contact adds.
+    ///
+    /// # Errors
+    /// [`NoBaseline`] where none of them is known.
+    pub fn untouched_reading(&self) -> Result<Vec<f64>, NoBaseline> {
+        let offsets = match &self.method {
+            Method::Influence(influence) => influence.offsets(),
+            Method::ClosedForm(_) | Method::Digit(_) => Some(vec![0.0; self.setup.layout().len()]),
+            _ => None,
+        };
+        let of_model = || self.setup.surface().model().map(|_| vec![0.0; self.setup.layout().len()]);
+        let known = offsets.or_else(|| self.untouched.clone()).or_else(of_model);
+        known.ok_or(NoBaseline { kind: self.kind() })
+    }
+
+    /// A tare of its readings, whose baseline is as calibration left it.
+    ///
+    /// ```
+    /// use palpate_estimators::{arrangement::Training, fit::Fit, influence::Influence, setup::Setup};
+    /// use palpate_mechanics::{sensing::SensorKind::Deflection, surface::Beam, units::{gpa, mm, newtons, um}};
+    ///
+    /// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+    /// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?.known_force(newtons(3.0))?;
+    /// let presses = setup.simulate(&Training::even(10), 0)?;
+    /// let locator = Influence::default().fit(&setup, &presses)?.into_locator();
+    ///
+    /// // The sensors have slipped by 0.1 mm since.
+    /// let mut tare = locator.tare()?;
+    /// tare.add_untouched(&[mm(0.1); 8])?;
+    /// let slipped: Vec<f64> = presses.rows[4].reading.iter().map(|reading| reading + mm(0.1)).collect();
+    /// let mut tared = vec![0.0; 8];
+    /// tare.apply(&slipped, &mut tared)?;
+    /// assert!((locator.locate(&tared)?.contact.position.x_m - mm(180.0)).abs() < mm(1.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`NoBaseline`] where calibration does not tell what the surface reads untouched.
+    pub fn tare(&self) -> Result<Tare<Vec<f64>>, NoBaseline> {
+        // What a locator holds is finite.
+        Tare::new(self.untouched_reading()?).map_err(|_| NoBaseline { kind: self.kind() })
     }
 
     /// Share of untouched readings that may be taken for a contact; `None` of a method that tells no untouched reading.

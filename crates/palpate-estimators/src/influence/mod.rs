@@ -127,6 +127,16 @@ impl InfluenceLocator {
 }
 
 impl InfluenceLocator {
+    /// Offset of each channel, in its SI unit; `None` where it was not learnt.
+    pub fn offsets(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Beam(beam) => Some(beam.offsets().to_vec()),
+            Self::Plane(plane) => Some(plane.offsets().to_vec()),
+            Self::ForceLinear(linear) => Some(linear.offsets()),
+            Self::Measured(_) => None,
+        }
+    }
+
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {

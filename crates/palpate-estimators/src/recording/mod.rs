@@ -27,6 +27,7 @@ use sha2::{Digest, Sha256};
 
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::{Layout, SensorKind};
+use palpate_numerics::mean;
 use std::borrow::Cow;
 
 /// Readings with the contacts that caused them.
@@ -198,6 +199,13 @@ impl Recording {
             rows,
             provenance: self.provenance.clone(),
         })
+    }
+
+    /// Mean reading of the rows in which nothing touched; `None` where there are none.
+    pub fn untouched_mean(&self) -> Option<Vec<f64>> {
+        let untouched: Vec<&Row> = self.rows.iter().filter(|row| !row.touches()).collect();
+        let channel = |c: usize| mean(untouched.iter().map(|row| row.reading[c]));
+        (!untouched.is_empty()).then(|| (0..self.channels.len()).map(channel).collect())
     }
 
     /// The recording that consists of `rows`, indices into this one's; those beyond it are left out.

@@ -251,6 +251,13 @@ impl ForceLinearLocator {
         self.stored.nonlinearity
     }
 
+    /// Offset of each channel, in its unit; 0 of those that are not in use.
+    pub fn offsets(&self) -> Vec<f64> {
+        let mut offsets = vec![0.0; self.stored.channels];
+        self.channels().for_each(|(c, offset, _)| offsets[c] = offset);
+        offsets
+    }
+
     /// Share of untouched readings that may be taken for a contact.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.false_alarm_rate

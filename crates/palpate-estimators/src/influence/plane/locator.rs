@@ -48,6 +48,11 @@ impl PlaneLocator {
         self.stored.force
     }
 
+    /// Offset of each channel, in its SI unit.
+    pub fn offsets(&self) -> &[f64] {
+        &self.stored.channels.offsets
+    }
+
     /// Share of untouched readings that may be taken for a contact.
     pub fn false_alarm_rate(&self) -> FalseAlarmRate {
         self.stored.channels.false_alarm_rate

@@ -1,0 +1,203 @@
+//! `--tare`: readings of a surface whose offsets have moved since its calibration.
+
+use crate::failure::{Complaint, Failure};
+use crate::lines::Readings;
+use palpate_estimators::estimator::{Locator, Status, Tare, TareError};
+use palpate_estimators::fit::Locate;
+use palpate_mechanics::units::Quantity;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Where the baseline comes from.
+#[derive(clap::Args)]
+pub struct TareOption {
+    /// Take what the channels read untouched today from the first N readings, from a FILE of untouched readings, or find and follow it
+    /// (`auto`), and bring every reading to what calibration learnt
+    #[arg(long, value_name = "N|FILE|auto")]
+    pub tare: Option<Source>,
+}
+
+/// The untouched readings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// So many of the first ones.
+    First(u64),
+    /// All of a file.
+    File(PathBuf),
+    /// Those that the locator's own rule finds.
+    Auto,
+}
+
+impl FromStr for Source {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_number = text.contains(|c: char| c.is_ascii_digit()) && text.parse::<f64>().is_ok();
+        match text {
+            "auto" => Ok(Self::Auto),
+            "-" => Err("untouched readings cannot come from stdin; name a file".to_owned()),
+            _ if is_number => match text.parse() {
+                Ok(count) if count > 0 => Ok(Self::First(count)),
+                _ => Err(format!(
+                    "`{text}` must be a whole number of readings, at least 1; a file of that name is `./{text}`"
+                )),
+            },
+            _ => Ok(Self::File(text.into())),
+        }
+    }
+}
+
+/// What a reading is to the tare.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// One of those that make the baseline: it is not located.
+    Baseline,
+    /// One that has been tared.
+    Tared,
+}
+
+/// The tare of a stream of readings.
+pub struct Taring<'a> {
+    locator: &'a Locator,
+    source: Source,
+    tare: Tare<Vec<f64>>,
+    /// Readings that have made the baseline.
+    count: u64,
+    /// The first of them, to see whether they are untouched ones.
+    kept: Vec<Vec<f64>>,
+    tared: Vec<f64>,
+}
+
+/// Readings that are looked at again, at most, and the share of them that may look touched.
+const MOST_KEPT: usize = 1000;
+const MOST_TOUCHED: f64 = 0.05;
+
+impl<'a> Taring<'a> {
+    /// The tare that was asked for; `None` where none was. A FILE is read at once.
+    pub fn new(option: &TareOption, locator: &'a Locator, no_header: bool) -> Result<Option<Self>, Failure> {
+        let Some(source) = option.tare.clone() else { return Ok(None) };
+        let tare = locator.tare().map_err(|error| {
+            Complaint::new(format!("--tare: {error}")).help(
+                "add rows of force 0 to the recording and fit again, or fit `kind = \"influence\"` to a recording with forces",
+            )
+        })?;
+        let tared = tare.learnt().to_vec();
+        let mut taring = Self { locator, source: source.clone(), tare, count: 0, kept: Vec::new(), tared };
+        match source {
+            Source::File(path) => taring.read(&path, no_header)?,
+            Source::First(_) => {}
+            Source::Auto if locator.false_alarm_rate().is_none() => {
+                let complaint = format!(
+                    "--tare auto: a locator of kind `{}` does not tell untouched readings from contacts",
+                    locator.kind()
+                );
+                return Err(Complaint::new(complaint)
+                    .help("--tare N takes the first N readings for untouched, --tare FILE those of a file")
+                    .into());
+            }
+            Source::Auto => {}
+        }
+        Ok(Some(taring))
+    }
+
+    fn read(&mut self, path: &Path, no_header: bool) -> Result<(), Failure> {
+        let mut readings = Readings::open(path, &self.locator.setup, no_header)?;
+        while let Some(reading) = readings.next()? {
+            self.add(&reading).map_err(|error| Complaint::about(path, error))?;
+        }
+        if !readings.is_whole() {
+            let complaint =
+                Complaint::about(path, "not every line is a reading, and so the tare would be another one");
+            return Err(complaint.help("mend the lines above, or take them out").into());
+        }
+        if self.count == 0 {
+            let complaint = Complaint::about(path, "it holds no untouched reading");
+            return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
+        }
+        self.look_again();
+        Ok(())
+    }
+
+    /// Takes a reading, which is the tared one afterwards.
+    pub fn take(&mut self, reading: &mut [f64]) -> Result<Taken, TareError> {
+        match self.source {
+            Source::First(needed) if self.count < needed => {
+                self.add(reading)?;
+                if self.count == needed {
+                    self.look_again();
+                }
+                return Ok(Taken::Baseline);
+            }
+            Source::First(_) | Source::File(_) => self.tare.apply(reading, &mut self.tared)?,
+            Source::Auto => {
+                let method = &self.locator.method;
+                self.tare.follow(reading, &mut self.tared, |tared| method.locate(tared))?;
+            }
+        }
+        reading.copy_from_slice(&self.tared);
+        Ok(Taken::Tared)
+    }
+
+    fn add(&mut self, reading: &[f64]) -> Result<(), TareError> {
+        self.tare.add_untouched(reading)?;
+        self.count += 1;
+        if self.kept.len() < MOST_KEPT {
+            self.kept.push(reading.to_vec());
+        }
+        Ok(())
+    }
+
+    /// Says what the baseline is, and warns where its readings do not look untouched beside their mean.
+    fn look_again(&mut self) {
+        self.say();
+        if self.locator.false_alarm_rate().is_none() {
+            return;
+        }
+        let kept = std::mem::take(&mut self.kept);
+        let mut touched = 0;
+        for reading in &kept {
+            let tared = self.tare.apply(reading, &mut self.tared);
+            let estimate = tared.ok().and_then(|()| self.locator.locate(&self.tared).ok());
+            touched += usize::from(estimate.is_none_or(|estimate| estimate.status != Status::NoContact));
+        }
+        if touched as f64 > MOST_TOUCHED * kept.len() as f64 {
+            eprintln!(
+                "palpate: warning: {touched} of {} readings of the tare are not within the noise of their mean: was the surface touched, or did it drift?",
+                kept.len()
+            );
+        }
+    }
+
+    /// Says how far the channels have moved.
+    fn say(&self) {
+        let moved = self.tare.baseline().iter().zip(self.tare.learnt()).map(|(today, learnt)| today - learnt);
+        let most = moved.enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let Some((channel, value)) = most else { return };
+        let sensor = &self.locator.setup.layout().sensors()[channel];
+        let from = match self.source {
+            Source::Auto => "found untouched readings".to_owned(),
+            Source::First(_) | Source::File(_) => format!("the mean of {} readings", self.count),
+        };
+        let moved = Quantity { value, dimension: sensor.kind.dimension() };
+        eprintln!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
+    }
+
+    /// The end of the readings of `source`.
+    ///
+    /// # Errors
+    /// When there were fewer readings than make the baseline.
+    pub fn finish(&self, source: &str) -> Result<(), Failure> {
+        match self.source {
+            Source::First(needed) if self.count < needed => {
+                let complaint = format!(
+                    "--tare {needed}: {source} holds {} readings; the first {needed} are to be the untouched ones",
+                    self.count
+                );
+                return Err(Complaint::new(complaint).help("give fewer, or record longer").into());
+            }
+            Source::Auto => self.say(),
+            Source::First(_) | Source::File(_) => {}
+        }
+        Ok(())
+    }
+}

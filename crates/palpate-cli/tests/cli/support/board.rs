@@ -1,0 +1,113 @@
+//! A board of one's own by known physics: a strip on two supports over raw deflection sensors, read in counts.
+
+use std::fmt::Write;
+
+/// The board's rig.
+pub const RIG: &str = r#"[surface]
+kind = "measured"
+length = "300 mm"
+
+[sensors]
+measure = "raw"
+count = 6
+
+[recording]
+position = "Position"
+position_unit = "mm"
+force = "Force"
+channels = ["g1", "g2", "g3", "g4", "g5", "g6"]
+
+[estimator]
+kind = "influence"
+"#;
+
+const LENGTH_MM: f64 = 300.0;
+const SENSORS: usize = 6;
+
+/// Sensors with offsets and a count of noise each.
+pub struct Board {
+    offsets: [f64; SENSORS],
+    state: u64,
+}
+
+/// Where and how hard it is touched; a force of 0 is no touch.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    pub position_mm: f64,
+    pub force_n: f64,
+}
+
+impl Touch {
+    pub const NONE: Self = Self { position_mm: 0.0, force_n: 0.0 };
+}
+
+impl Board {
+    pub fn new(seed: u64) -> Self {
+        let mut board = Self { offsets: [0.0; SENSORS], state: seed };
+        board.move_offsets(300.0);
+        board
+    }
+
+    /// Moves every offset by up to so many counts.
+    pub fn move_offsets(&mut self, most: f64) {
+        for c in 0..SENSORS {
+            self.offsets[c] += most * (2.0 * self.uniform() - 1.0);
+        }
+    }
+
+    /// A number between 0 and 1 (D. Knuth's linear congruential generator, its upper half).
+    pub fn uniform(&mut self) -> f64 {
+        self.state =
+            self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.state >> 33) as f64 / (1u64 << 31) as f64
+    }
+
+    /// Noise of one count: twelve uniform numbers less their mean.
+    fn noise(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+
+    pub fn reading(&mut self, touch: Touch) -> [f64; SENSORS] {
+        std::array::from_fn(|c| {
+            let sensor_mm = LENGTH_MM * (c as f64 + 0.7) / (SENSORS as f64 + 0.4);
+            let gain = 40.0 + 3.0 * c as f64;
+            self.offsets[c] + touch.force_n * gain * deflection(sensor_mm, touch.position_mm) + self.noise()
+        })
+    }
+
+    /// A touch anywhere but next to the supports.
+    pub fn touch(&mut self) -> Touch {
+        let position_mm = 30.0 + 240.0 * self.uniform();
+        Touch { position_mm, force_n: 0.5 + 4.0 * self.uniform() }
+    }
+
+    /// Presses of recorded force at 21 places, and untouched rows between them.
+    pub fn calibration(&mut self, presses: usize) -> String {
+        let place_mm = |i: usize| 15.0 + 13.5 * (i % 21) as f64;
+        let mut touches = Vec::new();
+        for i in 0..presses {
+            let force_n = 0.5 + 4.0 * self.uniform();
+            touches.push(Touch { position_mm: place_mm(i), force_n });
+            touches.push(Touch::NONE);
+        }
+        self.recording(&touches)
+    }
+
+    /// Readings of touches, with their contacts.
+    pub fn recording(&mut self, touches: &[Touch]) -> String {
+        let mut csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
+        for touch in touches {
+            let reading = self.reading(*touch).map(|value| format!("{value:.3}")).join(",");
+            writeln!(csv, "{:.3},{:.4},{reading}", touch.position_mm, touch.force_n)
+                .expect("text can be written");
+        }
+        csv
+    }
+}
+
+/// Deflection of a simply supported beam at one place under a force at another, over the most there is.
+fn deflection(at_mm: f64, force_mm: f64) -> f64 {
+    let (x, a) = if at_mm < force_mm { (at_mm, force_mm) } else { (force_mm, at_mm) };
+    let (x, b) = (x / LENGTH_MM, 1.0 - a / LENGTH_MM);
+    8.0 * x * b * (1.0 - x * x - b * b)
+}

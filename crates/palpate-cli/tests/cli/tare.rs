@@ -1,0 +1,155 @@
+//! `--tare` from outside: boards whose offsets have moved since their calibration.
+
+use crate::support::board::{Board, RIG, Touch};
+use crate::support::command::{complained, folder, run, said};
+use crate::support::examples::MOVING_LOAD;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Untouched readings at the beginning of a recording.
+const FIRST: usize = 60;
+
+/// A folder with a board's rig and locator, and the board.
+fn fitted() -> (TempDir, Board) {
+    let (folder, mut board) = (folder(RIG), Board::new(7));
+    fs::write(folder.path().join("presses.csv"), board.calibration(84)).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
+    (folder, board)
+}
+
+/// Readings of an untouched board, then of touches with pauses between them.
+fn touches(board: &mut Board) -> Vec<Touch> {
+    let mut touches = vec![Touch::NONE; FIRST];
+    for _ in 0..60 {
+        let touch = board.touch();
+        touches.extend([touch, touch, Touch::NONE]);
+    }
+    touches
+}
+
+/// Mean error of the touches, in millimetres, and the share of untouched rows behind the first that are `no_contact`.
+fn judged(folder: &Path, touches: &[Touch], options: &[&str]) -> (f64, f64) {
+    let located = said(&run(folder, &[&["locate", "board.json", "touches.csv"], options].concat()));
+    let rows: Vec<Vec<&str>> = located.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), touches.len());
+    let (mut errors, mut untouched) = (Vec::new(), Vec::new());
+    for (row, touch) in rows.iter().zip(touches).skip(FIRST) {
+        if touch.force_n > 0.0 {
+            errors.push((row[0].parse::<f64>().unwrap() - touch.position_mm).abs());
+        } else {
+            untouched.push(f64::from(row[4] == "no_contact"));
+        }
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    (mean(&errors), mean(&untouched))
+}
+
+#[test]
+fn a_board_that_moved_is_as_good_as_a_fresh_one_with_a_tare() {
+    let (folder, mut board) = fitted();
+    let touches = touches(&mut board);
+    let file = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    file("touches.csv", board.recording(&touches));
+    let fresh = judged(folder.path(), &touches, &[]);
+    board.move_offsets(50.0);
+    file("touches.csv", board.recording(&touches));
+    file("untouched.csv", board.recording(&[Touch::NONE; 80]));
+    let moved = judged(folder.path(), &touches, &[]);
+    println!("fresh {fresh:?}, moved {moved:?}");
+    assert!(fresh.1 > 0.95 && moved.1 < 0.1 && moved.0 > 5.0 * fresh.0, "{fresh:?} {moved:?}");
+    for tare in [FIRST.to_string().as_str(), "untouched.csv", "auto"] {
+        let tared = judged(folder.path(), &touches, &["--tare", tare]);
+        println!("--tare {tare}: {tared:?}");
+        assert!(tared.0 < 1.15 * fresh.0 + 0.1, "--tare {tare}: {tared:?}, fresh {fresh:?}");
+        assert!(tared.1 > 0.95, "--tare {tare}: {tared:?}");
+    }
+}
+
+#[test]
+fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
+    let (folder, mut board) = fitted();
+    board.move_offsets(50.0);
+    let touch = Touch { position_mm: 150.0, force_n: 2.0 };
+    fs::write(folder.path().join("few.csv"), board.recording(&[Touch::NONE, Touch::NONE, touch])).unwrap();
+    let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2"]);
+    let lines: Vec<String> = said(&output).lines().map(str::to_owned).collect();
+    assert_eq!(lines[..3], ["position_mm,force_n,low_mm,high_mm,status", ",,,,tare", ",,,,tare"]);
+    assert!(lines[3].ends_with(",located"), "{lines:?}");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("tare from the mean of 2 readings; g"), "{told}");
+    let json = said(&run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2", "--json"]));
+    assert_eq!(json.lines().nth(1), Some(r#"{"line":3,"status":"tare"}"#));
+
+    // A touched board is no tare.
+    let touched: Vec<Touch> = (0..40).map(|i| if i % 2 == 0 { touch } else { Touch::NONE }).collect();
+    fs::write(folder.path().join("touched.csv"), board.recording(&touched)).unwrap();
+    let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "touched.csv"]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("40 of 40 readings of the tare are not within the noise"), "{told}");
+}
+
+#[test]
+fn bad_tares_are_refused() {
+    let (folder, mut board) = fitted();
+    let file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    file("few.csv", &board.recording(&[Touch::NONE; 3]));
+    file("broken.csv", "g1,g2,g3,g4,g5,g6\n1,2,3,4,5,nan\n");
+    file("narrow.csv", "g1,g2,g3\n1,2,3\n");
+    file("empty.csv", "");
+    file("header.csv", "g1,g2,g3,g4,g5,g6\n");
+    let neighbours = RIG.replace("\"influence\"", "\"neighbours\"");
+    file("neighbours.toml", &neighbours);
+    let pressed = fs::read_to_string(folder.path().join("presses.csv")).unwrap();
+    let touched: Vec<&str> = pressed.lines().filter(|line| !line.contains(",0.0000,")).collect();
+    file("touched.csv", &touched.join("\n"));
+    said(&run(folder.path(), &["fit", "neighbours.toml", "--data", "touched.csv", "-o", "touched.json"]));
+    said(&run(folder.path(), &["fit", "neighbours.toml", "--data", "presses.csv", "-o", "neighbours.json"]));
+    let refused = |locator: &str, tare: &str| {
+        let option = format!("--tare={tare}");
+        complained(&run(folder.path(), &["locate", locator, "few.csv", &option]), 2)
+    };
+    let mut shown = Vec::new();
+    let tares =
+        ["4", "0", "-3", "2.5", "-", "nowhere.csv", "broken.csv", "narrow.csv", "empty.csv", "header.csv"];
+    for tare in tares {
+        shown.push(refused("board.json", tare));
+    }
+    shown.extend([refused("touched.json", "2"), refused("neighbours.json", "auto")]);
+    insta::assert_snapshot!(shown.join("\n"));
+    // With rows of force 0, the mean of those is the baseline.
+    said(&run(folder.path(), &["locate", "neighbours.json", "few.csv", "--tare", "2"]));
+}
+
+#[test]
+fn a_track_is_tared_too() {
+    let folder = folder(MOVING_LOAD);
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv", "--seed", "1"]));
+    let csv = fs::read_to_string(folder.path().join("moving.csv")).unwrap();
+    let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let move_by = |line: &str, mm: f64| {
+        let cell = |(cell, name): (&str, &&str)| match name.starts_with("deflection") {
+            true => format!("{}", cell.parse::<f64>().unwrap() + mm),
+            false => cell.to_owned(),
+        };
+        line.split(',').zip(&header).map(cell).collect::<Vec<_>>().join(",")
+    };
+    let moved: Vec<String> = lines.map(|line| move_by(line, 0.3)).collect();
+    let text = format!("{}\n{}\n", header.join(","), moved.join("\n"));
+    fs::write(folder.path().join("moved.csv"), text).unwrap();
+    let zeros: Vec<&str> =
+        header.iter().map(|name| if name.starts_with("deflection") { "0.3" } else { "0" }).collect();
+    let untouched = format!("{}\n{}\n", header.join(","), zeros.join(","));
+    fs::write(folder.path().join("untouched.csv"), untouched).unwrap();
+    let plain = said(&run(folder.path(), &["track", "locator.json", "moving.csv"]));
+    let tared = said(&run(folder.path(), &["track", "locator.json", "moved.csv", "--tare", "untouched.csv"]));
+    let positions = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).filter_map(|line| line.split(',').nth(1)?.parse().ok()).collect()
+    };
+    let (plain, tared) = (positions(&plain), positions(&tared));
+    assert_eq!(plain.len(), tared.len());
+    assert!(plain.len() > 100);
+    assert!(plain.iter().zip(&tared).all(|(a, b)| (a - b).abs() < 0.1));
+}
