@@ -1,4 +1,11 @@
-//! `networks.csv`: a row per network that was trained in lanes, written as it is finished; a study resumes from it.
+//! `networks.csv`: a row per fit of a study, written as it is finished; a study resumes from the networks in it.
+//!
+//! Columns are the arm, the seed, epochs, status and aggregate error of a network's training, the errors of the fit in % of the surface's length,
+//! the effective length, and the weights of a network. What a fit of another estimator has not is an empty cell.
+//!
+//! Weights stand in the order in which `palpate_core::Network` has them: layer by layer from the input side, node by node of the layer; of
+//! each node the weights of the nodes before it, in their order, and then, where there are biases, its bias. Inputs are the channels in the
+//! layout's order.
 
 use super::results::percent;
 use super::{PreparedStudy, Study, Trained};
@@ -62,14 +69,15 @@ impl<'a> NetworksCsv<'a> {
 
     /// The row of a fit.
     pub fn row(&self, trained: &Trained) -> String {
-        let outcome = trained.fit.locator.training_outcome().unwrap_or_default();
+        let outcome = trained.fit.locator.training_outcome();
+        let told = |told: fn(&TrainingOutcome) -> String| outcome.as_ref().map_or_else(String::new, told);
         let weights: Vec<String> = trained.fit.locator.weights().iter().map(f64::to_string).collect();
         let mut cells = vec![
             self.study.study.arms[trained.arm].name.clone(),
             trained.fit.seed.to_string(),
-            outcome.epochs.to_string(),
-            outcome.status.to_string(),
-            outcome.aggregate_error.to_string(),
+            told(|outcome| outcome.epochs.to_string()),
+            told(|outcome| outcome.status.to_string()),
+            told(|outcome| outcome.aggregate_error.to_string()),
         ];
         cells.extend(self.metrics(Some(trained)).into_iter().map(|(_, value)| format!("{value:.6}")));
         cells.push(weights.join(" "));
@@ -114,18 +122,22 @@ impl<'a> NetworksCsv<'a> {
         let whole = rows.rfind('\n').map_or("", |end| &rows[..end]);
         for (i, row) in whole.lines().enumerate() {
             let trained = self.read_row(row).map_err(|what| CheckpointError::Row { line: i + 3, what })?;
-            checkpoint.done.push(trained);
+            checkpoint.done.extend(trained);
         }
         Ok(checkpoint)
     }
 
-    fn read_row(&self, row: &str) -> Result<Trained, &'static str> {
+    /// The network of a row; `None` of a fit of another estimator, which has no weights to go on from.
+    fn read_row(&self, row: &str) -> Result<Option<Trained>, &'static str> {
         let cells: Vec<&str> = row.split(',').collect();
         let [name, seed, epochs, status, error, .., weights] = cells[..] else {
             return Err("a row has too few cells");
         };
         let arm = self.study.study.arms.iter().position(|arm| arm.name == name);
         let arm = arm.ok_or("the study has no arm of this name")?;
+        if !self.study.is_kept(arm) {
+            return Ok(None);
+        }
         let seed = seed.parse().map_err(|_| "the seed is not a whole number")?;
         let outcome = TrainingOutcome {
             status: status_from(status).ok_or("the status is none that training can have")?,
@@ -135,7 +147,7 @@ impl<'a> NetworksCsv<'a> {
         let weights = weights.split(' ').map(str::parse).collect::<Result<Vec<f64>, _>>();
         let weights = weights.map_err(|_| "a weight is not a number")?;
         let trained = self.study.restore(arm, seed, weights, outcome);
-        trained.ok_or("the number of weights is not the network's")
+        trained.map(Some).ok_or("the number of weights is not the network's")
     }
 }
 

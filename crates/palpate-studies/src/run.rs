@@ -99,7 +99,12 @@ impl PreparedStudy {
         Ok(Self { study, arms })
     }
 
-    /// Whether an arm's networks are trained in lanes, and so kept in `networks.csv`. Others are fitted again when a run is resumed.
+    /// Whether an arm's fits are networks, whose weights `networks.csv` keeps; others are fitted again when a run is resumed.
+    pub fn is_kept(&self, arm: usize) -> bool {
+        matches!(self.study.arms[arm].rig.estimator, Estimator::Network(_))
+    }
+
+    /// Whether an arm's networks are trained in lanes.
     pub fn is_in_lanes(&self, arm: usize) -> bool {
         matches!(self.arms[arm], PreparedArm::InLanes(_))
     }
@@ -119,8 +124,8 @@ impl PreparedStudy {
         Some(Trained { arm, fit: TrainedSeed { seed, locator, evaluation } })
     }
 
-    /// A network that was trained in lanes, from its weights and outcome, and judged; `None` when their number is not the network's,
-    /// or for another arm.
+    /// A network of this study, from its weights and outcome, and judged; `None` when their number is not the network's, or for an arm
+    /// of another estimator.
     pub fn restore(
         &self,
         arm: usize,
@@ -128,11 +133,24 @@ impl PreparedStudy {
         weights: Vec<f64>,
         outcome: TrainingOutcome,
     ) -> Option<Trained> {
-        let PreparedArm::InLanes(prepared) = &self.arms[arm] else { return None };
-        let Estimator::Network(network) = &prepared.estimator else { return None };
-        let task = prepared.task(Watch::NONE).seed(seed);
-        let locator = network.restore(task, weights, outcome).ok()??;
-        self.judge(arm, seed, locator.map(Method::Network))
+        match &self.arms[arm] {
+            PreparedArm::InLanes(prepared) => {
+                let Estimator::Network(network) = &prepared.estimator else { return None };
+                let task = prepared.task(Watch::NONE).seed(seed);
+                let locator = network.restore(task, weights, outcome).ok()??;
+                self.judge(arm, seed, locator.map(Method::Network))
+            }
+            PreparedArm::SeedBySeed { calibration, .. } => {
+                let Estimator::Network(network) = &self.study.arms[arm].rig.estimator else { return None };
+                // The recording of a seed is simulated again: it is the same to the last bit.
+                let restored = |task: FitTask| match network.restore(task, weights, outcome) {
+                    Ok(Some(locator)) => Ok(locator.map(Method::Network)),
+                    Ok(None) | Err(_) => Err(Cancelled),
+                };
+                let fit = calibration.run_with(seed, Watch::NONE, restored).ok()?;
+                Some(Trained { arm, fit })
+            }
+        }
     }
 
     /// Positions and tolerance by which the study judges.
@@ -269,7 +287,7 @@ pub struct RunOptions {
 pub type OnTrained<'a> = dyn Fn(&Trained) + Sync + 'a;
 
 impl PreparedStudy {
-    /// Fits every seed of every arm but those in `done`, which may hold networks trained in lanes only, and answers with all
+    /// Fits every seed of every arm but those in `done`, which may hold networks only, and answers with all
     /// of them. A seed gives the same locator whatever the number of threads and whatever was done before.
     ///
     /// # Errors

@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Folder for results and report [default: palpate-out/<study>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on from an earlier run that was stopped: networks on perfect sensors are kept, what else there is is fitted again
+    /// Go on from an earlier run that was stopped: networks are kept, what else there is is fitted again
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     /// Throw an earlier, unfinished run away
@@ -114,7 +114,7 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Fits what an earlier run has not, keeping `networks.csv` up to date where networks are kept; leaves it sorted.
+/// Fits what an earlier run has not, keeping `networks.csv` up to date where there are networks; leaves it sorted, with a row for every fit.
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
@@ -123,7 +123,7 @@ fn train(
 ) -> Result<(Vec<ArmOutcome>, RunFacts), Failure> {
     let table = NetworksCsv::new(prepared);
     output::make_folder(out)?;
-    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_in_lanes(arm));
+    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_kept(arm));
     let (file, done) = if keeps {
         let (file, done) = CheckpointFile::open(out, &table, arguments.resume, arguments.overwrite)?;
         (Some(file), done)
@@ -140,7 +140,7 @@ fn train(
     if matches!(outcomes, Err(StudyRunError::Cancelled(Cancelled))) {
         let wanted = prepared.study.arms.len() as u64 * options.seeds;
         return Err(Failure::Interrupted(if keeps {
-            let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm));
+            let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_kept(*arm));
             let kept: u64 = kept.map(|(_, fits)| fits).sum();
             let path = out.join(fits::NETWORKS_CSV);
             format!(
@@ -153,9 +153,7 @@ fn train(
         }));
     }
     let outcomes = outcomes.map_err(Complaint::new)?;
-    if keeps {
-        fits::write_sorted(out, &table, prepared, &outcomes)?;
-    }
+    fits::write_sorted(out, &table, &outcomes)?;
     Ok((outcomes.clone(), facts(prepared, options, &outcomes, &resumed, seconds)))
 }
 

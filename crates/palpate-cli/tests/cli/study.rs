@@ -132,7 +132,7 @@ fn reactions_cure_the_blind_edges() {
 }
 
 #[test]
-fn a_study_without_networks_keeps_none_and_gives_the_same_again() {
+fn a_study_without_networks_lists_its_fits_and_gives_the_same_again() {
     let folder = tempfile::tempdir().unwrap();
     let wanted = ["unknown-deflection-8", "known-reaction-2"];
     let study = Toml::parse(SENSOR_KINDS_STUDY).keep_arms(|name| wanted.contains(&name)).to_string();
@@ -141,7 +141,12 @@ fn a_study_without_networks_keeps_none_and_gives_the_same_again() {
     let table = said(&run(folder.path(), &[&arguments[..], &["1", "--out", "one"]].concat()));
     let head = table.split("\n\n").take(2).collect::<Vec<_>>().join("\n\n");
     insta::assert_snapshot!(head);
-    assert!(!folder.path().join("one/networks.csv").exists());
+    let fits = fs::read_to_string(folder.path().join("one/networks.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = fits.lines().skip(2).map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 4);
+    // An arm, a seed, no training, errors, no weights.
+    assert!(rows.iter().all(|row| row[2..5] == ["", "", ""] && row.last() == Some(&"")), "{fits}");
+    assert!(rows.iter().all(|row| row[5].parse::<f64>().unwrap() > 0.0), "{fits}");
     said(&run(folder.path(), &[&arguments[..], &["2", "--out", "two", "--resume"]].concat()));
     assert_eq!(results(folder.path(), "one")["arms"], results(folder.path(), "two")["arms"]);
 }
@@ -195,6 +200,27 @@ fn a_stopped_study_goes_on_where_it_was() {
     said(&resumed);
     assert!(String::from_utf8_lossy(&resumed.stderr).contains("cut off"));
     assert_eq!(fs::read_to_string(&networks).unwrap(), whole);
+}
+
+#[test]
+fn networks_of_noisy_sensors_are_kept_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = arms_of_ten().add("sensors.noise", "5 um").set("estimator.max_epochs", 2000).to_string();
+    fs::write(folder.path().join("noisy.toml"), study).unwrap();
+    let arguments = ["study", "noisy.toml", "--seeds", "3", "--out", "out"];
+    said(&run(folder.path(), &arguments));
+    let networks = folder.path().join("out/networks.csv");
+    let whole = fs::read_to_string(&networks).unwrap();
+    let arms = (whole.lines().count() - 2) / 3;
+    assert!(arms >= 1 && whole.lines().nth(2).unwrap().split(' ').count() == 101, "{whole}");
+    let before = results(folder.path(), "out")["arms"].clone();
+    // As a run that was stopped leaves it: some rows, and no results.
+    let some: Vec<&str> = whole.lines().take(4).collect();
+    fs::write(&networks, some.join("\n") + "\n").unwrap();
+    fs::remove_file(folder.path().join("out/results.json")).unwrap();
+    said(&run(folder.path(), &[&arguments[..], &["--resume"]].concat()));
+    assert_eq!(fs::read_to_string(&networks).unwrap(), whole);
+    assert_eq!(results(folder.path(), "out")["arms"], before);
 }
 
 #[test]

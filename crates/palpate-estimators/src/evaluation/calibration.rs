@@ -2,7 +2,7 @@
 
 use super::{Evaluation, EvaluationError, Split};
 use crate::arrangement::{Training, all_over};
-use crate::fit::{Fit, FitTask, Fitted, SeedList};
+use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
 use crate::simulate::{SimulateError, simulate_at};
 use palpate_mechanics::contact::Position;
@@ -134,9 +134,22 @@ impl Calibration {
         seed: u64,
         watch: Watch,
     ) -> Result<Calibrated<E::Method>, EvaluationError<E::Error>> {
+        self.run_with(seed, watch, |task| estimator.fit_task(task))
+    }
+
+    /// Simulates, gets a locator by `fit`, and judges it.
+    ///
+    /// # Errors
+    /// [`EvaluationError`] when the setup cannot be simulated or there is no locator.
+    pub fn run_with<M: Locate, E: std::error::Error>(
+        &self,
+        seed: u64,
+        watch: Watch,
+        fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
+    ) -> Result<Calibrated<M>, EvaluationError<E>> {
         let Split { training, judged } = self.simulate(seed)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
-        let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
+        let locator = fit(task).map_err(EvaluationError::Fit)?;
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
     }
 

@@ -1,6 +1,6 @@
-//! The fits of a study as they are finished: a row of `networks.csv` for every network that is kept, and a step of the bar.
+//! The fits of a study as they are finished: a row of `networks.csv` for each, and a step of the bar.
 //!
-//! The file grows as networks that are trained in lanes are finished, survives Ctrl-C, and is sorted at the end.
+//! The file grows as fits are finished, survives Ctrl-C, and is sorted at the end.
 
 use crate::failure::{Complaint, Failure};
 use crate::{input, output, progress};
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Name of the file that keeps the networks which are trained in lanes.
+/// Name of the file that has a row for every fit, and keeps the networks.
 pub const NETWORKS_CSV: &str = "networks.csv";
 
 /// The file, open for more rows.
@@ -84,14 +84,9 @@ fn read(path: &Path, table: &NetworksCsv) -> Result<Vec<Trained>, Failure> {
 }
 
 /// Replaces the file by one whose rows are in the order of the arms and seeds, whatever the threads did.
-pub fn write_sorted(
-    out: &Path,
-    table: &NetworksCsv,
-    prepared: &PreparedStudy,
-    outcomes: &[ArmOutcome],
-) -> Result<(), Failure> {
+pub fn write_sorted(out: &Path, table: &NetworksCsv, outcomes: &[ArmOutcome]) -> Result<(), Failure> {
     let mut rows = table.heading();
-    for (arm, outcome) in outcomes.iter().enumerate().filter(|(arm, _)| prepared.is_in_lanes(*arm)) {
+    for (arm, outcome) in outcomes.iter().enumerate() {
         for fit in &outcome.fits {
             rows.push_str(&table.row(&Trained { arm, fit: fit.clone() }));
         }
@@ -114,7 +109,7 @@ pub struct Tally<'a> {
 }
 
 struct State {
-    /// `None` where no network is kept.
+    /// `None` where there is no network to go on from.
     file: Option<CheckpointFile>,
     error: Option<std::io::Error>,
     arms: Vec<ArmTally>,
@@ -158,12 +153,12 @@ impl<'a> Tally<'a> {
         Self { prepared, table, bar, start: Instant::now(), state }
     }
 
-    /// A fit is finished: the row of a network that is kept goes to the file, and the bar goes on.
+    /// A fit is finished: its row goes to the file, and the bar goes on.
     pub fn note(&self, trained: &Trained) {
-        let row = self.prepared.is_in_lanes(trained.arm).then(|| self.table.row(trained));
+        let row = self.table.row(trained);
         let presented = presentations(self.prepared, trained.arm, &trained.fit);
         let mut state = self.state();
-        if let (Some(file), Some(row)) = (&mut state.file, row)
+        if let Some(file) = &mut state.file
             && let Err(error) = file.add(&row)
         {
             state.error.get_or_insert(error);
