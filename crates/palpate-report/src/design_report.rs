@@ -66,8 +66,9 @@ pub fn sensor_design_report(report: &SensorDesignReport) -> Vec<ReportFile> {
 }
 
 impl<'a> SensorDesignReport<'a> {
+    /// The even layout, or today's where its sensors are kept.
     fn even(&self) -> Option<&'a Designed> {
-        self.designed.iter().find(|designed| designed.method == Method::Even)
+        self.problem.reference(self.designed)
     }
 
     fn best(&self) -> Option<&'a Designed> {
@@ -88,21 +89,22 @@ impl<'a> SensorDesignReport<'a> {
         let error = |designed: &Designed| {
             self.verification(designed.method).map(|verified| verified.mean_error_m * 1e3)
         };
+        let even = self.even();
+        let reference = even.map_or("", |even| even.method.reference_in_words());
         let compared = |even: f64, best: f64| {
             let percent = 100.0 * (1.0 - best / even);
             let word = if percent >= 0.0 { "below" } else { "above" };
             if percent.is_finite() {
-                format!(", {} % {word} the even layout's {} mm", number(percent.abs()), number(even))
+                format!(", {} % {word} {reference} {} mm", number(percent.abs()), number(even))
             } else {
                 String::new()
             }
         };
-        let even = self.even();
         html! {
             li {
                 "Best of " (counted(self.designed.len(), "layout", "layouts")) " of "
                 (counted(best.layout.len(), "sensor", "sensors")) ": " b { (best.method.name()) } ", "
-                (best.layout.places_in_words(self.problem.extent())) "."
+                (self.problem.places_in_words(&best.layout)) "."
             }
             li {
                 "Its mean limit is " b { (number(limit(best))) " mm" }
@@ -159,10 +161,9 @@ impl<'a> SensorDesignReport<'a> {
     }
 
     fn places(&self) -> Table {
-        let extent = self.problem.extent();
         Table::from_rows(self.designed)
             .short("layout", |designed| designed.method.name())
-            .wide("sensors", |designed| designed.layout.places_in_words(extent))
+            .wide("sensors", |designed| self.problem.places_in_words(&designed.layout))
             .caption(html! { "Where their sensors sit." })
     }
 
@@ -318,6 +319,12 @@ impl<'a> SensorDesignReport<'a> {
             .collect();
         html! {
             ul {
+                @if !design.kept.is_empty() {
+                    li {
+                        (counted(design.kept.len(), "sensor is", "sensors are")) " kept; "
+                        (counted(design.count - design.kept.len(), "is", "are")) " new."
+                    }
+                }
                 li { (counted(design.count, "sensor", "sensors")) " out of " (counted(self.problem.candidates(), "candidate", "candidates")) ": " (kinds.join("; ")) "." }
                 li {
                     (counted(self.problem.contacts().len(), "contact", "contacts")) " over " (zone(design.contacts.from, design.contacts.to))

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use palpate_design::sensors::{
-    ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Symmetry,
+    ContactPrior, DesignCriterion, KeepOut, MustHave, SensorDesign, SensorOffer, Sites, Supply, Symmetry,
 };
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::Force;
@@ -140,6 +140,7 @@ impl At<DesignKeys> {
             spacing_m: self.spacing.map_or(default.spacing_m, |spacing| spacing.si),
             keep_out: self.keep_out.iter().map(|zone| zone.build(extent)).collect::<Result<_, _>>()?,
             must_have: must_have.collect::<Result<_, _>>()?,
+            kept: default.kept,
             budget: self.budget.map(|budget| budget.si),
             symmetry: self.symmetry.unwrap_or(default.symmetry),
             offers,
@@ -184,7 +185,7 @@ impl At<OfferKeys> {
                 Some(noise) => noise.place.refuse("greater than 0, or nothing limits what the sensor tells"),
             });
         }
-        Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si) })
+        Ok(SensorOffer { kind, channel, cost: self.cost.map_or(1.0, |cost| cost.si), supply: Supply::Any })
     }
 }
 

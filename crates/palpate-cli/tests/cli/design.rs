@@ -156,3 +156,64 @@ fn what_cannot_be_designed_is_refused_in_words() {
     };
     insta::assert_snapshot!(cases.iter().map(complaint).collect::<Vec<_>>().join("\n"));
 }
+
+#[test]
+fn todays_sensors_are_kept_and_more_are_placed() {
+    let folder = folder(SENSOR_DESIGN);
+    let told = said(&run(folder.path(), &["design", "sensors", "rig.toml", "--add", "2", "-o", "more.toml"]));
+    assert!(told.starts_with("rig.toml: 8 kept and 2 new of 87 candidate sensors"), "{told}");
+    let kept = "44.44, 88.89, 133.33, 177.78, 222.22, 266.67, 311.11, 355.56 mm";
+    for method in
+        ["greedy-exchange", "genetic", "refined", "d-optimal", "principal-components", "qr-pivoting"]
+    {
+        let places = told.lines().find(|line| line.starts_with(&format!("{method}: "))).unwrap();
+        assert!(
+            places.contains(": new deflection ") && places.ends_with(&format!("kept deflection {kept}")),
+            "{places}"
+        );
+    }
+    let best = told.lines().find(|line| line.starts_with("Best: ")).unwrap();
+    assert!(best.contains("below today's 2.641 mm"), "{best}");
+    let written = fs::read_to_string(folder.path().join("more.toml")).unwrap();
+    assert!(written.contains("\"355.556 mm\", ") && written.contains("] # the last 2 are new"), "{written}");
+    let again = json(folder.path(), &["design", "sensors", "more.toml", "--add", "1"]);
+    let best =
+        again["designs"].as_array().unwrap().iter().find(|design| design["method"] == "refined").unwrap();
+    let kept =
+        best["positions"].as_array().unwrap().iter().map(|position| position["kept"].as_bool().unwrap());
+    assert_eq!(kept.collect::<Vec<_>>(), [vec![true; 10], vec![false]].concat());
+
+    // Another kind beside them.
+    let strain = rig_with("kinds = [{ measure = \"strain\", noise = \"1 ue\" }]");
+    let strain = designs(&strain, &["--add", "2"]);
+    let refined =
+        strain["designs"].as_array().unwrap().iter().find(|design| design["method"] == "refined").unwrap();
+    let kinds: Vec<&Value> =
+        refined["positions"].as_array().unwrap().iter().map(|at| &at["measure"]).collect();
+    assert_eq!(kinds[8..], ["strain", "strain"]);
+    assert!(kinds[..8].iter().all(|kind| *kind == "deflection"));
+}
+
+#[test]
+fn additions_that_cannot_be_are_refused_in_words() {
+    let cases = [
+        ("none", "", "0"),
+        ("too many", "", "200"),
+        ("too close", "spacing = \"50 mm\"", "1"),
+        ("kept out", "keep_out = [{ from = \"30 mm\", to = \"60 mm\" }]", "1"),
+        ("another noise", "kinds = [{ measure = \"deflection\", noise = \"1 um\" }]", "1"),
+        (
+            "one alone in symmetry",
+            "symmetry = \"wanted\"\nkeep_out = [{ from = \"190 mm\", to = \"210 mm\" }]",
+            "1",
+        ),
+        ("beyond the budget", "budget = 9", "2"),
+    ];
+    let complaint = |(what, keys, count): (&str, &str, &str)| {
+        let folder = folder(rig_with(keys));
+        let complaint =
+            complained(&run(folder.path(), &["design", "sensors", "rig.toml", "--add", count]), 2);
+        format!("{what}:\n{complaint}")
+    };
+    insta::assert_snapshot!(cases.map(complaint).join("\n"));
+}

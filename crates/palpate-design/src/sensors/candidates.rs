@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::design::{DesignError, Exclusion};
-use super::design::{MustHave, SensorDesign, Sites, Symmetry};
+use super::design::{FixedList, MustHave, SensorDesign, Sites, Supply, Symmetry};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{SensorKind, even_positions};
 use palpate_mechanics::surface::{Extent, Surface};
@@ -41,7 +41,8 @@ impl Candidates {
         let extent = surface.extent();
         let sites = sites(&design.sites, extent);
         let mut sensors = Vec::new();
-        for (offer, kind) in design.offers.iter().map(|offer| offer.kind).enumerate() {
+        let offered = design.offers.iter().enumerate().filter(|(_, offer)| offer.supply == Supply::Any);
+        for (offer, kind) in offered.map(|(i, offer)| (i, offer.kind)) {
             let reads = |position: &Position| reads_something(surface, kind, *position);
             let at = |position: Position| PlacedSensor { offer, position };
             if kind == SensorKind::Reaction {
@@ -52,8 +53,8 @@ impl Candidates {
             }
         }
         let mut candidates = Self { sensors, must_have: Vec::new() };
-        for wanted in &design.must_have {
-            candidates.must_have(wanted, surface, design)?;
+        for (i, wanted) in design.must_have.iter().enumerate() {
+            candidates.must_have(wanted, design.list_of(i), surface, design)?;
         }
         check_must_haves(&candidates, design, extent)?;
         Ok(candidates)
@@ -62,16 +63,17 @@ impl Candidates {
     fn must_have(
         &mut self,
         wanted: &MustHave,
+        list: FixedList,
         surface: &dyn Surface,
         design: &SensorDesign,
     ) -> Result<(), DesignError> {
         let MustHave { offer, position } = *wanted;
         let (kind, extent) = (design.offers[offer].kind, surface.extent());
         if !reads_something(surface, kind, position) {
-            return Err(DesignError::MustHaveReadsNothing { kind, position, extent });
+            return Err(DesignError::MustHaveReadsNothing { list, kind, position, extent });
         }
         if design.keeps_out(position, extent) && kind != SensorKind::Reaction {
-            return Err(DesignError::MustHaveKeptOut { kind, position, extent });
+            return Err(DesignError::MustHaveKeptOut { list, kind, position, extent });
         }
         let index = self.add(PlacedSensor { offer, position }, extent);
         self.must_have.push(index);
@@ -151,7 +153,8 @@ fn check_must_haves(
                 if first == second { Some(Exclusion::Same) } else { exclusion(&a, &b, design, extent) };
             if let Some(reason) = reason {
                 let (first, second) = (b.position, a.position);
-                return Err(DesignError::MustHavesExclude { first, second, reason, extent });
+                let list = design.list_of(i);
+                return Err(DesignError::MustHavesExclude { list, first, second, reason, extent });
             }
         }
     }
@@ -359,10 +362,12 @@ fn fixed_units(
     extent: Extent,
 ) -> Result<Vec<usize>, DesignError> {
     let mut fixed: Vec<usize> = Vec::new();
-    for candidate in &candidates.must_have {
+    for (i, candidate) in candidates.must_have.iter().enumerate() {
+        let list = design.list_of(i);
         let PlacedSensor { offer, position } = candidates.sensors[*candidate];
         let unit = units.iter().position(|unit| unit.members().any(|member| member == *candidate));
-        let without = DesignError::MustHaveWithoutTwin { kind: design.offers[offer].kind, position, extent };
+        let kind = design.offers[offer].kind;
+        let without = DesignError::MustHaveWithoutTwin { list, kind, position, extent };
         let unit = unit.ok_or(without)?;
         if !fixed.contains(&unit) {
             fixed.push(unit);

@@ -3,7 +3,7 @@
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::limit::{Force, LimitError};
-use palpate_mechanics::sensing::{ChannelModel, LayoutError, SensorKind};
+use palpate_mechanics::sensing::{ChannelModel, Layout, LayoutError, Sensor, SensorKind};
 use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::format_length_mm;
 
@@ -41,6 +41,8 @@ pub struct SensorDesign {
     pub keep_out: Vec<KeepOut>,
     /// Sensors that every layout has.
     pub must_have: Vec<MustHave>,
+    /// Today's sensors, where they stay: the first of `must_have` are these.
+    pub kept: Vec<Sensor>,
     /// Largest cost of all sensors together, in the unit of their costs; no bound where `None`.
     pub budget: Option<f64>,
     /// Whether layouts are to be their own mirror image.
@@ -56,6 +58,18 @@ pub struct SensorOffer {
     pub channel: ChannelModel,
     /// Cost of one; at least 0, in any unit.
     pub cost: f64,
+    /// Whether further ones can be had.
+    pub supply: Supply,
+}
+
+/// Where the sensors of an offer come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Supply {
+    /// As many as are wanted can be had.
+    #[default]
+    Any,
+    /// There are today's alone.
+    Kept,
 }
 
 /// Candidate sites.
@@ -165,7 +179,7 @@ impl SensorDesign {
         for sensor in setup.layout().sensors() {
             if sensor.kind != SensorKind::Raw && offers.iter().all(|offer| offer.kind != sensor.kind) {
                 let channel = ChannelModel { dead: false, ..sensor.channel };
-                offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0 });
+                offers.push(SensorOffer { kind: sensor.kind, channel, cost: 1.0, supply: Supply::Any });
             }
         }
         if offers.is_empty() {
@@ -183,6 +197,7 @@ impl SensorDesign {
             spacing_m: 0.0,
             keep_out: Vec::new(),
             must_have: Vec::new(),
+            kept: Vec::new(),
             budget: None,
             symmetry: Symmetry::Any,
         })
@@ -192,6 +207,47 @@ impl SensorDesign {
     #[must_use]
     pub fn count(self, count: usize) -> Self {
         Self { count, ..self }
+    }
+
+    /// The same with every living sensor of today's layout and `count` more. `must_have` sensors that are among today's are not wanted twice.
+    ///
+    /// # Errors
+    /// [`DesignError::KeptDiffers`] where the noise of one of today's sensors is not that of its kind's offer, as a layout has one channel
+    /// a kind; [`LimitError::NoModel`] for a raw channel.
+    pub fn adding(mut self, count: usize, today: &Layout) -> Result<Self, DesignError> {
+        let living = |sensor: &&Sensor| !sensor.channel.dead;
+        let mut kept = Vec::new();
+        for (sensor, number) in today.sensors().iter().zip(1..).filter(|(sensor, _)| living(sensor)) {
+            let Sensor { kind, position, channel, .. } = *sensor;
+            if kind == SensorKind::Raw {
+                return Err(LimitError::NoModel.into());
+            }
+            let offered = self.offers.iter().position(|offer| offer.kind == kind);
+            let offer = offered.unwrap_or_else(|| {
+                // Sensors that there are, and that the design does not offer, cost nothing.
+                self.offers.push(SensorOffer { kind, channel, cost: 0.0, supply: Supply::Kept });
+                self.offers.len() - 1
+            });
+            if self.offers[offer].channel != channel {
+                return Err(DesignError::KeptDiffers { number, kind });
+            }
+            kept.push(MustHave { offer, position });
+        }
+        let others = std::mem::take(&mut self.must_have);
+        self.kept = today.sensors().iter().filter(living).cloned().collect();
+        self.count = kept.len() + count;
+        self.must_have = kept;
+        for wanted in others {
+            if !self.must_have.contains(&wanted) {
+                self.must_have.push(wanted);
+            }
+        }
+        Ok(self)
+    }
+
+    /// The list that a sensor of `must_have` is of, by its index.
+    pub(super) fn list_of(&self, index: usize) -> FixedList {
+        if index < self.kept.len() { FixedList::Kept } else { FixedList::MustHave }
     }
 
     /// The same with other candidate sites.
@@ -332,8 +388,10 @@ pub enum DesignError {
         mirrored: bool,
     },
     /// A sensor that every layout has, where it would read nothing.
-    #[error("the {kind} sensor of `must_have` at {} would read nothing there", extent.place_in_words(*position))]
+    #[error("the {kind} sensor of {list} at {} would read nothing there", extent.place_in_words(*position))]
     MustHaveReadsNothing {
+        /// The list that it is of.
+        list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
         /// Its position.
@@ -342,8 +400,10 @@ pub enum DesignError {
         extent: Extent,
     },
     /// A sensor that every layout has, where none may sit.
-    #[error("the {kind} sensor of `must_have` at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
+    #[error("the {kind} sensor of {list} at {} lies in a `keep_out` zone", extent.place_in_words(*position))]
     MustHaveKeptOut {
+        /// The list that it is of.
+        list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
         /// Its position.
@@ -352,8 +412,10 @@ pub enum DesignError {
         extent: Extent,
     },
     /// Two sensors that every layout has, and that exclude each other.
-    #[error("the sensors of `must_have` at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
+    #[error("the sensors of {list} at {} and {} exclude each other: {}", extent.place_in_words(*first), extent.place_in_words(*second), reason)]
     MustHavesExclude {
+        /// The list that they are of.
+        list: FixedList,
         /// Position of the one.
         first: Position,
         /// Position of the other.
@@ -364,14 +426,26 @@ pub enum DesignError {
         extent: Extent,
     },
     /// A sensor that every layout has, without a place for its twin.
-    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of `must_have` at {} is no place for one", extent.place_in_words(*position))]
+    #[error("symmetry is wanted, but the mirror image of the {kind} sensor of {list} at {} is no place for one", extent.place_in_words(*position))]
     MustHaveWithoutTwin {
+        /// The list that it is of.
+        list: FixedList,
         /// Quantity that it measures.
         kind: SensorKind,
         /// Its position.
         position: Position,
         /// The surface.
         extent: Extent,
+    },
+    /// One of today's sensors, whose noise is not that of its kind.
+    #[error(
+        "sensor {number} of today's layout is a {kind} sensor of another noise, resolution or fault than the {kind} sensors that are offered"
+    )]
+    KeptDiffers {
+        /// Which sensor, from 1.
+        number: usize,
+        /// Quantity that it measures.
+        kind: SensorKind,
     },
     /// No site has its mirror image among the sites.
     #[error(
@@ -403,6 +477,24 @@ pub enum DesignError {
         /// Bytes at most.
         most: f64,
     },
+}
+
+/// A list of sensors that every layout has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FixedList {
+    /// Those that the design asks for.
+    MustHave,
+    /// Those that there are.
+    Kept,
+}
+
+impl std::fmt::Display for FixedList {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::MustHave => "`must_have`",
+            Self::Kept => "today's layout",
+        })
+    }
 }
 
 /// Reason for which two sensors exclude each other.

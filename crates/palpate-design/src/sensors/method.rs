@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::design::DesignCriterion;
-use super::design::DesignError;
+use super::design::{DesignError, MustHave, SensorOffer, Supply};
 use super::exchange::{Found, Search};
 use super::principal::{PrincipalComponents, Reconstruction};
 use super::{Assessment, PlacedSensor, SensorProblem, exhaustive, genetic, pivoting, refine};
@@ -52,6 +52,14 @@ impl Method {
             Self::DOptimal => "d-optimal",
             Self::PrincipalComponents => "principal-components",
             Self::QrPivoting => "qr-pivoting",
+        }
+    }
+
+    /// The layout that others are compared with, in words: "the even layout's".
+    pub const fn reference_in_words(self) -> &'static str {
+        match self {
+            Self::Existing => "today's",
+            _ => "the even layout's",
         }
     }
 
@@ -162,7 +170,8 @@ impl SensorProblem<'_> {
     /// The even layout, where one kind is not tied to supports.
     pub(super) fn even_if_any(&self) -> Result<Option<Designed>, DesignError> {
         let design = &self.pool.design;
-        let Some(offer) = design.offers.iter().position(|offer| offer.kind != SensorKind::Reaction) else {
+        let is_free = |offer: &SensorOffer| offer.kind != SensorKind::Reaction && offer.supply == Supply::Any;
+        let Some(offer) = design.offers.iter().position(is_free) else {
             return Ok(None);
         };
         let sensors = even_positions(design.count, self.pool.extent)
@@ -227,22 +236,67 @@ impl SensorProblem<'_> {
         Ok(Designed { method, layout, assessment })
     }
 
-    /// Layout of some sensors, kind by kind, from left to right.
+    /// Layout of some sensors: today's, where those are kept, then kind by kind, from left to right.
     fn layout(&self, mut placed: Vec<PlacedSensor>) -> Result<Layout, DesignError> {
         placed.sort_by(|a, b| {
             let by_offer = a.offer.cmp(&b.offer);
             let by_row = a.position.y_m.total_cmp(&b.position.y_m);
             by_offer.then(by_row).then(a.position.x_m.total_cmp(&b.position.x_m))
         });
-        let mut sensors: Vec<Sensor> = Vec::new();
+        let mut sensors = self.kept_among(&mut placed);
         for PlacedSensor { offer, position } in placed {
             let offer = &self.pool.design.offers[offer];
-            let number = sensors.iter().filter(|sensor| sensor.kind == offer.kind).count() + 1;
+            let of_kind = sensors.iter().filter(|sensor| sensor.kind == offer.kind).count();
             let channel = ChannelModel { dead: false, ..offer.channel };
-            let name = format!("{}_{number}", offer.kind);
+            let mut names = (of_kind + 1..).map(|number| format!("{}_{number}", offer.kind));
+            let is_free = |name: &String| sensors.iter().all(|sensor| sensor.name != *name);
+            let name = names.find(is_free).unwrap_or_default();
             sensors.push(Sensor { kind: offer.kind, position, name, channel });
         }
         Ok(Layout::new(sensors)?)
+    }
+
+    /// Today's sensors, where all of them are placed, and takes those out.
+    fn kept_among(&self, placed: &mut Vec<PlacedSensor>) -> Vec<Sensor> {
+        let design = &self.pool.design;
+        let is_kept = |sensor: &PlacedSensor, wanted: &MustHave| {
+            let wanted = PlacedSensor { offer: wanted.offer, position: wanted.position };
+            sensor.is_same(&wanted, self.pool.extent)
+        };
+        let kept = &design.must_have[..design.kept.len()];
+        if !kept.iter().all(|wanted| placed.iter().any(|sensor| is_kept(sensor, wanted))) {
+            return Vec::new();
+        }
+        placed.retain(|sensor| !kept.iter().any(|wanted| is_kept(sensor, wanted)));
+        design.kept.clone()
+    }
+
+    /// Whether a sensor is one of today's that the design keeps.
+    pub fn is_kept(&self, sensor: &Sensor) -> bool {
+        let kept = &self.pool.design.kept;
+        kept.iter().any(|kept| kept.kind == sensor.kind && kept.position == sensor.position)
+    }
+
+    /// Positions of the sensors of a layout, in words; where today's are kept, of the new ones apart.
+    pub fn places_in_words(&self, layout: &Layout) -> String {
+        let words = |new: bool| {
+            let sensors = layout.sensors().iter().filter(|sensor| self.is_kept(sensor) != new);
+            let some = Layout::new(sensors.cloned().collect()).ok();
+            some.map_or_else(String::new, |layout| layout.places_in_words(self.pool.extent))
+        };
+        if self.pool.design.kept.is_empty() || !layout.sensors().iter().any(|sensor| self.is_kept(sensor)) {
+            return layout.places_in_words(self.pool.extent);
+        }
+        match words(true).as_str() {
+            "" => format!("kept {}", words(false)),
+            new => format!("new {new}; kept {}", words(false)),
+        }
+    }
+
+    /// The layout that the others are compared with: today's where it is kept, else the even one.
+    pub fn reference<'d>(&self, designed: &'d [Designed]) -> Option<&'d Designed> {
+        let method = if self.pool.design.kept.is_empty() { Method::Even } else { Method::Existing };
+        designed.iter().find(|designed| designed.method == method)
     }
 }
 

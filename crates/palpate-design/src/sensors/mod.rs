@@ -46,8 +46,8 @@ pub use crate::verification::Verification;
 pub use assessment::{Assessment, CountPoint, enough};
 pub use candidates::PlacedSensor;
 pub(crate) use design::TOLERANCE_M;
-pub use design::{DesignCriterion, DesignError, Exclusion, KeepOut, MustHave, SensorDesign, SensorOffer};
-pub use design::{Sites, Symmetry};
+pub use design::{DesignCriterion, DesignError, Exclusion, FixedList, KeepOut, MustHave, SensorDesign};
+pub use design::{SensorOffer, Sites, Supply, Symmetry};
 pub use method::{Designed, Method, best_design};
 pub use pivoting::{condition_number, pivoted_columns};
 

@@ -25,7 +25,12 @@ fn searched(problem: &SensorProblem) -> Found {
 }
 
 fn offer(kind: SensorKind, noise_sd: f64, cost: f64) -> SensorOffer {
-    SensorOffer { kind, channel: ChannelModel { noise_sd, ..ChannelModel::default() }, cost }
+    SensorOffer {
+        kind,
+        channel: ChannelModel { noise_sd, ..ChannelModel::default() },
+        cost,
+        supply: Supply::Any,
+    }
 }
 
 fn four_kinds() -> Vec<SensorOffer> {

@@ -23,7 +23,7 @@ use palpate_rig::Rig;
 use serde::Serialize;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table as TomlTable, Value, value};
 
 /// Where to put the sensors: layouts by several methods, scored by the location error that physics allows.
 ///
@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Sensors to place [default: the rig's]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: Option<u16>,
+    /// Keep today's sensors, those of the rig, and place so many more
+    #[arg(long, value_name = "N", conflicts_with = "count", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    add: Option<u16>,
     /// How the limit falls with the number of sensors, as in `--counts 2..16`
     #[arg(long, value_name = "FROM..TO", value_parser = counts)]
     counts: Option<RangeInclusive<usize>>,
@@ -96,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
         let extent = setup.surface().extent();
         let (rig, written) =
-            changed_rig(path, &text, "layout", |rig| place_sensors(rig, &best.layout, extent))?;
+            changed_rig(path, &text, "layout", |rig| place_sensors(rig, &best.layout, &design.kept, extent))?;
         if rig.setup.layout().len() != best.layout.len() {
             return Err(Complaint::new("the rig does not take the layout").into());
         }
@@ -126,6 +129,14 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
     }
     if let Some(count) = arguments.count {
         design.count = usize::from(count);
+    }
+    if let Some(count) = arguments.add {
+        let adding = design.adding(usize::from(count), rig.setup.layout());
+        design = adding.map_err(|error| complaint(&error, &arguments.rig))?;
+        let dead = rig.setup.layout().len() - design.kept.len();
+        if dead > 0 {
+            eprintln!("palpate: {dead} of today's sensors are dead, and are not kept");
+        }
     }
     Ok((setup, design))
 }
@@ -228,6 +239,9 @@ pub fn help(error: &DesignError) -> &'static str {
         DesignError::MustHaveKeptOut { .. } => "move it, or change the zone",
         DesignError::MustHavesExclude { .. } => "move one of them, or relax the constraint",
         DesignError::MustHaveWithoutTwin { .. } => "move it, or leave `symmetry` out",
+        DesignError::KeptDiffers { .. } => {
+            "give the kind that noise in [design] `kinds`, or give every sensor of the kind the same in [sensors]"
+        }
         DesignError::Symmetry { .. } => {
             "choose `sites` that mirror each other, such as a distance that divides the length, or an even `count`"
         }
@@ -244,7 +258,10 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
     output::say(format!(
         "{}: {} of {} candidate sensors, {} contacts, {} N, force {}; score: {}\n",
         outcome.rig.display(),
-        design.count,
+        match design.kept.len() {
+            0 => design.count.to_string(),
+            kept => format!("{kept} kept and {} new", design.count - kept),
+        },
         format_count(problem.candidates() as u64),
         problem.contacts().len(),
         problem.force_n(),
@@ -257,11 +274,7 @@ fn print(outcome: &Outcome) -> Result<(), Failure> {
     }
     output::say("")?;
     for designed in &outcome.designed {
-        output::say(format!(
-            "{}: {}",
-            designed.method.name(),
-            designed.layout.places_in_words(outcome.problem.extent())
-        ))?;
+        output::say(format!("{}: {}", designed.method.name(), problem.places_in_words(&designed.layout)))?;
     }
     if let Some(best) = best_design(&outcome.designed) {
         output::say(format!("\nBest: {}", gain(outcome, best)))?;
@@ -313,7 +326,10 @@ fn designs(outcome: &Outcome) -> String {
 /// Gain over the even layout, in words.
 fn gain(outcome: &Outcome, best: &Designed) -> String {
     let name = best.method.name();
-    let even = outcome.designed.iter().find(|designed| designed.method.name() == "even");
+    let (even, reference) = match outcome.problem.reference(&outcome.designed) {
+        Some(reference) => (Some(reference), reference.method.reference_in_words()),
+        None => (None, ""),
+    };
     let limits = even.and_then(|even| {
         let (even_m, best_m) = (even.assessment.mean_limit_m?, best.assessment.mean_limit_m?);
         Some((even_m * 1e3, best_m * 1e3, 100.0 * (1.0 - best_m / even_m)))
@@ -322,16 +338,14 @@ fn gain(outcome: &Outcome, best: &Designed) -> String {
     let compared = |percent: f64| {
         if percent >= 0.0 { format!("{percent:.1} % below") } else { format!("{:.1} % above", -percent) }
     };
-    let mut words = format!(
-        "{name}, mean limit {best_mm:.3} mm, {} the even layout's {even_mm:.3} mm",
-        compared(percent)
-    );
+    let mut words =
+        format!("{name}, mean limit {best_mm:.3} mm, {} {reference} {even_mm:.3} mm", compared(percent));
     let errors =
         even.and_then(|even| Some((outcome.verification(even.method)?, outcome.verification(best.method)?)));
     if let Some((even, best)) = errors {
         let percent = 100.0 * (1.0 - best.mean_error_m / even.mean_error_m);
         words += &format!(
-            "; in simulation its error is {:.3} mm, {} the even layout's {:.3} mm",
+            "; in simulation its error is {:.3} mm, {} {reference} {:.3} mm",
             best.mean_error_m * 1e3,
             compared(percent),
             even.mean_error_m * 1e3
@@ -376,7 +390,15 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
             "keeps_constraints": assessed.keeps_constraints,
         }
     };
-    let position = |sensor: &Sensor| object! { "measure": sensor.kind, "x_mm": sensor.position.x_m * 1e3, "y_mm": sensor.position.y_m * 1e3 };
+    let position = |sensor: &Sensor| {
+        object! {
+            "measure": sensor.kind,
+            "x_mm": sensor.position.x_m * 1e3,
+            "y_mm": sensor.position.y_m * 1e3,
+            // Whether it is one of today's, where those are kept.
+            "kept"?: (!design.kept.is_empty()).then(|| problem.is_kept(sensor)),
+        }
+    };
     // Of simulated calibrations.
     let simulated = |verification: &Verification| {
         object! {
@@ -420,14 +442,20 @@ fn to_json(outcome: &Outcome) -> impl Serialize {
 const PLACES: [&str; 4] = ["count", "grid", "positions", "dead"];
 
 /// Puts other sensors into a rig, a section a kind; everything else of its text stays as it was.
-fn place_sensors(rig: &mut DocumentMut, layout: &Layout, extent: Extent) {
+fn place_sensors(rig: &mut DocumentMut, layout: &Layout, kept: &[Sensor], extent: Extent) {
     let own = sections(rig.get("sensors"));
     let mut new = ArrayOfTables::new();
     for kind in SensorKind::ALL {
         let sensors: Vec<&Sensor> = layout.sensors().iter().filter(|sensor| sensor.kind == kind).collect();
         if let Some(first) = sensors.first() {
             let mut section = section(kind, &own, &first.channel);
-            section.insert("positions", value(positions(&sensors, extent)));
+            let mut places = positions(&sensors, extent);
+            let of_kind = kept.iter().filter(|sensor| sensor.kind == kind).count();
+            if !kept.is_empty() && of_kind < sensors.len() {
+                let new = format!(" # the last {} are new", sensors.len() - of_kind);
+                places.decor_mut().set_suffix(new);
+            }
+            section.insert("positions", Item::Value(Value::Array(places)));
             new.push(section);
         }
     }
