@@ -14,6 +14,7 @@ mod json;
 mod lines;
 mod output;
 mod progress;
+mod tables;
 mod tare;
 
 use clap::{Parser, Subcommand};

@@ -35,6 +35,7 @@ mod fixtures;
 pub mod gaussian_process;
 mod held_out;
 pub mod influence;
+pub mod lightest_touch;
 pub mod likelihood;
 pub mod load_profile;
 pub mod neighbours;

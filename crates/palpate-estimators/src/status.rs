@@ -3,8 +3,8 @@
 //!
 //! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
 //!   exceeds more often than the [`FalseAlarmRate`], and the best contact takes no more of it off than a contact costs. Noise alone
-//!   fails the first at that rate. The cost of a contact is that of the extended Bayesian information criterion at 0.1 %, and less by
-//!   2·ln(rate/0.1 %) at another rate, by which the chance that noise exceeds it changes as the rate does. A cost is no quantile:
+//!   fails the first at that rate. The cost of a contact is that of the extended Bayesian information criterion at 0.1 %; at
+//!   another rate Φ(−√cost), the chance that noise exceeds it along one contact's reading, changes as the rate does. A cost is no quantile:
 //!   noise fails the second at a rate that the numbers of channels and places give, up to twice the one that is set on the benches of
 //!   docs/at-the-limit.md. Force-linear surfaces without a model have [`NoiseBounds`] in its place, which noise fails at the rate itself.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
@@ -117,6 +117,16 @@ fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
     chi_squared_critical_value(rate.0, channels.max(1))
 }
 
+/// The cost of a contact at a rate, from that at the default one: noise exceeds it along the reading of a contact as much more often as the
+/// rate is greater.
+fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
+    if rate == FalseAlarmRate::DEFAULT {
+        return contact_cost;
+    }
+    let tail = normal_cdf(-contact_cost.sqrt()) * rate.0 / FalseAlarmRate::DEFAULT.0;
+    bisect((0.0, 20.0), 50, |u| normal_cdf(-u) > tail).powi(2)
+}
+
 /// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for
 /// normal noise, and at least twice what one in a hundred of the recording's own readings leaves, as real noise has longer tails.
 pub(crate) fn learnt_misfit_bound<'a>(
@@ -169,7 +179,7 @@ impl StatusRule {
         let contact_cost = contact_cost(unknowns, channels, places);
         Self {
             noise_bound: noise_bound(channels, rate),
-            detection_cost: (contact_cost - 2.0 * (rate.0 / FalseAlarmRate::DEFAULT.0).ln()).max(0.0),
+            detection_cost: detection_cost(contact_cost, rate),
             contact_cost,
             misfit_bound: misfit_bound(channels.saturating_sub(unknowns)),
         }
@@ -197,6 +207,11 @@ impl StatusRule {
     #[inline(always)]
     pub fn is_explained(&self, misfit: f64) -> bool {
         misfit <= self.misfit_bound
+    }
+
+    /// When the rule finds a contact of so many unknowns in readings of so many channels.
+    pub fn detection(&self, channels: usize, unknowns: usize) -> Detection {
+        Detection { channels, unknowns, square: self.noise_bound, taken: self.detection_cost }
     }
 
     /// χ² that a contact costs beside others, which no false-alarm rate changes.
@@ -237,11 +252,7 @@ impl Directions {
             let across = self.area * (z * z - 1.0) * below(left, channels.saturating_sub(3)) / TAU.powf(1.5);
             bell * (along + across)
         };
-        // Simpson's rule.
-        let step = (most - u) / STEPS as f64;
-        let weight = |i: usize| if i == 0 || i == STEPS { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
-        let integral: f64 =
-            (0..=STEPS).map(|i| weight(i) * density(u + i as f64 * step)).sum::<f64>() * step / 3.0;
+        let integral = simpson((u, most), STEPS, density);
         integral + self.length / TAU * (-0.5 * u * u).exp() * below(square - u * u, channels)
     }
 }
@@ -270,6 +281,73 @@ impl NoiseBounds {
         let (u, square) = of_tail(bisect((0.5 * rate.0, rate.0), 20, is_rarer));
         Self { square, taken: u * u }
     }
+}
+
+/// When a contact is found: a rule of `no_contact` for channels of unit noise.
+///
+/// Symbols: d whitened reading, n channels, k unknowns of a contact (its coordinates and its force, which nobody knows), s length of the
+/// contact's own whitened reading (its signal-to-noise ratio), B the bound on |d|² and C that on what the best contact takes off it.
+///
+/// About the contact the readings of all others span k dimensions, along its own reading and along its tangents, so that the best of them
+/// takes u = (s + z)² + v off |d|² = u + w, with z normal, v χ² of k − 1 and w χ² of n − k degrees of freedom, all independent. The
+/// contact is missed where u ≤ C and u + w ≤ B. To first order, as contacts far away in the readings are left out, and the curvature of the
+/// readings between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Detection {
+    /// n.
+    pub channels: usize,
+    /// k.
+    pub unknowns: usize,
+    /// B.
+    pub square: f64,
+    /// C.
+    pub taken: f64,
+}
+
+impl Detection {
+    /// Probability that a contact of signal-to-noise ratio `signal` is found.
+    pub fn probability(&self, signal: f64) -> f64 {
+        const STEPS: usize = 80;
+        /// Standard deviations beyond which a normal variable has no probability worth adding up.
+        const FAR: f64 = 7.0;
+        let Self { channels, unknowns, square, taken } = *self;
+        let tangents = unknowns.min(channels).saturating_sub(1);
+        let rest = channels.saturating_sub(unknowns);
+        let below = |left: f64| if left < 0.0 { 0.0 } else { 1.0 - chi_squared_survival(left, rest) };
+        let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
+        // Missed for a component x = s + z along the contact: over the length y of what the tangents take.
+        let missed = |x: f64| {
+            let room = (taken - x * x).max(0.0);
+            match tangents {
+                0 => below(square - x * x),
+                _ => {
+                    let density = |y: f64| {
+                        let power = if tangents == 1 { 2.0 } else { y * TAU.sqrt() };
+                        power * normal(y) * below(square - x * x - y * y)
+                    };
+                    simpson((0.0, room.sqrt().min(FAR)), STEPS, density)
+                }
+            }
+        };
+        let (from, to) = ((-taken.sqrt()).max(signal - FAR), taken.sqrt().min(signal + FAR));
+        if from >= to {
+            return 1.0;
+        }
+        1.0 - simpson((from, to), STEPS, |x| normal(x - signal) * missed(x))
+    }
+
+    /// Signal-to-noise ratio of a contact that is found with a probability.
+    pub fn signal(&self, probability: f64) -> f64 {
+        let most = self.taken.sqrt() + self.square.sqrt() + 10.0;
+        bisect((0.0, most), 40, |signal| self.probability(signal) < probability)
+    }
+}
+
+/// Integral by Simpson's rule, of an even number of steps.
+fn simpson((from, to): (f64, f64), steps: usize, of: impl Fn(f64) -> f64) -> f64 {
+    let step = (to - from) / steps as f64;
+    let weight = |i: usize| if i == 0 || i == steps { 1.0 } else { 2.0 + 2.0 * (i % 2) as f64 };
+    (0..=steps).map(|i| weight(i) * of(from + i as f64 * step)).sum::<f64>() * step / 3.0
 }
 
 /// The estimate of a reading that nothing but noise is in.

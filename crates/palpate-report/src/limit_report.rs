@@ -11,6 +11,7 @@ use super::numbers::{counted, mm, number, place, quantity, stated};
 use super::page::{Figure, Page, ReportFile, Section, Table};
 use super::{Axis, Chart, HeatMap, HeatPanel, Mark, Series};
 use palpate_estimators::estimator::Cells;
+use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, LimitWarning};
@@ -42,12 +43,14 @@ pub struct LimitReport<'a> {
     pub warnings: &'a [LimitWarning],
     /// Positions for the table.
     pub listed: &'a [Position],
+    /// The lightest touch that is told from noise.
+    pub touch: &'a LightestTouch<'a>,
 }
 
 /// Reports a limit: `report.html`, one self-contained page, and its figures as SVG files.
 ///
 /// ```
-/// use palpate_estimators::setup::Setup;
+/// use palpate_estimators::{influence::Influence, setup::Setup};
 /// use palpate_mechanics::limit::{Force, LimitCurve};
 /// use palpate_mechanics::sensing::SensorKind::Deflection;
 /// use palpate_mechanics::surface::Beam;
@@ -66,6 +69,7 @@ pub struct LimitReport<'a> {
 ///     force: Force::Known,
 ///     warnings: &[],
 ///     listed: &[],
+///     touch: &Influence::default().lightest_touch(&limit),
 /// });
 /// assert_eq!([&files[0].name, &files[1].name], ["report.html", "figure-1.svg"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -84,6 +88,9 @@ pub fn limit_report(report: &LimitReport) -> Vec<ReportFile> {
             .figure(figure)
             .table(report.limit_table())
             .figures(report.digit_figures()),
+        Section::new("lightest-touch", "The lightest touch")
+            .text(report.lightest_touch_in_words())
+            .figure(report.touch_figure()),
         Section::new("warnings", "What this bench cannot tell").text(report.warnings_in_words()),
         Section::new("meaning", "What the limit means").text(meaning()),
     ];
@@ -118,6 +125,14 @@ impl LimitReport<'_> {
                 }
             } @else {
                 li { "With this knowledge of the force the readings do not tell the position anywhere." }
+            }
+            @if let Some(surely) = self.surely() {
+                li {
+                    "Lightest touch that is told from noise in " (stated(100.0 * surely.found)) " % of its readings: median "
+                    b { (number(surely.median_n)) " N" } ", largest " (number(surely.worst.1)) " N at "
+                    (place(surely.worst.0, extent)) " mm; an untouched surface is taken for a touched one in " (self.touch.rate().to_string())
+                    " of its readings."
+                }
             }
             li { a href="#warnings" { (counted(self.warnings.len(), "warning", "warnings")) } "." }
         }
@@ -224,7 +239,53 @@ impl LimitReport<'_> {
             .mm("mean error, mm", |(_, [known, _])| known.map(|bound| bound.mean_error_m()))
             .mm("force unknown: limit, mm", |(_, [_, unknown])| unknown.map(|bound| bound.sd_position_m))
             .number("of the force, N", |(_, [_, unknown])| unknown.and_then(|bound| bound.sd_force_n))
+            .number("lightest touch, N", |(position, _)| self.touch.forces_at(*position)[1])
             .caption(caption)
+    }
+
+    /// The lightest touch that is hardly ever missed, over the surface.
+    fn surely(&self) -> Option<TouchSummary> {
+        let positions: Vec<Position> = self.known.points.iter().map(|point| point.position).collect();
+        let [_, surely] = self.touch.summaries(&positions);
+        surely
+    }
+
+    fn lightest_touch_in_words(&self) -> Markup {
+        let [half, surely] = LightestTouch::FOUND.map(|found| stated(100.0 * found));
+        html! {
+            p {
+                "Below some force a reading is `no_contact`: noise alone could have made it. That bound is set so that an untouched                  surface is taken for a touched one in " (self.touch.rate().to_string()) " of its readings (`false_alarm_rate` in the rig). The                  lightest touch is the force that is found all the same, in " (half) " % and in " (surely) " % of its readings, by a                  locator that does not know the force."
+            }
+            @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
+                p { "At " (counted(without, "position", "positions")) " no force is found." }
+            }
+        }
+    }
+
+    /// The lightest touch along a line.
+    fn touch_figure(&self) -> Option<Figure> {
+        let length_mm = self.known.extent.length_m() * 1e3;
+        let Extent::Line { .. } = self.known.extent else { return None };
+        let line = |i: usize| {
+            let points = self.known.points.iter().map(|point| point.position);
+            let force = |at: Position| (at.x_m * 1e3, self.touch.forces_at(at)[i].unwrap_or(f64::NAN));
+            let label = format!("found in {} %", stated(100.0 * LightestTouch::FOUND[i]));
+            Series::line(&label, i, points.map(force).collect())
+        };
+        let series = vec![line(0), line(1)];
+        let extremes = Extremes::from_lines(&series);
+        let axis = extremes.axis("force, N");
+        let axis = match extremes.are_far_apart() {
+            true => axis.from_to(0.7 * extremes.least, 1.4 * extremes.greatest),
+            false if extremes.greatest > 0.0 => axis.from_to(0.0, 1.1 * extremes.greatest),
+            false => axis,
+        };
+        let x = Axis::linear("contact position, mm").from_to(0.0, length_mm);
+        let chart = Chart::new("The lightest touch that is told from noise", x, axis, series);
+        let caption = html! {
+            "The force that a contact at each position must have to be found, at " (self.touch.rate().to_string()) " of false alarms."
+        };
+        Some(Figure::chart(&chart, caption))
     }
 
     fn warnings_in_words(&self) -> Markup {

@@ -28,7 +28,7 @@ pub enum StudyRunError {
         /// The bytes of the study file that ask for it.
         span: Range<usize>,
         /// Why.
-        error: DesignError,
+        error: Box<DesignError>,
     },
     /// An arm's bench cannot be simulated.
     #[error("arm `{arm}`: {error}")]
@@ -200,7 +200,11 @@ fn lay_out(mut study: Study, watch: Watch) -> Result<Study, StudyRunError> {
             None => {
                 let layout = request.layout(watch).map_err(|error| match error {
                     DesignError::Cancelled(cancelled) => StudyRunError::Cancelled(cancelled),
-                    error => StudyRunError::Design { arm: arm.name.clone(), span: asked.span, error },
+                    error => StudyRunError::Design {
+                        arm: arm.name.clone(),
+                        span: asked.span,
+                        error: Box::new(error),
+                    },
                 })?;
                 found.push((request, layout.clone()));
                 layout

@@ -153,7 +153,7 @@ fn a_layout_that_cannot_be_had_is_refused_with_its_arm_and_place() {
         panic!()
     };
     assert_eq!((arm.as_str(), said), ("tight", span));
-    assert!(matches!(error, DesignError::Spacing { count: 8, .. }), "{error}");
+    assert!(matches!(*error, DesignError::Spacing { count: 8, .. }), "{error}");
 }
 
 #[test]

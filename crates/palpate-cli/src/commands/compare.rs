@@ -5,9 +5,11 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::output::Table;
-use crate::{input, output, progress};
+use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
+use crate::{input, output, progress, tables};
 use palpate_estimators::estimator::{Comparison, contenders};
-use palpate_estimators::evaluation::{Split, evaluate_splits, limit_ratio, percentage_error};
+use palpate_estimators::evaluation::{Evaluation, Split, evaluate_splits, limit_ratio, percentage_error};
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
@@ -37,7 +39,7 @@ pub struct Arguments {
     /// Seed of simulation and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Folder for a report
+    /// Folder for a report, with `errors.csv`, the errors of each position, and `trials.csv`, those of each trial
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the comparison as JSON
@@ -50,11 +52,15 @@ type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let rig = input::read_rig(&arguments.rig)?;
-    let Trials { data, how, trials } = trials(arguments, &rig)?;
+    let Trials { data, source, how, trials } = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
     let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
     if let Some(out) = &arguments.out {
         write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
+        let comment =
+            format!("estimators compared on {}, {source}, seed {}", arguments.rig.display(), arguments.seed);
+        errors_table(&comment, &comparisons, rig.setup.surface().extent()).write(out, ERRORS_CSV)?;
+        trials_table(&comment, &comparisons, &trials).write(out, "trials.csv")?;
     }
     if arguments.json {
         let estimators = comparisons.iter().filter_map(|comparison| json_row(&rig, comparison, arguments));
@@ -99,9 +105,46 @@ fn write_report(
     output::write_report(out, comparison_report(&report))
 }
 
+/// The errors of each estimator at each position.
+fn errors_table(comment: &str, comparisons: &[Comparison], extent: Extent) -> CsvTable {
+    let columns = [vec!["estimator"], tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat();
+    let mut table = CsvTable::new(comment, columns);
+    for Comparison { estimator, tried } in comparisons {
+        for (position, evaluation) in tables::by_position(&tried.evaluation) {
+            let position = tables::position_cells(position, extent);
+            table.row(
+                [vec![estimator.kind().to_owned()], position, tables::error_cells(&evaluation)].concat(),
+            );
+        }
+    }
+    table
+}
+
+/// The errors of each estimator in each trial: a fold, or a simulated calibration.
+fn trials_table(comment: &str, comparisons: &[Comparison], trials: &[Split]) -> CsvTable {
+    let columns = [vec!["estimator", "trial"], ERROR_COLUMNS.to_vec()].concat();
+    let mut table = CsvTable::new(comment, columns);
+    for Comparison { estimator, tried } in comparisons {
+        let Evaluation { extent, located } = &tried.evaluation;
+        let mut rest = located.as_slice();
+        for (number, trial) in trials.iter().enumerate() {
+            // The answers of all trials are one behind the other.
+            let count = trial.judged.rows.iter().filter(|row| row.touches()).count();
+            let (own, others) = rest.split_at(count.min(rest.len()));
+            rest = others;
+            let evaluation = Evaluation { extent: *extent, located: own.to_vec() };
+            let head = vec![estimator.kind().to_owned(), number.to_string()];
+            table.row([head, tables::error_cells(&evaluation)].concat());
+        }
+    }
+    table
+}
+
 /// Splits that the estimators are compared on, the name of their data, and a description of its use.
 struct Trials {
     data: String,
+    /// The data with their digests, and their use.
+    source: String,
     how: String,
     trials: Vec<Split>,
 }
@@ -115,12 +158,14 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         let calibrations = arguments.calibrations;
         let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());
         let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each");
-        return Ok(Trials { data: "simulation".to_owned(), how, trials });
+        return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
     let trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
+    let cross_validated =
+        |data: &str| format!("{data}, cross-validated in {} folds by position", arguments.folds);
+    let source = cross_validated(&tables::source_in_words(&recording.provenance));
     let data = recording.provenance.source;
-    let how = format!("{data}, cross-validated in {} folds by position", arguments.folds);
-    Ok(Trials { data, how, trials })
+    Ok(Trials { source, how: cross_validated(&data), data, trials })
 }
 
 fn compare(

@@ -5,7 +5,8 @@ use crate::input::{RecordingFiles, RigOrLocator};
 use crate::json::object;
 use crate::output::Table;
 use crate::progress::Observer;
-use crate::{input, output};
+use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
+use crate::{input, output, tables};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
 use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
@@ -37,7 +38,7 @@ pub struct Arguments {
     /// Seed of simulation and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Folder for a report
+    /// Folder for a report, with `errors.csv`, the errors of each position
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the errors as JSON
@@ -104,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             tolerance_m: arguments.tolerance,
         };
         output::write_report(out, evaluation_report(&report))?;
+        errors_table(arguments, &answers).write(out, ERRORS_CSV)?;
     }
     let evaluation = &answers.evaluation;
     let folds = matches!(answers.subject, RigOrLocator::Rig(_)).then_some(arguments.folds);
@@ -121,6 +123,23 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
         "errors": errors,
     })
+}
+
+/// The errors of each position.
+fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
+    let how = match &answers.subject {
+        RigOrLocator::Locator(_) => "located".to_owned(),
+        RigOrLocator::Rig(_) => format!("cross-validated in {} folds by position", arguments.folds),
+    };
+    let (subject, data) = (arguments.subject.display(), tables::source_in_words(&answers.recording));
+    let comment = format!("errors of {subject} on {data}, {how}, seed {}", arguments.seed);
+    let extent = answers.evaluation.extent;
+    let mut table =
+        CsvTable::new(&comment, [tables::position_columns(extent), ERROR_COLUMNS.to_vec()].concat());
+    for (position, evaluation) in tables::by_position(&answers.evaluation) {
+        table.row([tables::position_cells(position, extent), tables::error_cells(&evaluation)].concat());
+    }
+    table
 }
 
 /// A rig: its estimator is fitted to each fold, and judged at the positions that the fold holds out.

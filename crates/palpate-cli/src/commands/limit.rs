@@ -1,10 +1,15 @@
-//! `palpate limit`: what physics allows on a rig's bench, position by position.
+//! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
 
 use crate::failure::{Complaint, Failure};
-use crate::input;
+use crate::input::{self, RigOrLocator};
 use crate::json::object;
 use crate::output::{self, Table, figure};
+use crate::tables::{self, CsvTable};
+use palpate_estimators::estimator::Method;
+use palpate_estimators::influence::{ForceLinearLocator, Influence, InfluenceLocator};
+use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
 use palpate_estimators::setup::Setup;
+use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
     Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
@@ -16,10 +21,14 @@ use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, and what the bench cannot tell.
+/// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, the lightest touch that is told from noise,
+/// and what the bench cannot tell.
+///
+/// A surface without a model has influence functions and noise once a locator has learnt them: name the locator.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The rig file
+    /// The rig file, or a locator
+    #[arg(value_name = "RIG|LOCATOR")]
     rig: PathBuf,
     /// List every so far instead of a few positions, as in `--every "10 mm"`
     #[arg(long, value_name = "LENGTH", value_parser = input::length)]
@@ -33,7 +42,7 @@ pub struct Arguments {
     /// Noise of every sensor that measures in this unit, instead of the rig's, as in `--noise "5 um"`; may be repeated
     #[arg(long, value_name = "NOISE", value_parser = input::quantity)]
     noise: Vec<Quantity>,
-    /// Folder for a report
+    /// Folder for a report, with `limit.csv`, all over the surface
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the limit as JSON
@@ -50,13 +59,28 @@ struct Limits<'a> {
     unknown: LimitCurve,
     listed: Vec<Position>,
     warnings: Vec<LimitWarning>,
+    touch: &'a LightestTouch<'a>,
+    /// The lightest touch over the surface.
+    touches: [Option<TouchSummary>; 2],
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let setup = setup(arguments)?;
+    let bench = RigOrLocator::read(&arguments.rig)?;
+    let setup = setup(&bench, arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
-    let limit = setup.cramer_rao_bound().map_err(complain)?;
-    let limits = limits(&limit, &setup, arguments).map_err(complain)?;
+    let (limit, touch);
+    match learnt(&bench) {
+        Some(linear) => {
+            limit = linear.cramer_rao_bound(setup.surface().extent());
+            touch = linear.lightest_touch();
+        }
+        None => {
+            limit = setup.cramer_rao_bound().map_err(complain)?;
+            touch = Influence { false_alarm_rate: false_alarm_rate(&bench), ..Influence::default() }
+                .lightest_touch(&limit);
+        }
+    }
+    let limits = limits(&limit, &touch, &setup, arguments).map_err(complain)?;
     if let Some(out) = &arguments.out {
         write_report(&limits, &setup, arguments, out)?;
     }
@@ -67,9 +91,43 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// The rig's bench, with the force and the noise of the command line.
-fn setup(arguments: &Arguments) -> Result<Setup, Failure> {
-    let mut setup = input::read_rig(&arguments.rig)?.setup;
+/// The influence functions that a locator of a surface without a model has learnt.
+fn learnt(bench: &RigOrLocator) -> Option<&ForceLinearLocator> {
+    match bench {
+        RigOrLocator::Locator(locator) => match &locator.method {
+            Method::Influence(InfluenceLocator::ForceLinear(linear)) => Some(linear),
+            _ => None,
+        },
+        RigOrLocator::Rig(_) => None,
+    }
+}
+
+fn false_alarm_rate(bench: &RigOrLocator) -> FalseAlarmRate {
+    let set = match bench {
+        RigOrLocator::Rig(rig) => rig.estimator.false_alarm_rate(),
+        RigOrLocator::Locator(locator) => locator.false_alarm_rate(),
+    };
+    set.unwrap_or_default()
+}
+
+/// The bench, with the noise of the command line, or that which a locator has learnt.
+fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> {
+    let mut setup = bench.setup().clone();
+    if let Some(linear) = learnt(bench) {
+        if let Some(noise) = arguments.noise.first() {
+            let complaint =
+                format!("--noise {noise}: the noise of a locator of a measured surface is what it learnt");
+            return Err(Complaint::new(complaint).help("leave --noise out").into());
+        }
+        let learnt = setup.edit_sensors(|sensors| {
+            sensors.iter_mut().for_each(|sensor| sensor.channel.dead = true);
+            for (c, _, noise_sd) in linear.channels() {
+                sensors[c].channel.dead = false;
+                sensors[c].channel.noise_sd = noise_sd;
+            }
+        });
+        learnt.map_err(|error| Complaint::about(&arguments.rig, error))?;
+    }
     for noise in &arguments.noise {
         let meant = |sensor: &Sensor| sensor.kind.dimension() == noise.dimension;
         if !setup.layout().sensors().iter().any(meant) {
@@ -90,7 +148,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
     let complaint = Complaint::about(rig, error);
     let help = match error {
         LimitError::NoModel => {
-            "give a surface with a model, such as `kind = \"beam\"`; how far a locator is off on recordings says `palpate evaluate`"
+            "fit `kind = \"influence\"` to a recording with forces, and name its locator instead of the rig; or give a surface with a model, such as `kind = \"beam\"`"
         }
         LimitError::Noise(NoiseError::Singular { .. }) => {
             "add `noise = \"5 um\"` to [sensors], or try one with --noise \"5 um\""
@@ -105,6 +163,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
 
 fn limits<'a>(
     limit: &'a CramerRaoBound<'a>,
+    touch: &'a LightestTouch<'a>,
     setup: &Setup,
     arguments: &Arguments,
 ) -> Result<Limits<'a>, LimitError> {
@@ -119,11 +178,15 @@ fn limits<'a>(
         }
         None => a_few(extent),
     };
+    let known = LimitCurve::over_surface(limit, force_n, Force::Known)?;
+    let positions: Vec<Position> = known.points.iter().map(|point| point.position).collect();
     Ok(Limits {
         limit,
         force_n,
         force,
-        known: LimitCurve::over_surface(limit, force_n, Force::Known)?,
+        touch,
+        touches: touch.summaries(&positions),
+        known,
         unknown: LimitCurve::over_surface(limit, force_n, Force::Unknown)?,
         listed,
         warnings: limit_warnings(limit, force_n, force)?,
@@ -163,8 +226,37 @@ fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Pat
         force: limits.force,
         warnings: &limits.warnings,
         listed: &limits.listed,
+        touch: limits.touch,
     };
-    output::write_report(out, limit_report(&report))
+    output::write_report(out, limit_report(&report))?;
+    limit_table(limits, arguments).write(out, "limit.csv")
+}
+
+/// The limit and the lightest touch all over the surface. What the readings do not tell is an empty cell.
+fn limit_table(limits: &Limits, arguments: &Arguments) -> CsvTable {
+    let extent = limits.known.extent;
+    let comment = format!(
+        "limit of {}, {} N, {} of false alarms",
+        arguments.rig.display(),
+        limits.force_n,
+        limits.touch.rate()
+    );
+    let figures = [
+        "limit_known_force_mm",
+        "limit_unknown_force_mm",
+        "limit_of_force_n",
+        "lightest_touch_50_percent_n",
+        "lightest_touch_95_percent_n",
+    ];
+    let mut table = CsvTable::new(&comment, [tables::position_columns(extent), figures.to_vec()].concat());
+    for (known, unknown) in limits.known.points.iter().zip(&limits.unknown.points) {
+        let mm = |bound: &Option<Bound>| bound.map(|bound| bound.sd_position_m * 1e3);
+        let [half_n, surely_n] = limits.touch.forces_at(known.position);
+        let force_n = unknown.bound.and_then(|bound| bound.sd_force_n);
+        let figures = [mm(&known.bound), mm(&unknown.bound), force_n, half_n, surely_n].map(tables::cell);
+        table.row([tables::position_cells(known.position, extent), figures.to_vec()].concat());
+    }
+    table
 }
 
 /// JSON of the limit. A limit that is not there, because the readings do not tell, is null.
@@ -190,6 +282,17 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "known_force_mm": known.map(|bound| bound.sd_position_m * 1e3),
             "unknown_force_mm": unknown.map(|bound| bound.sd_position_m * 1e3),
             "force_sd_n": unknown.and_then(|bound| bound.sd_force_n),
+            "lightest_touch_n": limits.touch.forces_at(position),
+        }
+    };
+    // Forces that a locator without knowledge of the force finds with so much probability.
+    let touch = |summary: &TouchSummary| {
+        object! {
+            "found_percent": summary.found * 100.0,
+            "median_n": summary.median_n,
+            "largest_n": summary.worst.1,
+            "largest_at_mm": in_mm(summary.worst.0),
+            "positions_without": summary.without,
         }
     };
     let warning = |warning: &LimitWarning| {
@@ -217,6 +320,8 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
         "force": limits.force,
         "known_force": limits.known.summary().map(summary),
         "unknown_force": limits.unknown.summary().map(summary),
+        "false_alarm_rate_percent": limits.touch.rate().share() * 100.0,
+        "lightest_touch": limits.touches.iter().map(|summary| summary.as_ref().map(touch)).collect::<Vec<_>>(),
         "positions": limits.listed.iter().map(at).collect::<Vec<_>>(),
         "warnings": limits.warnings.iter().map(warning).collect::<Vec<_>>(),
     }
@@ -239,6 +344,7 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
         line @ Extent::Line { .. } => print_line(limits, line)?,
         Extent::Plane { .. } => print_plane(limits)?,
     }
+    output::say(format!("\n{}", lightest_touch_in_words(limits)))?;
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
@@ -252,7 +358,8 @@ fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
         .column("limit, mm", |(position, _)| extent.place_in_words(*position))
         .column("force known", |(_, [known, _])| limit(*known))
         .column("force unknown", |(_, [_, unknown])| limit(*unknown))
-        .column("force itself, N", |(_, [_, unknown])| figure(unknown.and_then(|bound| bound.sd_force_n)));
+        .column("force itself, N", |(_, [_, unknown])| figure(unknown.and_then(|bound| bound.sd_force_n)))
+        .column("lightest touch, N", |(position, _)| force_figure(limits.touch.forces_at(*position)[1]));
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
 
@@ -280,10 +387,38 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
         output::say(format!("{table}\n"))?;
     }
     let table = Table::from_rows([]).column("limit, mm", |()| String::new());
-    let table = ["force known", "force unknown", ""]
+    let table = ["force known", "force unknown", "", ""]
         .into_iter()
         .fold(table, |t, name| t.column(name, |()| String::new()));
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
+}
+
+/// A force with three digits; a dash for none.
+fn force_figure(force_n: Option<f64>) -> String {
+    let three = |force_n: f64| -> f64 { format!("{force_n:.2e}").parse().unwrap_or(force_n) };
+    force_n.map_or_else(|| "–".to_owned(), |force_n| three(force_n).to_string())
+}
+
+/// The lightest touch over the surface, in words.
+fn lightest_touch_in_words(limits: &Limits) -> String {
+    let extent = limits.known.extent;
+    let rate = limits.touch.rate();
+    let [Some(half), Some(surely)] = &limits.touches else {
+        return format!("lightest touch: none is told from noise at {rate} of false alarms");
+    };
+    let without = match surely.without {
+        0 => String::new(),
+        without => format!(", none at {without} positions"),
+    };
+    format!(
+        "lightest touch, found in {} % of its readings at {rate} of false alarms, force unknown: median {} N, largest {} N at {}{without}; found in {} %: median {} N",
+        surely.found * 100.0,
+        force_figure(Some(surely.median_n)),
+        force_figure(Some(surely.worst.1)),
+        extent.place_in_words(surely.worst.0),
+        half.found * 100.0,
+        force_figure(Some(half.median_n)),
+    )
 }
 
 /// Rows of the limit over the whole surface, whatever positions are listed.
@@ -291,7 +426,7 @@ fn summary_rows(limits: &Limits) -> Vec<Vec<String>> {
     let summaries = [limits.known.summary(), limits.unknown.summary()];
     let row = |name: &str, of: fn(&LimitSummary) -> f64| {
         let [known, unknown] = summaries.map(|summary| figure(summary.as_ref().map(|s| of(s) * 1e3)));
-        vec![name.to_owned(), known, unknown, String::new()]
+        vec![name.to_owned(), known, unknown, String::new(), String::new()]
     };
     vec![
         row("surface: mean", |summary| summary.mean_m),

@@ -162,3 +162,37 @@ fn rigs_and_recordings_that_cannot_be_compared_are_refused() {
     let odd = complained(&run(folder.path(), &odd), 2);
     insta::assert_snapshot!([no_model, no_contacts, odd].join("\n"));
 }
+
+#[test]
+fn tables_stand_beside_the_reports() {
+    let folder = folder(crate::support::examples::PAPER);
+    let compare =
+        ["compare", "rig.toml", "--only", "influence", "--only", "closed-form", "--calibrations", "2"];
+    said(&run(folder.path(), &[&compare[..], &["--out", "page"]].concat()));
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["evaluate", "locator.json", "--out", "page2"]));
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let rows = |name: &str| -> Vec<Vec<String>> {
+        read(name).lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    };
+    assert!(
+        read("page/errors.csv")
+            .starts_with("# palpate 0.1.0, estimators compared on rig.toml, 2 simulated calibrations")
+    );
+    let figures =
+        "readings,mean_error_mm,median_error_mm,p95_error_mm,rms_error_mm,max_error_mm,covered_percent";
+    let (errors, trials) = (rows("page/errors.csv"), rows("page/trials.csv"));
+    assert_eq!(errors[0].join(","), format!("estimator,position_mm,{figures}"));
+    assert_eq!(trials[0].join(","), format!("estimator,trial,{figures}"));
+    assert_eq!((errors.len(), trials.len()), (1 + 2 * 399, 1 + 2 * 2));
+    assert_eq!(errors[1][1..3], ["1", "2"]);
+    // The mean over the positions is that over the trials.
+    let mean = |rows: &[Vec<String>], column: usize| {
+        let own = rows.iter().filter(|row| row[0] == "influence");
+        let errors: Vec<f64> = own.map(|row| row[column].parse().unwrap()).collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
+    };
+    assert!((mean(&errors, 3) / mean(&trials, 3) - 1.0).abs() < 1e-6);
+    let evaluated = rows("page2/errors.csv");
+    assert_eq!((evaluated[0].join(","), evaluated.len()), (format!("position_mm,{figures}"), 400));
+}

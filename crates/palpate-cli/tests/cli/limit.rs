@@ -1,10 +1,12 @@
 //! `palpate limit` from outside: what physics allows on the paper's bench, and what it refuses.
 
+use crate::support::board::{self, Board, Touch};
 use crate::support::command::{complained, folder, json, run, said};
 use crate::support::examples::{FSI_WATER, PAPER};
 use crate::support::toml::Toml;
 use serde_json::Value;
 use std::fmt::Display;
+use std::fs;
 use toml_edit::Array;
 
 fn limit(rig: impl Display, arguments: &[&str]) -> String {
@@ -110,4 +112,35 @@ fn benches_without_a_limit_are_refused_in_words() {
         format!("{what}:\n{complaint}")
     };
     insta::assert_snapshot!(cases.iter().map(complaint).collect::<Vec<_>>().join("\n"));
+}
+
+#[test]
+fn a_locator_of_a_measured_surface_has_a_limit_and_a_lightest_touch() {
+    let (folder, mut board) = (folder(board::RIG), Board::new(3));
+    fs::write(folder.path().join("presses.csv"), board.calibration(210)).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
+    let told = json(folder.path(), &["limit", "board.json", "--force", "3 N", "--out", "page"]);
+    assert!(folder.path().join("page/report.html").is_file());
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{told}"));
+    assert_eq!((number(&told["sensors_alive"]), number(&told["false_alarm_rate_percent"])), (6.0, 0.1));
+    // A count of noise where a newton moves a sensor by up to 55.
+    let surely = &told["lightest_touch"][1];
+    assert_eq!(number(&surely["found_percent"]), 95.0);
+    assert!((0.03..0.2).contains(&number(&surely["median_n"])), "{told}");
+    assert!((0.5..10.0).contains(&number(&told["unknown_force"]["median_mm"])), "{told}");
+
+    // Touches of that force in the middle are found as often as it says.
+    let middle = told["positions"].as_array().unwrap().iter().find(|at| at["x_mm"] == 150.0).unwrap();
+    let force_n = number(&middle["lightest_touch_n"][1]);
+    let touches = vec![Touch { position_mm: 150.0, force_n }; 1000];
+    fs::write(folder.path().join("touches.csv"), board.recording(&touches)).unwrap();
+    let located = said(&run(folder.path(), &["locate", "board.json", "touches.csv"]));
+    let found = located.lines().skip(1).filter(|line| !line.ends_with("no_contact")).count();
+    assert!((915..=980).contains(&found), "{found}");
+
+    let refused = |options: &[&str]| complained(&run(folder.path(), options), 2);
+    let rig = refused(&["limit", "rig.toml", "--force", "3 N"]);
+    let noise = refused(&["limit", "board.json", "--force", "3 N", "--noise", "2"]);
+    let force = refused(&["limit", "board.json"]);
+    insta::assert_snapshot!([rig, noise, force].join("\n"));
 }

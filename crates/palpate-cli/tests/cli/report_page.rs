@@ -5,6 +5,7 @@ use std::fs;
 use crate::support::browser::measure;
 use crate::support::examples::PAPER;
 use crate::support::toml::Toml;
+use palpate_estimators::influence::Influence;
 use palpate_mechanics::limit::{Force, LimitCurve, limit_warnings};
 use palpate_numerics::watch::Watch;
 use palpate_report::{LimitReport, ReportFile, StudyReport, limit_report, paper_report, study_report};
@@ -39,6 +40,7 @@ fn limit_page() -> Vec<ReportFile> {
         force: Force::Unknown,
         warnings: &limit_warnings(&limit, 3.0, Force::Unknown).unwrap(),
         listed: &known.points.iter().step_by(50).map(|point| point.position).collect::<Vec<_>>(),
+        touch: &Influence::default().lightest_touch(&limit),
     };
     limit_report(&report)
 }

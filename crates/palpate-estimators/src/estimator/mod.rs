@@ -195,6 +195,16 @@ impl Estimator {
         }
     }
 
+    /// Share of untouched readings that its locators may take for a contact; `None` where they tell none, or where that is left to the choice.
+    pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
+        match self {
+            Self::Influence(config) => Some(config.false_alarm_rate),
+            Self::ClosedForm(config) => Some(config.false_alarm_rate),
+            Self::Digit(config) => Some(config.false_alarm_rate),
+            _ => None,
+        }
+    }
+
     /// The most often that one fit asks whether to go on.
     pub fn most_rounds(&self) -> u64 {
         match self {

@@ -21,10 +21,12 @@ pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
+use crate::lightest_touch::LightestTouch;
 use crate::setup::Setup;
-use crate::status::FalseAlarmRate;
+use crate::status::{FalseAlarmRate, LINE_PLACES, StatusRule, unknowns};
 use measured::{MeasuredInfluence, MeasuredLocator};
 use palpate_core::Estimate;
+use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
@@ -70,6 +72,24 @@ impl Fit for Influence {
 }
 
 impl Influence {
+    /// The lightest touch on a bench with a model, found at its false-alarm rate without knowledge of the force; that of `closed-form`
+    /// and `digit` is the same.
+    pub fn lightest_touch<'a>(&self, limit: &'a CramerRaoBound<'a>) -> LightestTouch<'a> {
+        let extent = limit.extent();
+        let unknowns = unknowns(extent.dimensions(), None);
+        let places = match extent {
+            Extent::Line { .. } => LINE_PLACES,
+            Extent::Plane { .. } => PlaneTable::places(extent),
+        };
+        let rule = StatusRule::new(limit.alive(), unknowns, places, self.false_alarm_rate);
+        let detection = rule.detection(limit.alive(), unknowns);
+        LightestTouch::new(
+            detection,
+            self.false_alarm_rate,
+            Box::new(|contact| limit.signal_to_noise(contact)),
+        )
+    }
+
     /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
     /// correct.
     fn check_measured(&self) -> Result<(), InfluenceFitError> {

@@ -69,7 +69,7 @@ impl LimitCurve {
     /// # Errors
     /// [`LimitError::Force`] for a force that is not positive and finite.
     pub fn over_surface(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Self, LimitError> {
-        Self::at_positions(limit, force_n, force, &Grid::over_surface(limit.surface.extent()).positions)
+        Self::at_positions(limit, force_n, force, &Grid::over_surface(limit.extent).positions)
     }
 
     /// The limit at positions `every_m` (metres) apart, the first of them `every_m` from the edge.
@@ -82,12 +82,7 @@ impl LimitCurve {
         force: Force,
         every_m: f64,
     ) -> Result<Self, LimitError> {
-        Self::at_positions(
-            limit,
-            force_n,
-            force,
-            &Grid::with_spacing(limit.surface.extent(), every_m)?.positions,
-        )
+        Self::at_positions(limit, force_n, force, &Grid::with_spacing(limit.extent, every_m)?.positions)
     }
 
     /// The limit at the given positions, which must be on the surface.
@@ -103,12 +98,7 @@ impl LimitCurve {
         check_force(force_n)?;
         let point =
             |&position| LimitPoint { position, bound: limit.bound_at(Contact { position, force_n }, force) };
-        Ok(Self {
-            extent: limit.surface.extent(),
-            force_n,
-            force,
-            points: positions.iter().map(point).collect(),
-        })
+        Ok(Self { extent: limit.extent, force_n, force, points: positions.iter().map(point).collect() })
     }
 
     /// A figure of the bound by x in metres, from left to right; on a plane its mean across the width. NaN where there is no bound.

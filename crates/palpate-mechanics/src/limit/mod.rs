@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 use crate::contact::Contact;
 use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
-use crate::surface::{ResponseFunction, ResponseGradient, Surface};
+use crate::surface::{Extent, ResponseFunction, ResponseGradient, Surface};
 use bound::{inverse_information, norm};
 
 /// Knowledge of the contact force: given, or estimated along.
@@ -50,7 +50,9 @@ impl Force {
 /// A surface with the sensors that are alive and the noise of each.
 #[derive(Clone)]
 pub struct CramerRaoBound<'a> {
-    surface: &'a dyn Surface,
+    extent: Extent,
+    /// The mechanics, where there are some.
+    model: Option<&'a dyn Surface>,
     channels: Vec<Channel<'a>>,
 }
 
@@ -76,12 +78,49 @@ impl<'a> CramerRaoBound<'a> {
             Some(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
         };
         let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
-        Ok(Self { surface, channels })
+        Ok(Self { extent: surface.extent(), model: Some(surface), channels })
     }
 
-    /// The surface.
-    pub fn surface(&self) -> &'a dyn Surface {
-        self.surface
+    /// The limit of a surface without a model, from what each of its channels reads over the standard deviation of its noise, as a
+    /// recording told it.
+    ///
+    /// ```
+    /// use palpate_mechanics::contact::{Contact, Position};
+    /// use palpate_mechanics::limit::{CramerRaoBound, Force};
+    /// use palpate_mechanics::surface::{Extent, InfluenceFunction, Proportional, ResponseFunction};
+    /// use std::sync::Arc;
+    ///
+    /// /// A scale under the right end of a board 1 m long, and its noise of 0.01 N.
+    /// struct Scale;
+    ///
+    /// impl InfluenceFunction for Scale {
+    ///     fn at(&self, contact: Position) -> f64 {
+    ///         contact.x_m / 0.01
+    ///     }
+    ///
+    ///     fn gradient(&self, _contact: Position) -> [f64; 2] {
+    ///         [1.0 / 0.01, 0.0]
+    ///     }
+    /// }
+    ///
+    /// let response: Arc<dyn ResponseFunction> = Arc::new(Proportional(Arc::new(Scale)));
+    /// let bound = CramerRaoBound::of_responses(Extent::line(1.0)?, [response]);
+    /// let contact = Contact { position: Position::along(0.3), force_n: 2.0 };
+    /// let sd_m = bound.bound_at(contact, Force::Known).unwrap().sd_position_m;
+    /// assert!((sd_m - 0.005).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn of_responses(
+        extent: Extent,
+        whitened: impl IntoIterator<Item = Arc<dyn ResponseFunction + 'a>>,
+    ) -> Self {
+        let channel = |response| Channel { kind: SensorKind::Raw, response, sd: 1.0, range: None };
+        Self { extent, model: None, channels: whitened.into_iter().map(channel).collect() }
+    }
+
+    /// The surface that is touched.
+    pub fn extent(&self) -> Extent {
+        self.extent
     }
 
     /// Number of sensors that are alive.
@@ -140,7 +179,7 @@ impl<'a> CramerRaoBound<'a> {
             columns.along.push(weight * along_x);
             across.push(weight * along_y);
         }
-        columns.across = self.surface.extent().if_plane(across);
+        columns.across = self.extent.if_plane(across);
         columns
     }
 }

@@ -7,6 +7,7 @@ use super::zone::{Grid, Zone, zones};
 use super::{CramerRaoBound, Force, LimitError, check_force};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
+use crate::surface::Surface;
 use palpate_numerics::normal_cdf;
 use palpate_numerics::small::dot;
 
@@ -86,12 +87,16 @@ pub fn limit_warnings(
 ) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
     // A support that stands between the positions of the grid could be missed: next to it little may be told.
-    let grid = Grid::over_surface(limit.surface.extent()).including(&limit.surface.force_supports());
+    let grid = Grid::over_surface(limit.extent).including(&force_supports(limit));
     let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
     warnings.extend(survey.mirrors());
     warnings.extend(survey.faint());
     Ok(warnings)
+}
+
+fn force_supports(limit: &CramerRaoBound) -> Vec<Position> {
+    limit.model.map_or_else(Vec::new, Surface::force_supports)
 }
 
 /// One look all over the surface.
@@ -114,11 +119,11 @@ impl Survey<'_> {
     }
 
     fn blind_from_m(&self) -> f64 {
-        BLIND_SHARE * self.limit.surface.extent().length_m()
+        BLIND_SHARE * self.limit.extent.length_m()
     }
 
     fn blind(&self) -> Vec<LimitWarning> {
-        let extent = self.limit.surface.extent();
+        let extent = self.limit.extent;
         let bound_m = self.blind_from_m();
         let size = |position: Position| self.sd_m(position, self.force).unwrap_or(f64::INFINITY);
         let found = zones(extent, &self.grid, |position| size(position) > bound_m);
@@ -140,13 +145,14 @@ impl Survey<'_> {
 
     fn lacks_reactions(&self) -> bool {
         let reacts = |channel: &super::Channel| channel.kind == SensorKind::Reaction;
-        self.limit.surface.full_scale(SensorKind::Reaction) > 0.0 && !self.limit.channels.iter().any(reacts)
+        let has_reactions = |model: &dyn Surface| model.full_scale(SensorKind::Reaction) > 0.0;
+        self.limit.model.is_some_and(has_reactions) && !self.limit.channels.iter().any(reacts)
     }
 
     /// Whether some support's reaction changes with a contact's position, or tells a force that is not known. That of a clamp
     /// which alone holds the surface is the force, wherever that acts.
     fn reactions_tell(&self, at: Position) -> bool {
-        let CramerRaoBound { surface, .. } = self.limit;
+        let Some(surface) = self.limit.model else { return false };
         let supports = surface.force_supports();
         let changes = |support: &Position| {
             let [along, across] = surface.influence_function(SensorKind::Reaction, *support).gradient(at);
@@ -164,7 +170,7 @@ impl Survey<'_> {
                 && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
         };
         let twin = |position: Position| clear(position).then(|| search.twin_of(position)).flatten();
-        let found = zones(self.limit.surface.extent(), &self.grid, |position| twin(position).is_some());
+        let found = zones(self.limit.extent, &self.grid, |position| twin(position).is_some());
         let mut warnings: Vec<LimitWarning> = Vec::new();
         for (zone, inside) in found {
             let pairs: Vec<(Position, Twin)> =
@@ -191,7 +197,7 @@ impl Survey<'_> {
     }
 
     fn faint(&self) -> Vec<LimitWarning> {
-        let extent = self.limit.surface.extent();
+        let extent = self.limit.extent;
         let found = zones(extent, &self.grid, |position| self.signal(position) < FAINT_SIGNAL);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
             let at = inside.into_iter().min_by(|a, b| self.signal(*a).total_cmp(&self.signal(*b)))?;
@@ -375,7 +381,7 @@ struct TwinSearch<'a> {
 
 impl<'a> TwinSearch<'a> {
     pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force) -> Self {
-        let grid = Grid::over_surface(limit.surface.extent());
+        let grid = Grid::over_surface(limit.extent);
         let mut search = Self { limit, force_n, force, grid, shapes: Vec::new(), spreads: Vec::new() };
         search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();
         let spread = |i: usize| {
@@ -437,7 +443,7 @@ impl<'a> TwinSearch<'a> {
             let better = around
                 .map(|(dx, dy)| Position { x_m: x_m + dx, y_m: y_m + dy })
                 .into_iter()
-                .filter(|&position| self.limit.surface.contains(position))
+                .filter(|&position| self.limit.extent.contains(position))
                 .map(|position| Twin { position, distance: self.distance(target, &self.shape(position).0) })
                 .find(|near| near.distance < twin.distance);
             match better {

@@ -9,6 +9,7 @@ use crate::{
 use palpate_estimators::estimator::Estimator;
 use palpate_estimators::evaluation::{Evaluation, Portion};
 use palpate_estimators::fit::Fit;
+use palpate_estimators::influence::Influence;
 use palpate_estimators::setup::Setup;
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::contact::Position;
@@ -277,6 +278,7 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
         force,
         warnings: &limit_warnings(&limit, 3.0, force).unwrap(),
         listed: &[0.0, 0.05, 0.2].map(Position::along),
+        touch: &Influence::default().lightest_touch(&limit),
     })
 }
 
@@ -292,7 +294,7 @@ fn a_limit_is_drawn_and_told() {
     ];
     for (sensors, force, said) in cases {
         let files = limits(sensors, force);
-        assert_sound(&files, &[1, 2]);
+        assert_sound(&files, &[1, 2, 3]);
         let text = shown_text(page(&files));
         for fact in [said, "3 N", "Cramér–Rao", "standard deviation"] {
             assert!(text.contains(fact), "{fact} is missing: {text}");

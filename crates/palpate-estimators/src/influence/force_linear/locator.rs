@@ -16,13 +16,18 @@ use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{
     Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
 };
+use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use crate::status::{Directions, FalseAlarmRate, NoiseBounds, learnt_misfit_bound, unknowns};
+use crate::status::{Detection, Directions, FalseAlarmRate, NoiseBounds, learnt_misfit_bound, unknowns};
 use palpate_core::{Estimate, Status};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::limit::CramerRaoBound;
+use palpate_mechanics::surface::{Extent, ResponseFunction, ResponseGradient};
 use palpate_numerics::normal_between;
 use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Learnt functions of the channels in use, over the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -296,6 +301,43 @@ impl ForceLinearLocator {
         self.stored.live.iter().zip(offsets).zip(noise_sd).map(|((c, offset), noise)| (*c, *offset, *noise))
     }
 
+    /// The Cramér–Rao bound of its surface, by the influences and the noise that the recording told; beyond the places that were pressed the
+    /// influences stay what they are at the last.
+    pub fn cramer_rao_bound(&self, extent: Extent) -> CramerRaoBound<'_> {
+        let channel = |channel| {
+            let response: Arc<dyn ResponseFunction> = Arc::new(LearntResponse { locator: self, channel });
+            response
+        };
+        CramerRaoBound::of_responses(extent, (0..self.stored.live.len()).map(channel))
+    }
+
+    /// The lightest touch that is told from noise, by its own rule.
+    pub fn lightest_touch(&self) -> LightestTouch<'_> {
+        let coordinates = if self.stored.y.count > 1 { 2 } else { 1 };
+        let detection = Detection {
+            channels: self.stored.live.len(),
+            unknowns: unknowns(coordinates, None),
+            square: self.noise_bound,
+            taken: self.detection_bound,
+        };
+        let signal = move |Contact { position, force_n }: Contact| {
+            let mut buffer = Buffer::default();
+            let values = self.place_at(position, &mut buffer).values;
+            let open = &self.stored.functions.offset_variances;
+            let square: f64 = values.iter().zip(open).map(|(f, open)| f * f / (1.0 + open)).sum();
+            self.response_n(force_n) * square.sqrt()
+        };
+        LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(signal))
+    }
+
+    /// The influences at a position; beyond the grid those of its edge.
+    fn place_at<'b>(&self, position: Position, buffer: &'b mut Buffer) -> Place<'b> {
+        let [x, y] = self.axes();
+        let node =
+            |axis: Axis, at_m: f64| ((at_m - axis.start) / axis.step).clamp(0.0, (axis.count - 1) as f64);
+        self.between(node(x, position.x_m), node(y, position.y_m), buffer)
+    }
+
     fn axes(&self) -> [Axis; 2] {
         [self.stored.x, self.stored.y]
     }
@@ -469,10 +511,15 @@ impl ForceLinearLocator {
         }
     }
 
+    /// φ of a force.
+    fn response_n(&self, force_n: f64) -> f64 {
+        let Stored { response, force_scale_n, .. } = self.stored;
+        force_scale_n * (force_n / force_scale_n).powf(response)
+    }
+
     /// φ of the known force.
     fn known_response_n(&self) -> Option<f64> {
-        let Stored { known_force_n, response, force_scale_n, .. } = self.stored;
-        known_force_n.map(|force_n| force_scale_n * (force_n / force_scale_n).powf(response))
+        self.stored.known_force_n.map(|force_n| self.response_n(force_n))
     }
 
     /// The force and its variance that belong to φ.
@@ -541,6 +588,44 @@ impl ForceLinearLocator {
 /// A place between those of the grid: f, v and β of each channel.
 #[derive(Default)]
 struct Buffer([Vec<f64>; 3]);
+
+/// Reading of a channel less its offset, over its noise, as a function of the contact.
+struct LearntResponse<'a> {
+    locator: &'a ForceLinearLocator,
+    channel: usize,
+}
+
+impl LearntResponse<'_> {
+    fn influence(&self, position: Position) -> f64 {
+        self.locator.place_at(position, &mut Buffer::default()).values[self.channel]
+    }
+}
+
+impl ResponseFunction for LearntResponse<'_> {
+    fn at(&self, contact: Contact) -> f64 {
+        self.locator.response_n(contact.force_n) * self.influence(contact.position)
+    }
+
+    fn gradient(&self, Contact { position, force_n }: Contact) -> ResponseGradient {
+        /// Half a difference, in steps of the grid.
+        const REACH: f64 = 0.05;
+        let [x, y] = self.locator.axes();
+        let response_n = self.locator.response_n(force_n);
+        let slope = |axis: Axis, moved: &dyn Fn(f64) -> Position| {
+            if axis.count < 2 {
+                return 0.0;
+            }
+            let reach_m = REACH * axis.step;
+            let change = self.influence(moved(reach_m)) - self.influence(moved(-reach_m));
+            response_n * change / (2.0 * reach_m)
+        };
+        let along = slope(x, &|by_m| Position { x_m: position.x_m + by_m, ..position });
+        let across = slope(y, &|by_m| Position { y_m: position.y_m + by_m, ..position });
+        // φ is a power of the force.
+        let growth = self.locator.stored.response * response_n / force_n;
+        ResponseGradient { position: [along, across], force: growth * self.influence(position) }
+    }
+}
 
 impl Locate for ForceLinearLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {

@@ -1,0 +1,93 @@
+//! CSV tables beside a report: what its figures are drawn from, for whoever draws their own.
+//!
+//! The first line is a comment that names version, inputs and seed; columns have their units in their names.
+
+use crate::failure::Failure;
+use crate::output;
+use palpate_estimators::evaluation::{Evaluation, Located};
+use palpate_estimators::recording::{Provenance, csv_row};
+use palpate_mechanics::contact::Position;
+use palpate_mechanics::surface::Extent;
+use std::path::Path;
+
+/// The file with the errors of each position.
+pub const ERRORS_CSV: &str = "errors.csv";
+
+/// A table of named columns.
+pub struct CsvTable {
+    text: String,
+}
+
+impl CsvTable {
+    /// A table that begins with `comment` and these columns.
+    pub fn new(comment: &str, columns: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
+        let comment = comment.replace(['\r', '\n'], " ");
+        Self { text: format!("# palpate {}, {comment}\n{}", env!("CARGO_PKG_VERSION"), csv_row(columns)) }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = impl AsRef<str>>) {
+        self.text += &csv_row(cells);
+    }
+
+    /// Writes it into a folder, which is made where it is not there yet.
+    pub fn write(&self, folder: &Path, name: &str) -> Result<(), Failure> {
+        output::make_folder(folder)?;
+        output::write_file(&folder.join(name), self.text.as_bytes())
+    }
+}
+
+/// A number with nine digits, none of them zeros at the end; an empty cell for one that is not there.
+pub fn cell(value: Option<f64>) -> String {
+    let nine = |value: f64| -> f64 { format!("{value:.8e}").parse().unwrap_or(value) };
+    value.filter(|value| value.is_finite()).map_or_else(String::new, |value| nine(value).to_string())
+}
+
+/// Names of the columns of a position.
+pub fn position_columns(extent: Extent) -> Vec<&'static str> {
+    match extent {
+        Extent::Line { .. } => vec!["position_mm"],
+        Extent::Plane { .. } => vec!["x_mm", "y_mm"],
+    }
+}
+
+/// Cells of a position.
+pub fn position_cells(position: Position, extent: Extent) -> Vec<String> {
+    extent.coordinates_m(position).map(|at_m| cell(Some(at_m * 1e3))).collect()
+}
+
+/// Columns of errors in millimetres, and of the share of the 95 % regions that hold their contact.
+pub const ERROR_COLUMNS: [&str; 7] = [
+    "readings",
+    "mean_error_mm",
+    "median_error_mm",
+    "p95_error_mm",
+    "rms_error_mm",
+    "max_error_mm",
+    "covered_percent",
+];
+
+/// Cells of [`ERROR_COLUMNS`].
+pub fn error_cells(evaluation: &Evaluation) -> Vec<String> {
+    let Some(errors) = evaluation.summary(None) else { return vec![String::new(); ERROR_COLUMNS.len()] };
+    let figures_m = [errors.average_m, errors.median_m, errors.p95_m, errors.rmse_m, errors.largest_m];
+    let mut cells = vec![errors.count.to_string()];
+    cells.extend(figures_m.map(|error_m| cell(Some(error_m * 1e3))));
+    cells.push(cell(evaluation.coverage_percent()));
+    cells
+}
+
+/// The answers at each position, by x and then y.
+pub fn by_position(evaluation: &Evaluation) -> Vec<(Position, Evaluation)> {
+    let mut sorted = evaluation.located.clone();
+    sorted.sort_by(|a, b| a.truth.cmp_by_x_then_y(&b.truth));
+    let groups = sorted.chunk_by(|a, b| a.truth == b.truth);
+    let part = |located: &[Located]| Evaluation { extent: evaluation.extent, located: located.to_vec() };
+    groups.map(|group| (group[0].truth, part(group))).collect()
+}
+
+/// The files of a recording with their digests, in words.
+pub fn source_in_words(provenance: &Provenance) -> String {
+    let digests = provenance.digests.iter().map(|digest| format!(" sha256 {digest}"));
+    format!("{}{}", provenance.source, digests.collect::<String>())
+}

@@ -1,0 +1,105 @@
+//! The lightest touch that is told from noise: the force from which on a contact is found at a given false-alarm rate.
+//!
+//! How probably a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]).
+
+use crate::status::{Detection, FalseAlarmRate};
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_numerics::{bisect, percentile};
+
+/// The lightest touch of a surface, position by position, by a locator that does not know the force.
+///
+/// ```
+/// use palpate_estimators::{influence::Influence, setup::Setup};
+/// use palpate_mechanics::contact::Position;
+/// use palpate_mechanics::sensing::SensorKind::Deflection;
+/// use palpate_mechanics::surface::Beam;
+/// use palpate_mechanics::units::{gpa, mm, um};
+///
+/// let beam = Beam::new(mm(400.0), mm(40.0), mm(1.2), gpa(200.0))?;
+/// let setup = Setup::new(beam).sensors(Deflection.evenly(8).noise(um(5.0)))?;
+/// let limit = setup.cramer_rao_bound()?;
+/// let touch = Influence::default().lightest_touch(&limit);
+/// let [half_n, surely_n] = touch.forces_at(Position::along(mm(200.0))).map(Option::unwrap);
+/// assert!(half_n < surely_n && surely_n < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct LightestTouch<'a> {
+    rate: FalseAlarmRate,
+    /// Signal-to-noise ratios that are found with the probabilities [`LightestTouch::FOUND`].
+    needed: [f64; 2],
+    /// Signal-to-noise ratio of a contact.
+    signal: Box<dyn Fn(Contact) -> f64 + 'a>,
+}
+
+/// The lightest touch all over a surface, found with one probability.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchSummary {
+    /// Probability that it is found.
+    pub found: f64,
+    /// Median over the positions, in newtons.
+    pub median_n: f64,
+    /// The largest, in newtons, and where it is.
+    pub worst: (Position, f64),
+    /// Positions at which no force is found.
+    pub without: usize,
+}
+
+impl<'a> LightestTouch<'a> {
+    /// Probabilities with which a touch is found.
+    pub const FOUND: [f64; 2] = [0.5, 0.95];
+    /// Forces beyond this are none that a surface is touched with, in newtons.
+    const MOST_N: f64 = 1e6;
+
+    pub(crate) fn new(
+        detection: Detection,
+        rate: FalseAlarmRate,
+        signal: Box<dyn Fn(Contact) -> f64 + 'a>,
+    ) -> Self {
+        Self { rate, needed: Self::FOUND.map(|found| detection.signal(found)), signal }
+    }
+
+    /// The false-alarm rate at which it is found.
+    pub fn rate(&self) -> FalseAlarmRate {
+        self.rate
+    }
+
+    /// The forces, in newtons, that are found with the probabilities [`LightestTouch::FOUND`] at a position; `None` where no force is.
+    pub fn forces_at(&self, position: Position) -> [Option<f64>; 2] {
+        self.needed.map(|needed| self.force_n(position, needed))
+    }
+
+    /// The force whose signal-to-noise ratio is `needed`.
+    fn force_n(&self, position: Position, needed: f64) -> Option<f64> {
+        let signal = |force_n: f64| (self.signal)(Contact { position, force_n });
+        let guess_n = needed / signal(1.0);
+        if guess_n <= Self::MOST_N && (signal(guess_n) / needed - 1.0).abs() < 1e-9 {
+            return Some(guess_n);
+        }
+        // Readings that are not proportional to the force, or that saturate.
+        let enough = |force_n: &f64| signal(*force_n) >= needed;
+        let high_n = std::iter::successors(Some(1e-9), |force_n| Some(2.0 * force_n))
+            .take_while(|force_n| *force_n <= Self::MOST_N)
+            .find(enough)?;
+        Some(bisect((0.0, high_n), 50, |force_n| !enough(&force_n)))
+    }
+
+    /// The lightest touch over some positions, for each of the probabilities; `None` where no force is found anywhere.
+    pub fn summaries(&self, positions: &[Position]) -> [Option<TouchSummary>; 2] {
+        let forces: Vec<[Option<f64>; 2]> = positions.iter().map(|at| self.forces_at(*at)).collect();
+        [0, 1].map(|i| {
+            let of = |(at, forces): (&Position, &[Option<f64>; 2])| Some((*at, forces[i]?));
+            let mut found: Vec<(Position, f64)> = positions.iter().zip(&forces).filter_map(of).collect();
+            found.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let forces_n: Vec<f64> = found.iter().map(|(_, force_n)| *force_n).collect();
+            Some(TouchSummary {
+                found: Self::FOUND[i],
+                median_n: percentile(&forces_n, 50.0)?,
+                worst: *found.last()?,
+                without: positions.len() - found.len(),
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,144 @@
+//! The lightest touch measured by locators' own rule of `no_contact`.
+
+use super::*;
+use crate::closed_form::ClosedForm;
+use crate::estimator::{Estimator, Locator, Method};
+use crate::fit::Fit;
+use crate::fixtures::{Example, paper, plate};
+use crate::influence::{Influence, InfluenceLocator, Structure};
+use crate::recording::Row;
+use crate::setup::Setup;
+use crate::simulate::CleanSensors;
+use crate::status::FalseAlarmRate;
+use palpate_core::Status;
+use palpate_mechanics::limit::{CramerRaoBound, Force};
+use palpate_mechanics::sensing::{ChannelErrors, ChannelModel, measure};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const READINGS: usize = 2000;
+
+/// Share of the readings of a contact that a locator finds.
+fn found(bench: &Example, locator: &Locator, contact: Contact) -> f64 {
+    let (surface, layout) = (bench.setup.surface().model().unwrap(), bench.setup.layout());
+    let clean = CleanSensors::new(surface, layout).reading(contact);
+    let errors = ChannelErrors::none(layout);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
+    let is_found = |_: &usize| {
+        let reading = measure(layout, &clean, &errors, &mut rng);
+        locator.locate(&reading).unwrap().status != Status::NoContact
+    };
+    (0..READINGS).filter(is_found).count() as f64 / READINGS as f64
+}
+
+/// Checks that forces a tenth less than the lightest touch are found less often than it says, and a tenth more more often.
+fn check(name: &str, bench: &Example, locator: &Locator, touch: &LightestTouch, positions: &[Position]) {
+    for position in positions {
+        for (share, force_n) in LightestTouch::FOUND.into_iter().zip(touch.forces_at(*position)) {
+            let force_n = force_n.unwrap();
+            let [less, just, more] = [0.9, 1.0, 1.1].map(|times| {
+                found(bench, locator, Contact { position: *position, force_n: times * force_n })
+            });
+            println!(
+                "{name}, {position:?}: {force_n:.5} N is found in {share}: {less:.3} {just:.3} {more:.3}"
+            );
+            assert!(less < share && share < more, "{name} {position:?} {share}: {less} {just} {more}");
+        }
+    }
+}
+
+const ALONG: [f64; 4] = [0.02, 0.1, 0.17, 0.2];
+
+#[test]
+fn on_a_beam_it_is_true_within_a_tenth() {
+    let bench = paper(5e-6, 300);
+    let setup = bench.setup.clone().unknown_force();
+    let positions = ALONG.map(Position::along);
+    let limit = bench.setup.cramer_rao_bound().unwrap();
+    for rate in [0.01, 0.001].map(|share| FalseAlarmRate::new(share).unwrap()) {
+        let estimators = [
+            Estimator::Influence(Influence { false_alarm_rate: rate, ..Influence::default() }),
+            Estimator::ClosedForm(ClosedForm { false_alarm_rate: rate }),
+        ];
+        for estimator in estimators {
+            let locator = estimator.fit(&setup, &bench.simulate(0)).unwrap();
+            let touch = Influence { false_alarm_rate: rate, ..Influence::default() }.lightest_touch(&limit);
+            check(&format!("{} at {rate}", locator.kind()), &bench, &locator, &touch, &positions);
+        }
+    }
+}
+
+#[test]
+fn on_a_plate_it_is_true_within_a_tenth() {
+    let mut bench = plate(24, ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() });
+    bench.training = bench.training.repeated(300);
+    let setup = bench.setup.clone().unknown_force();
+    let extent = bench.setup.surface().extent();
+    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap());
+    let at = |x: f64, y: f64| Position { x_m: x * length_m, y_m: y * width_m };
+    let limit = bench.setup.cramer_rao_bound().unwrap();
+    let touch = Influence::default().lightest_touch(&limit);
+    let locator = Influence::default().fit(&setup, &bench.simulate(0)).unwrap().into_locator();
+    check("plate", &bench, &locator, &touch, &[at(0.5, 0.5), at(0.2, 0.35)]);
+}
+
+#[test]
+fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
+    let bench = paper(5e-6, 60);
+    let mut recording = bench.simulate(0);
+    let names = bench.setup.layout().names();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let setup = Setup::measured(bench.setup.surface().extent().length_m(), &names).unwrap();
+    recording.kinds = setup.layout().kinds();
+    let (layout, errors) = (bench.setup.layout(), ChannelErrors::none(bench.setup.layout()));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+    for _ in 0..300 {
+        let reading = measure(layout, &vec![0.0; layout.len()], &errors, &mut rng);
+        recording.rows.push(Row {
+            position: Position::default(),
+            force_n: Some(0.0),
+            nuisance: None,
+            time_s: None,
+            reading,
+        });
+    }
+    let config = Influence { structure: Structure::ForceLinear, ..Influence::default() };
+    let locator = config.fit(&setup, &recording).unwrap().into_locator();
+    let Method::Influence(InfluenceLocator::ForceLinear(linear)) = &locator.method else { panic!() };
+    let positions = [0.1, 0.17, 0.2].map(Position::along);
+    check("force-linear", &bench, &locator, &linear.lightest_touch(), &positions);
+    // And its limit is that of the mechanics, as far as the recording tells the influences.
+    let extent = setup.surface().extent();
+    let (learnt, known) = (linear.cramer_rao_bound(extent), bench.setup.cramer_rao_bound().unwrap());
+    for position in positions {
+        let contact = Contact { position, force_n: 3.0 };
+        let sd = |bound: &CramerRaoBound| bound.bound_at(contact, Force::Unknown).unwrap().sd_position_m;
+        let ratio = sd(&learnt) / sd(&known);
+        assert!((0.85..1.15).contains(&ratio), "{position:?}: {ratio}");
+    }
+}
+
+#[test]
+fn a_surface_that_does_not_notice_has_no_lightest_touch() {
+    let detection = Detection { channels: 3, unknowns: 2, square: 16.0, taken: 11.0 };
+    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(|_| 0.0));
+    assert_eq!(touch.forces_at(Position::along(0.1)), [None, None]);
+    assert_eq!(touch.summaries(&[Position::along(0.1)]), [None, None]);
+    // One that saturates is found where its readings do not.
+    let saturating = |contact: Contact| (4.0 * contact.force_n).min(8.0);
+    let touch = LightestTouch::new(detection, FalseAlarmRate::default(), Box::new(saturating));
+    let [half_n, surely_n] = touch.forces_at(Position::along(0.1)).map(Option::unwrap);
+    assert!(half_n < surely_n && 4.0 * surely_n < 8.0);
+}
+
+#[test]
+fn one_channel_and_one_unknown_are_a_normal_variable() {
+    // Found above C = 9 or below −3; the length bound of 25 is never the one that counts.
+    let detection = Detection { channels: 1, unknowns: 1, square: 25.0, taken: 9.0 };
+    for signal in [0.0, 1.5, 3.0, 5.0] {
+        let expected =
+            palpate_numerics::normal_cdf(signal - 3.0) + palpate_numerics::normal_cdf(-3.0 - signal);
+        assert!((detection.probability(signal) - expected).abs() < 1e-5, "{signal}");
+    }
+    assert!((detection.signal(0.5) - 3.0).abs() < 1e-4);
+}
