@@ -3,10 +3,10 @@
 use super::*;
 use crate::closed_form::ClosedForm;
 use crate::digit::{DigitEstimator, DigitTheory};
-use crate::estimator::{Estimator, Locator};
-use crate::fit::Fit;
+use crate::estimator::Estimator;
+use crate::fit::{Fit, Fitted};
 use crate::fixtures::{Example, beam, digit, paper, plate};
-use crate::influence::{Influence, Structure};
+use crate::influence::{ForceLinearLocator, Influence, InfluenceLocator, Structure};
 use crate::setup::Setup;
 use crate::simulate::{CleanSensors, clean_reading};
 use ndarray::Array1;
@@ -208,8 +208,8 @@ fn false_alarms_are_as_rare_as_the_rule_says() {
 }
 
 /// The beam's presses as a recording of raw channels, a seventh of them of no force.
-fn force_linear_locator(rate: FalseAlarmRate) -> Locator {
-    let bench = paper(5e-6, REPEATS);
+fn force_linear_locator() -> Fitted<ForceLinearLocator> {
+    let bench = paper(5e-6, 100);
     let mut recording = bench.simulate(0);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let (layout, errors) = (bench.setup.layout(), ChannelErrors::none(bench.setup.layout()));
@@ -222,29 +222,32 @@ fn force_linear_locator(rate: FalseAlarmRate) -> Locator {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let setup = Setup::measured(bench.setup.surface().extent().length_m(), &names).unwrap();
     recording.kinds = setup.layout().kinds();
-    let config =
-        Influence { false_alarm_rate: rate, structure: Structure::ForceLinear, ..Influence::default() };
-    config.fit(&setup, &recording).unwrap().into_locator()
+    let config = Influence { structure: Structure::ForceLinear, ..Influence::default() };
+    config.fit(&setup, &recording).unwrap().map(|method| match method {
+        InfluenceLocator::ForceLinear(linear) => *linear,
+        other => panic!("{other:?}"),
+    })
 }
 
 #[test]
 fn a_force_linear_surface_has_the_rate_that_is_set() {
-    const READINGS: usize = 40_000;
     let bench = paper(5e-6, 1);
     let (layout, errors) = (bench.setup.layout(), ChannelErrors::none(bench.setup.layout()));
     let silence = vec![0.0; layout.len()];
-    for share in [0.01, 0.001] {
-        let locator = force_linear_locator(FalseAlarmRate::new(share).unwrap());
+    let fitted = force_linear_locator();
+    for (share, readings) in [(0.01, 5_000), (0.001, 20_000)] {
+        let rate = FalseAlarmRate::new(share).unwrap();
+        let locator = fitted.clone().map(|linear| linear.with_false_alarm_rate(rate));
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
         let is_alarm = |_: &usize| {
             let noise = measure(layout, &silence, &errors, &mut rng);
             locator.locate(&noise).unwrap().status != Status::NoContact
         };
-        let alarms = (0..READINGS).filter(is_alarm).count();
-        println!("force-linear at {share}: {alarms} of {READINGS}");
+        let alarms = (0..readings).filter(is_alarm).count();
+        println!("force-linear at {share}: {alarms} of {readings}");
         // The bounds are wider by what calibration leaves open of noise and offsets, and contacts are asked at the nodes of a grid alone.
-        let (least, _) = binomial_bounds(READINGS, 0.8 * share);
-        let (_, most) = binomial_bounds(READINGS, 1.1 * share);
+        let (least, _) = binomial_bounds(readings, 0.8 * share);
+        let (_, most) = binomial_bounds(readings, 1.1 * share);
         assert!((least..=most).contains(&alarms), "{share}: {alarms} not in {least}..={most}");
     }
 }
