@@ -6,7 +6,7 @@
 //!   fails the first at that rate. The cost of a contact is that of the extended Bayesian information criterion at 0.1 %; at
 //!   another rate Φ(−√cost), the chance that noise exceeds it along one contact's reading, changes as the rate does. A cost is no quantile:
 //!   noise fails the second at a rate that the numbers of channels and places give, up to twice the one that is set on the benches of
-//!   docs/at-the-limit.md. Force-linear surfaces without a model have [`NoiseBounds`] in its place, which noise fails at the rate itself.
+//!   docs/at-the-limit.md. Force-linear surfaces without a model have `NoiseBounds` in its place, which noise fails at the rate itself.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
 //!   [`OUTSIDE_MODEL_RATE`].
 //! - `ambiguous`: another place has a share of at least [`OTHER_PLACE`] of the posterior probability.
