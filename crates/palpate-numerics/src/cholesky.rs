@@ -69,6 +69,15 @@ impl Cholesky {
         Ok(Self { lower: matrix })
     }
 
+    /// The factor whose L is given, its diagonal greater than 0.
+    ///
+    /// # Panics
+    /// When the matrix is not square.
+    pub fn from_lower(lower: Array2<f64>) -> Self {
+        assert_eq!(lower.nrows(), lower.ncols(), "a factor is square");
+        Self { lower: lower.as_standard_layout().into_owned() }
+    }
+
     /// L.
     pub fn lower(&self) -> ArrayView2<'_, f64> {
         self.lower.view()

@@ -12,7 +12,7 @@ use super::{Kernel, Trend};
 use crate::{Cholesky, NotPositiveDefinite};
 
 /// b²: the prior variance of the trend's coefficients over the signal's, for standardized coordinates.
-const TREND_VARIANCE: f64 = 1e8;
+pub(super) const TREND_VARIANCE: f64 = 1e8;
 /// Added to the diagonal of C, so that a covariance without noise has a factor despite rounding.
 pub(super) const NUGGET: f64 = 1e-12;
 /// Largest value that is added where that is not enough.

@@ -72,22 +72,31 @@ impl Evidence<'_> {
 
 /// s_j² for each output, given α = P·ȳ, in the groups' standardized units.
 pub(super) fn signal_variances(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
+    variances_of(groups, ratio, &quadratic_forms(groups, ratio, alpha))
+}
+
+/// s_j² for each output, given Q_j.
+pub(super) fn variances_of(groups: &Groups, ratio: f64, quadratics: &[f64]) -> Vec<f64> {
     if groups.noise_given {
         return vec![1.0 / ratio; groups.means.ncols()];
     }
     let rows = groups.total_rows() as f64;
-    quadratic_forms(groups, ratio, alpha).iter().map(|q| q / rows).collect()
+    quadratics.iter().map(|q| q / rows).collect()
 }
 
 /// ln p of all outputs in their own units, given α = P·ȳ.
 pub(super) fn log_evidence(groups: &Groups, ratio: f64, covariance: &Covariance, alpha: &Array2<f64>) -> f64 {
+    evidence_of(groups, ratio, covariance.log_determinant(), &quadratic_forms(groups, ratio, alpha))
+}
+
+/// ln p of all outputs in their own units, given the logarithm of the points' determinant and Q_j.
+pub(super) fn evidence_of(groups: &Groups, ratio: f64, log_determinant: f64, quadratics: &[f64]) -> f64 {
     let rows = groups.total_rows() as f64;
     let repeats = rows - groups.len() as f64;
     let precisions: f64 = groups.precision.iter().map(|p| p.ln()).sum();
     let variances: f64 = groups.log_variance.iter().sum();
-    let determinant = covariance.log_determinant() + repeats * ratio.ln() + precisions + variances;
-    let signal = signal_variances(groups, ratio, alpha);
-    let quadratics = quadratic_forms(groups, ratio, alpha);
+    let determinant = log_determinant + repeats * ratio.ln() + precisions + variances;
+    let signal = variances_of(groups, ratio, quadratics);
     let of_output = |j: usize| {
         let units = 2.0 * rows * groups.scale[j].ln();
         -0.5 * (rows * (2.0 * PI * signal[j]).ln() + determinant + quadratics[j] / signal[j] + units)
@@ -95,14 +104,19 @@ pub(super) fn log_evidence(groups: &Groups, ratio: f64, covariance: &Covariance,
     (0..quadratics.len()).map(of_output).sum()
 }
 
-/// Q_j.
+/// Q_j, given α = P·ȳ.
 fn quadratic_forms(groups: &Groups, ratio: f64, alpha: &Array2<f64>) -> Vec<f64> {
-    let of_output = |j: usize| {
-        let fit = groups.means.column(j).dot(&alpha.column(j));
-        let least = if groups.noise_given { 0.0 } else { LEAST_QUADRATIC };
-        fit.max(0.0) + groups.scatter.column(j).sum() / ratio + least
-    };
-    (0..groups.means.ncols()).map(of_output).collect()
+    let of_means: Vec<f64> =
+        groups.means.columns().into_iter().zip(alpha.columns()).map(|(y, alpha)| y.dot(&alpha)).collect();
+    with_scatter(groups, ratio, &of_means)
+}
+
+/// Q_j, given what the means of the points add to it.
+pub(super) fn with_scatter(groups: &Groups, ratio: f64, of_means: &[f64]) -> Vec<f64> {
+    let least = if groups.noise_given { 0.0 } else { LEAST_QUADRATIC };
+    let of_output =
+        |(j, of_means): (usize, &f64)| of_means.max(0.0) + groups.scatter.column(j).sum() / ratio + least;
+    of_means.iter().enumerate().map(of_output).collect()
 }
 
 /// d ln p/dK_il with i and l apart: ½·(Σ_j α_j·α_jᵀ/s_j² − m·P) (Rasmussen and Williams, eq. 5.9).

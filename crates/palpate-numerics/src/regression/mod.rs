@@ -23,17 +23,19 @@
 //!
 //! Rasmussen and Williams, *Gaussian Processes for Machine Learning* (2006), chapters 2, 4 and 5.
 
+mod blocks;
 mod covariance;
 mod evidence;
 mod groups;
 mod kernel;
 mod lbfgs;
 mod posterior;
+mod reduced;
 mod search;
 
 pub use groups::Samples;
 pub use kernel::{Hyperparameters, Kernel, Trend};
-pub use posterior::{GaussianProcess, PosteriorFault, PredictionScratch};
+pub use posterior::{GaussianProcess, MOST_EXACT, PosteriorFault, PredictionScratch};
 pub use search::Regression;
 
 use crate::NotPositiveDefinite;

@@ -1,29 +1,69 @@
 //! The posterior of a Gaussian process, and its predictions.
 
 use ndarray::linalg::general_mat_vec_mul;
-use ndarray::{Array2, ArrayView1, ArrayViewMut1};
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis};
 
+use super::blocks::{Blocks, Triangle};
 use super::covariance::{Covariance, Points};
-use super::evidence::{log_evidence, signal_variances};
+use super::evidence::{evidence_of, log_evidence, signal_variances, variances_of, with_scatter};
 use super::groups::Groups;
 use super::kernel::squared_distances_into;
+use super::reduced::{self, OF_MEAN, OF_VARIANCE, Reduced, ReducedScratch, Rows};
 use super::{Hyperparameters, Kernel, RegressionError, Trend};
-use crate::NotPositiveDefinite;
+use crate::watch::Watch;
+use crate::{Cholesky, NotPositiveDefinite};
 
-/// The posterior of m functions of d coordinates.
+/// The posterior of m functions of d coordinates: exact up to [`MOST_EXACT`] points, that of a thousand well-chosen ones beyond.
 ///
-/// It is written without the factor of its covariance, which is made again when it is read: n³/3 operations for n
-/// distinct points.
+/// It is written without what can be computed from it, which is made again when it is read.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(into = "PosteriorData", try_from = "PosteriorData")]
 pub struct GaussianProcess {
     data: PosteriorData,
     points: Points,
-    covariance: Covariance,
+    blocks: Blocks,
+    variance: Variance,
     /// α, m×n.
     weights: Array2<f64>,
     /// β, m×q.
     trend: Array2<f64>,
+}
+
+/// Points up to which the posterior is that of all of them.
+pub const MOST_EXACT: usize = 3000;
+/// Points up to which its variance is.
+const MOST_EXACT_VARIANCE: usize = 512;
+
+/// Variance of a posterior.
+#[derive(Clone, Debug)]
+enum Variance {
+    /// Of all points: L⁻¹, with L⁻¹·H and the factor of A.
+    Exact { whiten: Triangle, basis: Array2<f64>, trend: Cholesky },
+    /// Of some.
+    Reduced(Reduced),
+}
+
+impl Variance {
+    /// Of all points or the best of them, whichever are few enough.
+    fn of_points(
+        points: &Points,
+        kernel: Kernel,
+        noise: &[f64],
+        ratio: f64,
+        exact: Option<Covariance>,
+    ) -> Result<Self, RegressionError> {
+        if points.scaled.ncols() <= MOST_EXACT_VARIANCE {
+            let covariance = exact.map_or_else(|| Covariance::regularised(points, kernel, noise), Ok)?;
+            let whiten = Triangle::new(&covariance.factor.inverse_lower().view());
+            return Ok(Self::Exact { whiten, basis: covariance.basis, trend: covariance.trend });
+        }
+        let chosen = reduced::chosen(kernel, &points.scaled.view(), ratio, OF_VARIANCE);
+        let none = Array2::zeros((noise.len(), 0));
+        let rows =
+            Rows { scaled: points.scaled.view(), basis: points.basis.view(), means: none.view(), noise };
+        let learnt = reduced::learn(kernel, rows, &chosen, Watch::NONE)?;
+        Ok(Self::Reduced(Reduced::new(kernel, &points.scaled.view(), chosen, &learnt.variance)?))
+    }
 }
 
 /// Room for predictions of one [`GaussianProcess`].
@@ -33,11 +73,13 @@ pub struct PredictionScratch {
     point: Vec<f64>,
     /// h, then what the trend leaves unexplained.
     basis: Vec<f64>,
-    /// r², then the correlations with every row.
-    correlations: Vec<f64>,
-    /// dc/d(r²), then its product with u − u_i.
+    /// The correlations with every point, in blocks.
+    correlations: Vec<[f64; 8]>,
+    reduced: ReducedScratch,
+    /// dc/d(r²).
     slopes: Vec<f64>,
-    product: Vec<f64>,
+    /// L⁻¹ times the correlations; or r², then the product of the slopes with u − u_i.
+    product: Vec<[f64; 8]>,
     /// One number an output.
     outputs: Vec<f64>,
 }
@@ -49,13 +91,17 @@ impl PartialEq for GaussianProcess {
 }
 
 impl GaussianProcess {
-    /// The exact posterior of all groups.
+    /// The posterior of all groups.
     pub(super) fn of_groups(
         groups: &Groups,
         kernel: Kernel,
         trend: Trend,
         hyperparameters: &Hyperparameters,
+        watch: Watch,
     ) -> Result<Self, RegressionError> {
+        if groups.len() > MOST_EXACT {
+            return Self::of_chosen(groups, kernel, trend, hyperparameters, watch);
+        }
         let ratio = hyperparameters.noise_ratio;
         let scales = &hyperparameters.length_scales;
         let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
@@ -63,25 +109,72 @@ impl GaussianProcess {
         let covariance = Covariance::regularised(&points, kernel, &noise)?;
         let (alpha, beta) = covariance.solve(&groups.means);
         let signal = signal_variances(groups, ratio, &alpha);
+        let log_evidence = log_evidence(groups, ratio, &covariance, &alpha);
+        let inputs = groups.coordinates.t().iter().copied().collect();
         let data = PosteriorData {
-            kernel,
-            trend,
-            centre: groups.centre.clone(),
-            spread: groups.spread.clone(),
-            hyperparameters: hyperparameters.clone(),
-            inputs: groups.coordinates.t().iter().copied().collect(),
-            noise,
-            row_noise: if groups.noise_given { None } else { Some(ratio) },
-            offset: groups.offset.clone(),
-            scale: groups.scale.clone(),
-            signal_variance: signal.iter().zip(&groups.scale).map(|(s2, scale)| s2 * scale * scale).collect(),
-            weights: alpha.t().iter().copied().collect(),
-            trend_coefficients: beta.t().iter().copied().collect(),
-            log_evidence: log_evidence(groups, ratio, &covariance, &alpha),
+            noise: noise.clone(),
+            log_evidence,
+            ..PosteriorData::new(groups, (kernel, trend), hyperparameters, inputs, &signal, (&alpha, &beta))
         };
-        let weights = alpha.t().as_standard_layout().into_owned();
-        let trend = beta.t().as_standard_layout().into_owned();
-        Ok(Self { data, points, covariance, weights, trend })
+        let variance = Variance::of_points(&points, kernel, &noise, ratio, Some(covariance))?;
+        Ok(Self::assemble(data, points, variance))
+    }
+
+    /// The posterior of all groups through the best of their points.
+    pub(super) fn of_chosen(
+        groups: &Groups,
+        kernel: Kernel,
+        trend: Trend,
+        hyperparameters: &Hyperparameters,
+        watch: Watch,
+    ) -> Result<Self, RegressionError> {
+        let ratio = hyperparameters.noise_ratio;
+        let scales = &hyperparameters.length_scales;
+        let all = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let noise = groups.noise_ratios(ratio);
+        let chosen = reduced::chosen(kernel, &all.scaled.view(), ratio, OF_MEAN);
+        let rows = Rows {
+            scaled: all.scaled.view(),
+            basis: all.basis.view(),
+            means: groups.means.view(),
+            noise: &noise,
+        };
+        let learnt = reduced::learn(kernel, rows, &chosen, watch)?;
+        let quadratics = with_scatter(groups, ratio, &learnt.quadratics);
+        let signal = variances_of(groups, ratio, &quadratics);
+        let inputs = groups.coordinates.select(Axis(1), &chosen);
+        let first = chosen.len().min(OF_VARIANCE);
+        let data = PosteriorData {
+            noise: chosen.iter().map(|i| noise[*i]).collect(),
+            log_evidence: evidence_of(groups, ratio, learnt.log_determinant, &quadratics),
+            sparse: Some(SparseData {
+                points: groups.len(),
+                factor: packed(&learnt.variance.lower(), first + trend.size(scales.len())),
+            }),
+            ..PosteriorData::new(
+                groups,
+                (kernel, trend),
+                hyperparameters,
+                inputs.t().iter().copied().collect(),
+                &signal,
+                (&learnt.weights, &learnt.trend),
+            )
+        };
+        let points = Points::new(&inputs.view(), &groups.centre, &groups.spread, scales, trend);
+        let reduced = Reduced::new(kernel, &points.scaled.view(), (0..first).collect(), &learnt.variance)?;
+        Ok(Self::assemble(data, points, Variance::Reduced(reduced)))
+    }
+
+    fn assemble(data: PosteriorData, points: Points, variance: Variance) -> Self {
+        let (d, n) = points.scaled.dim();
+        let m = data.offset.len();
+        let shape = |values: &[f64], rows, columns| {
+            Array2::from_shape_vec((rows, columns), values.to_vec()).unwrap_or_default()
+        };
+        let weights = shape(&data.weights, m, n);
+        let trend = shape(&data.trend_coefficients, m, data.trend.size(d));
+        let blocks = Blocks::new(data.kernel, &points.scaled.view(), &weights.view());
+        Self { data, points, blocks, variance, weights, trend }
     }
 
     /// Coordinates of a point, d.
@@ -94,8 +187,13 @@ impl GaussianProcess {
         self.weights.nrows()
     }
 
-    /// Distinct points that it has seen, n.
+    /// Distinct points that it has learnt from.
     pub fn points(&self) -> usize {
+        self.data.sparse.as_ref().map_or(self.kept(), |sparse| sparse.points)
+    }
+
+    /// Distinct points that its mean is told by, n: all, or well-chosen ones where there are more than [`MOST_EXACT`].
+    pub fn kept(&self) -> usize {
         self.points.scaled.ncols()
     }
 
@@ -122,13 +220,18 @@ impl GaussianProcess {
 
     /// Room for its predictions.
     pub fn scratch(&self) -> PredictionScratch {
-        let n = self.points();
+        let n = self.kept();
+        let reduced = match &self.variance {
+            Variance::Exact { .. } => ReducedScratch::default(),
+            Variance::Reduced(reduced) => reduced.scratch(),
+        };
         PredictionScratch {
             point: vec![0.0; self.coordinates()],
             basis: vec![0.0; self.trend.ncols()],
-            correlations: vec![0.0; n],
+            correlations: vec![[0.0; 8]; n.div_ceil(8)],
+            reduced,
             slopes: vec![0.0; n],
-            product: vec![0.0; n],
+            product: vec![[0.0; 8]; n.div_ceil(8)],
             outputs: vec![0.0; self.outputs()],
         }
     }
@@ -139,9 +242,6 @@ impl GaussianProcess {
     /// When `point` is not d long, or `means` not m.
     pub fn mean_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) {
         self.place(point, scratch);
-        for r2 in &mut scratch.correlations {
-            *r2 = self.data.kernel.correlation(*r2);
-        }
         self.means(means, scratch);
     }
 
@@ -159,20 +259,24 @@ impl GaussianProcess {
         let d = self.coordinates();
         assert_eq!(gradients.len(), self.outputs() * d, "a gradient is as long as outputs times coordinates");
         self.place(point, scratch);
-        for (r2, slope) in scratch.correlations.iter_mut().zip(&mut scratch.slopes) {
-            (*r2, *slope) = self.data.kernel.correlation_and_slope(*r2);
-        }
         self.means(means, scratch);
+        let n = self.kept();
+        let PredictionScratch { point, slopes, product, outputs, .. } = scratch;
+        let product = &mut product.as_flattened_mut()[..n];
+        squared_distances_into(product, &self.points.scaled.view(), |k| point[k]);
+        for (slope, r2) in slopes.iter_mut().zip(&*product) {
+            *slope = self.data.kernel.correlation_and_slope(*r2).1;
+        }
         for k in 0..d {
-            let u = scratch.point[k];
+            let u = point[k];
             let row = self.points.scaled.row(k);
-            for ((product, slope), ui) in scratch.product.iter_mut().zip(&scratch.slopes).zip(row) {
+            for ((product, slope), ui) in product.iter_mut().zip(&*slopes).zip(row) {
                 *product = slope * (u - ui);
             }
             let factor = 2.0 / self.data.hyperparameters.length_scales[k];
-            let mut sums = ArrayViewMut1::from(&mut scratch.outputs[..]);
-            general_mat_vec_mul(factor, &self.weights, &ArrayView1::from(&scratch.product), 0.0, &mut sums);
-            for (j, sum) in scratch.outputs.iter().enumerate() {
+            let mut sums = ArrayViewMut1::from(&mut outputs[..]);
+            general_mat_vec_mul(factor, &self.weights, &ArrayView1::from(&*product), 0.0, &mut sums);
+            for (j, sum) in outputs.iter().enumerate() {
                 let slope = match self.data.trend {
                     Trend::Constant => 0.0,
                     Trend::Linear => self.trend[[j, 1 + k]] / self.data.spread[k],
@@ -195,14 +299,20 @@ impl GaussianProcess {
     ) {
         assert_eq!(variances.len(), self.outputs(), "there is one variance an output");
         self.mean_into(point, means, scratch);
-        self.covariance.factor.solve_lower_in_place(&mut scratch.correlations);
-        let explained: f64 = scratch.correlations.iter().map(|v| v * v).sum();
-        let half = ArrayView1::from(&scratch.correlations[..]);
-        let mut rest = ArrayViewMut1::from(&mut scratch.basis[..]);
-        general_mat_vec_mul(-1.0, &self.covariance.basis.t(), &half, 1.0, &mut rest);
-        self.covariance.trend.solve_lower_in_place(&mut scratch.basis);
-        let trend: f64 = scratch.basis.iter().map(|r| r * r).sum();
-        let variance = (1.0 - explained + trend).max(0.0);
+        let correlations = &scratch.correlations.as_flattened()[..self.kept()];
+        let variance = match &self.variance {
+            Variance::Reduced(reduced) => {
+                reduced.variance(correlations, &scratch.basis, &mut scratch.reduced)
+            }
+            Variance::Exact { whiten, basis, trend } => {
+                let explained = whiten.product_into(correlations, &mut scratch.product);
+                let half = ArrayView1::from(&scratch.product.as_flattened()[..self.kept()]);
+                let mut rest = ArrayViewMut1::from(&mut scratch.basis[..]);
+                general_mat_vec_mul(-1.0, &basis.t(), &half, 1.0, &mut rest);
+                trend.solve_lower_in_place(&mut scratch.basis);
+                (1.0 - explained + scratch.basis.iter().map(|r| r * r).sum::<f64>()).max(0.0)
+            }
+        };
         for (out, signal) in variances.iter_mut().zip(&self.data.signal_variance) {
             *out = signal * variance;
         }
@@ -218,7 +328,7 @@ impl GaussianProcess {
         (means, variances)
     }
 
-    /// u, h and the squared distances to every row.
+    /// u and h.
     fn place(&self, point: &[f64], scratch: &mut PredictionScratch) {
         assert_eq!(point.len(), self.coordinates(), "a point has as many coordinates as a row");
         let PosteriorData { centre, spread, hyperparameters, .. } = &self.data;
@@ -229,15 +339,12 @@ impl GaussianProcess {
         for (k, h) in scratch.basis[1..].iter_mut().enumerate() {
             *h = (point[k] - centre[k]) / spread[k];
         }
-        squared_distances_into(&mut scratch.correlations, &self.points.scaled.view(), |k| scratch.point[k]);
     }
 
-    /// Means from h and the correlations.
-    fn means(&self, means: &mut [f64], scratch: &PredictionScratch) {
+    /// Correlations with the points, and means from them and h.
+    fn means(&self, means: &mut [f64], scratch: &mut PredictionScratch) {
         assert_eq!(means.len(), self.outputs(), "there is one mean an output");
-        let correlations = ArrayView1::from(&scratch.correlations[..]);
-        let mut sums = ArrayViewMut1::from(&mut means[..]);
-        general_mat_vec_mul(1.0, &self.weights, &correlations, 0.0, &mut sums);
+        self.blocks.sums_into(&scratch.point, &mut scratch.correlations, means);
         for (j, mean) in means.iter_mut().enumerate() {
             let trend: f64 = self.trend.row(j).iter().zip(&scratch.basis).map(|(b, h)| b * h).sum();
             *mean = self.data.offset[j] + self.data.scale[j] * (*mean + trend);
@@ -256,18 +363,32 @@ impl TryFrom<PosteriorData> for GaussianProcess {
 
     fn try_from(data: PosteriorData) -> Result<Self, PosteriorFault> {
         data.check()?;
-        let (n, d, m) = (data.noise.len(), data.centre.len(), data.offset.len());
-        let shape = |values: &[f64], rows, columns| {
-            Array2::from_shape_vec((rows, columns), values.to_vec()).unwrap_or_default()
+        let (n, d) = (data.noise.len(), data.centre.len());
+        let coordinates =
+            Array2::from_shape_vec((n, d), data.inputs.clone()).unwrap_or_default().reversed_axes();
+        let Hyperparameters { length_scales, noise_ratio } = &data.hyperparameters;
+        let points = Points::new(&coordinates.view(), &data.centre, &data.spread, length_scales, data.trend);
+        let variance = match &data.sparse {
+            None => Variance::of_points(&points, data.kernel, &data.noise, *noise_ratio, None)?,
+            Some(sparse) => {
+                let first = n.min(OF_VARIANCE);
+                let factor = Cholesky::from_lower(unpacked(&sparse.factor, first + data.trend.size(d)));
+                let chosen = (0..first).collect();
+                Variance::Reduced(Reduced::new(data.kernel, &points.scaled.view(), chosen, &factor)?)
+            }
         };
-        let coordinates = shape(&data.inputs, n, d).reversed_axes();
-        let scales = &data.hyperparameters.length_scales;
-        let points = Points::new(&coordinates.view(), &data.centre, &data.spread, scales, data.trend);
-        let covariance = Covariance::regularised(&points, data.kernel, &data.noise)?;
-        let weights = shape(&data.weights, m, n);
-        let trend = shape(&data.trend_coefficients, m, data.trend.size(d));
-        Ok(Self { data, points, covariance, weights, trend })
+        Ok(Self::assemble(data, points, variance))
     }
+}
+
+/// The lower triangle of a matrix of this size, row by row.
+fn packed(lower: &ArrayView2<f64>, size: usize) -> Vec<f64> {
+    (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|at| lower[at]).collect()
+}
+
+/// The matrix whose lower triangle a list is, row by row.
+fn unpacked(list: &[f64], size: usize) -> Array2<f64> {
+    Array2::from_shape_fn((size, size), |(i, j)| if j <= i { list[i * (i + 1) / 2 + j] } else { 0.0 })
 }
 
 /// Everything that predictions need, but for what can be computed from it. Lists of lists are flat, row by row.
@@ -295,6 +416,19 @@ struct PosteriorData {
     /// m×q.
     pub trend_coefficients: Vec<f64>,
     pub log_evidence: f64,
+    /// Where the points are some of many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sparse: Option<SparseData>,
+}
+
+/// What chosen points do not tell of all.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SparseData {
+    /// Number of all points.
+    points: usize,
+    /// R of those that tell the variance, row by row.
+    factor: Vec<f64>,
 }
 
 /// A posterior from a file, whose numbers do not fit together.
@@ -325,9 +459,40 @@ pub enum PosteriorFault {
     /// Its covariance does not factor.
     #[error("the Gaussian process's covariance cannot be factored: {0}")]
     Singular(#[from] NotPositiveDefinite),
+    /// Its variance cannot be computed.
+    #[error(transparent)]
+    Regression(#[from] RegressionError),
 }
 
 impl PosteriorData {
+    /// From what all posteriors have; noise and evidence are still to be filled in.
+    fn new(
+        groups: &Groups,
+        (kernel, trend): (Kernel, Trend),
+        hyperparameters: &Hyperparameters,
+        inputs: Vec<f64>,
+        signal: &[f64],
+        (alpha, beta): (&Array2<f64>, &Array2<f64>),
+    ) -> Self {
+        Self {
+            kernel,
+            trend,
+            centre: groups.centre.clone(),
+            spread: groups.spread.clone(),
+            hyperparameters: hyperparameters.clone(),
+            inputs,
+            noise: Vec::new(),
+            row_noise: if groups.noise_given { None } else { Some(hyperparameters.noise_ratio) },
+            offset: groups.offset.clone(),
+            scale: groups.scale.clone(),
+            signal_variance: signal.iter().zip(&groups.scale).map(|(s2, scale)| s2 * scale * scale).collect(),
+            weights: alpha.t().iter().copied().collect(),
+            trend_coefficients: beta.t().iter().copied().collect(),
+            log_evidence: 0.0,
+            sparse: None,
+        }
+    }
+
     /// Checks lengths and ranges.
     pub fn check(&self) -> Result<(), PosteriorFault> {
         let (n, d, m) = (self.noise.len(), self.centre.len(), self.offset.len());
@@ -346,7 +511,12 @@ impl PosteriorData {
             ("weights", n.saturating_mul(m), &self.weights),
         ];
         let trend = ("trend coefficients", m * self.trend.size(d), &self.trend_coefficients[..]);
-        for (what, needed, list) in lists.into_iter().chain([trend]) {
+        let size = n.min(OF_VARIANCE).saturating_add(self.trend.size(d));
+        let factor = self
+            .sparse
+            .as_ref()
+            .map(|sparse| ("variance factors", size.saturating_mul(size + 1) / 2, sparse.factor.as_slice()));
+        for (what, needed, list) in lists.into_iter().chain([trend]).chain(factor) {
             if list.len() != needed {
                 return Err(PosteriorFault::Count { what, needed, found: list.len() });
             }
@@ -367,6 +537,11 @@ impl PosteriorData {
             |v| v > 0.0,
             "finite and greater than 0",
         )?;
+        if let Some(SparseData { factor, .. }) = &self.sparse {
+            numbers("variance factor", factor, |_| true, "finite")?;
+            let diagonal: Vec<f64> = (0..size).map(|i| factor[i * (i + 3) / 2]).collect();
+            numbers("variance factor", &diagonal, |value| value > 0.0, "finite and greater than 0")?;
+        }
         numbers("log evidence", &[self.log_evidence], |_| true, "finite")?;
         let noise: Vec<f64> = self.noise.iter().copied().chain(self.row_noise).collect();
         numbers("noise", &noise, |value| value >= 0.0, "finite and at least 0")

@@ -18,7 +18,8 @@ pub struct Regression {
     /// Basis of the mean.
     pub trend: Trend,
     /// The hyperparameters are found from at most this many distinct points, drawn at random; at least 2. Whatever
-    /// their number, the posterior is that of all rows.
+    /// their number, the posterior is that of all rows: exactly up to [`MOST_EXACT`](super::MOST_EXACT) points, beyond through a
+    /// thousand of them.
     pub search_points: usize,
     /// Fixes the draw.
     pub seed: u64,
@@ -50,7 +51,7 @@ impl Regression {
     pub fn fit(&self, samples: Samples, watch: Watch) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::new(samples)?;
         let found = self.search(&groups, watch)?;
-        GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found)
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, &found, watch)
     }
 
     /// As [`Self::fit`], every output with hyperparameters of its own: one process an output.
@@ -76,7 +77,7 @@ impl Regression {
     ) -> Result<GaussianProcess, RegressionError> {
         let groups = Groups::new(samples)?;
         hyperparameters.check(groups.coordinates.nrows())?;
-        GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters)
+        GaussianProcess::of_groups(&groups, self.kernel, self.trend, hyperparameters, Watch::NONE)
     }
 
     fn search(&self, groups: &Groups, watch: Watch) -> Result<Hyperparameters, Cancelled> {

@@ -1,11 +1,13 @@
 //! Properties of the regression, against a dense computation on every row as it came.
 
 use crate::watch::{Cancelled, Watch};
-use ndarray::{Array1, Array2, array};
+use ndarray::{Array1, Array2, Axis, array};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::blocks::{Blocks, Triangle};
+use super::covariance::{Covariance, Points};
 use super::evidence::Evidence;
 use super::groups::Groups;
 use super::{GaussianProcess, Hyperparameters, Kernel, Regression, RegressionError, Samples, Trend};
@@ -332,4 +334,113 @@ fn it_comes_back_from_a_file_and_a_damaged_file_is_refused() {
     {
         assert!(serde_json::from_str::<GaussianProcess>(&text.replacen(from, to, 1)).is_err(), "{to}");
     }
+}
+
+/// Eight bell-shaped features of a position with noise, and the position: what regression of positions sees.
+fn features(rows: usize, seed: u64) -> (Array2<f64>, Array2<f64>) {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let y = Array2::from_shape_fn((rows, 1), |_| rng.random_range(0.0..1.0));
+    let x = Array2::from_shape_fn((rows, 8), |(i, k)| {
+        let error: f64 = StandardNormal.sample(&mut rng);
+        (-(4.0 * y[[i, 0]] - 0.5 * k as f64).powi(2)).exp() + 0.01 * error
+    });
+    (x, y)
+}
+
+/// Largest difference of two processes' means and standard deviations of a new row, over the deviations of the first.
+fn difference(exact: &GaussianProcess, other: &GaussianProcess, at: &Array2<f64>) -> [f64; 2] {
+    let mut worst = [0.0_f64; 2];
+    for at in at.outer_iter() {
+        let (mean, variance) = exact.predict(&at.to_vec());
+        let (other_mean, other_variance) = other.predict(&at.to_vec());
+        for j in 0..mean.len() {
+            let row = |variance: f64| (variance + exact.noise_variance(j).unwrap_or(0.0)).sqrt();
+            let sd = row(variance[j]);
+            worst[0] = worst[0].max((mean[j] - other_mean[j]).abs() / sd);
+            worst[1] = worst[1].max((row(other_variance[j]) / sd - 1.0).abs());
+        }
+    }
+    worst
+}
+
+#[test]
+fn chosen_points_tell_what_all_do() {
+    for (samples_of, trend) in [
+        (features as fn(usize, u64) -> (Array2<f64>, Array2<f64>), Trend::Constant),
+        (|rows, seed| noisy(rows, 1, 0.2, seed), Trend::Linear),
+    ] {
+        let (x, y) = samples_of(900, 10);
+        let regression = Regression { trend, search_points: 200, ..Regression::default() };
+        let all = samples(&x, &y, None);
+        let process = fit(regression, all);
+        let found = process.hyperparameters();
+        let groups = Groups::new(all).unwrap();
+        let kernel = Kernel::Matern52;
+        let sparse = GaussianProcess::of_chosen(&groups, kernel, trend, found, Watch::NONE).unwrap();
+        // The textbook's variance, of all rows.
+        let noise = groups.noise_ratios(found.noise_ratio);
+        let scales = &found.length_scales;
+        let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let covariance = Covariance::regularised(&points, kernel, &noise).unwrap();
+        let at = samples_of(50, 11).0;
+        for at in at.outer_iter() {
+            let standard = |k: usize, by: &[f64]| (at[k] - groups.centre[k]) / by[k];
+            let d = scales.len();
+            let here =
+                Points::new(&at.insert_axis(Axis(1)).view(), &groups.centre, &groups.spread, scales, trend);
+            let correlations: Vec<f64> = (0..groups.len())
+                .map(|i| {
+                    let r2 = (0..d).map(|k| (standard(k, scales) - points.scaled[[k, i]]).powi(2)).sum();
+                    kernel.correlation(r2)
+                })
+                .collect();
+            let half = covariance.factor.solve_lower(&Array1::from(correlations));
+            let rest = covariance.trend.solve_lower(&(&here.basis.row(0) - &half.dot(&covariance.basis)));
+            let exact = 1.0 - half.dot(&half) + rest.dot(&rest);
+            let variance = process.predict(&at.to_vec()).1[0] / process.signal_variance(0);
+            let sd = |variance: f64| (variance + found.noise_ratio).sqrt();
+            assert!((sd(variance) / sd(exact) - 1.0).abs() < 0.03, "{trend:?}: {variance} {exact}");
+        }
+        let [mean, sd] = difference(&process, &sparse, &at);
+        assert!(mean < 0.05 && sd < 0.02, "{trend:?}: {mean} {sd}");
+        let evidence = sparse.log_evidence() - process.log_evidence();
+        assert!(evidence.abs() < 0.01 * process.log_evidence().abs(), "{trend:?}: {evidence}");
+        assert_eq!((sparse.points(), sparse.kept() < 900), (900, true));
+        let text = serde_json::to_string(&sparse).unwrap();
+        let back: GaussianProcess = serde_json::from_str(&text).unwrap();
+        let [mean, sd] = difference(&sparse, &back, &at);
+        assert!(mean < 1e-6 && sd < 1e-6, "{mean} {sd}");
+        let damaged = text.replacen("\"factor\":[", "\"factor\":[-", 1);
+        assert!(serde_json::from_str::<GaussianProcess>(&damaged).is_err());
+    }
+}
+
+#[test]
+fn blocks_correlate_as_the_kernel_does() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
+    let points = Array2::from_shape_fn((3, 21), |_| rng.random_range(-2.0..2.0));
+    let weights = Array2::from_shape_fn((6, 21), |_| rng.random_range(-1.0..1.0));
+    let u = [0.3, -0.4, 1.1];
+    for kernel in [Kernel::Matern52, Kernel::Matern32, Kernel::SquaredExponential] {
+        let blocks = Blocks::new(kernel, &points.view(), &weights.view());
+        let (mut correlations, mut sums) = (vec![[0.0; 8]; blocks.len()], [0.0; 6]);
+        blocks.sums_into(&u, &mut correlations, &mut sums);
+        let correlations = Array1::from(correlations.as_flattened()[..21].to_vec());
+        for (point, c) in points.columns().into_iter().zip(&correlations) {
+            let r2 = point.iter().zip(u).map(|(a, b)| (a - b).powi(2)).sum();
+            assert!((c - kernel.correlation(r2)).abs() < 1e-12, "{kernel:?}");
+        }
+        for (sum, row) in sums.iter().zip(weights.outer_iter()) {
+            assert!((sum - row.dot(&correlations)).abs() < 1e-12);
+        }
+    }
+    let square = Array2::from_shape_fn((21, 21), |_| rng.random_range(-1.0..1.0));
+    let x: Vec<f64> = (0..21).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let mut product = [[0.0; 8]; 3];
+    let length = Triangle::new(&square.view()).product_into(&x, &mut product);
+    for (i, found) in product.as_flattened()[..21].iter().enumerate() {
+        let truth: f64 = (0..=i).map(|j| square[[i, j]] * x[j]).sum();
+        assert!((found - truth).abs() < 1e-12);
+    }
+    assert!((length - product.as_flattened().iter().map(|v| v * v).sum::<f64>()).abs() < 1e-12);
 }

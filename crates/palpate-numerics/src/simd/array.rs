@@ -77,6 +77,10 @@ impl<R: Real, const N: usize, const FUSED: bool> Vector<N> for Array<R, N, FUSED
         }
     }
     #[inline(always)]
+    fn square_root(self) -> Self {
+        each_lane!(self, l => self.0[l].square_root())
+    }
+    #[inline(always)]
     fn power_of_two(self) -> Self {
         each_lane!(self, l => self.0[l].power_of_two())
     }

@@ -30,6 +30,8 @@ fn vector_operations<V: Vector<N>, const N: usize>(shift: usize) -> Vec<[V::Real
         a.mul_add(b, c),
         a.mul_sub(b, c),
         (whole + V::splat(V::Real::ROUNDER)).power_of_two(),
+        (a * a).square_root(),
+        a.exponential(),
         V::splat(row(shift)[1]),
         V::look_up(&table, &picks),
     ];
@@ -118,4 +120,14 @@ fn a_whole_number_is_the_exponent_of_two() {
         let shifted = Array::<f32, 1, true>::splat(n as f32 + f32::ROUNDER);
         assert_eq!(shifted.power_of_two().to_array(), [2f32.powi(n)]);
     }
+}
+
+#[test]
+fn the_exponential_is_right_to_fourteen_digits() {
+    let exponential = |z: f64| Array::<f64, 1, true>::splat(z).exponential().to_array()[0];
+    for z in (-6990..=6990).map(|i| 0.1 * f64::from(i)) {
+        assert!((exponential(z) / z.exp() - 1.0).abs() < 2e-13, "{z}");
+    }
+    assert_eq!(exponential(0.0), 1.000_000_000_000_012_7);
+    assert!(exponential(-1e300) < 1e-300 && exponential(1e300).is_finite());
 }

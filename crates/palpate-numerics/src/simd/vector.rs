@@ -25,6 +25,8 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// `self` · `factor` + `term`, rounded once.
     fn fused_mul_add(self, factor: Self, term: Self) -> Self;
+    /// The square root.
+    fn square_root(self) -> Self;
     /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
     fn power_of_two(self) -> Self;
 }
@@ -46,6 +48,10 @@ macro_rules! real {
             #[inline(always)]
             fn fused_mul_add(self, factor: Self, term: Self) -> Self {
                 self.mul_add(factor, term)
+            }
+            #[inline(always)]
+            fn square_root(self) -> Self {
+                self.sqrt()
             }
             #[inline(always)]
             fn power_of_two(self) -> Self {
@@ -116,8 +122,28 @@ pub trait Vector<const N: usize>: Arithmetic {
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self` · `factor` − `term`, rounded once where the machine can.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// The square root.
+    fn square_root(self) -> Self;
     /// 2ⁿ of `self` = n + [`Real::ROUNDER`], where that is a normal number.
     fn power_of_two(self) -> Self;
+
+    /// eᶻ, by 2^x = 2^n · 2^r with n the whole number next to x and a polynomial in r; that of the nearest z between plus and minus twice
+    /// [`Real::HALF_OF_EXP`] where it would be infinite or subnormal.
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        let number = |x: f64| Self::splat(Self::Real::from_f64(x));
+        let end = Self::splat(Self::Real::HALF_OF_EXP + Self::Real::HALF_OF_EXP);
+        let z = self.min(end).max(number(0.0) - end);
+        let to_binary = number(std::f64::consts::LOG2_E);
+        let rounder = Self::splat(Self::Real::ROUNDER);
+        let shifted = z.mul_add(to_binary, rounder);
+        let r = z.mul_sub(to_binary, shifted - rounder);
+        let mut power = Self::splat(Self::Real::EXP2[Self::Real::EXP2.len() - 1]);
+        for i in (0..Self::Real::EXP2.len() - 1).rev() {
+            power = power.mul_add(r, Self::splat(Self::Real::EXP2[i]));
+        }
+        power * shifted.power_of_two()
+    }
 
     /// The number that each lane picks, of whose pick only the low bits count.
     #[inline(always)]

@@ -41,6 +41,7 @@ macro_rules! vector {
     (
         $(#[$doc:meta])* $vector:ident: [$real:ty; $lanes:literal] in [$register:ty; $registers:literal],
         $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident, $mul_add:ident, $mul_sub:ident,
+        $square_root:ident,
         power_of_two: $n:ident => $power_of_two:expr,
         $($look_up_and_transpose:item)*
     ) => {
@@ -93,6 +94,10 @@ macro_rules! vector {
                 each_register!(self, r => $mul_sub(self.0[r], factor.0[r], term.0[r]))
             }
             #[inline(always)]
+            fn square_root(self) -> Self {
+                each_register!(self, r => $square_root(self.0[r]))
+            }
+            #[inline(always)]
             fn power_of_two(self) -> Self {
                 each_register!(self, r => { let $n = self.0[r]; $power_of_two })
             }
@@ -136,7 +141,7 @@ vector! {
     /// Eight f64 in a register.
     Avx512F64: [f64; 8] in [__m512d; 1],
     _mm512_set1_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd, _mm512_max_pd, _mm512_min_pd,
-    _mm512_fmadd_pd, _mm512_fmsub_pd,
+    _mm512_fmadd_pd, _mm512_fmsub_pd, _mm512_sqrt_pd,
     power_of_two: n => _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(n))),
 
     /// The numbers lie in four registers, which two permutes and a blend search faster than a gather.
@@ -157,7 +162,7 @@ vector! {
     /// Sixteen f32 in a register.
     Avx512F32: [f32; 16] in [__m512; 1],
     _mm512_set1_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps, _mm512_max_ps, _mm512_min_ps,
-    _mm512_fmadd_ps, _mm512_fmsub_ps,
+    _mm512_fmadd_ps, _mm512_fmsub_ps, _mm512_sqrt_ps,
     power_of_two: n => _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(n))),
 
     /// The numbers lie in two registers, which one permute searches faster than a gather.
@@ -177,7 +182,7 @@ vector! {
     /// Eight f64 in two registers.
     Avx2F64: [f64; 8] in [__m256d; 2],
     _mm256_set1_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd, _mm256_max_pd, _mm256_min_pd,
-    _mm256_fmadd_pd, _mm256_fmsub_pd,
+    _mm256_fmadd_pd, _mm256_fmsub_pd, _mm256_sqrt_pd,
     power_of_two: n => _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(n))),
 }
 
@@ -185,7 +190,7 @@ vector! {
     /// Sixteen f32 in two registers.
     Avx2F32: [f32; 16] in [__m256; 2],
     _mm256_set1_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
-    _mm256_fmadd_ps, _mm256_fmsub_ps,
+    _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_sqrt_ps,
     power_of_two: n => _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(n))),
 
     transpose!(2 quarters: _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps);
