@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 mod commands;
+mod cost;
 mod failure;
 mod input;
 mod json;

@@ -1,6 +1,7 @@
 //! `palpate compare`: every estimator on the same trials, against the limit.
 
 use super::evaluate::ErrorFigures;
+use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
@@ -42,6 +43,8 @@ pub struct Arguments {
     /// Folder for a report, with `errors.csv`, the errors of each position, and `trials.csv`, those of each trial
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    memory: MemoryLimit,
     /// Print the comparison as JSON
     #[arg(long)]
     json: bool,
@@ -183,11 +186,21 @@ fn compare(
     contenders.retain(|contender| {
         arguments.only.is_empty() || arguments.only.iter().any(|kind| kind == contender.kind())
     });
+    // Alone it is refused; among others it is left out.
+    if let ([only], Some(trial)) = (&contenders[..], trials.first()) {
+        arguments.memory.check(only, &rig.setup, &trial.training)?;
+    }
     let bar = progress::bar(contenders.len() as u64, "comparing");
     let start = Instant::now();
     let (mut comparisons, mut left_out) = (Vec::new(), Vec::new());
     for contender in contenders {
         bar.set_prefix(contender.kind());
+        let cost = trials.first().map(|trial| contender.fit_cost(&rig.setup, &trial.training));
+        if let Some(why) = cost.and_then(|cost| arguments.memory.refusal(&contender, cost)) {
+            left_out.push((contender.kind(), why));
+            bar.inc(1);
+            continue;
+        }
         let clock = || start.elapsed().as_secs_f64();
         let go_on = |_| !progress::interrupted();
         match evaluate_splits(&rig.setup, &contender, trials, arguments.seed, &clock, Watch::new(&go_on)) {

@@ -1,5 +1,6 @@
 //! `palpate evaluate`: how far a locator is off, or how far a rig's estimator would be.
 
+use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::{RecordingFiles, RigOrLocator};
 use crate::json::object;
@@ -41,6 +42,8 @@ pub struct Arguments {
     /// Folder for a report, with `errors.csv`, the errors of each position
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    memory: MemoryLimit,
     /// Print the errors as JSON
     #[arg(long)]
     json: bool,
@@ -149,6 +152,7 @@ fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Fail
         None => rig.simulate(arguments.seed).map_err(simulation_complaint)?,
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
+    arguments.memory.check(&rig.estimator, &rig.setup, &recording)?;
     let task = FitTask::new(&rig.setup, &recording).seed(seed);
     let evaluation = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds())
         .watch(|watch| cross_validate(&rig.estimator, task.watch(watch), folds))

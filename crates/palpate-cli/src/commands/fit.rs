@@ -1,6 +1,7 @@
 //! `palpate fit`: calibrate an estimator.
 
 use super::inspect::rows;
+use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
@@ -33,6 +34,8 @@ pub struct Arguments {
     /// Seconds that the choice of `auto` may take; an estimator that is not done by then is left out
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     auto_seconds: u32,
+    #[command(flatten)]
+    memory: MemoryLimit,
     /// Print the outcome as JSON
     #[arg(long)]
     json: bool,
@@ -47,6 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Complaint::about(&arguments.rig, error).help("--data names a recording to fit")
         })?,
     };
+    arguments.memory.check(&rig.estimator, &rig.setup, &recording)?;
     let rig = decided(rig, &recording, arguments)?;
     let needed = rig.estimator.positions_needed();
     recording.check_distinct_positions(needed).map_err(Complaint::new)?;

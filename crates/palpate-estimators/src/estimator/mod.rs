@@ -1,5 +1,6 @@
 //! Every estimator as one type: whoever evaluates, studies, reports or listens treats all alike.
 
+mod cost;
 mod locator_file;
 mod settings;
 
@@ -9,6 +10,7 @@ pub use crate::load_profile::{
     Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
+pub use cost::FitCost;
 pub use locator_file::{FORMAT_VERSION, LocatorFileError};
 pub use palpate_core::{ContactEstimate, Estimate, Mode, Status, Tare, TareError, Uncertainty};
 pub use settings::Setting;

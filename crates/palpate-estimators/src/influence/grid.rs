@@ -5,7 +5,7 @@ use crate::fit::LocatorFault;
 use crate::status::OTHER_PLACE;
 use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
-use palpate_numerics::normal_interval_95;
+use palpate_numerics::{bisect, normal_interval_95};
 
 /// Evenly spaced nodes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -89,7 +89,7 @@ pub(super) fn weights_around(
 }
 
 /// Lagrange's weights of four nodes around `place`, or of fewer where there are no four, and the first of them.
-fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
+pub(super) fn cubic(place: f64, count: usize) -> (usize, [f64; 4]) {
     let used = count.min(4);
     let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
     let at = place - first as f64;
@@ -114,17 +114,27 @@ pub(super) fn parts_of(
     parts: usize,
     place: usize,
 ) -> impl Iterator<Item = (f64, f64)> + use<> {
-    let along = cut(place / y.count, x.count, parts);
-    let across = cut(place % y.count, y.count, parts);
-    along.into_iter().flat_map(move |x| across.clone().into_iter().map(move |y| (x, y)))
+    let along = Cut { node: place / y.count, count: x.count, parts };
+    let across = Cut { node: place % y.count, count: y.count, parts };
+    along.middles().flat_map(move |(_, x)| across.middles().map(move |(_, y)| (x, y)))
 }
 
-fn cut(node: usize, count: usize, parts: usize) -> Vec<f64> {
-    if count == 1 {
-        return vec![0.0];
+/// A cell's extent along one axis in equal parts.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    node: usize,
+    /// Nodes of the axis.
+    count: usize,
+    parts: usize,
+}
+
+impl Cut {
+    /// Number and middle of each part, in nodes; of those within the axis.
+    fn middles(self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let parts = if self.count == 1 { 1 } else { self.parts };
+        let middles = (0..parts).map(move |k| (k, self.node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5));
+        middles.filter(move |(_, place)| (0.0..=(self.count - 1) as f64).contains(place))
     }
-    let middles = (0..parts).map(|k| node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5);
-    middles.filter(|place| (0.0..=(count - 1) as f64).contains(place)).collect()
 }
 
 /// Residuals further than this above the least have no probability worth adding up: e⁻¹⁰.
@@ -155,11 +165,12 @@ pub(super) struct PartOfCell {
     pub residual: f64,
 }
 
-/// A part of a cell that has some probability.
+/// Parts of a cell next to each other along one axis, of even width.
 #[derive(Clone, Copy, Debug)]
-struct Part {
-    x_m: f64,
-    y_m: f64,
+struct Slice {
+    middle_m: f64,
+    /// Half its width, in metres.
+    half_m: f64,
     weight: f64,
 }
 
@@ -176,11 +187,13 @@ struct Cell {
 #[derive(Debug)]
 pub(super) struct GridPosterior {
     axes: [Axis; 2],
-    /// Into how many parts each cell is cut along each axis.
+    /// Into how many parts a cell is cut along each axis, where the cell does not say otherwise.
     parts_per_cell: usize,
     force: ToldForce,
     cells: Vec<Cell>,
-    parts: Vec<Part>,
+    /// Slices of the cells along x, and along y.
+    columns: Vec<Slice>,
+    rows: Vec<Slice>,
     /// The least residual of any part.
     pub residual: f64,
 }
@@ -188,21 +201,60 @@ pub(super) struct GridPosterior {
 impl GridPosterior {
     /// Over a grid whose cells are cut into so many parts along each axis.
     pub fn new(axes: [Axis; 2], parts_per_cell: usize, force: ToldForce) -> Self {
-        Self { axes, parts_per_cell, force, cells: Vec::new(), parts: Vec::new(), residual: f64::INFINITY }
+        Self {
+            axes,
+            parts_per_cell,
+            force,
+            cells: Vec::new(),
+            columns: Vec::new(),
+            rows: Vec::new(),
+            residual: f64::INFINITY,
+        }
     }
 
     /// Adds the cell of a place; `part` is asked for the part at (x, y), in nodes.
     pub fn add_cell(&mut self, place: usize, mut part: impl FnMut(f64, f64) -> PartOfCell) {
+        let parts = self.axes.map(|axis| if axis.count > 1 { self.parts_per_cell } else { 1 });
+        self.add_cut_cell(place, parts, |_, [x, y]| part(x, y));
+    }
+
+    /// Adds the cell of a place, cut into so many parts along each axis; `part` is asked for the part of this column and row at (x, y), in
+    /// nodes, column by column.
+    pub fn add_cut_cell(
+        &mut self,
+        place: usize,
+        parts: [usize; 2],
+        mut part: impl FnMut([usize; 2], [f64; 2]) -> PartOfCell,
+    ) {
+        let [x_axis, y_axis] = self.axes;
+        let across = Cut { node: place % y_axis.count, count: y_axis.count, parts: parts[1] };
+        let along = Cut { node: place / y_axis.count, count: x_axis.count, parts: parts[0] };
+        let area = 1.0 / (parts[0] * parts[1]) as f64;
+        let half = |axis: Axis, parts: usize| 0.5 * axis.step / parts as f64;
         let mut cell = Cell { place, moments: Moments::default(), peak: 0.0 };
-        for (x, y) in parts_of(self.axes, self.parts_per_cell, place) {
-            let PartOfCell { weight, force_n, force_variance_n2, residual } = part(x, y);
-            if weight > 0.0 {
-                self.residual = self.residual.min(residual);
-                let (x_m, y_m) = (self.axes[0].value(x), self.axes[1].value(y));
-                cell.moments.add(weight, [x_m, y_m, force_n]);
-                cell.moments.add_force_variance(weight, force_variance_n2);
-                cell.peak = cell.peak.max(weight);
-                self.parts.push(Part { x_m, y_m, weight });
+        let first_row = self.rows.len();
+        self.rows.extend(across.middles().map(|(_, y)| Slice {
+            middle_m: y_axis.value(y),
+            half_m: half(y_axis, parts[1]),
+            weight: 0.0,
+        }));
+        for (column, x) in along.middles() {
+            let x_m = x_axis.value(x);
+            let mut slice = Slice { middle_m: x_m, half_m: half(x_axis, parts[0]), weight: 0.0 };
+            for ((row, y), sum) in across.middles().zip(first_row..) {
+                let PartOfCell { weight, force_n, force_variance_n2, residual } = part([column, row], [x, y]);
+                if weight > 0.0 {
+                    self.residual = self.residual.min(residual);
+                    cell.peak = cell.peak.max(weight);
+                    let weight = weight * area;
+                    cell.moments.add(weight, [x_m, self.rows[sum].middle_m, force_n]);
+                    cell.moments.add_force_variance(weight, force_variance_n2);
+                    slice.weight += weight;
+                    self.rows[sum].weight += weight;
+                }
+            }
+            if slice.weight > 0.0 {
+                self.columns.push(slice);
             }
         }
         if cell.moments.weight > 0.0 {
@@ -288,32 +340,42 @@ impl GridPosterior {
 
     /// The 95 % intervals along x and y.
     fn intervals(&mut self, total: f64) -> ((f64, f64), (f64, f64)) {
-        let [x_axis, y_axis] = self.axes;
-        let half = |step: f64| 0.5 * step / self.parts_per_cell as f64;
-        let (half_x, half_y) = (half(x_axis.step), half(y_axis.step));
-        self.parts.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
-        let x = quantiles(&self.parts, |part| part.x_m, total, half_x);
-        if y_axis.count == 1 {
+        let x = interval(&mut self.columns, total);
+        if self.axes[1].count == 1 {
             return (x, (0.0, 0.0));
         }
-        self.parts.sort_by(|a, b| a.y_m.total_cmp(&b.y_m));
-        (x, quantiles(&self.parts, |part| part.y_m, total, half_y))
+        (x, interval(&mut self.rows, total))
     }
 }
 
-/// Quantiles below which 2.5 % and 97.5 % of the weight lie, of parts in rising order whose weight is spread evenly over `half`
-/// to either side.
-fn quantiles(parts: &[Part], coordinate: impl Fn(&Part) -> f64, total: f64, half: f64) -> (f64, f64) {
+/// Places below which 2.5 % and 97.5 % of the weight of slices lie, which is spread evenly over each.
+fn interval(slices: &mut [Slice], total: f64) -> (f64, f64) {
+    slices.sort_unstable_by(|a, b| a.middle_m.total_cmp(&b.middle_m));
+    let Some(half_m) = slices.first().map(|slice| slice.half_m) else { return (0.0, 0.0) };
+    if slices.iter().any(|slice| slice.half_m != half_m) {
+        return [0.025, 0.975].map(|share| quantile_of_any(slices, share * total)).into();
+    }
     let find = |share: f64| {
         let (mut below, wanted) = (0.0, share * total);
-        for slice in parts.chunk_by(|a, b| coordinate(b) - coordinate(a) < 0.5 * half) {
-            let weight: f64 = slice.iter().map(|part| part.weight).sum();
-            if below + weight >= wanted {
-                return coordinate(&slice[0]) - half + 2.0 * half * (wanted - below) / weight;
+        for group in slices.chunk_by(|a, b| b.middle_m - a.middle_m < 0.5 * half_m) {
+            let weight: f64 = group.iter().map(|slice| slice.weight).sum();
+            if below + weight >= wanted && weight > 0.0 {
+                return group[0].middle_m - half_m + 2.0 * half_m * (wanted - below) / weight;
             }
             below += weight;
         }
-        parts.last().map_or(0.0, |part| coordinate(part) + half)
+        slices.last().map_or(0.0, |slice| slice.middle_m + half_m)
     };
     (find(0.025), find(0.975))
+}
+
+/// The place below which so much of the weight of slices lies that may overlap.
+fn quantile_of_any(slices: &[Slice], wanted: f64) -> f64 {
+    let ends = |end: f64| slices.iter().map(move |slice| slice.middle_m + end * slice.half_m);
+    let range = (ends(-1.0).fold(f64::INFINITY, f64::min), ends(1.0).fold(f64::NEG_INFINITY, f64::max));
+    let below = |place_m: f64| {
+        let part = |slice: &Slice| (0.5 + 0.5 * (place_m - slice.middle_m) / slice.half_m).clamp(0.0, 1.0);
+        slices.iter().map(|slice| slice.weight * part(slice)).sum::<f64>()
+    };
+    bisect(range, 30, |place_m| below(place_m) < wanted)
 }

@@ -83,11 +83,16 @@ impl Fit for Neighbours {
     }
 }
 
-/// Errors (x, y) in metres of every row by 1, 2, … neighbours at other positions, up to `most` or as many as every row has.
+/// Rows that are held out; their errors tell the number of neighbours and how far off they are long before all are.
+const MOST_HELD_OUT: usize = 4000;
+
+/// Errors (x, y) in metres of every row, or of evenly picked ones, by 1, 2, … neighbours at other positions, up to `most` or as many
+/// as every row has.
 fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<Vec<[f64; 2]>>, Cancelled> {
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
-    for (i, row) in rows.iter().enumerate() {
-        watch.round()?;
+    let every = rows.len().div_ceil(MOST_HELD_OUT).max(1);
+    for (i, row) in rows.iter().step_by(every).enumerate() {
+        watch.stage("holding presses out", (i * every) as f64 / rows.len() as f64)?;
         let others = rows.iter().filter(|other| other.position != row.position);
         let means = means(&nearest(others, &row.features, most));
         if i == 0 {

@@ -36,6 +36,7 @@ mod search;
 pub use groups::Samples;
 pub use kernel::{Hyperparameters, Kernel, Trend};
 pub use posterior::{GaussianProcess, MOST_EXACT, PosteriorFault, PredictionScratch};
+pub use reduced::INDUCING;
 pub use search::Regression;
 
 use crate::NotPositiveDefinite;

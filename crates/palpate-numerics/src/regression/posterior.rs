@@ -1,14 +1,14 @@
 //! The posterior of a Gaussian process, and its predictions.
 
 use ndarray::linalg::general_mat_vec_mul;
-use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis};
 
 use super::blocks::{Blocks, Triangle};
 use super::covariance::{Covariance, Points};
 use super::evidence::{evidence_of, log_evidence, signal_variances, variances_of, with_scatter};
 use super::groups::Groups;
 use super::kernel::squared_distances_into;
-use super::reduced::{self, OF_MEAN, OF_VARIANCE, Reduced, ReducedScratch, Rows};
+use super::reduced::{self, INDUCING, OF_VARIANCE, Reduced, ReducedScratch, Rows};
 use super::{Hyperparameters, Kernel, RegressionError, Trend};
 use crate::watch::Watch;
 use crate::{Cholesky, NotPositiveDefinite};
@@ -132,7 +132,7 @@ impl GaussianProcess {
         let scales = &hyperparameters.length_scales;
         let all = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
         let noise = groups.noise_ratios(ratio);
-        let chosen = reduced::chosen(kernel, &all.scaled.view(), ratio, OF_MEAN);
+        let chosen = reduced::chosen(kernel, &all.scaled.view(), ratio, INDUCING);
         let rows = Rows {
             scaled: all.scaled.view(),
             basis: all.basis.view(),
@@ -299,8 +299,16 @@ impl GaussianProcess {
     ) {
         assert_eq!(variances.len(), self.outputs(), "there is one variance an output");
         self.mean_into(point, means, scratch);
+        let variance = self.relative_variance(scratch);
+        for (out, signal) in variances.iter_mut().zip(&self.data.signal_variance) {
+            *out = signal * variance;
+        }
+    }
+
+    /// Var f_j(x) over the signal's variance, from the correlations and h.
+    fn relative_variance(&self, scratch: &mut PredictionScratch) -> f64 {
         let correlations = &scratch.correlations.as_flattened()[..self.kept()];
-        let variance = match &self.variance {
+        match &self.variance {
             Variance::Reduced(reduced) => {
                 reduced.variance(correlations, &scratch.basis, &mut scratch.reduced)
             }
@@ -312,10 +320,43 @@ impl GaussianProcess {
                 trend.solve_lower_in_place(&mut scratch.basis);
                 (1.0 - explained + scratch.basis.iter().map(|r| r * r).sum::<f64>()).max(0.0)
             }
-        };
-        for (out, signal) in variances.iter_mut().zip(&self.data.signal_variance) {
-            *out = signal * variance;
         }
+    }
+
+    /// E f_j(x) for every output; returns Var f_j(x) over the signal's variance, for tables that are made once: where the points that tell
+    /// the variance are not all, also by the nearest, and the less of both. Neither is less than that of all points.
+    ///
+    /// # Panics
+    /// When `point` is not d long, or `means` not m.
+    pub fn tabulate_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) -> f64 {
+        self.mean_into(point, means, scratch);
+        if let (Variance::Reduced(reduced), None) = (&self.variance, &self.data.sparse) {
+            let all = scratch.correlations.as_flattened()[..self.kept()].to_vec();
+            let by_chosen = reduced.variance(&all, &scratch.basis, &mut scratch.reduced);
+            return self
+                .variance_by_nearest(&all, &scratch.basis)
+                .map_or(by_chosen, |near| near.min(by_chosen));
+        }
+        self.relative_variance(scratch)
+    }
+
+    /// Variance over the signal's, from the points of greatest correlation; `None` where they have no factor.
+    fn variance_by_nearest(&self, correlations: &[f64], h: &[f64]) -> Option<f64> {
+        const NEAREST: usize = 32;
+        let mut order: Vec<usize> = (0..correlations.len()).collect();
+        let by_distance = |a: &usize, b: &usize| correlations[*b].total_cmp(&correlations[*a]).then(a.cmp(b));
+        order.select_nth_unstable_by(NEAREST.min(correlations.len() - 1), by_distance);
+        order.truncate(NEAREST);
+        let points = Points {
+            scaled: self.points.scaled.select(Axis(1), &order),
+            basis: self.points.basis.select(Axis(0), &order),
+        };
+        let noise: Vec<f64> = order.iter().map(|i| self.data.noise[*i]).collect();
+        let here: Array1<f64> = order.iter().map(|i| correlations[*i]).collect();
+        let covariance = Covariance::regularised(&points, self.data.kernel, &noise).ok()?;
+        let half = covariance.factor.solve_lower(&here);
+        let rest = covariance.trend.solve_lower(&(&ArrayView1::from(h) - &half.dot(&covariance.basis)));
+        Some((1.0 - half.dot(&half) + rest.dot(&rest)).max(0.0))
     }
 
     /// E f_j(x) and Var f_j(x), allocating.

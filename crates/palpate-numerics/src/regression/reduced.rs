@@ -20,8 +20,8 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
 /// Points that tell the variance.
 pub(super) const OF_VARIANCE: usize = 256;
-/// Points that tell the mean, where all are too many.
-pub(super) const OF_MEAN: usize = 1000;
+/// Points that tell the mean of a process, where all are too many.
+pub const INDUCING: usize = 1000;
 /// Points among which those are looked for.
 const CANDIDATES: usize = 4000;
 /// Share of the noise below which a variance that is left does not matter.

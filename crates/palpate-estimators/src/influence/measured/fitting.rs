@@ -1,7 +1,7 @@
 //! From a recording to a locator: presses, regression, noise, how far it misses positions that were held out, table.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
-use super::locator::{MeasuredLocator, NuisanceRole};
+use super::locator::{MadeFromTable, MeasuredLocator, NuisanceRole};
 use super::presses::{Presses, nuisance_coordinate};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
@@ -65,6 +65,7 @@ impl Fit for MeasuredInfluence {
             nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
             force_n: setup.force_n(),
+            search: MadeFromTable::default(),
         };
         locator.residual_limit = residual_limit(&locator, recording);
         Ok(locator)
@@ -104,9 +105,7 @@ impl Presses {
         let nodes = x.count * y.count * nuisance.count;
         let (mut means, mut variances) = (Vec::with_capacity(nodes * channels), Vec::with_capacity(nodes));
         let mut scratch = process.scratch();
-        let (mut mean, mut variance) = (vec![0.0; channels], vec![0.0; channels]);
-        let mut white = vec![0.0; channels];
-        let signal = process.signal_variance(0);
+        let (mut mean, mut white) = (vec![0.0; channels], vec![0.0; channels]);
         for node in 0..nodes {
             if node % 64 == 0 {
                 watch.round()?;
@@ -118,10 +117,9 @@ impl Presses {
                     .then(|| y.value((place % y.count) as f64)),
             );
             at.extend(self.has_nuisance.then(|| nuisance.value((node % nuisance.count) as f64)));
-            process.predict_into(&at, &mut mean, &mut variance, &mut scratch);
+            variances.push(process.tabulate_into(&at, &mut mean, &mut scratch));
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
-            variances.push(if signal > 0.0 { variance[0] / signal } else { 0.0 });
         }
         Ok(Table::new(axes, means, variances, channels))
     }
@@ -159,7 +157,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
     let readings = recording.rows.iter().map(|row| row.reading.as_slice());
     learnt_misfit_bound(freedom, readings, |reading| {
-        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.residual(&whitened))
+        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.search().residual(&whitened))
     })
 }
 

@@ -1,0 +1,168 @@
+//! What a fit will take, before it is begun: memory and time by the sizes of what each method factors and tabulates.
+//!
+//! Times are for one core of some 3 GHz, to within a factor of a few; memory to within a half.
+
+use super::Estimator;
+use crate::influence::{Influence, Structure};
+use crate::recording::Recording;
+use crate::setup::Setup;
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::regression::{INDUCING, MOST_EXACT};
+use std::collections::HashSet;
+
+/// Memory and time that a fit will take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitCost {
+    /// Memory at its peak, in bytes, besides the program itself.
+    pub memory_bytes: f64,
+    /// Time of one core, in seconds; the most where a method may end earlier.
+    pub seconds: f64,
+}
+
+impl FitCost {
+    fn and(self, other: Self) -> Self {
+        Self { memory_bytes: self.memory_bytes + other.memory_bytes, seconds: self.seconds + other.seconds }
+    }
+}
+
+/// Size of an f64.
+const NUMBER: f64 = 8.0;
+/// Multiply-adds of a matrix product in a second.
+const PRODUCTS: f64 = 5e9;
+/// Those of loops over what does not fit into the cache.
+const LOOPS: f64 = 1e9;
+
+/// Sizes of a task.
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    rows: f64,
+    channels: f64,
+    /// Distinct contacts, each with its force and its nuisance coordinate.
+    presses: f64,
+    is_plane: bool,
+    has_nuisance: bool,
+}
+
+impl Estimator {
+    /// What fitting to a recording of a setup will take.
+    pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
+        let sizes = Sizes::new(setup, recording);
+        let own = match self {
+            Self::GaussianProcess(_) => sizes.process(sizes.rows, sizes.channels + 1.0, 2.0),
+            Self::Influence(influence) => sizes.influence(influence, setup, recording),
+            Self::Neighbours(_) => FitCost {
+                memory_bytes: sizes.rows * (NUMBER * sizes.channels + 80.0),
+                seconds: sizes.rows.min(4000.0) * sizes.rows * sizes.channels / LOOPS,
+            },
+            Self::Network(network) => {
+                let nodes = network.hidden.iter().sum::<usize>() as f64;
+                let weights = nodes * (sizes.channels + 3.0);
+                FitCost {
+                    memory_bytes: 3.0 * NUMBER * sizes.rows * (sizes.channels + 2.0),
+                    seconds: f64::from(network.training.max_epochs) * sizes.rows * weights / LOOPS,
+                }
+            }
+            Self::NetworkLm(levenberg) => {
+                let weights = levenberg.hidden.iter().sum::<usize>() as f64 * (sizes.channels + 3.0);
+                let steps = 2.0 * levenberg.ensemble as f64 * f64::from(levenberg.max_iterations);
+                let rows = sizes.rows.min(1000.0);
+                FitCost {
+                    memory_bytes: 3.0 * NUMBER * (sizes.rows * sizes.channels + 2.0 * rows * weights),
+                    seconds: steps * 2.0 * rows * weights * weights / PRODUCTS,
+                }
+            }
+            Self::ClosedForm(_) | Self::Digit(_) | Self::Centroid(_) => {
+                FitCost { memory_bytes: 0.0, seconds: sizes.rows * sizes.channels * 1e-6 }
+            }
+            Self::Auto => {
+                let contenders = Self::contenders(setup);
+                let costs = contenders.iter().map(|contender| contender.fit_cost(setup, recording));
+                // One after the other, in five folds.
+                costs.fold(FitCost { memory_bytes: 0.0, seconds: 0.0 }, |sum, cost| FitCost {
+                    memory_bytes: sum.memory_bytes.max(cost.memory_bytes),
+                    seconds: sum.seconds + 5.0 * cost.seconds,
+                })
+            }
+        };
+        own.and(FitCost { memory_bytes: 3.0 * sizes.rows * (NUMBER * sizes.channels + 120.0), seconds: 0.0 })
+    }
+}
+
+impl Sizes {
+    fn new(setup: &Setup, recording: &Recording) -> Self {
+        let presses: HashSet<[u64; 4]> = recording
+            .rows
+            .iter()
+            .map(|row| {
+                let own = row.nuisance.or(row.force_n).unwrap_or_default();
+                [row.position.x_m, row.position.y_m, own, 0.0].map(f64::to_bits)
+            })
+            .collect();
+        Self {
+            rows: recording.rows.len() as f64,
+            channels: setup.layout().len() as f64,
+            presses: presses.len() as f64,
+            is_plane: matches!(setup.surface().extent(), Extent::Plane { .. }),
+            has_nuisance: recording.rows.iter().any(|row| row.nuisance.is_some()),
+        }
+    }
+
+    /// A Gaussian process of so many points, their coordinates and outputs.
+    fn process(&self, points: f64, coordinates: f64, outputs: f64) -> FitCost {
+        const SEARCHED: f64 = 500.0;
+        /// Evaluations of the evidence, each a factor and an inverse.
+        const EVALUATIONS: f64 = 60.0;
+        let searched = points.min(SEARCHED);
+        let search = EVALUATIONS * 2.0 * searched.powi(3) / PRODUCTS;
+        let rows = 4.0 * NUMBER * points * (coordinates + outputs);
+        if points <= MOST_EXACT as f64 {
+            return FitCost {
+                memory_bytes: rows + NUMBER * (3.0 * points * points + 4.0 * searched * searched),
+                seconds: search + points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9,
+            };
+        }
+        let kept = INDUCING as f64;
+        FitCost {
+            memory_bytes: rows + NUMBER * (10.0 * kept * kept + 4096.0 * kept),
+            seconds: search + points * (1.5 * kept * kept / PRODUCTS + kept * 4e-9) + kept * kept * 4e-6,
+        }
+    }
+
+    fn influence(&self, influence: &Influence, setup: &Setup, recording: &Recording) -> FitCost {
+        /// Presses that influence functions are learnt from, and nodes of a table of theirs.
+        const LEARNT: f64 = 1000.0;
+        let nodes = if self.is_plane { 6400.0 } else { 400.0 };
+        let is_free = setup.surface().model().is_none()
+            && (influence.structure == Structure::Free
+                || self.has_nuisance
+                || recording.rows.iter().any(|row| row.force_n.is_none()));
+        if !is_free {
+            let presses = self.presses.min(LEARNT);
+            let factors = 6.0 * self.channels * presses.powi(3) / PRODUCTS;
+            return FitCost {
+                memory_bytes: NUMBER * (6.0 * presses * presses + nodes * (presses + 4.0 * self.channels)),
+                seconds: 10.0 * presses.min(400.0).powi(3) / PRODUCTS * self.channels
+                    + factors
+                    + self.channels * nodes * presses * presses / 2.0 / LOOPS,
+            };
+        }
+        let depth = match (
+            self.has_nuisance || recording.rows.iter().any(|row| row.force_n.is_some()),
+            self.is_plane,
+        ) {
+            (false, _) => 1.0,
+            (true, true) => 16.0,
+            (true, false) => 64.0,
+        };
+        let coordinates = 1.0 + f64::from(u8::from(self.is_plane)) + f64::from(u8::from(depth > 1.0));
+        let process = self.process(self.presses, coordinates, self.channels);
+        let kept = if self.presses <= MOST_EXACT as f64 { self.presses } else { INDUCING as f64 };
+        let table = FitCost {
+            memory_bytes: NUMBER * nodes * depth * (5.0 * self.channels + 16.0),
+            // Each node twice: some tables are made again, finer.
+            seconds: 2.0 * nodes * depth * (kept * (self.channels + 30.0) / LOOPS / 4.0 + 6e-5),
+        };
+        // A fifth of the presses is held out of a second process.
+        process.and(FitCost { seconds: process.seconds, ..process }).and(table)
+    }
+}
