@@ -73,7 +73,7 @@ impl Cholesky {
     ///
     /// # Panics
     /// When the matrix is not square.
-    pub fn from_lower(lower: Array2<f64>) -> Self {
+    pub fn from_lower(lower: &ArrayView2<f64>) -> Self {
         assert_eq!(lower.nrows(), lower.ncols(), "a factor is square");
         Self { lower: lower.as_standard_layout().into_owned() }
     }

@@ -163,6 +163,6 @@ impl Sizes {
             seconds: 2.0 * nodes * depth * (kept * (self.channels + 30.0) / LOOPS / 4.0 + 6e-5),
         };
         // A fifth of the presses is held out of a second process.
-        process.and(FitCost { seconds: process.seconds, ..process }).and(table)
+        process.and(FitCost { memory_bytes: 0.0, ..process }).and(table)
     }
 }

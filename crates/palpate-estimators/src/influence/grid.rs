@@ -165,6 +165,12 @@ pub(super) struct PartOfCell {
     pub residual: f64,
 }
 
+/// Parts of a cell that tell what they are. A trait, as closures are not compiled for the instruction set of the work that they are part of.
+pub(super) trait Parts {
+    /// The part of a column and row of a cell, at (x, y) in nodes.
+    fn part(&mut self, number: [usize; 2], at: [f64; 2]) -> PartOfCell;
+}
+
 /// Parts of a cell next to each other along one axis, of even width.
 #[derive(Clone, Copy, Debug)]
 struct Slice {
@@ -215,17 +221,20 @@ impl GridPosterior {
     /// Adds the cell of a place; `part` is asked for the part at (x, y), in nodes.
     pub fn add_cell(&mut self, place: usize, mut part: impl FnMut(f64, f64) -> PartOfCell) {
         let parts = self.axes.map(|axis| if axis.count > 1 { self.parts_per_cell } else { 1 });
-        self.add_cut_cell(place, parts, |_, [x, y]| part(x, y));
+        struct At<F>(F);
+        impl<F: FnMut(f64, f64) -> PartOfCell> Parts for At<F> {
+            #[inline(always)]
+            fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
+                (self.0)(x, y)
+            }
+        }
+        self.add_cut_cell(place, parts, &mut At(&mut part));
     }
 
-    /// Adds the cell of a place, cut into so many parts along each axis; `part` is asked for the part of this column and row at (x, y), in
+    /// Adds the cell of a place, cut into so many parts along each axis; `of` is asked for the part of this column and row at (x, y), in
     /// nodes, column by column.
-    pub fn add_cut_cell(
-        &mut self,
-        place: usize,
-        parts: [usize; 2],
-        mut part: impl FnMut([usize; 2], [f64; 2]) -> PartOfCell,
-    ) {
+    #[inline(always)]
+    pub fn add_cut_cell(&mut self, place: usize, parts: [usize; 2], of: &mut impl Parts) {
         let [x_axis, y_axis] = self.axes;
         let across = Cut { node: place % y_axis.count, count: y_axis.count, parts: parts[1] };
         let along = Cut { node: place / y_axis.count, count: x_axis.count, parts: parts[0] };
@@ -242,7 +251,8 @@ impl GridPosterior {
             let x_m = x_axis.value(x);
             let mut slice = Slice { middle_m: x_m, half_m: half(x_axis, parts[0]), weight: 0.0 };
             for ((row, y), sum) in across.middles().zip(first_row..) {
-                let PartOfCell { weight, force_n, force_variance_n2, residual } = part([column, row], [x, y]);
+                let PartOfCell { weight, force_n, force_variance_n2, residual } =
+                    of.part([column, row], [x, y]);
                 if weight > 0.0 {
                     self.residual = self.residual.min(residual);
                     cell.peak = cell.peak.max(weight);

@@ -413,7 +413,8 @@ impl TryFrom<PosteriorData> for GaussianProcess {
             None => Variance::of_points(&points, data.kernel, &data.noise, *noise_ratio, None)?,
             Some(sparse) => {
                 let first = n.min(OF_VARIANCE);
-                let factor = Cholesky::from_lower(unpacked(&sparse.factor, first + data.trend.size(d)));
+                let factor =
+                    Cholesky::from_lower(&unpacked(&sparse.factor, first + data.trend.size(d)).view());
                 let chosen = (0..first).collect();
                 Variance::Reduced(Reduced::new(data.kernel, &points.scaled.view(), chosen, &factor)?)
             }

@@ -121,7 +121,7 @@ impl Presses {
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
         }
-        Ok(Table::new(axes, means, variances, channels))
+        Ok(Table::new(axes, means, variances))
     }
 
     /// The axes of position with about `factor` times the nodes, as far as there may be so many.

@@ -9,9 +9,10 @@
 
 use super::locator::MeasuredLocator;
 use super::stretch::{Seen, Stretch};
-use crate::influence::grid::{Axis, CUT, GridPosterior, PartOfCell, ToldForce, cubic, neighbours};
+use crate::influence::grid::{Axis, CUT, GridPosterior, PartOfCell, Parts, ToldForce, cubic, neighbours};
 use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd};
 use palpate_numerics::small::Ldl;
+use std::marker::PhantomData;
 
 /// A mean between the nodes of the table may lie this much further than halfway to a neighbour.
 const CURVED: f64 = 1.25;
@@ -32,7 +33,7 @@ pub(super) struct Search {
     variances: Vec<f64>,
     /// How far from a node's mean that of anywhere in its cell may lie.
     reaches: Vec<f64>,
-    /// How far from a place's line that of anywhere in its cell may lie.
+    /// How far from a node the line of anywhere in its cell may lie.
     line_reaches: Vec<f64>,
     signal: Vec<[f64; 8]>,
     gain: f64,
@@ -81,7 +82,7 @@ impl Search {
             means: table.means.chunks_exact(channels.max(1)).flat_map(padded).collect(),
             variances: table.variances.clone(),
             reaches: Vec::new(),
-            line_reaches: table.reaches.clone(),
+            line_reaches: table.line_reaches(),
             signal: padded(&whitening.signal),
             gain: whitening.gain,
             levels: Vec::new(),
@@ -289,7 +290,10 @@ impl Search {
                 let mut candidates = Vec::new();
                 let best =
                     if self.0.is_finite() { self.0.candidates::<S::F64>(&mut candidates) } else { None };
-                best.map_or(f64::INFINITY, |best| self.0.refine::<S::F64>(best).residual)
+                match best {
+                    Some(best) => self.0.refine::<S::F64>(best).residual,
+                    None => f64::INFINITY,
+                }
             }
         }
         let reading = self.padded(whitened);
@@ -627,9 +631,7 @@ impl Asked<'_> {
         candidates.sort_unstable_by_key(|c| (c.place, c.stretch));
         let mut cells: Vec<Cell> = candidates.chunk_by(|a, b| a.place == b.place).map(Cell::of).collect();
         // The line of a place is nearer to its neighbours' than their stretches are to each other.
-        cells.retain(|cell| {
-            search.least_near(cell.best.residual, search.line_reaches[cell.best.place]) <= least + CUT
-        });
+        cells.retain(|cell| search.least_near(cell.best.residual, search.line_reach(cell)) <= least + CUT);
         let mut claims: Vec<Option<usize>> = vec![None; cells.len()];
         loop {
             let newest = modes.len() - 1;
@@ -693,6 +695,13 @@ impl Cell {
 const PREDICTED: f64 = 2.0 * CUT;
 
 impl Search {
+    /// How far from the stretches of a cell that may matter the line of anywhere in the cell may lie.
+    fn line_reach(&self, cell: &Cell) -> f64 {
+        let [first, _] = self.ends(cell.best.place, cell.first);
+        let [_, last] = self.ends(cell.best.place, cell.last);
+        self.line_reaches[first..=last].iter().copied().fold(0.0, f64::max)
+    }
+
     /// Whether the residual in a cell rises about as a mode predicts.
     fn explains(&self, mode: &Mode, cell: &Cell) -> bool {
         let (x, y) = (cell.best.place / self.y.count, cell.best.place % self.y.count);
@@ -722,26 +731,12 @@ impl<F: Fn(f64, f64) -> (f64, f64)> CellSums<'_, F> {
         mode: Option<&Mode>,
         parts: [usize; 2],
     ) {
-        let search = self.asked.search;
-        let (place, first) = (cell.best.place, cell.first);
         self.between.begin(cell);
-        let nodes = self.between.nodes;
         let matters = self.blocks_that_matter::<V>(cell, mode, parts);
-        let Self { asked, least, force, between } = self;
-        let least = *least;
-        posterior.add_cut_cell(place, parts, |[column, row], [x, y]| {
-            if parts == [1, 1] {
-                let node = place * search.nuisance.count + first;
-                let means = &search.means[node * search.groups..(node + nodes) * search.groups];
-                return asked.part::<V>(means, &search.variances[node..node + nodes], first, least, &*force);
-            }
-            let block = column * BLOCKS / parts[0] * BLOCKS + row * BLOCKS / parts[1];
-            if !matters[block] || mode.is_some_and(|mode| mode.predicted(x, y) > least + PREDICTED) {
-                return PartOfCell::default();
-            }
-            between.at::<V>(x, y);
-            asked.part::<V>(&between.line, &between.variances, first, least, &*force)
-        });
+        let place = cell.best.place;
+        let mut parts_of_cell =
+            PartsOfCell::<V, F> { sums: self, cell, mode, parts, matters, vectors: PhantomData };
+        posterior.add_cut_cell(place, parts, &mut parts_of_cell);
     }
 
     /// Whether anything in each block of a cell's parts can matter, by the residual in its middle.
@@ -760,7 +755,7 @@ impl<F: Fn(f64, f64) -> (f64, f64)> CellSums<'_, F> {
         }
         let search = self.asked.search;
         let place = [cell.best.place / search.y.count, cell.best.place % search.y.count];
-        let reach = CURVED * search.line_reaches[cell.best.place] / BLOCKS as f64;
+        let reach = CURVED * search.line_reach(cell) / BLOCKS as f64;
         for (block, matters) in matters.iter_mut().enumerate() {
             let middle = |k: usize, block: usize| {
                 let off = (block as f64 + 0.5) / BLOCKS as f64 - 0.5;
@@ -777,6 +772,40 @@ impl<F: Fn(f64, f64) -> (f64, f64)> CellSums<'_, F> {
             *matters = search.least_near(residual, reach) <= self.least + CUT;
         }
         matters
+    }
+}
+
+/// Parts of a cell as the posterior asks for them.
+struct PartsOfCell<'s, 'a, V, F> {
+    sums: &'s mut CellSums<'a, F>,
+    cell: &'s Cell,
+    mode: Option<&'s Mode>,
+    parts: [usize; 2],
+    matters: [bool; BLOCKS * BLOCKS],
+    vectors: PhantomData<V>,
+}
+
+impl<V: Eight, F: Fn(f64, f64) -> (f64, f64)> Parts for PartsOfCell<'_, '_, V, F> {
+    #[inline(always)]
+    fn part(&mut self, [column, row]: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
+        let CellSums { asked, least, force, between } = &mut *self.sums;
+        let (search, first) = (asked.search, self.cell.first);
+        if self.parts == [1, 1] {
+            let node = self.cell.best.place * search.nuisance.count + first;
+            let means = &search.means[node * search.groups..(node + between.nodes) * search.groups];
+            let variances = &search.variances[node..node + between.nodes];
+            return asked.part::<V>(means, variances, first, *least, force);
+        }
+        if !self.matters[column * BLOCKS / self.parts[0] * BLOCKS + row * BLOCKS / self.parts[1]] {
+            return PartOfCell::default();
+        }
+        if let Some(mode) = self.mode
+            && mode.predicted(x, y) > *least + PREDICTED
+        {
+            return PartOfCell::default();
+        }
+        between.at::<V>(x, y);
+        asked.part::<V>(&between.line, &between.variances, first, *least, force)
     }
 }
 

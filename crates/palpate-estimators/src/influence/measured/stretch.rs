@@ -32,7 +32,7 @@ impl Stretch<'_> {
             sums[1] = (a * weight).mul_add(d, sums[1]);
             sums[2] = (d * weight).mul_add(d, sums[2]);
         }
-        let [aa, ad, dd] = sums.map(|sum| sum.sum());
+        let [aa, ad, dd] = [sums[0].sum(), sums[1].sum(), sums[2].sum()];
         if with_gain {
             let gain2 = gain * gain;
             return Seen { aa: (aa - gain2 * ad * ad / (1.0 + gain2 * dd)).max(0.0), ad: 0.0, dd: 0.0 };

@@ -32,14 +32,13 @@ const MOST_PARTS: usize = 12;
 
 impl Table {
     /// From means and variances at the nodes.
-    pub(super) fn new(
-        [x, y, nuisance]: [Axis; 3],
-        means: Vec<f64>,
-        variances: Vec<f64>,
-        channels: usize,
-    ) -> Self {
+    pub(super) fn new([x, y, nuisance]: [Axis; 3], means: Vec<f64>, variances: Vec<f64>) -> Self {
         let mut table = Self { x, y, nuisance, means, variances, reaches: Vec::new(), parts: 1 };
-        table.reaches = (0..table.places()).map(|place| table.reach(place, channels)).collect();
+        let of_nodes = table.line_reaches();
+        table.reaches = of_nodes
+            .chunks_exact(nuisance.count)
+            .map(|nodes| nodes.iter().copied().fold(0.0, f64::max))
+            .collect();
         table.parts = ((table.cell_length() / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
         table
     }
@@ -65,9 +64,16 @@ impl Table {
         self.x.count * self.y.count
     }
 
-    /// Half the longest distance from a node of a place to the line of a neighbour, of which only the stretches near the node's own
-    /// are asked.
-    fn reach(&self, place: usize, channels: usize) -> f64 {
+    /// Half the longest distance from each node to the line of a neighbouring place, of which only the stretches near the node's own are
+    /// asked.
+    pub(super) fn line_reaches(&self) -> Vec<f64> {
+        let channels = self.means.len() / self.variances.len().max(1);
+        (0..self.variances.len())
+            .map(|node| self.line_reach(node / self.nuisance.count, node % self.nuisance.count, channels))
+            .collect()
+    }
+
+    fn line_reach(&self, place: usize, k: usize, channels: usize) -> f64 {
         const NEAR: usize = 4;
         let nodes = self.nuisance.count;
         let node = |place: usize, k: usize| {
@@ -89,8 +95,7 @@ impl Table {
             });
             squares.fold(f64::INFINITY, f64::min)
         };
-        let squares = (0..nodes)
-            .flat_map(|k| neighbours([self.x, self.y], place).map(move |other| square_to(place, k, other)));
+        let squares = neighbours([self.x, self.y], place).map(|other| square_to(place, k, other));
         0.5 * squares.fold(0.0, f64::max).sqrt()
     }
 }

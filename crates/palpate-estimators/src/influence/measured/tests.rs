@@ -261,7 +261,7 @@ fn dent(position: Position, depth_mm: f64, noise_of: f64, rng: &mut Xoshiro256Pl
     let sensors = [(0.2, 0.2), (0.8, 0.2), (0.5, 0.5), (0.2, 0.8), (0.8, 0.8)];
     let clean = sensors.map(|(a, b)| depth_mm.powf(1.3) * (-4.0 * ((u - a).powi(2) + (v - b).powi(2))).exp());
     let reading = clean.map(|clean| clean + noise_of * noise(rng)).to_vec();
-    Row { position, force_n: None, nuisance: Some(depth_mm), reading }
+    Row { position, force_n: None, nuisance: Some(depth_mm), time_s: None, reading }
 }
 
 /// Fails unless estimates are those of the formula: means within a share of the deviation, deviations within a share of themselves.
