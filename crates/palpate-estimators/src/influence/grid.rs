@@ -193,8 +193,6 @@ struct Cell {
 #[derive(Debug)]
 pub(super) struct GridPosterior {
     axes: [Axis; 2],
-    /// Into how many parts a cell is cut along each axis, where the cell does not say otherwise.
-    parts_per_cell: usize,
     force: ToldForce,
     cells: Vec<Cell>,
     /// Slices of the cells along x, and along y.
@@ -205,30 +203,16 @@ pub(super) struct GridPosterior {
 }
 
 impl GridPosterior {
-    /// Over a grid whose cells are cut into so many parts along each axis.
-    pub fn new(axes: [Axis; 2], parts_per_cell: usize, force: ToldForce) -> Self {
+    /// Over a grid.
+    pub fn new(axes: [Axis; 2], force: ToldForce) -> Self {
         Self {
             axes,
-            parts_per_cell,
             force,
             cells: Vec::new(),
             columns: Vec::new(),
             rows: Vec::new(),
             residual: f64::INFINITY,
         }
-    }
-
-    /// Adds the cell of a place; `part` is asked for the part at (x, y), in nodes.
-    pub fn add_cell(&mut self, place: usize, mut part: impl FnMut(f64, f64) -> PartOfCell) {
-        let parts = self.axes.map(|axis| if axis.count > 1 { self.parts_per_cell } else { 1 });
-        struct At<F>(F);
-        impl<F: FnMut(f64, f64) -> PartOfCell> Parts for At<F> {
-            #[inline(always)]
-            fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
-                (self.0)(x, y)
-            }
-        }
-        self.add_cut_cell(place, parts, &mut At(&mut part));
     }
 
     /// Adds the cell of a place, cut into so many parts along each axis; `of` is asked for the part of this column and row at (x, y), in

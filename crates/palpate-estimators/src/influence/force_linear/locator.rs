@@ -14,7 +14,7 @@ use super::posterior::Functions;
 use super::prior::Source;
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{
-    Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
+    Axis, CUT, GridPosterior, PartOfCell, Parts, ToldForce, check_axes, neighbours, parts_of, weights_around,
 };
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
@@ -122,6 +122,8 @@ pub struct ForceLinearLocator {
     expected: [f64; 2],
     /// For each place half the longest way to a neighbour's line, per newton and over the noise.
     reaches: Vec<f64>,
+    /// Bounds of what each place costs a reading.
+    scan: Scan,
     /// Into how many parts each cell is cut along each axis when a reading is located within it.
     parts: usize,
     /// The largest square of a relative reading of noise alone.
@@ -147,11 +149,13 @@ impl Stored {
             },
             stored: self,
             reaches: Vec::new(),
+            scan: Scan::default(),
             parts: 1,
             noise_bound: 0.0,
             detection_bound: 0.0,
         };
         locator.cut_cells();
+        locator.scan = Scan::new(&locator);
         locator.bound_noise();
         locator
     }
@@ -456,17 +460,24 @@ impl ForceLinearLocator {
         channels.map(|((c, offset), noise)| (reading[*c] - offset) / noise).collect()
     }
 
+    /// Variance of the noise: where it was learnt from few readings it may be larger than it seems, as that of Student's t is.
+    fn noise(&self) -> f64 {
+        self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
+    }
+
     /// How a place explains a reading.
-    fn explain(&self, relative: &[f64], place: Place) -> Explained {
-        /// Steps from the weights of one force to those of the next; two leave less than a thousandth.
-        const STEPS: usize = 3;
+    ///
+    /// The force is found in steps from about `force_n`, each by the weights of the last.
+    fn explain(&self, relative: &[f64], place: Place, force_n: f64) -> Explained {
+        /// Two steps leave less than a thousandth.
+        const STEPS: usize = 2;
+        const LARGE: f64 = 1e100;
         let open = &self.stored.functions.offset_variances;
         let channels = || {
             let Place { values, variances, covariances } = place;
             relative.iter().zip(values).zip(variances.iter().zip(covariances).zip(open))
         };
-        // Noise that was learnt from few readings may be larger than it seems: the variance of Student's t.
-        let noise = self.stored.noise_freedom / (self.stored.noise_freedom - 2.0);
+        let noise = self.noise();
         let variance = |force_n: f64, ((v, beta), open): ((&f64, &f64), &f64)| {
             noise + (open + force_n * (2.0 * beta + force_n * v)).max(0.0)
         };
@@ -481,13 +492,19 @@ impl ForceLinearLocator {
         let hardest_n = self.stored.hardest_n;
         let held = |(fd, ff): (f64, f64)| if ff > 0.0 { (fd / ff).clamp(0.0, hardest_n) } else { 0.0 };
         let known = self.known_response_n();
-        let force_n = known.unwrap_or_else(|| (0..STEPS).fold(0.0, |force_n, _| held(sums(force_n))));
-        let (mut misfit, mut log_determinant) = (0.0, 0.0);
+        let force_n = known.unwrap_or_else(|| (0..STEPS).fold(force_n, |force_n, _| held(sums(force_n))));
+        let (mut misfit, mut determinant, mut log_determinant) = (0.0, 1.0, 0.0);
         for ((d, f), left_open) in channels() {
             let variance = variance(force_n, left_open);
             misfit += (d - force_n * f).powi(2) / variance;
-            log_determinant += variance.ln();
+            determinant *= variance;
+            // One logarithm for many channels, but before their product overflows.
+            if determinant > LARGE {
+                log_determinant += determinant.ln();
+                determinant = 1.0;
+            }
         }
+        log_determinant += determinant.ln();
         let cost = misfit + log_determinant;
         if known.is_some() {
             return Explained { misfit, cost, force_n, force_variance_n2: 0.0 };
@@ -537,29 +554,40 @@ impl ForceLinearLocator {
     fn posterior(&self, relative: &[f64]) -> GridPosterior {
         let axes = self.axes();
         let told = self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known);
-        let mut posterior = GridPosterior::new(axes, self.parts, told);
-        let places = axes[0].count * axes[1].count;
-        let explained: Vec<Explained> =
-            (0..places).map(|place| self.explain(relative, self.place(place))).collect();
-        let best = (0..places).min_by(|a, b| explained[*a].cost.total_cmp(&explained[*b].cost));
+        let mut posterior = GridPosterior::new(axes, told);
+        let bounds: Vec<Bound> =
+            (0..self.reaches.len()).map(|place| self.scan.bound(place, relative)).collect();
+        let best = (0..bounds.len()).min_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost));
         let Some(best) = best else { return posterior };
         let mut buffer = Buffer::default();
-        let mut least = explained[best].cost;
+        let mut least = self.explain(relative, self.place(best), bounds[best].force_n).cost;
         for (x, y) in parts_of(axes, self.parts, best) {
-            least = least.min(self.explain(relative, self.between(x, y, &mut buffer)).cost);
+            let part = self.explain(relative, self.between(x, y, &mut buffer), bounds[best].force_n);
+            least = least.min(part.cost);
         }
-        for (place, found) in explained.iter().enumerate() {
-            let closest = (found.misfit.sqrt() - self.reaches[place] * found.force_n).max(0.0);
-            if closest * closest + (found.cost - found.misfit) <= least + CUT {
-                posterior.add_cell(place, |x, y| {
-                    let part = self.explain(relative, self.between(x, y, &mut buffer));
-                    let (force_n, force_variance_n2) = self.force_of(part.force_n, part.force_variance_n2);
-                    let weight = (-0.5 * (part.cost - least)).exp();
-                    PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
-                });
+        for (place, bound) in bounds.iter().enumerate() {
+            let within =
+                |misfit: f64, force_n: f64| (misfit.sqrt() - self.reaches[place] * force_n).max(0.0).powi(2);
+            if within(bound.misfit, bound.force_n) + (bound.cost - bound.misfit) > least + CUT {
+                continue;
             }
+            let found = self.explain(relative, self.place(place), bound.force_n);
+            if within(found.misfit, found.force_n) + (found.cost - found.misfit) > least + CUT {
+                continue;
+            }
+            let parts = self.parts_of_cell(place, found.force_n);
+            let mut between =
+                Between { locator: self, relative, least, force_n: found.force_n, buffer: &mut buffer };
+            posterior.add_cut_cell(place, parts, &mut between);
         }
         posterior
+    }
+
+    /// Into how many parts the cell of a place is cut along each axis for a contact of about this force.
+    fn parts_of_cell(&self, place: usize, force_n: f64) -> [usize; 2] {
+        let most = if self.stored.y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS };
+        let parts = ((2.0 * self.reaches[place] * force_n / FINE).ceil().min(most as f64) as usize).max(1);
+        self.axes().map(|axis| if axis.count > 1 { parts } else { 1 })
     }
 
     /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
@@ -582,6 +610,87 @@ impl ForceLinearLocator {
         }
         variances.iter_mut().for_each(|variance| *variance = variance.max(0.0));
         Place { values, variances, covariances }
+    }
+}
+
+/// Parts of a cell, as a reading sees them.
+struct Between<'a> {
+    locator: &'a ForceLinearLocator,
+    relative: &'a [f64],
+    least: f64,
+    force_n: f64,
+    buffer: &'a mut Buffer,
+}
+
+impl Parts for Between<'_> {
+    fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
+        let place = self.locator.between(x, y, self.buffer);
+        let part = self.locator.explain(self.relative, place, self.force_n);
+        let (force_n, force_variance_n2) = self.locator.force_of(part.force_n, part.force_variance_n2);
+        let weight = (-0.5 * (part.cost - self.least)).exp();
+        PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
+    }
+}
+
+/// The least that a place may cost a reading, without the weights of its force: those of the largest variance of each channel.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Scan {
+    /// Weights w and w·f of each channel at each place, side by side.
+    weights: Vec<[f64; 2]>,
+    /// Σ w·f² and what is expected of the force, and the least of the determinant and the force's width, at each place.
+    places: Vec<[f64; 2]>,
+    channels: usize,
+    /// Expected φ and its precision, or the known φ.
+    expected: [f64; 2],
+    known: Option<f64>,
+}
+
+/// Bounds of what a place costs a reading.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    misfit: f64,
+    cost: f64,
+    /// About the force of the least misfit.
+    force_n: f64,
+}
+
+impl Scan {
+    fn new(locator: &ForceLinearLocator) -> Self {
+        let noise = locator.noise();
+        let known = locator.known_response_n();
+        let hardest_n = known.unwrap_or(locator.stored.hardest_n);
+        let open = &locator.stored.functions.offset_variances;
+        let mut scan = Self { channels: open.len(), expected: locator.expected, known, ..Self::default() };
+        for place in 0..locator.reaches.len() {
+            let Place { values, variances, covariances } = locator.place(place);
+            let (mut ff, mut log_determinant) = (locator.expected[1], 0.0);
+            for (c, open) in open.iter().enumerate() {
+                let (f, v, beta) = (values[c], variances[c], covariances[c]);
+                let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
+                let weight = 1.0 / hardest.max(noise + open);
+                let told = if v > 0.0 { beta * beta / v } else { 0.0 };
+                log_determinant += (noise + (open - told).max(0.0)).ln();
+                ff += weight * f * f;
+                scan.weights.push([weight, weight * f]);
+            }
+            let width = if known.is_some() { 0.0 } else { ff.max(f64::MIN_POSITIVE).ln() };
+            scan.places.push([ff, log_determinant + width]);
+        }
+        scan
+    }
+
+    fn bound(&self, place: usize, relative: &[f64]) -> Bound {
+        let [expected_n, precision] = self.expected;
+        let weights = &self.weights[place * self.channels..(place + 1) * self.channels];
+        let start = (precision * expected_n * expected_n, precision * expected_n);
+        let (dd, fd) = weights
+            .iter()
+            .zip(relative)
+            .fold(start, |(dd, fd), ([weight, scaled], d)| (dd + weight * d * d, fd + scaled * d));
+        let [ff, constant] = self.places[place];
+        let force_n = self.known.unwrap_or(if ff > 0.0 { fd / ff } else { 0.0 });
+        let misfit = (dd + force_n * (force_n * ff - 2.0 * fd)).max(0.0);
+        Bound { misfit, cost: misfit + constant, force_n: force_n.max(0.0) }
     }
 }
 

@@ -616,7 +616,7 @@ impl Asked<'_> {
     #[inline(always)]
     fn posterior<V: Eight>(&self, told: ToldForce, force: impl Fn(f64, f64) -> (f64, f64)) -> GridPosterior {
         let search = self.search;
-        let mut posterior = GridPosterior::new([search.x, search.y], search.parts, told);
+        let mut posterior = GridPosterior::new([search.x, search.y], told);
         let mut candidates = Vec::with_capacity(64);
         // No contact explains an infinity.
         let best = if self.is_finite() { self.candidates::<V>(&mut candidates) } else { None };
