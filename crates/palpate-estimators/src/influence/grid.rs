@@ -215,6 +215,18 @@ impl GridPosterior {
         }
     }
 
+    /// Adds the cell of a place, cut into so many parts along each axis; `part` is asked for the part at (x, y), in nodes.
+    pub fn add_cell(&mut self, place: usize, parts: usize, part: impl FnMut(f64, f64) -> PartOfCell) {
+        struct At<F>(F);
+        impl<F: FnMut(f64, f64) -> PartOfCell> Parts for At<F> {
+            fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
+                (self.0)(x, y)
+            }
+        }
+        let parts = self.axes.map(|axis| if axis.count > 1 { parts } else { 1 });
+        self.add_cut_cell(place, parts, &mut At(part));
+    }
+
     /// Adds the cell of a place, cut into so many parts along each axis; `of` is asked for the part of this column and row at (x, y), in
     /// nodes, column by column.
     #[inline(always)]

@@ -30,7 +30,7 @@ pub struct GaussianProcess {
 }
 
 /// Points up to which the posterior is that of all of them.
-pub const MOST_EXACT: usize = 3000;
+pub const MOST_EXACT: usize = 4096;
 /// Points up to which its variance is.
 const MOST_EXACT_VARIANCE: usize = 512;
 

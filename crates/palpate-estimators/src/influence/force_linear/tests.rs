@@ -387,7 +387,7 @@ fn compare_strips(count: u64, (presses, places): (usize, usize), structure: Stru
 #[test]
 fn strips_are_located_better_than_by_a_spline() {
     for (presses, places) in [(25, 9), (60, 15), (120, 30)] {
-        let comparison = compare_strips(benches(5), (presses, places), Structure::Auto);
+        let comparison = compare_strips(benches(10), (presses, places), Structure::Auto);
         comparison.print(&format!("strip, {presses} presses at {places} places"));
         let ((won, _), (won_mean, [ours_mm, theirs_mm])) =
             (Comparison::summary(&comparison.medians), Comparison::summary(&comparison.means));

@@ -1,7 +1,7 @@
 //! From a recording to a locator: presses, regression, noise, how far it misses positions that were held out, table.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
-use super::locator::{MadeFromTable, MeasuredLocator, NuisanceRole};
+use super::locator::{MeasuredLocator, NuisanceRole};
 use super::presses::{Presses, nuisance_coordinate};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
@@ -65,7 +65,6 @@ impl Fit for MeasuredInfluence {
             nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
             force_n: setup.force_n(),
-            search: MadeFromTable::default(),
         };
         locator.residual_limit = residual_limit(&locator, recording);
         Ok(locator)
@@ -121,7 +120,7 @@ impl Presses {
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
         }
-        Ok(Table::new(axes, means, variances))
+        Ok(Table::new(axes, means, variances, channels))
     }
 
     /// The axes of position with about `factor` times the nodes, as far as there may be so many.
@@ -157,7 +156,7 @@ fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
     let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
     let readings = recording.rows.iter().map(|row| row.reading.as_slice());
     learnt_misfit_bound(freedom, readings, |reading| {
-        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.search().residual(&whitened))
+        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.residual(&whitened))
     })
 }
 

@@ -1,14 +1,12 @@
-//! The locator of a measured surface: what it knows, and the estimate that its search gives.
+//! The locator of a measured surface: probabilities of places, gathered cell by cell of the table, and the estimate that they give.
 
 use super::config::Scale;
-use super::search::Search;
-use super::table::Table;
+use super::table::{Line, LineBuffer, Table};
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{ToldForce, check_axes, middle};
+use crate::influence::grid::{CUT, GridPosterior, PartOfCell, ToldForce, check_axes, middle, parts_of};
 use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
-use std::sync::OnceLock;
 
 /// Role of the nuisance coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -40,37 +38,16 @@ pub struct MeasuredLocator {
     pub residual_limit: f64,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
-    /// The table as it is searched.
-    #[serde(skip)]
-    pub(super) search: MadeFromTable,
-}
-
-/// A search that is made when it is first asked for; two of the same table are the same.
-#[derive(Clone, Debug, Default)]
-pub(super) struct MadeFromTable(OnceLock<Box<Search>>);
-
-impl PartialEq for MadeFromTable {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
 }
 
 impl MeasuredLocator {
-    /// The table as it is searched.
-    pub(super) fn search(&self) -> &Search {
-        self.search.0.get_or_init(|| Box::new(Search::new(self)))
-    }
-
-    /// Mean and variance of the force, off its scale, from those of the nuisance coordinate in nodes.
-    fn force(&self, node: f64, variance: f64) -> (f64, f64) {
-        match self.role {
-            NuisanceRole::Force => (self.force_at(node), self.force_spread(node, variance)),
-            NuisanceRole::None | NuisanceRole::Other => (0.0, 0.0),
-        }
+    /// The least squared residual of a whitened reading, over the variances.
+    pub(super) fn residual(&self, whitened: &[f64]) -> f64 {
+        posterior(self, whitened).residual
     }
 
     /// Source of the force of an estimate.
-    pub(super) fn told_force(&self) -> ToldForce {
+    fn told_force(&self) -> ToldForce {
         match (self.role, self.force_n) {
             (NuisanceRole::Force, _) => ToldForce::Estimated,
             (_, Some(force_n)) => ToldForce::Known(force_n),
@@ -106,10 +83,7 @@ impl MeasuredLocator {
 impl Locate for MeasuredLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self.whitened(reading) {
-            Some(whitened) => {
-                let force = |node: f64, variance: f64| self.force(node, variance);
-                self.search().posterior(&whitened, self.told_force(), force).estimate(self.residual_limit)
-            }
+            Some(whitened) => posterior(self, &whitened).estimate(self.residual_limit),
             None => Estimate::of_position(middle([self.table.x, self.table.y]), Status::OutsideModel),
         }
     }
@@ -139,5 +113,66 @@ impl Locate for MeasuredLocator {
         }
         LocatorFault::check_numbers("residual limit", [self.residual_limit], |v| v > 0.0, "greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |force| force > 0.0, "finite and greater than 0")
+    }
+}
+
+/// A place, and how well it explains the reading.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    place: usize,
+    residual: f64,
+}
+
+impl Candidate {
+    /// Whether somewhere `reach` closer, in deviations, could matter beside the residual `least`.
+    fn within(&self, reach: f64, least: f64) -> bool {
+        let closest = (self.residual.sqrt() - reach).max(0.0);
+        closest * closest <= least + CUT
+    }
+}
+
+/// Posterior of a whitened reading: the middles of blocks of places first, then the places of blocks that could matter, and of
+/// those the cells that could, cut finely.
+fn posterior(locator: &MeasuredLocator, reading: &[f64]) -> GridPosterior {
+    let (table, noise) = (&locator.table, &locator.whitening);
+    let look = |place: usize| Candidate { place, residual: table.line(place).residual(reading, noise) };
+    let nearest = |candidate: &mut dyn Iterator<Item = Candidate>| {
+        candidate.min_by(|a, b| a.residual.total_cmp(&b.residual))
+    };
+    let mut posterior = GridPosterior::new([table.x, table.y], locator.told_force());
+    let blocks: Vec<Candidate> = table.blocks().map(look).collect();
+    let Some(block) = nearest(&mut blocks.iter().copied()) else { return posterior };
+    let Some(best) = nearest(&mut table.block(block.place).map(look)) else { return posterior };
+    let mut buffer = LineBuffer::default();
+    let mut least = best.residual;
+    for (x, y) in parts_of([table.x, table.y], table.parts, best.place) {
+        least = least.min(table.line_between(x, y, &mut buffer).residual(reading, noise));
+    }
+    // From a block's middle to its other places is twice the reach, and from there half as far as that again.
+    for block in blocks.iter().filter(|block| block.within(3.5 * table.reaches[block.place], least)) {
+        for candidate in table.block(block.place).map(look) {
+            if candidate.within(table.reaches[candidate.place], least) {
+                let part =
+                    |x, y| part_of_cell(locator, table.line_between(x, y, &mut buffer), reading, least);
+                posterior.add_cell(candidate.place, table.parts, part);
+            }
+        }
+    }
+    posterior
+}
+
+/// Weight, force and residual of a part of a cell, relative to the residual `reference`.
+fn part_of_cell(locator: &MeasuredLocator, line: Line, reading: &[f64], reference: f64) -> PartOfCell {
+    let marginal = line.marginal(reading, &locator.whitening, reference);
+    if marginal.weight <= 0.0 {
+        return PartOfCell::default();
+    }
+    let node = marginal.nuisance / marginal.weight;
+    let spread = (marginal.nuisance_square / marginal.weight - node * node).max(0.0);
+    PartOfCell {
+        weight: marginal.weight,
+        force_n: locator.force_at(node),
+        force_variance_n2: locator.force_spread(node, spread),
+        residual: line.residual(reading, &locator.whitening),
     }
 }

@@ -19,8 +19,6 @@ mod config;
 mod fitting;
 mod locator;
 mod presses;
-mod search;
-mod stretch;
 mod table;
 
 pub use config::{MeasuredError, MeasuredInfluence, Scale};

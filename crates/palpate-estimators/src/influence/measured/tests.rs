@@ -1,8 +1,6 @@
 //! The method on surfaces whose readings are known functions, and on other people's recordings by the protocol that
 //! comes with them.
 
-mod reference;
-
 use std::sync::LazyLock;
 
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -253,83 +251,4 @@ fn settings_that_need_mechanics_are_refused() {
     assert!(refused(Influence { contacts: 2, ..good }).contains("several contacts"));
     assert!(refused(Influence { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
     assert!(refused(good).contains("0 distinct positions"));
-}
-
-/// Five sensors under a pad that is pressed to some depth.
-fn dent(position: Position, depth_mm: f64, noise_of: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
-    let (u, v) = (position.x_m / 0.03, position.y_m / 0.03);
-    let sensors = [(0.2, 0.2), (0.8, 0.2), (0.5, 0.5), (0.2, 0.8), (0.8, 0.8)];
-    let clean = sensors.map(|(a, b)| depth_mm.powf(1.3) * (-4.0 * ((u - a).powi(2) + (v - b).powi(2))).exp());
-    let reading = clean.map(|clean| clean + noise_of * noise(rng)).to_vec();
-    Row { position, force_n: None, nuisance: Some(depth_mm), time_s: None, reading }
-}
-
-/// Fails unless estimates are those of the formula: means within a share of the deviation, deviations within a share of themselves.
-fn check_against_the_sum(name: &str, locator: &MeasuredLocator, readings: &[Vec<f64>]) {
-    for reading in readings {
-        let truth = reference::posterior(locator, reading, locator.table.parts);
-        let estimate = locator.locate(reading);
-        let contact = estimate.contact;
-        let whitened = locator.whitened(reading).unwrap();
-        let posterior = locator.search().posterior(&whitened, locator.told_force(), |_, _| (0.0, 0.0));
-        // Between the middles of parts the residual is less.
-        let less = truth.residual - posterior.residual;
-        assert!((-0.1..5.0).contains(&less), "{name}: {less} {truth:?}");
-        if estimate.status == Status::Ambiguous {
-            continue;
-        }
-        let [xx, xy, _, yy, ..] = contact.uncertainty.unwrap().covariance;
-        let said = [(contact.position.x_m, xx), (contact.position.y_m, yy)];
-        for (k, (mean_m, variance_m2)) in said.into_iter().enumerate().take(1 + usize::from(yy > 0.0)) {
-            let sd_m = truth.covariance_m2[2 * k].sqrt();
-            let off = (mean_m - truth.mean_m[k]) / sd_m;
-            assert!(off.abs() < 0.03, "{name}: {off} of a deviation at {mean_m}, {truth:?}");
-            let factor = variance_m2.sqrt() / sd_m;
-            assert!((0.95..1.05).contains(&factor), "{name}: {factor} times {sd_m}");
-        }
-        let root = (truth.covariance_m2[0] * truth.covariance_m2[2]).sqrt();
-        assert!((xy - truth.covariance_m2[1]).abs() <= 0.05 * root, "{name}: {xy} {truth:?}");
-    }
-}
-
-#[test]
-fn the_search_finds_the_posterior_that_a_sum_over_every_cell_gives() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
-    let line = fit(&raw_setup(*STRIP, 2, None), &squeezes(11));
-    let readings: Vec<Vec<f64>> = (0..30)
-        .map(|i| squeeze(0.0005 + 0.0032 * f64::from(i), 1.0 + 0.12 * f64::from(i), &mut rng).reading)
-        .collect();
-    check_against_the_sum("line", &line, &readings);
-    for noise_of in [0.05, 0.003] {
-        let mut rows = Vec::new();
-        for i in 0..(7 * 7 * 3) {
-            let (x_m, y_m) = (0.005 * f64::from(i % 7), 0.005 * f64::from(i / 7 % 7));
-            rows.push(dent(Position { x_m, y_m }, 1.0 + 0.25 * f64::from(i / 49), noise_of, &mut rng));
-        }
-        let recording = raw_recording(rows);
-        let setup = raw_setup(*PAD, 5, None);
-        let config = MeasuredInfluence { readings: Some(Scale::Linear), ..MeasuredInfluence::default() };
-        let locator = config.fit_method(FitTask::new(&setup, &recording).seed(1)).unwrap();
-        let readings: Vec<Vec<f64>> = (0..3)
-            .map(|_| {
-                let position =
-                    Position { x_m: rng.random_range(0.0..0.03), y_m: rng.random_range(0.0..0.03) };
-                dent(position, rng.random_range(1.0..1.5), noise_of, &mut rng).reading
-            })
-            .collect();
-        check_against_the_sum(&format!("plane, noise {noise_of}"), &locator, &readings);
-    }
-    let mut rows = Vec::new();
-    for i in 0..(4 * 169) {
-        let (x_m, y_m) = (0.0025 * f64::from(i % 13), 0.0025 * f64::from(i % 169 / 13));
-        rows.push(corner(Position { x_m, y_m }, 0.05, &mut rng));
-    }
-    let gain = fit(&raw_setup(*PAD, 4, None), &raw_recording(rows));
-    let readings: Vec<Vec<f64>> = (0..8)
-        .map(|_| {
-            let position = Position { x_m: rng.random_range(0.0..0.03), y_m: rng.random_range(0.0..0.03) };
-            corner(position, 0.05, &mut rng).reading
-        })
-        .collect();
-    check_against_the_sum("gain", &gain, &readings);
 }
