@@ -557,10 +557,21 @@ impl ForceLinearLocator {
         let mut posterior = GridPosterior::new(axes, told);
         let bounds: Vec<Bound> =
             (0..self.reaches.len()).map(|place| self.scan.bound(place, relative)).collect();
-        let best = (0..bounds.len()).min_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost));
-        let Some(best) = best else { return posterior };
+        let Some(mut best) = (0..bounds.len()).min_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost))
+        else {
+            return posterior;
+        };
         let mut buffer = Buffer::default();
-        let mut least = self.explain(relative, self.place(best), bounds[best].force_n).cost;
+        let cost_at = |place: usize| self.explain(relative, self.place(place), bounds[place].force_n).cost;
+        let mut least = cost_at(best);
+        for (place, bound) in bounds.iter().enumerate() {
+            if bound.cost < least {
+                let cost = cost_at(place);
+                if cost < least {
+                    (best, least) = (place, cost);
+                }
+            }
+        }
         for (x, y) in parts_of(axes, self.parts, best) {
             let part = self.explain(relative, self.between(x, y, &mut buffer), bounds[best].force_n);
             least = least.min(part.cost);
@@ -581,6 +592,25 @@ impl ForceLinearLocator {
             posterior.add_cut_cell(place, parts, &mut between);
         }
         posterior
+    }
+
+    /// The estimate of a reading summed over every cell, cut as finely as any: what the bounds must not change.
+    #[cfg(test)]
+    pub fn locate_over_all_cells(&self, reading: &[f64]) -> Estimate {
+        let relative = &self.relative(reading);
+        let told = self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known);
+        let mut posterior = GridPosterior::new(self.axes(), told);
+        let force_n = self.expected[0];
+        let costs =
+            (0..self.reaches.len()).map(|place| self.explain(relative, self.place(place), force_n).cost);
+        let least = costs.fold(f64::INFINITY, f64::min);
+        let mut buffer = Buffer::default();
+        for place in 0..self.reaches.len() {
+            let parts = self.axes().map(|axis| if axis.count > 1 { self.parts } else { 1 });
+            let mut between = Between { locator: self, relative, least, force_n, buffer: &mut buffer };
+            posterior.add_cut_cell(place, parts, &mut between);
+        }
+        posterior.estimate(self.stored.residual_limit)
     }
 
     /// Into how many parts the cell of a place is cut along each axis for a contact of about this force.

@@ -608,3 +608,26 @@ fn the_determinant_of_many_gauges_does_not_overflow() {
     let (low_m, high_m) = contact.uncertainty.expect("some place explains the reading").x_95_m;
     assert!(low_m < high_m, "{contact:?}");
 }
+
+#[test]
+fn bounds_lose_nothing_of_the_sum_over_all_cells() {
+    let mut bench = Bench::strip(9, 25, 9);
+    let touches = bench.touches(40);
+    let mut precise = Bench::strip(10, 60, 15);
+    for row in &mut precise.presses {
+        // Next to no noise: a cell is many deviations wide.
+        let clean = (precise.influences)(row.position);
+        let force_n = row.force_n.unwrap();
+        row.reading = clean.iter().zip(&precise.offsets).map(|(f, offset)| offset + force_n * f).collect();
+    }
+    for (bench, touches) in [(&bench, &touches), (&precise, &precise.presses.clone())] {
+        let locator = bench.fit(Structure::Auto).unwrap();
+        for row in touches {
+            let [fast, all] = [locator.locate(&row.reading), locator.locate_over_all_cells(&row.reading)];
+            let sd_m = all.contact.uncertainty.unwrap().covariance[0].sqrt();
+            let apart_m = fast.contact.position.distance_m(all.contact.position);
+            assert!(fast.contact.uncertainty.is_some(), "{fast:?} {all:?}");
+            assert!(apart_m < 0.1 * sd_m + 1e-5, "{apart_m} m of {sd_m} m: {fast:?} {all:?}");
+        }
+    }
+}
