@@ -1,4 +1,4 @@
-//! What a fit will take, told before it is begun, and refused where it is more than it may.
+//! The cost of a fit, told before it is begun, and refused where it exceeds the limit.
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
@@ -31,7 +31,7 @@ impl MemoryLimit {
         Ok(())
     }
 
-    /// Why an estimator may not be fitted; `None` where it may.
+    /// Reason why an estimator may not be fitted; `None` where it may.
     pub fn refusal(&self, estimator: &Estimator, cost: FitCost) -> Option<String> {
         let limit = self.memory_limit.filter(|limit| cost.memory_bytes > *limit)?;
         let (needed, limit) = (size(cost.memory_bytes), size(limit));
@@ -42,7 +42,7 @@ impl MemoryLimit {
     }
 }
 
-/// What to do where memory is short.
+/// Advice where memory is short.
 const REMEDY: &str =
     "raise the limit, leave rows out, or name an estimator that keeps less: centroid, neighbours, network-lm";
 

@@ -46,7 +46,7 @@ impl Lines {
     }
 }
 
-/// What has been said of how a stream writes its table.
+/// Remarks that were made about a stream's dialect.
 #[derive(Default)]
 pub struct DialectNote(String);
 

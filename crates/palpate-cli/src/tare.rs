@@ -8,7 +8,7 @@ use palpate_mechanics::units::Quantity;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Where the baseline comes from.
+/// Source of the baseline.
 #[derive(clap::Args)]
 pub struct TareOption {
     /// Take what the channels read untouched today from the first N readings, from a FILE of untouched readings, or find and follow it
@@ -47,7 +47,7 @@ impl FromStr for Source {
     }
 }
 
-/// What a reading is to the tare.
+/// Use of a reading by the tare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
     /// One of those that make the baseline: it is not located.
@@ -185,7 +185,7 @@ impl<'a> Taring<'a> {
     /// The end of the readings of `source`.
     ///
     /// # Errors
-    /// When there were fewer readings than make the baseline.
+    /// A failure where there were fewer readings than make the baseline.
     pub fn finish(&self, source: &str) -> Result<(), Failure> {
         match self.source {
             Source::First(needed) if self.count < needed => {

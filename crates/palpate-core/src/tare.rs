@@ -24,7 +24,7 @@ use crate::{Estimate, Status};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tare<B> {
-    /// What calibration learnt that each channel reads untouched.
+    /// Untouched reading of each channel, as calibration learnt it.
     learnt: B,
     baseline: B,
     /// Readings that the baseline is the mean of, at most the time constant; 0 while it is what calibration learnt.
@@ -87,12 +87,12 @@ impl<B: AsRef<[f64]> + AsMut<[f64]> + Clone> Tare<B> {
         Self { time_constant: readings.max(Self::SETTLED), ..self }
     }
 
-    /// What each channel reads untouched today, as far as is known.
+    /// Untouched reading of each channel today, as far as is known.
     pub fn baseline(&self) -> &[f64] {
         self.baseline.as_ref()
     }
 
-    /// What calibration learnt that each channel reads untouched.
+    /// Untouched reading of each channel, as calibration learnt it.
     pub fn learnt(&self) -> &[f64] {
         self.learnt.as_ref()
     }
@@ -209,7 +209,7 @@ mod tests {
 
     const LEARNT: [f64; 4] = [50.0, -20.0, 0.0, 7.0];
 
-    /// What four channels read of a newton at `x`, from 0 to 1.
+    /// Readings of four channels of a newton at `x`, from 0 to 1.
     fn influence(x: f64) -> [f64; 4] {
         [40.0 * (1.0 - x), 40.0 * x, 60.0 * x * (1.0 - x), 25.0 * (1.0 - x * x)]
     }

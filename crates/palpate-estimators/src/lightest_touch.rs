@@ -1,6 +1,6 @@
 //! The lightest touch that is told from noise: the force from which on a contact is found at a given false-alarm rate.
 //!
-//! How probably a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]).
+//! The probability that a contact is found follows from its signal-to-noise ratio, by the rule of `no_contact` ([`crate::status`]).
 
 use crate::status::{Detection, FalseAlarmRate};
 use palpate_mechanics::contact::{Contact, Position};

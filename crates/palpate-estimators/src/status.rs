@@ -167,7 +167,7 @@ pub(crate) struct StatusRule {
     noise_bound: f64,
     /// Least |d|² − χ² of a contact.
     detection_cost: f64,
-    /// What a contact costs beside others.
+    /// Cost of a contact beside others.
     contact_cost: f64,
     /// Largest χ² of a contact.
     misfit_bound: f64,
@@ -209,7 +209,7 @@ impl StatusRule {
         misfit <= self.misfit_bound
     }
 
-    /// When the rule finds a contact of so many unknowns in readings of so many channels.
+    /// Bounds from which the rule finds a contact of so many unknowns in readings of so many channels.
     pub fn detection(&self, channels: usize, unknowns: usize) -> Detection {
         Detection { channels, unknowns, square: self.noise_bound, taken: self.detection_cost }
     }
@@ -283,7 +283,7 @@ impl NoiseBounds {
     }
 }
 
-/// When a contact is found: a rule of `no_contact` for channels of unit noise.
+/// Bounds from which a contact is found: a rule of `no_contact` for channels of unit noise.
 ///
 /// Symbols: d whitened reading, n channels, k unknowns of a contact (its coordinates and its force, which nobody knows), s length of the
 /// contact's own whitened reading (its signal-to-noise ratio), B the bound on |d|² and C that on what the best contact takes off it.

@@ -21,9 +21,9 @@ pub(crate) struct RecordingKeys {
     /// Whether the first line names the columns; without it columns are numbers, from 1.
     #[serde(default = "yes")]
     pub header: bool,
-    /// What stands between fields; what the first line tells unless said otherwise.
+    /// Separator of the fields; what the first line tells unless said otherwise.
     pub separator: Option<Separator>,
-    /// What stands before decimals; what the first number tells unless said otherwise.
+    /// Decimal mark; what the first number tells unless said otherwise.
     pub decimal: Option<Decimal>,
     /// Column of the contact's position along a line; `position_mm` unless said otherwise.
     pub position: Option<At<ColumnKey>>,

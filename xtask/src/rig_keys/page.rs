@@ -54,7 +54,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// What stands in a value of this type, where that is more than a cell can say.
+    /// Form of a value of this type, where that is more than a cell can say.
     fn explain(&mut self, file: &Path, type_text: &str, path: &str, level: usize) {
         let Some(item) = self.item(file, type_text) else { return };
         if !self.is_table(item) && !self.has_words(item) {

@@ -40,10 +40,10 @@ pub struct Arguments {
     /// Column of a channel; may be repeated
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// What stands between fields: comma, semicolon or tab [default: what the file tells]
+    /// Separator of the fields: comma, semicolon or tab [default: what the file tells]
     #[arg(long, value_name = "WORD", value_parser = separator)]
     separator: Option<Separator>,
-    /// What stands before decimals: point or comma [default: what the file tells]
+    /// Decimal mark: point or comma [default: what the file tells]
     #[arg(long, value_name = "WORD", value_parser = decimal)]
     decimal: Option<Decimal>,
 }

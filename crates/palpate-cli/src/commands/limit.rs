@@ -21,7 +21,7 @@ use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What physics allows: the Cramér–Rao bound of position and force at the sensors' noise, the lightest touch that is told from noise,
+/// Cramér–Rao bound of position and force at the sensors' noise, the lightest touch that is told from noise,
 /// and what the bench cannot tell.
 ///
 /// A surface without a model has influence functions and noise once a locator has learnt them: name the locator.

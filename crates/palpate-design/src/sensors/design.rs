@@ -62,7 +62,7 @@ pub struct SensorOffer {
     pub supply: Supply,
 }
 
-/// Where the sensors of an offer come from.
+/// Source of the sensors of an offer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Supply {
     /// As many as are wanted can be had.

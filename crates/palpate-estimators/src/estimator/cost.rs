@@ -1,4 +1,4 @@
-//! What a fit will take, before it is begun: memory and time by the sizes of what each method factors and tabulates.
+//! The cost of a fit, before it is begun: memory and time by the sizes of what each method factors and tabulates.
 //!
 //! Times are for one core of some 3 GHz, to within a factor of a few; memory to within a half.
 
@@ -44,7 +44,7 @@ struct Sizes {
 }
 
 impl Estimator {
-    /// What fitting to a recording of a setup will take.
+    /// Memory and time of fitting to a recording of a setup.
     pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
         let sizes = Sizes::new(setup, recording);
         let own = match self {

@@ -321,7 +321,7 @@ impl Locator {
         self.method.kind()
     }
 
-    /// What each channel reads untouched, as calibration left it: the offsets that influence functions were learnt with, the mean of the
+    /// Untouched reading of each channel, as calibration left it: the offsets that influence functions were learnt with, the mean of the
     /// recording's rows without contact, or nothing at all where a model says what a contact adds.
     ///
     /// # Errors
@@ -432,7 +432,7 @@ pub struct Choice {
     pub left_out: Vec<(&'static str, String)>,
 }
 
-/// How an estimator does at positions held out.
+/// Errors and intervals of an estimator at positions held out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tried {
     /// Its kind.
@@ -466,7 +466,7 @@ impl Tried {
 pub struct TimeLimit<'a> {
     /// Tells seconds since any fixed moment.
     pub clock: &'a (dyn Fn() -> f64 + Sync),
-    /// How long, in seconds; an estimator that is not done by then is left out.
+    /// Limit in seconds; an estimator that is not done by then is left out.
     pub seconds: f64,
 }
 

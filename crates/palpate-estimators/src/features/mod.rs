@@ -25,12 +25,10 @@ impl FeatureKind {
         if setup.force_n().is_some() { Self::Readings } else { Self::LoadInvariant }
     }
 
-    /// The kinds that suit a recording of a setup: that of [`FeatureKind::for_setup`], and logarithms where all readings have one.
-    pub fn candidates(setup: &Setup, recording: &Recording) -> Vec<Self> {
-        let usual = Self::for_setup(setup);
+    /// Logarithms, where the force is not known and all readings of a recording have one.
+    pub fn logarithms_for(setup: &Setup, recording: &Recording) -> Option<Self> {
         let mut readings = recording.rows.iter().flat_map(|row| &row.reading);
-        let logarithms = usual == Self::LoadInvariant && readings.all(|value| *value > 0.0);
-        if logarithms { vec![usual, Self::Logarithms] } else { vec![usual] }
+        (setup.force_n().is_none() && readings.all(|value| *value > 0.0)).then_some(Self::Logarithms)
     }
 }
 

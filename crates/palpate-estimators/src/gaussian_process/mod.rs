@@ -33,7 +33,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for those of [`FeatureKind::candidates`] under which the positions are the most probable.
+    /// Features of a reading; `None` for [`FeatureKind::for_setup`], or [`FeatureKind::logarithms_for`] where the positions
+    /// are more probable under them.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
     pub kernel: Kernel,
@@ -79,17 +80,18 @@ impl Fit for GaussianProcessEstimator {
     fn fit_method(&self, task: FitTask) -> Result<GaussianProcessLocator, GaussianProcessError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let kinds =
-            self.features.map_or_else(|| FeatureKind::candidates(setup, recording), |kind| vec![kind]);
-        let mut best: Option<GaussianProcessLocator> = None;
-        for kind in kinds {
+        let (usual, logarithms) = match self.features {
+            Some(kind) => (kind, None),
+            None => (FeatureKind::for_setup(setup), FeatureKind::logarithms_for(setup, recording)),
+        };
+        let mut best = self.with_features(usual, setup, recording, seed, watch)?;
+        if let Some(kind) = logarithms {
             let fitted = self.with_features(kind, setup, recording, seed, watch)?;
-            let evidence = |locator: &GaussianProcessLocator| locator.process.log_evidence();
-            if best.as_ref().is_none_or(|best| evidence(&fitted) > evidence(best)) {
-                best = Some(fitted);
+            if fitted.process.log_evidence() > best.process.log_evidence() {
+                best = fitted;
             }
         }
-        best.ok_or(GaussianProcessError::Features(NoFeatures { channels: recording.channels.len(), rows: 0 }))
+        Ok(best)
     }
 }
 

@@ -32,7 +32,7 @@ impl<'a> Cells<'a> {
         self.fields.len()
     }
 
-    /// What is in each field.
+    /// Text of each field.
     pub fn texts(&self) -> impl Iterator<Item = &str> {
         self.fields.iter().map(|field| field.value.as_ref())
     }

@@ -34,10 +34,10 @@ pub struct Columns {
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
     pub time: Option<ValueColumn>,
-    /// What stands between fields; `None` for what the first line tells.
+    /// Separator of the fields; `None` for what the first line tells.
     #[serde(default)]
     pub separator: Option<Separator>,
-    /// What stands before decimals; `None` for what the first number tells.
+    /// Decimal mark; `None` for what the first number tells.
     #[serde(default)]
     pub decimal: Option<Decimal>,
 }

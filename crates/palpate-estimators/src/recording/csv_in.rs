@@ -227,7 +227,7 @@ impl TimeField {
 /// Lines of CSV as they come, and the fields that the first of them told.
 #[derive(Clone, Debug)]
 pub(super) struct Lines<F> {
-    /// What the lines have told of how they are written.
+    /// Dialect of the lines, as far as they have told.
     dialect: Dialect,
     /// The separator, where the rig or a line before the header says it.
     separator: Option<Separator>,
@@ -395,7 +395,7 @@ impl ReadingParser {
         next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
     }
 
-    /// How the lines write their table, as far as they have told.
+    /// Dialect of the lines, as far as they have told.
     pub fn dialect(&self) -> &Dialect {
         &self.lines.dialect
     }
@@ -488,7 +488,7 @@ impl<'a> TimedParser<'a> {
         self.lines.fields.is_none()
     }
 
-    /// How the lines write their table, as far as they have told.
+    /// Dialect of the lines, as far as they have told.
     pub fn dialect(&self) -> &Dialect {
         &self.lines.dialect
     }
@@ -547,7 +547,7 @@ impl TimedFields {
     }
 }
 
-/// What is written in a line of bytes, without its end; `None` for a blank line or a comment. `decoded` holds the text where it is not
+/// Text of a line of bytes, without its end; `None` for a blank line or a comment. `decoded` holds the text where it is not
 /// UTF-8.
 fn written<'a>(
     bytes: &'a [u8],

@@ -1,4 +1,4 @@
-//! How a file writes its table: what stands between fields, what before decimals.
+//! The dialect of a file: its separator and its decimal mark.
 //!
 //! A plain file has commas between fields and decimal points. Spreadsheets of half the world write semicolons and decimal commas instead.
 //! The first line tells the separator, the first number with a comma or a point tells the decimal mark, and from there on both hold:
@@ -12,16 +12,16 @@ use super::csv_error::CsvProblem;
 use super::marks::{Decimal, Separator};
 use palpate_mechanics::units::Unit;
 
-/// How a file writes its table, as far as its lines have told.
+/// Dialect of a file, as far as its lines have told.
 ///
 /// Displayed in a few words, such as `semicolons, decimal commas, units in the header`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dialect {
     /// The name of the file.
     pub source: String,
-    /// What stands between fields.
+    /// Separator of the fields.
     pub separator: Separator,
-    /// What stands before decimals; `None` while all numbers are whole.
+    /// Decimal mark; `None` while all numbers are whole.
     pub decimal: Option<Decimal>,
     /// The number that has told the decimal mark, where others would read its mark as one of thousands.
     pub doubtful: Option<String>,
@@ -160,7 +160,7 @@ pub(super) fn windows_1252(bytes: &[u8]) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// What is said after numbers have been read, or the first refusal.
+    /// Remarks after numbers have been read, or the first refusal.
     fn said(separator: Separator, texts: &[&str]) -> String {
         let mut dialect = Dialect { separator, ..Dialect::default() };
         let numbers: Result<Vec<f64>, _> =

@@ -7,7 +7,7 @@ use palpate_mechanics::units::Unit;
 pub struct Heading<'a> {
     /// The name without the unit.
     pub name: &'a str,
-    /// What stands in the place of the unit.
+    /// Text in the place of the unit.
     pub unit: Option<&'a str>,
 }
 

@@ -1,10 +1,10 @@
-//! What stands between fields, and what before decimals.
+//! Separators of fields, and decimal marks.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// What stands between the fields of a line.
+/// Separator of the fields of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Separator {
@@ -56,7 +56,7 @@ impl fmt::Display for Separator {
     }
 }
 
-/// What stands before the decimals of a number.
+/// Decimal mark of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decimal {

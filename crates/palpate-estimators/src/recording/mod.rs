@@ -86,7 +86,7 @@ pub struct Provenance {
     pub rows: usize,
     /// The [`sha256_hex`] of each file that was read; empty for a simulation.
     pub digests: Vec<String>,
-    /// How each file writes its table, where that is not plainly.
+    /// Dialect of each file, where it is not plain CSV.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub dialects: Vec<Dialect>,
     /// The seed of a simulation.

@@ -25,9 +25,9 @@ pub struct Table {
 /// One column of a [`Table`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableColumn {
-    /// What the header calls it; its number, from 1, where there is no header.
+    /// Name in the header; its number, from 1, where there is no header.
     pub heading: String,
-    /// What is in its rows.
+    /// Text of its rows.
     pub content: Content,
 }
 

@@ -70,7 +70,7 @@ struct Timestamp {
     ns: i64,
 }
 
-/// What a timestamp tells.
+/// Kind of a timestamp: a time of day, or a date and time with or without its time zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     TimeOfDay,
@@ -92,10 +92,10 @@ impl Timestamp {
         if slashes == 3 && digits(date.split('/').next().unwrap_or_default(), 4..=4).is_none() {
             return Err(CsvProblem::SlashedDate { text: text.to_owned() });
         }
-        Ok(Self::of(date, time))
+        Ok(Self::from_date_and_time(date, time))
     }
 
-    fn of(date: &str, time: &str) -> Option<Self> {
+    fn from_date_and_time(date: &str, time: &str) -> Option<Self> {
         let (time, offset_ns) = match time.find(['Z', '+', '-']) {
             Some(at) => (&time[..at], Some(offset_ns(&time[at..])?)),
             None => (time, None),

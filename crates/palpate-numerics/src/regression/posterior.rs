@@ -458,12 +458,12 @@ struct PosteriorData {
     /// m×q.
     pub trend_coefficients: Vec<f64>,
     pub log_evidence: f64,
-    /// Where the points are some of many.
+    /// The sparse form, where the points are some of many.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sparse: Option<SparseData>,
 }
 
-/// What chosen points do not tell of all.
+/// Remainder of all points that chosen ones do not tell.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SparseData {

@@ -140,7 +140,7 @@ pub(super) struct Rows<'a> {
     pub noise: &'a [f64],
 }
 
-/// What rows say of a sparse process.
+/// Sums over the rows that determine a sparse process.
 pub(super) struct Learnt {
     /// α of the chosen points, k×m, and β, q×m.
     pub weights: Array2<f64>,

@@ -13,7 +13,7 @@ use crate::error::RigError;
 use crate::rig::Rig;
 use roles::{Left, PositionRole, Roles, range, suffixed};
 
-/// What is known of a recording beforehand: columns by their headings, with or without units, or by their numbers from 1 where there is
+/// Hints about a recording: columns by their headings, with or without units, or by their numbers from 1 where there is
 /// no header.
 #[derive(Clone, Debug, Default)]
 pub struct Hints {
@@ -31,9 +31,9 @@ pub struct Hints {
     pub nuisance: Option<String>,
     /// The channels; those that are guessed where there are none.
     pub channels: Vec<String>,
-    /// What stands between fields.
+    /// Separator of the fields.
     pub separator: Option<Separator>,
-    /// What stands before decimals.
+    /// Decimal mark.
     pub decimal: Option<Decimal>,
 }
 
@@ -108,7 +108,7 @@ pub enum FirstRigError {
         column: String,
         /// Its unit.
         unit: String,
-        /// What the column should measure.
+        /// Quantity that the column should measure.
         wanted: Dimension,
     },
     /// The rig that was guessed cannot be used.
@@ -193,12 +193,12 @@ impl FirstRig {
         Ok(first)
     }
 
-    /// What the bench's owner should look at.
+    /// Warnings for the bench's owner.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// What was taken for what, in one line.
+    /// Roles of the columns, in one line.
     pub fn summary(&self) -> String {
         let name = |column: usize| format!("`{}`", self.table.columns[column].heading);
         let position: Vec<String> = self.roles.position.columns().into_iter().map(name).collect();

@@ -159,7 +159,7 @@ pub(super) enum Left {
     Unnamed,
     /// A circumstance that is always the same.
     Constant(f64),
-    /// What may be a channel, always the same.
+    /// A channel that never changes, with its value.
     Dead(f64),
     Counter,
     /// Something else about the press.
@@ -306,10 +306,10 @@ pub(super) fn range(numbers: &[f64]) -> (f64, f64) {
 struct Name {
     /// Its words in small letters, the unit left out.
     words: Vec<String>,
-    /// What is left of it without the number at its end, and whether there is one.
+    /// Heading without the number at its end, and whether there is one.
     stem: (String, bool),
     unit: Option<Unit>,
-    /// What stands in the place of the unit and is none.
+    /// Text in the place of the unit that is none.
     foreign_unit: Option<String>,
     /// Whether a rig can name the column.
     can_be_named: bool,
@@ -474,7 +474,7 @@ impl Guess<'_> {
         name.stem.1 && self.names.iter().filter(|other| other.stem == name.stem).count() > 1
     }
 
-    /// Why a column has no role.
+    /// Reason why a column has no role.
     fn reason(&self, column: usize, has_force: bool) -> Left {
         let name = &self.names[column];
         let foreign = |name: &Name| {

@@ -30,7 +30,7 @@ pub struct Board {
     state: u64,
 }
 
-/// Where and how hard it is touched; a force of 0 is no touch.
+/// Position and force of a touch; a force of 0 is none.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
     pub position_mm: f64,

@@ -1,4 +1,4 @@
-//! How probable a channel's presses are under a prior, by the restricted likelihood: offsets and polynomials are projected out, as their
+//! Evidence of a channel's presses under a prior, by the restricted likelihood: offsets and polynomials are projected out, as their
 //! coefficients are as likely as any others (Patterson and Thompson, Biometrika 58, 1971; Rasmussen and Williams, *Gaussian Processes for
 //! Machine Learning*, 2006, section 2.7).
 //!
@@ -67,7 +67,7 @@ impl Restricted {
         (white, coefficients)
     }
 
-    /// What columns of `h` − Hᵀ·A⁻¹·k, whose L⁻¹·k are `white`, leave open: its scalar products are covariances.
+    /// R⁻ᵀ·(h − Hᵀ·A⁻¹·k) for columns of `h` and L⁻¹·k, `white`: scalar products of its columns are covariances.
     pub fn open_effects(&self, h: &Array2<f64>, white: &Array2<f64>) -> Array2<f64> {
         self.gram.solve_lower_matrix(h - &self.effects.t().dot(white))
     }
@@ -109,7 +109,7 @@ pub(super) struct Evidence<'a> {
     pub prior: &'a Prior,
     covariance: Array2<f64>,
     effects: Array2<f64>,
-    /// What presses read of a source at each place.
+    /// Readings of the presses by a source of unit amplitude at each place.
     sources: Array2<f64>,
 }
 

@@ -29,7 +29,7 @@ const LEAST_TO_JUDGE: usize = 6;
 /// Every fifth position is held out.
 const FOLDS: usize = 5;
 
-/// What a recording tells of a surface.
+/// Prior, noise and presses of a surface, as a recording tells them.
 pub(super) struct Learnt {
     pub presses: Presses,
     pub prior: Prior,
@@ -37,7 +37,7 @@ pub(super) struct Learnt {
     pub live: Vec<usize>,
     /// Those of the channels in use.
     fits: Vec<ChannelFit>,
-    /// Where sensors are looked for.
+    /// Places where sensors are looked for, in metres.
     sensors_m: Vec<Vec<f64>>,
     /// By what factor the variance of the learnt functions is multiplied, so that positions held out are as far off as it says.
     widening: f64,
@@ -221,11 +221,11 @@ fn all_functions(
 struct Found {
     prior: Prior,
     fits: Vec<ChannelFit>,
-    /// Where sensors are looked for.
+    /// Places where sensors are looked for, in metres.
     sensors_m: Vec<Vec<f64>>,
 }
 
-/// How a prior does at positions held out.
+/// A prior with its score at positions held out.
 struct Judged {
     found: Found,
     /// ln of the probability density of the presses that were held out.
@@ -318,7 +318,7 @@ struct Search<'a> {
 impl Search<'_> {
     /// The evidence of all channels together, their noise about that of the last prior.
     fn total(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
-        /// How far the noise of a channel moves from one prior to the next, in powers of ten.
+        /// Most that the noise of a channel moves from one prior to the next, in powers of ten.
         const ABOUT: i32 = 2;
         self.watch.round()?;
         let (from, to) = self.decades.get();

@@ -282,7 +282,7 @@ impl ForceLinearLocator {
         self.stored.response
     }
 
-    /// How far each channel in use, from 0, drifted over the recording: the standard deviation of the change from its first row to its
+    /// Drift of each channel in use, from 0, over the recording: the standard deviation of the change from its first row to its
     /// last, in its unit; nothing where the presses do not tell a drift.
     pub fn drifts(&self) -> Vec<(usize, f64)> {
         let sd = self.stored.drift.sqrt();
@@ -465,7 +465,7 @@ impl ForceLinearLocator {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
-    /// How a place explains a reading.
+    /// Misfit, cost and force of a place for a reading.
     ///
     /// The force is found in steps from about `force_n`, each by the weights of the last.
     fn explain(&self, relative: &[f64], place: Place, force_n: f64) -> Explained {

@@ -34,7 +34,7 @@ pub(super) fn of_equal_ratio(fits: &[ChannelFit]) -> Vec<Vec<usize>> {
     channels.chunk_by(|a, b| fits[*a].ratio == fits[*b].ratio).map(<[usize]>::to_vec).collect()
 }
 
-/// What is asked of the process: the offset at the time `at`, then the influence at each place.
+/// Linear functionals of the process: the offset at the recording's end, then the influence at each place.
 struct Functionals {
     /// h, q × (1 + places).
     effects: Array2<f64>,

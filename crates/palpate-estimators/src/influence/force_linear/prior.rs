@@ -1,4 +1,4 @@
-//! What is taken of influence functions beforehand: how they may change along the surface, with the force, and in time.
+//! The prior of influence functions: how they may change along the surface, with the force, and in time.
 //!
 //! Channel c reads o_c + φ(F)·f_c(a) + drift + noise for the force F at the position a. All channels share the form of
 //!
@@ -47,7 +47,7 @@ impl Source {
     }
 
     /// g at a place a load's way from the sensor, in units of the surface's length.
-    fn at(self, way: &[f64]) -> f64 {
+    fn singular_part(self, way: &[f64]) -> f64 {
         /// A sensor has a size, within which a plate's curvature does not grow.
         const SIZE: f64 = 0.01;
         match (self, way) {
@@ -63,7 +63,7 @@ impl Source {
     }
 }
 
-/// What all channels share.
+/// The prior that all channels share.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Prior {
     pub extent: Extent,
@@ -189,7 +189,7 @@ impl Prior {
         all[..self.polynomials()].to_vec()
     }
 
-    /// What presses read of an offset and of each polynomial: n × (1 + polynomials).
+    /// H, the readings of presses by an offset and by each polynomial: n × (1 + polynomials).
     pub fn effects(&self, presses: &Presses) -> Array2<f64> {
         let mut effects = Array2::ones((presses.len(), 1 + self.polynomials()));
         for ((mut row, place_m), phi) in
@@ -208,12 +208,12 @@ impl Prior {
         let at = |sensor_m: &Vec<f64>| {
             let ways = place_m.iter().zip(sensor_m).map(|(a, p)| (a - p) * scale);
             way.iter_mut().zip(ways).for_each(|(out, d)| *out = d);
-            source.at(&way)
+            source.singular_part(&way)
         };
         sensors_m.iter().map(at).collect()
     }
 
-    /// What presses read of sensors at each of `sensors_m`, a column a sensor.
+    /// Readings of presses by sources at each of `sensors_m`, a column a sensor.
     pub fn sources(&self, presses: &Presses, sensors_m: &[Vec<f64>]) -> Array2<f64> {
         let mut sources =
             Array2::zeros((presses.len(), if self.source.is_some() { sensors_m.len() } else { 0 }));
