@@ -11,7 +11,7 @@
 //! explain a reading otherwise.
 
 use super::posterior::Functions;
-use super::prior::Source;
+use super::prior::{Prior, Source};
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{
     Axis, CUT, GridPosterior, PartOfCell, Parts, ToldForce, check_axes, neighbours, parts_of, weights_around,
@@ -87,21 +87,8 @@ pub(super) struct Stored {
     pub hardest_n: f64,
     /// The squared residual, in variances, from which on no contact explains a reading.
     pub residual_limit: f64,
-    pub kernel: Kernel,
-    /// Length scale of the influence functions along each coordinate, in metres.
-    pub lengths_m: Vec<f64>,
-    /// Kind of the point sensors whose places were looked for; nothing where the influences are smooth alone.
-    pub source: Option<Source>,
-    /// η²: the share of the influences' smooth part in what is expected of them; 0 where there is none.
-    pub smooth_part: f64,
-    /// How far the presses were found from linear: the relative change of an influence with the force.
-    pub nonlinearity: f64,
-    /// γ: readings follow this power of the force.
-    pub response: f64,
-    /// Root mean square force of the presses, in newtons.
-    pub force_scale_n: f64,
-    /// κ: the variance of the drift over the recording, over that of the noise.
-    pub drift: f64,
+    /// The prior that the presses chose.
+    pub prior: Prior,
     /// Rows of the recording that were set aside, from 0.
     pub set_aside: Vec<usize>,
     /// Number of presses that were learnt from.
@@ -191,10 +178,8 @@ impl Stored {
         for (what, list) in [("offset variance", offset_variances), ("influence variance", variances)] {
             numbers(what, list, |v| v >= 0.0, "finite and at least 0")?;
         }
-        numbers("smooth part", &[self.smooth_part], |share| share >= 0.0, "at least 0")?;
-        numbers("drift", &[self.drift], |drift| drift >= 0.0, "at least 0")?;
-        numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
-        let force = [self.hardest_n, self.force_scale_n, self.force_sd_n, self.known_force_n.unwrap_or(1.0)];
+        self.prior.check()?;
+        let force = [self.hardest_n, self.force_sd_n, self.known_force_n.unwrap_or(1.0)];
         numbers("force", &force, |force| force > 0.0, "greater than 0")?;
         numbers(
             "degrees of freedom of the noise",
@@ -252,12 +237,13 @@ impl ForceLinearLocator {
     /// The kernel of the influence functions' smooth part, and its length scale along each coordinate in metres; `None` where they
     /// have none besides polynomials and point sensors.
     pub fn correlation(&self) -> Option<(Kernel, &[f64])> {
-        (self.stored.smooth_part > 0.0).then_some((self.stored.kernel, &self.stored.lengths_m))
+        (self.stored.prior.smooth_part > 0.0)
+            .then_some((self.stored.prior.kernel, &self.stored.prior.lengths_m))
     }
 
     /// How far the presses were found from linear: the relative change of an influence with the force; 0 where they agree.
     pub fn nonlinearity(&self) -> f64 {
-        self.stored.nonlinearity
+        self.stored.prior.nonlinearity
     }
 
     /// Offset of each channel, in its unit; 0 of those that are not in use.
@@ -274,18 +260,18 @@ impl ForceLinearLocator {
 
     /// Kind of the point sensors whose places were looked for; nothing where the influences are smooth alone.
     pub fn source(&self) -> Option<Source> {
-        self.stored.source
+        self.stored.prior.source
     }
 
     /// The power of the force that readings follow; 1 where they are linear in it.
     pub fn response(&self) -> f64 {
-        self.stored.response
+        self.stored.prior.response
     }
 
     /// Drift of each channel in use, from 0, over the recording: the standard deviation of the change from its first row to its
     /// last, in its unit; nothing where the presses do not tell a drift.
     pub fn drifts(&self) -> Vec<(usize, f64)> {
-        let sd = self.stored.drift.sqrt();
+        let sd = self.stored.prior.drift.sqrt();
         if sd > 0.0 { self.channels().map(|(c, _, noise)| (c, sd * noise)).collect() } else { Vec::new() }
     }
 
@@ -329,7 +315,7 @@ impl ForceLinearLocator {
             let values = self.place_at(position, &mut buffer).values;
             let open = &self.stored.functions.offset_variances;
             let square: f64 = values.iter().zip(open).map(|(f, open)| f * f / (1.0 + open)).sum();
-            self.response_n(force_n) * square.sqrt()
+            self.stored.prior.response_n(force_n) * square.sqrt()
         };
         LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(signal))
     }
@@ -370,7 +356,7 @@ impl ForceLinearLocator {
         };
         self.reaches = (0..x.count * y.count).map(reach).collect();
         let typical = 2.0 * self.reaches.iter().sum::<f64>() / self.reaches.len().max(1) as f64;
-        let force_n = self.stored.known_force_n.unwrap_or(0.5 * self.stored.hardest_n);
+        let force_n = self.known_response_n().unwrap_or(0.5 * self.stored.hardest_n);
         let most = if y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS };
         self.parts = ((typical * force_n / FINE).ceil().min(most as f64) as usize).max(1);
     }
@@ -528,26 +514,9 @@ impl ForceLinearLocator {
         }
     }
 
-    /// φ of a force.
-    fn response_n(&self, force_n: f64) -> f64 {
-        let Stored { response, force_scale_n, .. } = self.stored;
-        force_scale_n * (force_n / force_scale_n).powf(response)
-    }
-
     /// φ of the known force.
     fn known_response_n(&self) -> Option<f64> {
-        self.stored.known_force_n.map(|force_n| self.response_n(force_n))
-    }
-
-    /// The force and its variance that belong to φ.
-    fn force_of(&self, response_n: f64, variance_n2: f64) -> (f64, f64) {
-        let Stored { response, force_scale_n, .. } = self.stored;
-        if response == 1.0 || response_n <= 0.0 {
-            return (response_n, variance_n2);
-        }
-        let force_n = force_scale_n * (response_n / force_scale_n).powf(1.0 / response);
-        let slope = force_n / (response * response_n);
-        (force_n, variance_n2 * slope * slope)
+        self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
 
     /// The posterior of a reading, less offsets and over the noise.
@@ -656,7 +625,8 @@ impl Parts for Between<'_> {
     fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
         let place = self.locator.between(x, y, self.buffer);
         let part = self.locator.explain(self.relative, place, self.force_n);
-        let (force_n, force_variance_n2) = self.locator.force_of(part.force_n, part.force_variance_n2);
+        let (force_n, force_variance_n2) =
+            self.locator.stored.prior.force_of_response(part.force_n, part.force_variance_n2);
         let weight = (-0.5 * (part.cost - self.least)).exp();
         PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
     }
@@ -742,14 +712,14 @@ impl LearntResponse<'_> {
 
 impl ResponseFunction for LearntResponse<'_> {
     fn at(&self, contact: Contact) -> f64 {
-        self.locator.response_n(contact.force_n) * self.influence(contact.position)
+        self.locator.stored.prior.response_n(contact.force_n) * self.influence(contact.position)
     }
 
     fn gradient(&self, Contact { position, force_n }: Contact) -> ResponseGradient {
         /// Half a difference, in steps of the grid.
         const REACH: f64 = 0.05;
         let [x, y] = self.locator.axes();
-        let response_n = self.locator.response_n(force_n);
+        let response_n = self.locator.stored.prior.response_n(force_n);
         let slope = |axis: Axis, moved: &dyn Fn(f64) -> Position| {
             if axis.count < 2 {
                 return 0.0;
@@ -761,7 +731,7 @@ impl ResponseFunction for LearntResponse<'_> {
         let along = slope(x, &|by_m| Position { x_m: position.x_m + by_m, ..position });
         let across = slope(y, &|by_m| Position { y_m: position.y_m + by_m, ..position });
         // φ is a power of the force.
-        let growth = self.locator.stored.response * response_n / force_n;
+        let growth = self.locator.stored.prior.response * response_n / force_n;
         ResponseGradient { position: [along, across], force: growth * self.influence(position) }
     }
 }

@@ -54,7 +54,7 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
         .collect();
     let functions = learnt.functions(&places_m, watch)?;
     let pressed = presses.force_n.iter().filter(|force_n| **force_n != 0.0);
-    let forces = mean_and_variance(pressed.map(|force_n| prior.response_to(*force_n) * prior.force_scale_n));
+    let forces = mean_and_variance(pressed.map(|force_n| prior.response_n(*force_n)));
     let mut locator = Stored {
         x,
         y,
@@ -65,16 +65,9 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
         mean_force_n: forces.0,
         // Presses of one force alone, beside untouched rows, say nothing of others.
         force_sd_n: if forces.1 > 0.0 { forces.1.sqrt() } else { forces.0.abs() },
-        hardest_n: prior.response_to(HARDEST * presses.greatest_force_n()) * prior.force_scale_n,
+        hardest_n: prior.response_n(HARDEST * presses.greatest_force_n()),
         residual_limit: f64::INFINITY,
-        kernel: prior.kernel,
-        lengths_m: prior.lengths_m.clone(),
-        smooth_part: prior.smooth_part,
-        nonlinearity: prior.nonlinearity,
-        source: prior.source,
-        response: prior.response,
-        force_scale_n: prior.force_scale_n,
-        drift: prior.drift,
+        prior: prior.clone(),
         set_aside: learnt.set_aside.clone(),
         presses: presses.len(),
         noise_freedom: presses.noise_freedom(),

@@ -15,6 +15,7 @@
 //! Drift is a random walk of each channel over the recording, of variance κ times the noise's from one end to the other.
 
 use super::presses::Presses;
+use crate::fit::LocatorFault;
 use ndarray::{Array1, Array2};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
@@ -64,7 +65,8 @@ impl Source {
 }
 
 /// The prior that all channels share.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Prior {
     pub extent: Extent,
     /// F̄.
@@ -74,6 +76,7 @@ pub(super) struct Prior {
     pub lengths_m: Vec<f64>,
     /// η².
     pub smooth_part: f64,
+    /// Kind of the point sensors whose places are looked for; nothing where the influences are smooth alone.
     pub source: Option<Source>,
     /// δ: the relative change of an influence with the force.
     pub nonlinearity: f64,
@@ -115,6 +118,34 @@ impl Prior {
     pub fn response_to(&self, force_n: f64) -> f64 {
         let relative = force_n / self.force_scale_n;
         if self.response == 1.0 { relative } else { relative.signum() * relative.abs().powf(self.response) }
+    }
+
+    /// φ, in newtons.
+    pub fn response_n(&self, force_n: f64) -> f64 {
+        self.response_to(force_n) * self.force_scale_n
+    }
+
+    /// The force and its variance that belong to φ.
+    pub fn force_of_response(&self, response_n: f64, variance_n2: f64) -> (f64, f64) {
+        if self.response == 1.0 || response_n <= 0.0 {
+            return (response_n, variance_n2);
+        }
+        let force_n = self.force_scale_n * (response_n / self.force_scale_n).powf(1.0 / self.response);
+        let slope = force_n / (self.response * response_n);
+        (force_n, variance_n2 * slope * slope)
+    }
+
+    /// Checks what a file may have got wrong.
+    pub fn check(&self) -> Result<(), LocatorFault> {
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        LocatorFault::check_count("length scales", self.extent.dimensions(), self.lengths_m.len())?;
+        numbers("length scale", &self.lengths_m, |length| length > 0.0, "finite and greater than 0")?;
+        let shares = [self.smooth_part, self.nonlinearity, self.drift];
+        numbers("smooth part, nonlinearity or drift", &shares, |share| share >= 0.0, "at least 0")?;
+        numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
+        numbers("force", &[self.force_scale_n], |force| force > 0.0, "greater than 0")
     }
 
     /// φ/F̄ of every press.
