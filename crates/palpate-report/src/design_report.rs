@@ -334,7 +334,12 @@ impl<'a> SensorDesignReport<'a> {
                 }
                 @if design.spacing_m > 0.0 { li { "Sensors are at least " (mm(design.spacing_m)) " mm apart." } }
                 @for kept in &design.keep_out { li { "Nothing sits within " (zone(kept.from, kept.to)) "." } }
-                @if !design.must_have.is_empty() { li { (counted(design.must_have.len(), "sensor is", "sensors are")) " part of every layout." } }
+                @if design.must_have.len() > design.kept.len() {
+                    li {
+                        (counted(design.must_have.len() - design.kept.len(), "sensor is", "sensors are"))
+                        " part of every layout."
+                    }
+                }
                 @if let Some(budget) = design.budget { li { "All together cost at most " (stated(budget)) "." } }
                 @if design.symmetry == Symmetry::Wanted { li { "Layouts mirror themselves." } }
                 @if design.symmetry == Symmetry::Forbidden { li { "No sensor mirrors another." } }

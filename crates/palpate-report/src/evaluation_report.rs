@@ -309,7 +309,9 @@ fn rig_facts(rig: &Rig, folds: usize, seed: u64) -> Vec<(&'static str, Markup)> 
         ("fitted from seed", text(seed.to_string())),
         ("estimator", text(rig.estimator.kind())),
     ];
-    facts.extend(rig.estimator.settings().into_iter().map(|setting| (setting.name, text(setting.value))));
+    facts.extend(
+        rig.estimator.settings(&rig.setup).into_iter().map(|setting| (setting.name, text(setting.value))),
+    );
     facts
 }
 

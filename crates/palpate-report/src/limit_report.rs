@@ -254,7 +254,7 @@ impl LimitReport<'_> {
         let [half, surely] = LightestTouch::FOUND.map(|found| stated(100.0 * found));
         html! {
             p {
-                "Below some force a reading is `no_contact`: noise alone could have made it. That bound is set so that an untouched                  surface is taken for a touched one in " (self.touch.rate().to_string()) " of its readings (`false_alarm_rate` in the rig). The                  lightest touch is the force that is found all the same, in " (half) " % and in " (surely) " % of its readings, by a                  locator that does not know the force."
+                "Below some force a reading is " code { "no_contact" } ": noise alone could have made it. That bound is set so that an untouched                  surface is taken for a touched one in " (self.touch.rate().to_string()) " of its readings (" code { "false_alarm_rate" } " in the rig). The                  lightest touch is the force that is found all the same, in " (half) " % and in " (surely) " % of its readings, by a                  locator that does not know the force."
             }
             @if let Some(TouchSummary { without: without @ 1.., .. }) = self.surely() {
                 p { "At " (counted(without, "position", "positions")) " no force is found." }

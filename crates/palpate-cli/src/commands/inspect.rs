@@ -48,7 +48,10 @@ fn rig(rig: &Rig) -> Vec<String> {
     }
     lines.push(format!("estimator: {}", rig.estimator.kind()));
     lines.extend(
-        rig.estimator.settings().iter().map(|setting| format!("    {}: {}", setting.name, setting.value)),
+        rig.estimator
+            .settings(&rig.setup)
+            .iter()
+            .map(|setting| format!("    {}: {}", setting.name, setting.value)),
     );
     lines
 }

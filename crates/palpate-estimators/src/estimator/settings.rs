@@ -2,10 +2,11 @@
 
 use super::Estimator;
 use crate::digit::{DigitEstimator, DigitTheory};
-use crate::influence::{Influence, InfluenceSource};
+use crate::influence::{Influence, InfluenceSource, Structure};
 use crate::network::{
     Activation, BackPropagation, InputScale, LevenbergMarquardt, Network, OutputCoding, PresentationOrder,
 };
+use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
 use palpate_mechanics::units::format_count;
 
@@ -27,10 +28,11 @@ impl Setting {
 }
 
 impl Estimator {
-    /// Every setting of the estimator, in words.
-    pub fn settings(&self) -> Vec<Setting> {
+    /// Every setting of the estimator for a setup, in words.
+    pub fn settings(&self, setup: &Setup) -> Vec<Setting> {
         match self {
             Self::Network(config) => network(config),
+            Self::Influence(config) if setup.surface().model().is_none() => measured_influence(*config),
             Self::Influence(config) => influence(*config),
             Self::Digit(DigitEstimator { theory, false_alarm_rate }) => {
                 let theory = match theory {
@@ -76,6 +78,20 @@ fn influence(config: Influence) -> Vec<Setting> {
         Setting::new("from", "influence functions from", from),
         Setting::new("contacts", "contacts at once, at most", config.contacts.to_string()),
         Setting::new("force_sd", "contact force", force),
+        false_alarms(config.false_alarm_rate),
+    ]
+}
+
+fn measured_influence(config: Influence) -> Vec<Setting> {
+    let structure = match config.structure {
+        Structure::Auto => "whichever the presses tell",
+        Structure::ForceLinear => "force-linear",
+        Structure::ForceMonotone => "force-monotone",
+        Structure::Free => "free",
+    };
+    vec![
+        Setting::new("from", "influence functions from", "the recording alone"),
+        Setting::new("structure", "structure of the readings", structure),
         false_alarms(config.false_alarm_rate),
     ]
 }

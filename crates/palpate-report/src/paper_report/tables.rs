@@ -398,8 +398,10 @@ impl Paper<'_> {
     /// The setting with that key, with every value that an arm gives it.
     fn network_row(&self, key: &str, paper: &str) -> Option<[String; 3]> {
         let arms = self.report.study.study.arms.iter();
-        let found: Vec<Setting> =
-            arms.flat_map(|arm| arm.rig.estimator.settings()).filter(|setting| setting.key == key).collect();
+        let found: Vec<Setting> = arms
+            .flat_map(|arm| arm.rig.estimator.settings(&arm.rig.setup))
+            .filter(|setting| setting.key == key)
+            .collect();
         let name = found.first()?.name;
         let mut values: Vec<String> = Vec::new();
         for setting in found {

@@ -18,7 +18,6 @@ use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{bisect, chi_squared_critical_value};
-use std::cell::Cell;
 
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
@@ -88,8 +87,8 @@ impl Learnt {
         let presses = presses.of_channels(&live);
         let searched = presses.thinned(MOST_SEARCHED);
         let extent = setup.surface().extent();
-        let decades = Cell::new((*ALL_DECADES.start(), *ALL_DECADES.end()));
-        let search = Search { presses: &searched, extent, structure, watch, decades };
+        let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
+        let mut search = Search { presses: &searched, extent, structure, watch, decades };
         let smooth = search.smooth()?;
         // Repeats tell more as one than spread over the recording, but for drift.
         let presses = match presses_of(Repeats::All) {
@@ -312,34 +311,34 @@ struct Search<'a> {
     structure: Structure,
     watch: Watch<'a>,
     /// Powers of ten about those of the noise of the channels, as the last prior told them.
-    decades: Cell<(i32, i32)>,
+    decades: (i32, i32),
 }
 
 impl Search<'_> {
     /// The evidence of all channels together, their noise about that of the last prior.
-    fn total(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
+    fn total(&mut self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
         /// Most that the noise of a channel moves from one prior to the next, in powers of ten.
         const ABOUT: i32 = 2;
         self.watch.round()?;
-        let (from, to) = self.decades.get();
+        let (from, to) = self.decades;
         let Some(fits) = Evidence::new(self.presses, prior, sensors_m).best_decades(from..=to) else {
             return Ok(f64::NEG_INFINITY);
         };
         let decades = || fits.iter().map(|fit| fit.ratio.log10().round() as i32);
         let (least, most) = (decades().min().unwrap_or(0), decades().max().unwrap_or(0));
-        self.decades.set(((least - ABOUT).max(*ALL_DECADES.start()), (most + ABOUT).min(*ALL_DECADES.end())));
+        self.decades = ((least - ABOUT).max(*ALL_DECADES.start()), (most + ABOUT).min(*ALL_DECADES.end()));
         Ok(fits.iter().map(|fit| fit.evidence).sum())
     }
 
     /// The same, of a prior whose noise may be of any size.
-    fn total_anew(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
-        self.decades.set((*ALL_DECADES.start(), *ALL_DECADES.end()));
+    fn total_anew(&mut self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Result<f64, Cancelled> {
+        self.decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
         self.total(prior, sensors_m)
     }
 
     /// The most probable smooth prior: the smoother kernel on sufficient evidence, length scales by ever smaller steps; drift, response and
     /// nonlinearity last.
-    fn smooth(&self) -> Result<Found, Cancelled> {
+    fn smooth(&mut self) -> Result<Found, Cancelled> {
         let rough = Prior::smooth(self.extent, self.presses);
         self.total_anew(&rough, &[])?;
         let (mut best, mut prior) = self.climb_lengths(rough)?;
@@ -366,7 +365,7 @@ impl Search<'_> {
         Ok(self.found(prior, &[]))
     }
 
-    fn best_of<const N: usize>(&self, priors: [Prior; N]) -> Result<(f64, Prior), Cancelled> {
+    fn best_of<const N: usize>(&mut self, priors: [Prior; N]) -> Result<(f64, Prior), Cancelled> {
         let mut best = None;
         for prior in priors {
             let total = self.total(&prior, &[])?;
@@ -378,7 +377,7 @@ impl Search<'_> {
     }
 
     /// The response to the force: linear, unless another exponent is more probable by [`LEAST_GAIN`].
-    fn response(&self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
+    fn response(&mut self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
         let (mut found, mut prior) =
             self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }))?;
         if found < best + LEAST_GAIN && self.structure != Structure::ForceMonotone {
@@ -401,18 +400,18 @@ impl Search<'_> {
 
     /// The most probable prior of point sensors: which kind of source, then what share is smooth and over what length; `None` where the
     /// presses are too few for its polynomials.
-    fn sources(&self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
+    fn sources(&mut self, smooth: &Prior) -> Result<Option<Found>, Cancelled> {
         /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
         let sensors_m = everywhere(self.extent);
-        let dimensions = self.extent.dimensions();
+        let (dimensions, length_m) = (self.extent.dimensions(), self.extent.length_m());
         let plane = dimensions == 2;
         let of_length = |source: Source, share: f64, length: f64| Prior {
             source: Some(source),
             kernel: if plane { Kernel::SquaredExponential } else { Kernel::Matern52 },
             smooth_part: share,
-            lengths_m: vec![length * self.extent.length_m(); dimensions],
+            lengths_m: vec![length * length_m; dimensions],
             ..smooth.clone()
         };
         let mut best: Option<(f64, Prior)> = None;
@@ -432,7 +431,7 @@ impl Search<'_> {
         let Some((_, source)) = kinds.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
         for share in shares {
             let lengths = if *share == 0.0 { &LENGTHS[..1] } else { &LENGTHS[..] };
-            self.decades.set((*ALL_DECADES.start(), *ALL_DECADES.end()));
+            self.decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
             for length in lengths {
                 let prior = of_length(source, *share, *length);
                 keep(self.total(&prior, &sensors_m)?, prior);
@@ -450,7 +449,7 @@ impl Search<'_> {
     }
 
     /// Steps along the logarithm of one length scale at a time while the evidence rises.
-    fn climb_lengths(&self, mut prior: Prior) -> Result<(f64, Prior), Cancelled> {
+    fn climb_lengths(&mut self, mut prior: Prior) -> Result<(f64, Prior), Cancelled> {
         let (shortest_m, longest_m) = (1e-3 * self.extent.length_m(), 10.0 * self.extent.length_m());
         let mut best = self.total(&prior, &[])?;
         for step in [2.0, std::f64::consts::SQRT_2, 1.2] {
