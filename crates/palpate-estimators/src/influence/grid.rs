@@ -116,7 +116,7 @@ pub(super) fn parts_of(
 ) -> impl Iterator<Item = (f64, f64)> + use<> {
     let along = Cut { node: place / y.count, count: x.count, parts };
     let across = Cut { node: place % y.count, count: y.count, parts };
-    along.middles().flat_map(move |(_, x)| across.middles().map(move |(_, y)| (x, y)))
+    along.middles().flat_map(move |x| across.middles().map(move |y| (x, y)))
 }
 
 /// A cell's extent along one axis in equal parts.
@@ -129,11 +129,11 @@ struct Cut {
 }
 
 impl Cut {
-    /// Number and middle of each part, in nodes; of those within the axis.
-    fn middles(self) -> impl Iterator<Item = (usize, f64)> + use<> {
+    /// Middle of each part, in nodes; of those within the axis.
+    fn middles(self) -> impl Iterator<Item = f64> + use<> {
         let parts = if self.count == 1 { 1 } else { self.parts };
-        let middles = (0..parts).map(move |k| (k, self.node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5));
-        middles.filter(move |(_, place)| (0.0..=(self.count - 1) as f64).contains(place))
+        let middles = (0..parts).map(move |k| self.node as f64 + (k as f64 + 0.5) / parts as f64 - 0.5);
+        middles.filter(move |place| (0.0..=(self.count - 1) as f64).contains(place))
     }
 }
 
@@ -163,12 +163,6 @@ pub(super) struct PartOfCell {
     pub force_variance_n2: f64,
     /// The least squared residual there.
     pub residual: f64,
-}
-
-/// Parts of a cell that tell what they are. A trait, as closures are not compiled for the instruction set of the work that they are part of.
-pub(super) trait Parts {
-    /// The part of a column and row of a cell, at (x, y) in nodes.
-    fn part(&mut self, number: [usize; 2], at: [f64; 2]) -> PartOfCell;
 }
 
 /// Parts of a cell next to each other along one axis, of even width.
@@ -215,22 +209,10 @@ impl GridPosterior {
         }
     }
 
-    /// Adds the cell of a place, cut into so many parts along each axis; `part` is asked for the part at (x, y), in nodes.
-    pub fn add_cell(&mut self, place: usize, parts: usize, part: impl FnMut(f64, f64) -> PartOfCell) {
-        struct At<F>(F);
-        impl<F: FnMut(f64, f64) -> PartOfCell> Parts for At<F> {
-            fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
-                (self.0)(x, y)
-            }
-        }
+    /// Adds the cell of a place, cut into so many parts along each axis that varies; `part` is asked for the part at (x, y), in nodes,
+    /// column by column.
+    pub fn add_cell(&mut self, place: usize, parts: usize, mut part: impl FnMut(f64, f64) -> PartOfCell) {
         let parts = self.axes.map(|axis| if axis.count > 1 { parts } else { 1 });
-        self.add_cut_cell(place, parts, &mut At(part));
-    }
-
-    /// Adds the cell of a place, cut into so many parts along each axis; `of` is asked for the part of this column and row at (x, y), in
-    /// nodes, column by column.
-    #[inline(always)]
-    pub fn add_cut_cell(&mut self, place: usize, parts: [usize; 2], of: &mut impl Parts) {
         let [x_axis, y_axis] = self.axes;
         let across = Cut { node: place % y_axis.count, count: y_axis.count, parts: parts[1] };
         let along = Cut { node: place / y_axis.count, count: x_axis.count, parts: parts[0] };
@@ -238,25 +220,24 @@ impl GridPosterior {
         let half = |axis: Axis, parts: usize| 0.5 * axis.step / parts as f64;
         let mut cell = Cell { place, moments: Moments::default(), peak: 0.0 };
         let first_row = self.rows.len();
-        self.rows.extend(across.middles().map(|(_, y)| Slice {
+        self.rows.extend(across.middles().map(|y| Slice {
             middle_m: y_axis.value(y),
             half_m: half(y_axis, parts[1]),
             weight: 0.0,
         }));
-        for (column, x) in along.middles() {
+        for x in along.middles() {
             let x_m = x_axis.value(x);
             let mut slice = Slice { middle_m: x_m, half_m: half(x_axis, parts[0]), weight: 0.0 };
-            for ((row, y), sum) in across.middles().zip(first_row..) {
-                let PartOfCell { weight, force_n, force_variance_n2, residual } =
-                    of.part([column, row], [x, y]);
+            for (y, row) in across.middles().zip(first_row..) {
+                let PartOfCell { weight, force_n, force_variance_n2, residual } = part(x, y);
                 if weight > 0.0 {
                     self.residual = self.residual.min(residual);
                     cell.peak = cell.peak.max(weight);
                     let weight = weight * area;
-                    cell.moments.add(weight, [x_m, self.rows[sum].middle_m, force_n]);
+                    cell.moments.add(weight, [x_m, self.rows[row].middle_m, force_n]);
                     cell.moments.add_force_variance(weight, force_variance_n2);
                     slice.weight += weight;
-                    self.rows[sum].weight += weight;
+                    self.rows[row].weight += weight;
                 }
             }
             if slice.weight > 0.0 {

@@ -14,7 +14,7 @@ use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{
-    Axis, CUT, GridPosterior, PartOfCell, Parts, ToldForce, check_axes, neighbours, parts_of, weights_around,
+    Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
 };
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
@@ -111,8 +111,6 @@ pub struct ForceLinearLocator {
     reaches: Vec<f64>,
     /// Bounds of what each place costs a reading.
     scan: Scan,
-    /// Into how many parts each cell is cut along each axis when a reading is located within it.
-    parts: usize,
     /// The largest square of a relative reading of noise alone.
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
@@ -137,11 +135,10 @@ impl Stored {
             stored: self,
             reaches: Vec::new(),
             scan: Scan::default(),
-            parts: 1,
             noise_bound: 0.0,
             detection_bound: 0.0,
         };
-        locator.cut_cells();
+        locator.find_reaches();
         locator.scan = Scan::new(&locator);
         locator.bound_noise();
         locator
@@ -347,18 +344,14 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Finds the reaches of the places, and how finely cells must be cut.
-    fn cut_cells(&mut self) {
+    /// Finds the reaches of the places.
+    fn find_reaches(&mut self) {
         let [x, y] = self.axes();
         let reach = |place: usize| {
             let ways = neighbours([x, y], place).map(|other| self.way_between(place, other));
             0.5 * ways.fold(0.0, f64::max)
         };
         self.reaches = (0..x.count * y.count).map(reach).collect();
-        let typical = 2.0 * self.reaches.iter().sum::<f64>() / self.reaches.len().max(1) as f64;
-        let force_n = self.known_response_n().unwrap_or(0.5 * self.stored.hardest_n);
-        let most = if y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS };
-        self.parts = ((typical * force_n / FINE).ceil().min(most as f64) as usize).max(1);
     }
 
     /// How far, per newton and over the noise, the influences of one place are from those of another; from any multiple of them
@@ -541,7 +534,7 @@ impl ForceLinearLocator {
                 }
             }
         }
-        for (x, y) in parts_of(axes, self.parts, best) {
+        for (x, y) in parts_of(axes, self.parts_of_cell(best, bounds[best].force_n), best) {
             let part = self.explain(relative, self.between(x, y, &mut buffer), bounds[best].force_n);
             least = least.min(part.cost);
         }
@@ -556,9 +549,9 @@ impl ForceLinearLocator {
                 continue;
             }
             let parts = self.parts_of_cell(place, found.force_n);
-            let mut between =
-                Between { locator: self, relative, least, force_n: found.force_n, buffer: &mut buffer };
-            posterior.add_cut_cell(place, parts, &mut between);
+            posterior.add_cell(place, parts, |x, y| {
+                self.part(relative, self.between(x, y, &mut buffer), found.force_n, least)
+            });
         }
         posterior
     }
@@ -575,18 +568,30 @@ impl ForceLinearLocator {
         let least = costs.fold(f64::INFINITY, f64::min);
         let mut buffer = Buffer::default();
         for place in 0..self.reaches.len() {
-            let parts = self.axes().map(|axis| if axis.count > 1 { self.parts } else { 1 });
-            let mut between = Between { locator: self, relative, least, force_n, buffer: &mut buffer };
-            posterior.add_cut_cell(place, parts, &mut between);
+            posterior.add_cell(place, self.most_parts(), |x, y| {
+                self.part(relative, self.between(x, y, &mut buffer), force_n, least)
+            });
         }
         posterior.estimate(self.stored.residual_limit)
     }
 
     /// Into how many parts the cell of a place is cut along each axis for a contact of about this force.
-    fn parts_of_cell(&self, place: usize, force_n: f64) -> [usize; 2] {
-        let most = if self.stored.y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS };
-        let parts = ((2.0 * self.reaches[place] * force_n / FINE).ceil().min(most as f64) as usize).max(1);
-        self.axes().map(|axis| if axis.count > 1 { parts } else { 1 })
+    fn parts_of_cell(&self, place: usize, force_n: f64) -> usize {
+        ((2.0 * self.reaches[place] * force_n / FINE).ceil().min(self.most_parts() as f64) as usize).max(1)
+    }
+
+    /// The finest cut of a cell.
+    fn most_parts(&self) -> usize {
+        if self.stored.y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS }
+    }
+
+    /// A place as part of a cell; its weight is relative to that of the cost `least`.
+    fn part(&self, relative: &[f64], place: Place, force_n: f64, least: f64) -> PartOfCell {
+        let part = self.explain(relative, place, force_n);
+        let (force_n, force_variance_n2) =
+            self.stored.prior.force_of_response(part.force_n, part.force_variance_n2);
+        let weight = (-0.5 * (part.cost - least)).exp();
+        PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
     }
 
     /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
@@ -609,26 +614,6 @@ impl ForceLinearLocator {
         }
         variances.iter_mut().for_each(|variance| *variance = variance.max(0.0));
         Place { values, variances, covariances }
-    }
-}
-
-/// Parts of a cell, as a reading sees them.
-struct Between<'a> {
-    locator: &'a ForceLinearLocator,
-    relative: &'a [f64],
-    least: f64,
-    force_n: f64,
-    buffer: &'a mut Buffer,
-}
-
-impl Parts for Between<'_> {
-    fn part(&mut self, _: [usize; 2], [x, y]: [f64; 2]) -> PartOfCell {
-        let place = self.locator.between(x, y, self.buffer);
-        let part = self.locator.explain(self.relative, place, self.force_n);
-        let (force_n, force_variance_n2) =
-            self.locator.stored.prior.force_of_response(part.force_n, part.force_variance_n2);
-        let weight = (-0.5 * (part.cost - self.least)).exp();
-        PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
     }
 }
 
