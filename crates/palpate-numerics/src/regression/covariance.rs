@@ -8,6 +8,7 @@
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
 use super::kernel::squared_distances_into;
+use super::groups::Groups;
 use super::{Kernel, Trend};
 use crate::{Cholesky, NotPositiveDefinite};
 
@@ -41,6 +42,11 @@ impl Points {
             Array2::from_shape_fn((d, n), |(k, i)| (coordinates[[k, i]] - centre[k]) / divisors[k])
         };
         Self { scaled: over(length_scales), basis: trend.basis(&over(spread).view()) }
+    }
+
+    /// All points of some groups.
+    pub fn of_groups(groups: &Groups, length_scales: &[f64], trend: Trend) -> Self {
+        Self::new(&groups.coordinates.view(), &groups.centre, &groups.spread, length_scales, trend)
     }
 
     /// C, and dC/d(r²) where `slopes` wants it; lower triangles.

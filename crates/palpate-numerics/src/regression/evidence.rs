@@ -40,8 +40,7 @@ impl Evidence<'_> {
     ) -> Result<f64, NotPositiveDefinite> {
         let groups = self.groups;
         let (scales, ratio) = (&hyperparameters.length_scales, hyperparameters.noise_ratio);
-        let points =
-            Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, self.trend);
+        let points = Points::of_groups(groups, scales, self.trend);
         let noise = groups.noise_ratios(ratio);
         let mut slopes = Array2::zeros((groups.len(), groups.len()));
         let correlations = points.correlations(self.kernel, Some(&mut slopes));

@@ -104,7 +104,7 @@ impl GaussianProcess {
         }
         let ratio = hyperparameters.noise_ratio;
         let scales = &hyperparameters.length_scales;
-        let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let points = Points::of_groups(groups, scales, trend);
         let noise = groups.noise_ratios(ratio);
         let covariance = Covariance::regularised(&points, kernel, &noise)?;
         let (alpha, beta) = covariance.solve(&groups.means);
@@ -130,7 +130,7 @@ impl GaussianProcess {
     ) -> Result<Self, RegressionError> {
         let ratio = hyperparameters.noise_ratio;
         let scales = &hyperparameters.length_scales;
-        let all = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let all = Points::of_groups(groups, scales, trend);
         let noise = groups.noise_ratios(ratio);
         let chosen = reduced::chosen(kernel, &all.scaled.view(), ratio, INDUCING);
         let rows = Rows {

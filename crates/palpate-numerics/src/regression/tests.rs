@@ -380,7 +380,7 @@ fn chosen_points_tell_what_all_do() {
         // The textbook's variance, of all rows.
         let noise = groups.noise_ratios(found.noise_ratio);
         let scales = &found.length_scales;
-        let points = Points::new(&groups.coordinates.view(), &groups.centre, &groups.spread, scales, trend);
+        let points = Points::of_groups(&groups, scales, trend);
         let covariance = Covariance::regularised(&points, kernel, &noise).unwrap();
         let at = samples_of(50, 11).0;
         for at in at.outer_iter() {
