@@ -2,11 +2,12 @@
 //!
 //! Times are for one core of some 3 GHz, to within a factor of a few; memory to within a half.
 
-use super::Estimator;
-use crate::influence::{Influence, Structure};
+use super::{CHOICE_FOLDS, Estimator};
+use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
+use crate::influence::{self, Influence, Structure};
 use crate::recording::Recording;
 use crate::setup::Setup;
-use palpate_mechanics::surface::Extent;
+use crate::{neighbours, network};
 use palpate_numerics::regression::{INDUCING, MOST_EXACT};
 use std::collections::HashSet;
 
@@ -39,7 +40,6 @@ struct Sizes {
     channels: f64,
     /// Distinct contacts, each with its force and its nuisance coordinate.
     presses: f64,
-    is_plane: bool,
     has_nuisance: bool,
 }
 
@@ -48,11 +48,14 @@ impl Estimator {
     pub fn fit_cost(&self, setup: &Setup, recording: &Recording) -> FitCost {
         let sizes = Sizes::new(setup, recording);
         let own = match self {
-            Self::GaussianProcess(_) => sizes.process(sizes.rows, sizes.channels + 1.0, 2.0),
+            Self::GaussianProcess(process) => {
+                sizes.process(sizes.rows, sizes.channels + 1.0, 2.0, process.search_points)
+            }
             Self::Influence(influence) => sizes.influence(influence, setup, recording),
             Self::Neighbours(_) => FitCost {
                 memory_bytes: sizes.rows * (NUMBER * sizes.channels + 80.0),
-                seconds: sizes.rows.min(4000.0) * sizes.rows * sizes.channels / LOOPS,
+                seconds: sizes.rows.min(neighbours::MOST_HELD_OUT as f64) * sizes.rows * sizes.channels
+                    / LOOPS,
             },
             Self::Network(network) => {
                 let nodes = network.hidden.iter().sum::<usize>() as f64;
@@ -65,7 +68,7 @@ impl Estimator {
             Self::NetworkLm(levenberg) => {
                 let weights = levenberg.hidden.iter().sum::<usize>() as f64 * (sizes.channels + 3.0);
                 let steps = 2.0 * levenberg.ensemble as f64 * f64::from(levenberg.max_iterations);
-                let rows = sizes.rows.min(1000.0);
+                let rows = sizes.rows.min(network::MOST_PRESSES as f64);
                 FitCost {
                     memory_bytes: 3.0 * NUMBER * (sizes.rows * sizes.channels + 2.0 * rows * weights),
                     seconds: steps * 2.0 * rows * weights * weights / PRODUCTS,
@@ -77,10 +80,10 @@ impl Estimator {
             Self::Auto => {
                 let contenders = Self::contenders(setup);
                 let costs = contenders.iter().map(|contender| contender.fit_cost(setup, recording));
-                // One after the other, in five folds.
+                // One after the other, in each fold.
                 costs.fold(FitCost { memory_bytes: 0.0, seconds: 0.0 }, |sum, cost| FitCost {
                     memory_bytes: sum.memory_bytes.max(cost.memory_bytes),
-                    seconds: sum.seconds + 5.0 * cost.seconds,
+                    seconds: sum.seconds + CHOICE_FOLDS as f64 * cost.seconds,
                 })
             }
         };
@@ -102,17 +105,15 @@ impl Sizes {
             rows: recording.rows.len() as f64,
             channels: setup.layout().len() as f64,
             presses: presses.len() as f64,
-            is_plane: matches!(setup.surface().extent(), Extent::Plane { .. }),
             has_nuisance: recording.rows.iter().any(|row| row.nuisance.is_some()),
         }
     }
 
-    /// A Gaussian process of so many points, their coordinates and outputs.
-    fn process(&self, points: f64, coordinates: f64, outputs: f64) -> FitCost {
-        const SEARCHED: f64 = 500.0;
+    /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
+    fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
         /// Evaluations of the evidence, each a factor and an inverse.
         const EVALUATIONS: f64 = 60.0;
-        let searched = points.min(SEARCHED);
+        let searched = points.min(search_points as f64);
         let search = EVALUATIONS * 2.0 * searched.powi(3) / PRODUCTS;
         let rows = 4.0 * NUMBER * points * (coordinates + outputs);
         if points <= MOST_EXACT as f64 {
@@ -129,15 +130,17 @@ impl Sizes {
     }
 
     fn influence(&self, influence: &Influence, setup: &Setup, recording: &Recording) -> FitCost {
-        /// Presses that influence functions are learnt from, and nodes of a table of theirs.
-        const LEARNT: f64 = 1000.0;
-        let nodes = if self.is_plane { 6400.0 } else { 400.0 };
-        let is_free = setup.surface().model().is_none()
+        let extent = setup.surface().extent();
+        // Other tables than those of the free structure have fewer.
+        let nodes = most_nodes(extent) as f64;
+        let has_model = setup.surface().model().is_some();
+        let is_free = !has_model
             && (influence.structure == Structure::Free
                 || self.has_nuisance
                 || recording.rows.iter().any(|row| row.force_n.is_none()));
         if !is_free {
-            let presses = self.presses.min(LEARNT);
+            let learnt = if has_model { influence::MOST_LEARNT } else { influence::MOST_PRESSES };
+            let presses = self.presses.min(learnt as f64);
             let factors = 6.0 * self.channels * presses.powi(3) / PRODUCTS;
             return FitCost {
                 memory_bytes: NUMBER * (6.0 * presses * presses + nodes * (presses + 4.0 * self.channels)),
@@ -146,16 +149,15 @@ impl Sizes {
                     + self.channels * nodes * presses * presses / 2.0 / LOOPS,
             };
         }
-        let depth = match (
-            self.has_nuisance || recording.rows.iter().any(|row| row.force_n.is_some()),
-            self.is_plane,
-        ) {
-            (false, _) => 1.0,
-            (true, true) => 16.0,
-            (true, false) => 64.0,
-        };
-        let coordinates = 1.0 + f64::from(u8::from(self.is_plane)) + f64::from(u8::from(depth > 1.0));
-        let process = self.process(self.presses, coordinates, self.channels);
+        let has_depth = self.has_nuisance || recording.rows.iter().any(|row| row.force_n.is_some());
+        let depth = if has_depth { most_nuisance_nodes(extent) as f64 } else { 1.0 };
+        let coordinates = (extent.dimensions() + usize::from(has_depth)) as f64;
+        let process = self.process(
+            self.presses,
+            coordinates,
+            self.channels,
+            MeasuredInfluence::default().search_points,
+        );
         let kept = if self.presses <= MOST_EXACT as f64 { self.presses } else { INDUCING as f64 };
         let table = FitCost {
             memory_bytes: NUMBER * nodes * depth * (5.0 * self.channels + 16.0),

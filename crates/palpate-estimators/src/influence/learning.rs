@@ -365,7 +365,7 @@ const MOST_PRESSES: usize = 60;
 
 /// Presses that the functions are learnt from: a calibration that errs by this much less than a reading adds less than a hundredth to the
 /// error, while time and memory grow with the cube and the square of the presses.
-const MOST_LEARNT: usize = 800;
+pub(crate) const MOST_LEARNT: usize = 800;
 
 /// log₁₀ of the five spreads, with the bounds of each. The lower bounds mean "not at all".
 const START: [f64; 5] = [-2.0, -3.0, -3.0, -4.0, -4.0];

@@ -15,8 +15,10 @@ mod prior;
 
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
+pub(crate) use force_linear::MOST_PRESSES;
 pub use force_linear::{ForceLinearLocator, Source};
 pub use grid::Axis;
+pub(crate) use learning::MOST_LEARNT;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 

@@ -84,7 +84,7 @@ impl Fit for Neighbours {
 }
 
 /// Rows that are held out; their errors tell the number of neighbours and how far off they are long before all are.
-const MOST_HELD_OUT: usize = 4000;
+pub(crate) const MOST_HELD_OUT: usize = 4000;
 
 /// Errors (x, y) in metres of every row, or of evenly picked ones, by 1, 2, … neighbours at other positions, up to `most` or as many
 /// as every row has.

@@ -13,6 +13,7 @@ mod logistic;
 mod prepared;
 mod train;
 
+pub(crate) use levenberg_marquardt::MOST_PRESSES;
 pub use levenberg_marquardt::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,

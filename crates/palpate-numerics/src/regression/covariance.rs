@@ -7,8 +7,8 @@
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
-use super::kernel::squared_distances_into;
 use super::groups::Groups;
+use super::kernel::squared_distances_into;
 use super::{Kernel, Trend};
 use crate::{Cholesky, NotPositiveDefinite};
 

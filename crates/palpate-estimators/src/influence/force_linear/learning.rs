@@ -22,7 +22,7 @@ use palpate_numerics::{bisect, chi_squared_critical_value};
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
 /// Presses that are learnt from; the time grows with their cube, and so many tell all that there is.
-const MOST_PRESSES: usize = 1000;
+pub(crate) const MOST_PRESSES: usize = 1000;
 /// Distinct positions from which on every fifth can be held out.
 const LEAST_TO_JUDGE: usize = 6;
 /// Every fifth position is held out.

@@ -10,6 +10,7 @@ mod posterior;
 mod presses;
 mod prior;
 
+pub(crate) use learning::MOST_PRESSES;
 pub use locator::ForceLinearLocator;
 pub use prior::Source;
 

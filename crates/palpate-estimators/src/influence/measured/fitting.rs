@@ -27,6 +27,22 @@ const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
+/// Most nodes of a table over the positions of a surface.
+pub(crate) const fn most_nodes(extent: Extent) -> usize {
+    match extent {
+        Extent::Line { .. } => MOST_ALONG,
+        Extent::Plane { .. } => MOST_OF_PLANE * MOST_OF_PLANE,
+    }
+}
+
+/// Most nodes along the nuisance coordinate of a surface.
+pub(crate) const fn most_nuisance_nodes(extent: Extent) -> usize {
+    match extent {
+        Extent::Line { .. } => MOST_OF_NUISANCE,
+        Extent::Plane { .. } => MOST_OF_NUISANCE_OF_PLANE,
+    }
+}
+
 impl Fit for MeasuredInfluence {
     type Method = MeasuredLocator;
     type Error = MeasuredError;
@@ -136,15 +152,16 @@ impl Presses {
             let values = self.coordinates.column(k).to_vec();
             Axis::over(values, bounds, lengths[k], most)
         };
-        let (most, most_nuisance) = match extent {
-            Extent::Line { .. } => (MOST_ALONG, MOST_OF_NUISANCE),
-            Extent::Plane { .. } => (MOST_OF_PLANE, MOST_OF_NUISANCE_OF_PLANE),
+        let most = match extent {
+            Extent::Line { .. } => MOST_ALONG,
+            Extent::Plane { .. } => MOST_OF_PLANE,
         };
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let along = axis(0, (0.0, extent.length_m()), most);
         let across = extent.width_m().map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
-        let nuisance =
-            self.has_nuisance.then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance));
+        let nuisance = self
+            .has_nuisance
+            .then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance_nodes(extent)));
         [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
     }
 }

@@ -22,6 +22,7 @@ mod presses;
 mod table;
 
 pub use config::{MeasuredError, MeasuredInfluence, Scale};
+pub(crate) use fitting::{most_nodes, most_nuisance_nodes};
 pub use locator::{MeasuredLocator, NuisanceRole};
 pub use table::Table;
 

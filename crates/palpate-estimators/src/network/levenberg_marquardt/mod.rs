@@ -55,7 +55,7 @@ impl Default for LevenbergMarquardt {
 /// A network learns from at most this many presses, drawn at random, each of an ensemble from others (Bühlmann and Yu,
 /// *Analyzing bagging*, Annals of Statistics 30, 2002): a step costs presses × weights², and what more presses tell goes into the
 /// ensemble.
-const MOST_PRESSES: usize = 1000;
+pub(crate) const MOST_PRESSES: usize = 1000;
 
 /// A recording that the networks cannot be fitted to.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
