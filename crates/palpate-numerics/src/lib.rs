@@ -11,6 +11,7 @@
 //! assert_eq!(median(vec![3.0, 1.0, 2.0, 10.0]), Some(2.5));
 //! assert!((normal_interval_95(0.2, 0.001).1 - 0.20196).abs() < 1e-6);
 //! assert!((chi_squared_critical_value(0.05, 8) - 15.507).abs() < 1e-3); // exceeded with a probability of 5 %
+//! assert!((chi_squared_survival(15.507, 8) - 0.05).abs() < 1e-4);
 //! ```
 #![cfg_attr(
     not(test),

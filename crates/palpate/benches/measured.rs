@@ -2,7 +2,7 @@
 //! nuisance coordinate; beside them a sum of the likelihood over every node of the same table. One core, CPU time, medians.
 //!
 //! `cargo bench -p palpate --bench measured -- rows`: seconds and peak memory of the fit of every estimator that takes so many rows to 100,000 rows at 20,000
-//! positions, each in a process of its own, with what was estimated before, and the error beside that of a fit to 3,000 of the rows.
+//! positions, each in a process of its own, with what was estimated before, and the error beside that of a fit to every 33rd row.
 
 use cpu_time::ThreadTime;
 use palpate_core::ContactEstimate;

@@ -175,7 +175,7 @@ fn a_strip_over_air_is_as_scikit_learn_has_it() {
     check_strip("1d-air-2.0mm.csv", 0.600, 0.824);
 }
 
-/// Five exact processes of 3,844 rows take most of a minute.
+/// Five exact processes of 3,844 rows: the longest of these tests.
 #[test]
 fn a_magnetic_pad_is_as_scikit_learn_has_it() {
     let Some((setup, recording)) = pad_recording() else { return };
