@@ -11,7 +11,7 @@ use palpate_mechanics::units::{Dimension, Unit, format_length_mm};
 
 use crate::error::RigError;
 use crate::rig::Rig;
-use roles::{Left, PositionRole, Roles, range, suffixed};
+use roles::{Left, PositionRole, Roles, name_and_unit, range};
 
 /// Hints about a recording: columns by their headings, with or without units, or by their numbers from 1 where there is
 /// no header.
@@ -446,9 +446,7 @@ impl FirstRig {
 
 /// The unit that a heading says.
 fn own_unit(column: &TableColumn) -> Option<Unit> {
-    let heading = Heading::parse(&column.heading);
-    let suffix = || suffixed(heading.name).filter(|_| heading.unit.is_none()).map(|(_, unit)| unit);
-    heading.known_unit().or_else(suffix)
+    name_and_unit(Heading::parse(&column.heading)).1
 }
 
 /// The unit that numbers of a dimension are in where nothing is said.

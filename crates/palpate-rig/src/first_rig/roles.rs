@@ -319,11 +319,7 @@ impl Name {
     fn new(table: &Table, index: usize) -> Self {
         let text = &table.columns[index].heading;
         let heading = Heading::parse(text);
-        // As in `position_mm`.
-        let (name, unit) = match suffixed(heading.name).filter(|_| heading.unit.is_none()) {
-            Some((name, unit)) => (name, Some(unit)),
-            None => (heading.name, heading.known_unit()),
-        };
+        let (name, unit) = name_and_unit(heading);
         let foreign_unit = heading.unit.filter(|_| unit.is_none()).map(str::to_owned);
         let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
         let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -359,7 +355,7 @@ struct Guess<'a> {
 }
 
 impl Guess<'_> {
-    /// The columns of numbers, or of timestamps, that `fit`.
+    /// The columns that are free, can be named in a rig, and whose names `fit`.
     fn columns(&self, taken: &[usize], fit: impl Fn(&Name) -> bool) -> Vec<usize> {
         let free = (0..self.names.len()).filter(|i| !taken.contains(i) && self.names[*i].can_be_named);
         free.filter(|i| fit(&self.names[*i])).collect()
@@ -505,8 +501,16 @@ impl Guess<'_> {
     }
 }
 
+/// The name in a heading and its unit, which may also stand as in `position_mm`.
+pub(super) fn name_and_unit(heading: Heading<'_>) -> (&str, Option<Unit>) {
+    match suffixed(heading.name).filter(|_| heading.unit.is_none()) {
+        Some((name, unit)) => (name, Some(unit)),
+        None => (heading.name, heading.known_unit()),
+    }
+}
+
 /// The parts of a name with a unit behind it, as palpate itself writes them: `position_mm`, `force_n`.
-pub(super) fn suffixed(name: &str) -> Option<(&str, Unit)> {
+fn suffixed(name: &str) -> Option<(&str, Unit)> {
     let (name, unit) = name.rsplit_once('_').filter(|(name, _)| !name.is_empty())?;
     let unit = Unit::from_symbol(if unit == "n" { "N" } else { unit })?;
     (unit != Unit::NONE).then_some((name, unit))
