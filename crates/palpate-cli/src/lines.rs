@@ -53,7 +53,7 @@ pub struct DialectNote(String);
 impl DialectNote {
     /// Says on stderr what is new of the dialect.
     pub fn say(&mut self, dialect: &Dialect) {
-        let words = if dialect.is_plain() { String::new() } else { dialect.to_string() };
+        let words = dialect.to_string();
         if words != self.0 {
             eprintln!("{}: {words}", dialect.source);
             self.0 = words;

@@ -135,7 +135,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// What holds where a key is not said and its comment is silent.
+    /// Value of a key that is not said, where its comment is silent.
     fn default(&self, field: &Field, file: &Path) -> String {
         let fields_of = |item: &&Item| matches!(&item.shape, Shape::Struct(fields) if fields.iter().any(|own| std::ptr::eq(own, field)));
         let all_default =
@@ -156,7 +156,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// What can be written, in words.
+    /// Values of a type, in words.
     fn value(&self, file: &Path, type_text: &str) -> String {
         let text = type_text.trim();
         let (name, inner) = match text.split_once('<') {

@@ -39,8 +39,9 @@ pub struct Variant {
     pub name: String,
     pub docs: String,
     pub is_default: bool,
-    /// What it holds: fields of its own, or one type.
+    /// Fields of its own.
     pub fields: Vec<Field>,
+    /// The one type in its parentheses.
     pub holds: Option<String>,
 }
 

@@ -105,11 +105,17 @@ fn complaint(error: &FirstRigError, name: &str) -> Failure {
 }
 
 fn separator(text: &str) -> Result<Separator, String> {
-    let found = Separator::ALL.into_iter().find(|separator| separator.name() == text);
-    found.ok_or_else(|| format!("`{text}` is none of comma, semicolon, tab"))
+    word(text, &Separator::ALL, Separator::name)
 }
 
 fn decimal(text: &str) -> Result<Decimal, String> {
-    let found = Decimal::ALL.into_iter().find(|decimal| decimal.name() == text);
-    found.ok_or_else(|| format!("`{text}` is none of point, comma"))
+    word(text, &Decimal::ALL, Decimal::name)
+}
+
+fn word<T: Copy>(text: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {
+    let found = all.iter().copied().find(|value| name(*value) == text);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|value| name(*value)).collect();
+        format!("`{text}` is none of {}", known.join(", "))
+    })
 }

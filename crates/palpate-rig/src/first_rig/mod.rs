@@ -270,9 +270,7 @@ impl FirstRig {
         if self.roles.force.is_none() {
             toml.text.push('\n');
             toml.comment("[contact]");
-            toml.comment(
-                "force = \"3 N\"                   # where every contact, also in use, has one known force",
-            );
+            toml.line("# force = \"3 N\"", "where every contact, also in use, has one known force");
         }
     }
 
