@@ -5,8 +5,9 @@
 //! the process claims of them is checked, and its variance widened where it is too small. Presses that no function explains are set
 //! aside, and the rest learnt anew.
 
+use super::drift::DriftCourse;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
-use super::posterior::{Functions, functions, of_equal_ratio};
+use super::posterior::{Functions, functions, of_equal_ratio, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use crate::influence::config::Structure;
@@ -277,16 +278,16 @@ impl Found {
         errors: &mut Vec<[f64; 3]>,
         watch: Watch,
     ) -> Result<(), MeasuredError> {
-        let places_m: Vec<Vec<f64>> = held.iter().map(|i| presses.positions_m[*i].clone()).collect();
-        let functions = all_functions(&self.prior, kept, &self.fits, &self.sensors_m, &places_m, watch)?;
-        for (c, (functions, fit)) in functions.iter().zip(&self.fits).enumerate() {
-            for (k, &i) in held.iter().enumerate() {
-                let phi = self.prior.response_to(presses.force_n[i]);
-                let error =
-                    presses.means[[i, c]] + presses.centre[c] - functions.offset - phi * functions.values[k];
-                let process = functions.offset_variance
-                    + phi * (2.0 * functions.covariances[k] + phi * functions.variances[k]);
-                errors.push([error * error, fit.noise_variance() / presses.count[i], process.max(0.0)]);
+        let others = presses.select(held);
+        for channels in of_equal_ratio(&self.fits) {
+            watch.round()?;
+            let asked: Vec<_> = channels.iter().map(|c| (*c, &self.fits[*c])).collect();
+            let found = readings(&self.prior, kept, &asked, &self.sensors_m, &others)?;
+            for ((c, fit), readings) in asked.into_iter().zip(found) {
+                for (k, (reading, process)) in readings.into_iter().enumerate() {
+                    let error = others.means[[k, c]] + others.centre[c] - reading;
+                    errors.push([error * error, fit.noise_variance() / others.count[k], process]);
+                }
             }
         }
         Ok(())
@@ -295,8 +296,8 @@ impl Found {
 
 /// Nonlinearities that are tried.
 const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-/// Variances of drift over that of the noise that are tried.
-const DRIFTS: [f64; 5] = [1.0, 10.0, 100.0, 1e3, 1e4];
+/// Variances of drift over that of the noise that are tried first.
+const DRIFTS: [f64; 2] = [10.0, 1e3];
 /// Exponents of the response that are tried.
 const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
 /// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
@@ -347,9 +348,7 @@ impl Search<'_> {
         if smooth_best > best + LEAST_SMOOTHER {
             (best, prior) = (smooth_best, smooth);
         }
-        let drifts = DRIFTS.map(|drift| Prior { drift, ..prior.clone() });
-        let (found, drifting) = self.best_of(drifts)?;
-        if found > best + LEAST_GAIN {
+        if let Some((_, drifting)) = self.drift(best, &prior, &[])? {
             (best, prior) = self.climb_lengths(drifting)?;
         }
         if self.structure != Structure::ForceLinear {
@@ -357,7 +356,7 @@ impl Search<'_> {
         }
         if self.structure == Structure::Auto {
             let changed = NONLINEARITIES.map(|nonlinearity| Prior { nonlinearity, ..prior.clone() });
-            let (found, nonlinear) = self.best_of(changed)?;
+            let (found, nonlinear) = self.best_of(changed, &[])?;
             if found > best + LEAST_GAIN {
                 prior = nonlinear;
             }
@@ -365,10 +364,31 @@ impl Search<'_> {
         Ok(self.found(prior, &[]))
     }
 
-    fn best_of<const N: usize>(&mut self, priors: [Prior; N]) -> Result<(f64, Prior), Cancelled> {
+    /// The prior with another drift, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`.
+    fn drift(
+        &mut self,
+        best: f64,
+        prior: &Prior,
+        sensors_m: &[Vec<f64>],
+    ) -> Result<Option<(f64, Prior)>, Cancelled> {
+        let drifts = DriftCourse::ALL
+            .into_iter()
+            .flat_map(|drift_course| DRIFTS.map(|drift| Prior { drift, drift_course, ..prior.clone() }));
+        let coarse = self.best_of(drifts, sensors_m)?;
+        let closer = [0.1, 10.0].map(|factor| Prior { drift: coarse.1.drift * factor, ..coarse.1.clone() });
+        let closer = self.best_of(closer, sensors_m)?;
+        let found = if closer.0 > coarse.0 { closer } else { coarse };
+        Ok(Some(found).filter(|(total, _)| *total > best + LEAST_GAIN))
+    }
+
+    fn best_of(
+        &mut self,
+        priors: impl IntoIterator<Item = Prior>,
+        sensors_m: &[Vec<f64>],
+    ) -> Result<(f64, Prior), Cancelled> {
         let mut best = None;
         for prior in priors {
-            let total = self.total(&prior, &[])?;
+            let total = self.total(&prior, sensors_m)?;
             if best.as_ref().is_none_or(|(most, _)| total > *most) {
                 best = Some((total, prior));
             }
@@ -379,7 +399,7 @@ impl Search<'_> {
     /// The response to the force: linear, unless another exponent is more probable by [`LEAST_GAIN`].
     fn response(&mut self, best: f64, linear: Prior) -> Result<(f64, Prior), Cancelled> {
         let (mut found, mut prior) =
-            self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }))?;
+            self.best_of(RESPONSES.map(|response| Prior { response, ..linear.clone() }), &[])?;
         if found < best + LEAST_GAIN && self.structure != Structure::ForceMonotone {
             return Ok((best, linear));
         }
@@ -437,7 +457,11 @@ impl Search<'_> {
                 keep(self.total(&prior, &sensors_m)?, prior);
             }
         }
-        let Some((_, prior)) = best else { return Ok(None) };
+        let Some((total, mut prior)) = best else { return Ok(None) };
+        // Noise that the smooth prior took for its own makes a drift look smaller than it is.
+        if let Some((_, drifting)) = self.drift(total, &prior, &sensors_m)? {
+            prior = drifting;
+        }
         Ok(Some(self.found(prior, &sensors_m)))
     }
 

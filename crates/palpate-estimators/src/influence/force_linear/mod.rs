@@ -3,6 +3,7 @@
 //!
 //! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
 
+mod drift;
 mod evidence;
 mod learning;
 mod locator;

@@ -34,39 +34,87 @@ pub(super) fn of_equal_ratio(fits: &[ChannelFit]) -> Vec<Vec<usize>> {
     channels.chunk_by(|a, b| fits[*a].ratio == fits[*b].ratio).map(<[usize]>::to_vec).collect()
 }
 
-/// Linear functionals of the process: the offset at the recording's end, then the influence at each place.
-struct Functionals {
-    /// h, q × (1 + places).
-    effects: Array2<f64>,
-    /// k, n × (1 + places).
-    covariance: Array2<f64>,
-    /// k₀.
-    variance: Vec<f64>,
+/// A linear functional of a channel's process: the offset at a time, if any, and the influence at a place as often as a response says.
+struct Functional<'a> {
+    time: Option<f64>,
+    response: f64,
+    place_m: &'a [f64],
 }
 
 /// Share of the recording at whose end the offset is asked: what is located comes after it.
 const END: f64 = 1.0;
 
-impl Functionals {
-    fn new(prior: &Prior, presses: &Presses, ratio: f64, places_m: &[Vec<f64>]) -> Self {
-        let n = presses.len();
-        let mut effects = Array2::zeros((1 + prior.polynomials(), 1 + places_m.len()));
-        let mut covariance = Array2::zeros((n, 1 + places_m.len()));
-        effects[[0, 0]] = 1.0;
-        let drift = ratio * prior.drift;
-        covariance
-            .column_mut(0)
-            .assign(&presses.time.iter().map(|time| drift * time.min(END)).collect::<Array1<f64>>());
-        let mut variance = vec![drift * END];
-        let responses = prior.responses(presses);
-        for (k, place_m) in places_m.iter().enumerate() {
-            let h = Array1::from(prior.polynomials_at(place_m));
-            effects.slice_mut(s![1.., k + 1]).assign(&h);
-            covariance.column_mut(k + 1).assign(&prior.influence_covariance(presses, &responses, place_m));
-            variance.push(prior.influence_variance());
-        }
-        Self { effects, covariance, variance }
+impl<'a> Functional<'a> {
+    /// The offset at the recording's end.
+    const OFFSET: Self = Self { time: Some(END), response: 0.0, place_m: &[] };
+
+    /// The influence at a place, of unit response.
+    fn influence(place_m: &'a Vec<f64>) -> Self {
+        Self { time: None, response: 1.0, place_m }
     }
+
+    /// Noiseless reading of each press.
+    fn readings(prior: &Prior, presses: &'a Presses) -> Vec<Self> {
+        let responses = prior.responses(presses).into_iter();
+        let times_and_places = presses.time.iter().zip(&presses.positions_m);
+        let readings = responses.zip(times_and_places);
+        readings.map(|(response, (time, place_m))| Self { time: Some(*time), response, place_m }).collect()
+    }
+}
+
+/// What the presses have to do with functionals.
+struct Functionals<'a> {
+    asked: &'a [Functional<'a>],
+    /// h, q × functionals.
+    effects: Array2<f64>,
+    /// k, n × functionals.
+    covariance: Array2<f64>,
+    /// k₀.
+    variance: Vec<f64>,
+}
+
+impl<'a> Functionals<'a> {
+    fn new(prior: &Prior, presses: &Presses, ratio: f64, asked: &'a [Functional<'a>]) -> Self {
+        let mut effects = Array2::zeros((1 + prior.polynomials(), asked.len()));
+        let mut covariance = Array2::zeros((presses.len(), asked.len()));
+        let mut variance = vec![0.0; asked.len()];
+        let responses = prior.responses(presses);
+        for (k, Functional { time, response, place_m }) in asked.iter().enumerate() {
+            let mut column = covariance.column_mut(k);
+            if let Some(time) = time {
+                effects[[0, k]] = 1.0;
+                let drift = presses.time.iter().map(|other| ratio * prior.drift_between(*time, *other));
+                column += &drift.collect::<Array1<f64>>();
+                variance[k] += ratio * prior.drift_between(*time, *time);
+            }
+            if *response != 0.0 {
+                let h = Array1::from(prior.polynomials_at(place_m));
+                effects.slice_mut(s![1.., k]).assign(&(*response * h));
+                column.scaled_add(*response, &prior.influence_covariance(presses, &responses, place_m));
+                variance[k] += response * response * prior.influence_variance();
+            }
+        }
+        Self { asked, effects, covariance, variance }
+    }
+
+    /// The functionals of sources of unit amplitude at `sensors_m`, a row a functional.
+    fn of_sources(&self, prior: &Prior, sensors_m: &[Vec<f64>]) -> Array2<f64> {
+        let mut of_sources = Array2::zeros((self.asked.len(), sensors_m.len()));
+        for (mut row, Functional { response, place_m, .. }) in of_sources.outer_iter_mut().zip(self.asked) {
+            if *response != 0.0 && !sensors_m.is_empty() {
+                row.assign(&(*response * prior.sources_at(place_m, sensors_m)));
+            }
+        }
+        of_sources
+    }
+}
+
+/// Mean of a functional, its variance, and its covariance with the first of those that were asked with it.
+#[derive(Clone, Copy, Debug)]
+struct Moments {
+    mean: f64,
+    variance: f64,
+    with_first: f64,
 }
 
 /// Offsets and influences of some channels, which share a ratio, at places; sensors are looked for at `sensors_m` and closer to the
@@ -83,14 +131,7 @@ pub(super) fn functions(
 ) -> Result<Vec<Functions>, MeasuredError> {
     /// Places that are asked at once.
     const BLOCK: usize = 256;
-    let Some((_, first)) = channels.first() else { return Ok(Vec::new()) };
-    let evidence = Evidence::new(presses, prior, sensors_m);
-    let known = Known::new(&evidence, first.ratio)?;
-    let coarse = Sources::new(&evidence, &known, sensors_m.to_vec());
-    let told: Vec<Told> = channels
-        .iter()
-        .map(|(c, fit)| Told { c: *c, signal: fit.signal, sources: coarse.closer(&evidence, &known, *c) })
-        .collect();
+    let told = Posterior::new(prior, presses, channels, sensors_m)?;
     let empty = |c: usize| Functions {
         offset: presses.centre[c],
         values: Vec::with_capacity(places_m.len()),
@@ -101,16 +142,76 @@ pub(super) fn functions(
     let mut functions: Vec<Functions> = channels.iter().map(|(c, _)| empty(*c)).collect();
     for block in places_m.chunks(BLOCK) {
         watch.round()?;
-        let asked = Functionals::new(prior, presses, first.ratio, block);
-        let explained = known.restricted.cholesky.solve_lower_matrix(asked.covariance.clone());
-        let open = known.restricted.open_effects(&asked.effects, &explained);
-        for (told, out) in told.iter().zip(&mut functions) {
-            let base = asked.effects.t().dot(&known.coefficients.column(told.c))
-                + explained.t().dot(&known.white.column(told.c));
-            told.add_into(out, prior, &asked, block, &base.view(), [explained.view(), open.view()]);
+        let influences = block.iter().map(Functional::influence);
+        let asked: Vec<Functional> = std::iter::once(Functional::OFFSET).chain(influences).collect();
+        for (moments, out) in told.moments(&asked).into_iter().zip(&mut functions) {
+            let (offset, influences) = (moments[0], &moments[1..]);
+            if out.values.is_empty() {
+                out.offset += offset.mean;
+                out.offset_variance = offset.variance;
+            }
+            out.values.extend(influences.iter().map(|moments| moments.mean));
+            out.variances.extend(influences.iter().map(|moments| moments.variance));
+            out.covariances.extend(influences.iter().map(|moments| moments.with_first));
         }
     }
     Ok(functions)
+}
+
+/// Mean and variance of what some channels, which share a ratio, read of other presses without noise, each at its own time.
+pub(super) fn readings(
+    prior: &Prior,
+    presses: &Presses,
+    channels: &[(usize, &ChannelFit)],
+    sensors_m: &[Vec<f64>],
+    others: &Presses,
+) -> Result<Vec<Vec<(f64, f64)>>, MeasuredError> {
+    let told = Posterior::new(prior, presses, channels, sensors_m)?;
+    let moments = told.moments(&Functional::readings(prior, others));
+    let of_channel = |((c, _), moments): (&(usize, &ChannelFit), Vec<Moments>)| {
+        moments.iter().map(|moments| (presses.centre[*c] + moments.mean, moments.variance)).collect()
+    };
+    Ok(channels.iter().zip(moments).map(of_channel).collect())
+}
+
+/// Processes of some channels that share a ratio, as presses tell them.
+struct Posterior<'a> {
+    prior: &'a Prior,
+    presses: &'a Presses,
+    known: Known,
+    channels: Vec<Told>,
+}
+
+impl<'a> Posterior<'a> {
+    fn new(
+        prior: &'a Prior,
+        presses: &'a Presses,
+        channels: &[(usize, &ChannelFit)],
+        sensors_m: &[Vec<f64>],
+    ) -> Result<Self, MeasuredError> {
+        let evidence = Evidence::new(presses, prior, sensors_m);
+        let known = Known::new(&evidence, channels.first().map_or(1.0, |(_, fit)| fit.ratio))?;
+        let coarse = Sources::new(&evidence, &known, sensors_m.to_vec());
+        let channels = channels
+            .iter()
+            .map(|(c, fit)| Told { c: *c, signal: fit.signal, sources: coarse.closer(&evidence, &known, *c) })
+            .collect();
+        Ok(Self { prior, presses, known, channels })
+    }
+
+    /// Moments of functionals of every channel.
+    fn moments(&self, asked: &[Functional]) -> Vec<Vec<Moments>> {
+        let Self { prior, presses, known, channels } = self;
+        let asked = Functionals::new(prior, presses, known.ratio, asked);
+        let explained = known.restricted.cholesky.solve_lower_matrix(asked.covariance.clone());
+        let open = known.restricted.open_effects(&asked.effects, &explained);
+        let moments = |told: &Told| {
+            let base = asked.effects.t().dot(&known.coefficients.column(told.c))
+                + explained.t().dot(&known.white.column(told.c));
+            told.moments(prior, &asked, &base.view(), [explained.view(), open.view()])
+        };
+        channels.iter().map(moments).collect()
+    }
 }
 
 /// Presses at one ratio of noise to signal.
@@ -205,62 +306,46 @@ struct Told {
 }
 
 impl Told {
-    /// Adds offset and influences at a block of places; `base` are the means without sources.
-    fn add_into(
+    /// Moments of functionals; `base` are the means without sources.
+    fn moments(
         &self,
-        out: &mut Functions,
         prior: &Prior,
         asked: &Functionals,
-        block: &[Vec<f64>],
         base: &ArrayView1<f64>,
         [explained, open]: [ArrayView2<f64>; 2],
-    ) {
+    ) -> Vec<Moments> {
         let used: Vec<usize> = {
             let mut places: Vec<usize> = self.sources.fits.iter().map(|source| source.place).collect();
             places.dedup();
             places
         };
-        // What of each source the presses do not tell, at the offset and each place.
+        // What of each source the presses do not tell.
         let vs = self.sources.white.select(Dimension(1), &used);
         let coefficients = self.sources.coefficients.select(Dimension(1), &used);
-        let mut rest = -(asked.effects.t().dot(&coefficients) + explained.t().dot(&vs));
         let sensors_m: Vec<Vec<f64>> =
             used.iter().map(|place| self.sources.sensors_m[*place].clone()).collect();
-        if !used.is_empty() {
-            for (mut row, place_m) in rest.outer_iter_mut().skip(1).zip(block) {
-                row += &prior.sources_at(place_m, &sensors_m);
-            }
-        }
+        let rest = asked.of_sources(prior, &sensors_m)
+            - (asked.effects.t().dot(&coefficients) + explained.t().dot(&vs));
         let column = |place: usize| used.binary_search(&place).unwrap_or(0);
         let sources: Vec<_> = self.sources.fits.iter().map(|source| (column(source.place), source)).collect();
-        // Mean and second moment over the sources, of functional k, and with the offset.
-        let offset_rest = rest.row(0).to_owned();
-        let mean_of = |k: usize| {
-            base[k] + sources.iter().map(|(j, f)| f.weight * rest[[k, *j]] * f.amplitude).sum::<f64>()
-        };
-        let offset_shift: f64 = sources.iter().map(|(j, f)| f.weight * offset_rest[*j] * f.amplitude).sum();
-        for k in 0..asked.variance.len() {
-            let mean = mean_of(k);
-            let shift = mean - base[k];
+        // Mean over the sources of what they add to functional k.
+        let shift_of = |k: usize| sources.iter().map(|(j, f)| f.weight * rest[[k, *j]] * f.amplitude).sum();
+        let first_shift: f64 = shift_of(0);
+        let moments = |k: usize| {
+            let shift: f64 = shift_of(k);
             let told = explained.column(k);
             let within = asked.variance[k] - told.dot(&told) + open.column(k).dot(&open.column(k));
-            let with_offset = -told.dot(&explained.column(0)) + open.column(k).dot(&open.column(0));
-            let (mut variance, mut covariance) = (self.signal * within, self.signal * with_offset);
+            let with_first = -told.dot(&explained.column(0)) + open.column(k).dot(&open.column(0));
+            let (mut variance, mut covariance) = (self.signal * within, self.signal * with_first);
             for (j, f) in &sources {
-                let (r, o) = (rest[[k, *j]], offset_rest[*j]);
+                let (r, first) = (rest[[k, *j]], rest[[0, *j]]);
                 variance += f.weight * (self.signal * f.variance * r * r + (r * f.amplitude - shift).powi(2));
                 covariance += f.weight
-                    * (self.signal * f.variance * r * o
-                        + (r * f.amplitude - shift) * (o * f.amplitude - offset_shift));
+                    * (self.signal * f.variance * r * first
+                        + (r * f.amplitude - shift) * (first * f.amplitude - first_shift));
             }
-            if k > 0 {
-                out.values.push(mean);
-                out.variances.push(variance.max(0.0));
-                out.covariances.push(covariance);
-            } else if out.values.is_empty() {
-                out.offset += mean;
-                out.offset_variance = variance.max(0.0);
-            }
-        }
+            Moments { mean: base[k] + shift, variance: variance.max(0.0), with_first: covariance }
+        };
+        (0..asked.variance.len()).map(moments).collect()
     }
 }

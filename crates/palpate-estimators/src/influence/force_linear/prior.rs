@@ -12,8 +12,10 @@
 //!
 //! φ(F) = F̄·(F/F̄)^γ, F̄ being the root mean square force: γ = 1 but where the presses say that all positions share another
 //! response. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), tells how far the presses are from any of that.
-//! Drift is a random walk of each channel over the recording, of variance κ times the noise's from one end to the other.
+//! Drift is a Gaussian process of the time for each channel ([`DriftCourse`]), of variance κ times the noise's from one end of the
+//! recording to the other.
 
+use super::drift::DriftCourse;
 use super::presses::Presses;
 use crate::fit::LocatorFault;
 use ndarray::{Array1, Array2};
@@ -84,6 +86,8 @@ pub(super) struct Prior {
     pub response: f64,
     /// κ.
     pub drift: f64,
+    #[serde(default)]
+    pub drift_course: DriftCourse,
 }
 
 impl Prior {
@@ -100,6 +104,7 @@ impl Prior {
             nonlinearity: 0.0,
             response: 1.0,
             drift: 0.0,
+            drift_course: DriftCourse::default(),
         }
     }
 
@@ -182,10 +187,15 @@ impl Prior {
         }
         if self.drift > 0.0 {
             for ((i, j), value) in covariance.indexed_iter_mut() {
-                *value += ratio * self.drift * presses.time[i].min(presses.time[j]);
+                *value += ratio * self.drift_between(presses.time[i], presses.time[j]);
             }
         }
         covariance
+    }
+
+    /// Covariance of the drift at two times over the noise's variance.
+    pub fn drift_between(&self, a: f64, b: f64) -> f64 {
+        self.drift * self.drift_course.covariance(a, b)
     }
 
     /// Covariance of f at a place with the presses, over s² and 1/F̄.

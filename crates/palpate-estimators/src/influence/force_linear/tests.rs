@@ -22,6 +22,9 @@ use palpate_numerics::{Cholesky, mean, median};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::rc::Rc;
+
+mod drift;
 
 const STRIP_M: f64 = 0.3;
 const PLATE_M: [f64; 2] = [0.2, 0.15];
@@ -218,9 +221,20 @@ fn raw_influences(
 
 /// What fifteen lines of SciPy do: the basis of a regression of reading = offset + force × Σ coefficient × basis(position), solved by
 /// least squares, and the grid on which readings are located by least squares.
+#[derive(Clone)]
 struct Regression {
-    basis: Box<dyn Fn(Position) -> Vec<f64>>,
+    basis: Rc<dyn Fn(Position) -> Vec<f64>>,
     grid: Vec<Position>,
+    drift: Drift,
+}
+
+/// What a regression takes the offsets for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Drift {
+    /// They stay.
+    None,
+    /// They move in proportion to the time, or to the rows before.
+    Linear,
 }
 
 impl Regression {
@@ -230,7 +244,7 @@ impl Regression {
         let span_m = STRIP_M - 2.0 * MARGIN_M;
         let basis = move |at: Position| cubic_basis((at.x_m - MARGIN_M) / span_m, places);
         let grid = (0..=STEPS).map(|i| Position::along(MARGIN_M + span_m * i as f64 / STEPS as f64));
-        Self { basis: Box::new(basis), grid: grid.collect() }
+        Self { basis: Rc::new(basis), grid: grid.collect(), drift: Drift::None }
     }
 
     /// Cubic radial basis functions r³ around every place that was pressed, and a plane.
@@ -250,15 +264,26 @@ impl Regression {
             x_m: place(i, STEPS[0], PLATE_M[0]),
             y_m: place(j, STEPS[1], PLATE_M[1]),
         });
-        Self { basis: Box::new(basis), grid: grid.collect() }
+        Self { basis: Rc::new(basis), grid: grid.collect(), drift: Drift::None }
+    }
+
+    fn with_linear_drift(&self) -> Self {
+        Self { drift: Drift::Linear, ..self.clone() }
     }
 
     fn errors_mm(&self, presses: &[Row], touches: &[Row]) -> Vec<f64> {
-        let row = |row: &Row| -> Vec<f64> {
-            let force_n = row.force_n.unwrap();
-            std::iter::once(1.0).chain((self.basis)(row.position).into_iter().map(|b| force_n * b)).collect()
+        // Time runs from -1 to 0, so that the constant is the offset at the recording's end.
+        let time = |i: usize, row: &Row| match (self.drift, row.time_s, presses[presses.len() - 1].time_s) {
+            (Drift::None, ..) => Vec::new(),
+            (Drift::Linear, Some(time), Some(end)) => vec![time / end - 1.0],
+            (Drift::Linear, ..) => vec![i as f64 / (presses.len() - 1) as f64 - 1.0],
         };
-        let rows: Vec<Vec<f64>> = presses.iter().map(row).collect();
+        let row = |(i, row): (usize, &Row)| -> Vec<f64> {
+            let force_n = row.force_n.unwrap();
+            let influences = (self.basis)(row.position).into_iter().map(|b| force_n * b);
+            std::iter::once(1.0).chain(influences).chain(time(i, row)).collect()
+        };
+        let rows: Vec<Vec<f64>> = presses.iter().enumerate().map(row).collect();
         let design = Array2::from_shape_fn((rows.len(), rows[0].len()), |(i, j)| rows[i][j]);
         let ridge = Array2::from_diag(&Array1::from_elem(rows[0].len(), 1e-7));
         let normal = Cholesky::factor(design.t().dot(&design) + ridge).unwrap();
@@ -495,53 +520,6 @@ fn a_response_that_changes_along_the_surface_is_left_to_the_free_structure() {
     assert!(bench.fit(Structure::Auto).is_none());
     assert!(matches!(bench.fit_as(Structure::Auto), InfluenceLocator::Measured(_)));
     assert!(matches!(bench.fit_as(Structure::ForceLinear), InfluenceLocator::ForceLinear(_)));
-}
-
-/// A random walk of every gauge, of `counts` standard deviation from the first press to the last; gives where each ends.
-fn drift(bench: &mut Bench, counts: f64) -> Vec<f64> {
-    let step = counts / (bench.presses.len() as f64).sqrt();
-    let mut walk = vec![0.0; bench.offsets.len()];
-    for row in &mut bench.presses {
-        for (walk, value) in walk.iter_mut().zip(&mut row.reading) {
-            let normal: f64 = StandardNormal.sample(&mut bench.rng);
-            *walk += step * normal;
-            *value += *walk;
-        }
-    }
-    walk
-}
-
-#[test]
-fn drift_is_found_and_taken_off() {
-    let count = benches(3);
-    let (mut still, mut drifting, mut spline) = (Vec::new(), Vec::new(), Vec::new());
-    for seed in 0..count {
-        let mut bench = Bench::strip(seed, 60, 15);
-        let touches = bench.touches(100);
-        let locator = bench.fit(Structure::Auto).unwrap();
-        assert_eq!(locator.drifts(), [], "bench {seed}");
-        still.push(mean(errors_mm(&locator, &touches).0));
-        let walk = drift(&mut bench, 12.0);
-        let locator = bench.fit(Structure::Auto).unwrap();
-        let drifts = locator.drifts();
-        assert_eq!(drifts.len(), GAUGES);
-        assert!(drifts.iter().all(|(_, counts)| (3.0..48.0).contains(counts)), "{drifts:?}");
-        for ((c, offset, _), walk) in locator.channels().zip(&walk) {
-            assert!((offset - bench.offsets[c] - walk).abs() < 6.0, "gauge {c}: {offset}");
-        }
-        // Touches are read after the calibration.
-        let mut later = touches;
-        for row in &mut later {
-            row.reading.iter_mut().zip(&walk).for_each(|(value, walk)| *value += walk);
-        }
-        drifting.push(mean(errors_mm(&locator, &later).0));
-        spline.push(mean(Regression::spline(15).errors_mm(&bench.presses, &later)));
-    }
-    let [still, drifting, spline] = [still, drifting, spline].map(mean);
-    eprintln!(
-        "strip, 60 presses at 15 places: mean {still:.2} mm; {drifting:.2} mm after 12 counts of drift, a spline {spline:.2} mm"
-    );
-    assert!(drifting < 2.0 * still && drifting < 0.7 * spline, "{drifting} mm, {still} mm, {spline} mm");
 }
 
 #[test]

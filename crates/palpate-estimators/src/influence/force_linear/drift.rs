@@ -1,0 +1,49 @@
+//! How the offsets of channels move in the course of a recording.
+
+use palpate_numerics::regression::Kernel;
+use serde::{Deserialize, Serialize};
+
+/// Course of the drift, as a Gaussian process of the time from 0 at the recording's first row to 1 at its last.
+///
+/// Whatever the course, the variance of what the drift changes from the first row to the last is 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::influence) enum DriftCourse {
+    /// A random walk.
+    #[default]
+    Walk,
+    /// In proportion to the time.
+    Linear,
+    /// A smooth function of the time: a squared-exponential correlation over half the recording.
+    Smooth,
+}
+
+impl DriftCourse {
+    pub const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
+
+    /// Covariance of the drift at two times, but for a constant of the time, which is in the offset.
+    pub fn covariance(self, a: f64, b: f64) -> f64 {
+        /// Of the smooth course.
+        const LENGTH: f64 = 0.5;
+        let correlation = |way: f64| Kernel::SquaredExponential.correlation((way / LENGTH) * (way / LENGTH));
+        match self {
+            Self::Walk => a.min(b),
+            Self::Linear => a * b,
+            Self::Smooth => 0.5 * correlation(a - b) / (1.0 - correlation(1.0)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_course_moves_by_one_from_end_to_end() {
+        for course in DriftCourse::ALL {
+            let of = |a, b| course.covariance(a, b);
+            let variance = of(1.0, 1.0) - 2.0 * of(0.0, 1.0) + of(0.0, 0.0);
+            assert!((variance - 1.0).abs() < 1e-12, "{course:?}: {variance}");
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Strips whose gauges drift while they are calibrated; what is asked comes after the calibration, so it has the drift of its end.
+
+use super::*;
+
+/// Course of the drift of a gauge from 0 at the recording's first row to 1 at its last, up to its amount.
+#[derive(Clone, Copy, Debug)]
+enum Course {
+    /// As the temperature of a room that is being heated.
+    Ramp,
+    /// As a board that warms up after it was switched on: fast at first.
+    Settling,
+    /// A random walk, whose end has the amount as its standard deviation.
+    Walk,
+}
+
+impl Course {
+    const ALL: [Self; 3] = [Self::Ramp, Self::Settling, Self::Walk];
+}
+
+/// Times of the presses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pace {
+    /// One after the other at the same pace; the recording has no times.
+    Even,
+    /// With a pause of two thirds of all the time somewhere; the recording has a column of times.
+    WithPause,
+}
+
+/// Least and greatest drift over a recording, in counts.
+const AMOUNTS: std::ops::Range<f64> = 6.0..19.0;
+
+/// A drift of every gauge in the course of the presses; gives those readings less the drift, and where each gauge ends.
+fn drift(bench: &mut Bench, course: Course, pace: Pace) -> (Vec<Row>, Vec<f64>) {
+    let still = bench.presses.clone();
+    let rows = still.len();
+    let pause = match pace {
+        Pace::Even => None,
+        Pace::WithPause => Some(bench.rng.random_range(rows / 5..rows * 4 / 5)),
+    };
+    let mut times = vec![0.0];
+    for row in 1..rows {
+        let step = match pace {
+            Pace::Even => 1.0,
+            Pace::WithPause => bench.rng.random_range(0.3..1.7),
+        };
+        let pause = if pause == Some(row) { 2.0 * rows as f64 } else { 0.0 };
+        times.push(times[row - 1] + step + pause);
+    }
+    let end = times[rows - 1];
+    let mut ends = Vec::new();
+    for c in 0..bench.offsets.len() {
+        let sign = if bench.rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let amount = sign * bench.rng.random_range(AMOUNTS);
+        let (mut drift, mut walk, mut last) = (0.0, 0.0, 0.0);
+        for (row, time) in bench.presses.iter_mut().zip(&times) {
+            let share: f64 = time / end;
+            let normal: f64 = StandardNormal.sample(&mut bench.rng);
+            walk += normal * (share - last).sqrt();
+            last = share;
+            drift = amount
+                * match course {
+                    Course::Ramp => share,
+                    Course::Settling => (1.0 - (-4.0 * share).exp()) / (1.0 - (-4f64).exp()),
+                    Course::Walk => walk,
+                };
+            row.reading[c] += drift;
+        }
+        ends.push(drift);
+    }
+    if pace == Pace::WithPause {
+        bench.presses.iter_mut().zip(&times).for_each(|(row, time)| row.time_s = Some(4.0 * time));
+    }
+    (still, ends)
+}
+
+/// Strips that drift: locators beside regressions, which are named, and errors where a tare has made up for the drift.
+struct Study {
+    comparisons: [(&'static str, Comparison); 3],
+    tared_mm: Vec<f64>,
+}
+
+/// What nobody can have.
+const WITHOUT_DRIFT: &str = "a spline, the true drift taken off";
+
+impl Study {
+    fn new(count: u64, (presses, places): (usize, usize), course: Course, pace: Pace) -> Self {
+        let names = ["a spline", "a spline and a linear drift", WITHOUT_DRIFT];
+        let mut comparisons = names.map(|name| (name, Comparison::default()));
+        let mut tared_mm = Vec::new();
+        for seed in 0..count {
+            let mut bench = Bench::strip(seed, presses, places);
+            let touches = bench.touches(100);
+            let (still, ends) = drift(&mut bench, course, pace);
+            let locator = bench.fit_as(Structure::Auto);
+            let later = moved(&touches, &ends);
+            let spline = Regression::spline(places.min(15));
+            let theirs = [
+                spline.errors_mm(&bench.presses, &later),
+                spline.with_linear_drift().errors_mm(&bench.presses, &later),
+                spline.errors_mm(&still, &touches),
+            ];
+            let learnt = locator.offsets().unwrap();
+            let tare: Vec<f64> = learnt.iter().zip(&bench.offsets).map(|(a, b)| a - b).collect();
+            tared_mm.push(mean(errors_mm(&locator, &moved(&touches, &tare)).0));
+            bench.offsets.iter_mut().zip(&ends).for_each(|(offset, end)| *offset += end);
+            for ((_, comparison), theirs) in comparisons.iter_mut().zip(theirs) {
+                comparison.add(&bench, &locator, &later, theirs);
+            }
+        }
+        Self { comparisons, tared_mm }
+    }
+}
+
+fn moved(rows: &[Row], by: &[f64]) -> Vec<Row> {
+    let mut rows = rows.to_vec();
+    for row in &mut rows {
+        row.reading.iter_mut().zip(by).for_each(|(value, by)| *value += by);
+    }
+    rows
+}
+
+#[test]
+fn drifting_strips_are_located_better_than_by_a_spline() {
+    // Of all studies: mean errors beside each regression.
+    let mut means_mm = [Vec::new(), Vec::new(), Vec::new()];
+    for course in Course::ALL {
+        for (presses, places) in [(25, 9), (60, 15)] {
+            for pace in [Pace::Even, Pace::WithPause] {
+                let study = Study::new(benches(1), (presses, places), course, pace);
+                eprintln!("strip, {presses} presses at {places} places, {course:?}, {pace:?}");
+                for ((name, comparison), means_mm) in study.comparisons.iter().zip(&mut means_mm) {
+                    comparison.print(&format!("  beside {name}"));
+                    means_mm.extend_from_slice(&comparison.means);
+                    let (won, _) = Comparison::summary(&comparison.medians);
+                    assert!(won >= 0.9, "{course:?}, {pace:?}, {name}: {won}");
+                }
+                eprintln!("  mean {:.2} mm after a tare", mean(study.tared_mm));
+            }
+        }
+    }
+    for means_mm in &means_mm {
+        let (won, [ours_mm, theirs_mm]) = Comparison::summary(means_mm);
+        assert!(won >= 0.9 && ours_mm <= 0.8 * theirs_mm, "{won}: {ours_mm} mm, {theirs_mm} mm");
+    }
+}
+
+#[test]
+fn drift_is_found_where_there_is_any() {
+    for seed in 0..benches(3) {
+        let mut bench = Bench::strip(seed, 60, 15);
+        assert_eq!(bench.fit(Structure::Auto).unwrap().drifts(), [], "bench {seed}");
+        let (_, ends) = drift(&mut bench, Course::Walk, Pace::Even);
+        let locator = bench.fit(Structure::Auto).unwrap();
+        let drifts = locator.drifts();
+        assert_eq!(drifts.len(), GAUGES);
+        assert!(drifts.iter().all(|(_, counts)| (2.0..60.0).contains(counts)), "{drifts:?}");
+        for ((c, offset, _), end) in locator.channels().zip(&ends) {
+            assert!((offset - bench.offsets[c] - end).abs() < 6.0, "gauge {c}: {offset}");
+        }
+    }
+}
