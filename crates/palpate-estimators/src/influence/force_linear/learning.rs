@@ -297,7 +297,7 @@ impl Found {
 /// Nonlinearities that are tried.
 const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
 /// Variances of drift over that of the noise that are tried first.
-const DRIFTS: [f64; 2] = [10.0, 1e3];
+const DRIFTS: [f64; 3] = [10.0, 100.0, 1e3];
 /// Exponents of the response that are tried.
 const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
 /// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
@@ -424,6 +424,8 @@ impl Search<'_> {
         /// η² and ℓ, in lengths of the surface; on a plane a smooth part is always needed.
         const SHARES: [f64; 4] = [0.0, 1e-4, 1e-2, 1.0];
         const LENGTHS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
+        /// The drift is told as well by one of so many places of sensors.
+        const ONE_OF: usize = 5;
         let sensors_m = everywhere(self.extent);
         let (dimensions, length_m) = (self.extent.dimensions(), self.extent.length_m());
         let plane = dimensions == 2;
@@ -457,9 +459,11 @@ impl Search<'_> {
                 keep(self.total(&prior, &sensors_m)?, prior);
             }
         }
-        let Some((total, mut prior)) = best else { return Ok(None) };
+        let Some((_, mut prior)) = best else { return Ok(None) };
         // Noise that the smooth prior took for its own makes a drift look smaller than it is.
-        if let Some((_, drifting)) = self.drift(total, &prior, &sensors_m)? {
+        let few: Vec<Vec<f64>> = sensors_m.iter().step_by(ONE_OF).cloned().collect();
+        let total = self.total(&prior, &few)?;
+        if let Some((_, drifting)) = self.drift(total, &prior, &few)? {
             prior = drifting;
         }
         Ok(Some(self.found(prior, &sensors_m)))
