@@ -3,7 +3,8 @@
 use serde::Deserialize;
 
 use palpate_estimators::recording::{
-    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, Separator, ValueColumn,
+    Column, Columns, Decimal, ForceColumn, Frame, Header, Need, PositionColumns, Separator, TimeSpan,
+    ValueColumn,
 };
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
@@ -49,6 +50,11 @@ pub(crate) struct RecordingKeys {
     pub time: Option<At<ColumnKey>>,
     /// The unit of times that are numbers; s unless said otherwise.
     pub time_unit: Option<At<String>>,
+    /// Column that marks the rows in which nothing touched, with 1, true or yes; rows of force 0, and those with neither position nor force,
+    /// need no mark.
+    pub untouched: Option<At<ColumnKey>>,
+    /// Times in which nothing touched, by the time of the rows, which counts from their first where they have timestamps.
+    pub untouched_times: Option<Vec<At<Span>>>,
     /// The file's coordinates of the surface's left end or lower left corner; 0 unless said otherwise.
     pub origin: Option<At<Vec<Quantity<Length>>>>,
     /// Positions are rounded to whole multiples of this.
@@ -65,6 +71,17 @@ fn yes() -> bool {
 pub(crate) enum ColumnKey {
     Text(String),
     Number(Count<1, { i64::MAX }>),
+}
+
+/// A span of time, as in "0 s..10 s", "95 s.." or "..2 min".
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span(TimeSpan);
+
+impl<'de> Deserialize<'de> for Span {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map(Self).map_err(serde::de::Error::custom)
+    }
 }
 
 /// One unit for all channels, or one for each.
@@ -99,13 +116,15 @@ impl At<RecordingKeys> {
             separator: self.separator,
             decimal: self.decimal,
             time: self.value("time", &self.time, &self.time_unit, time_unit)?,
+            untouched: self.untouched.as_ref().map(|column| column.column()),
+            untouched_times: self.untouched_times.iter().flatten().map(|span| span.0).collect(),
         })
     }
 
     /// Checks that without a header columns are numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
-        let values = [&self.force, &self.nuisance, &self.time].into_iter().flatten();
+        let values = [&self.force, &self.nuisance, &self.time, &self.untouched].into_iter().flatten();
         let channels = self.channels.iter().flat_map(|channels| channels.iter());
         let named = |key: &&At<ColumnKey>| matches!(***key, ColumnKey::Text(_));
         match positions.clone().chain(values).chain(channels).find(named) {

@@ -6,6 +6,7 @@ use super::dialect::Dialect;
 use super::heading::Heading;
 use super::marks::Separator;
 use super::timestamp::Clock;
+use super::untouched::is_mark;
 use palpate_mechanics::units::{Dimension, Unit};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -91,7 +92,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Index of `column` among the fields of every line, from this first line of the file: by its heading, or by that without a unit.
-    fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
+    pub fn find(&self, column: &Column, header: Header) -> Result<usize, CsvError> {
         let count = self.width();
         let name = match column {
             Column::Number(number) if (1..=count).contains(number) => return Ok(number - 1),
@@ -144,6 +145,22 @@ impl<'a> Cells<'a> {
     /// The finite number in field `index`, in SI units.
     pub fn number(&mut self, index: usize, unit: Unit) -> Result<f64, CsvError> {
         self.read(index, |text, dialect| dialect.number(text, unit))
+    }
+
+    /// Whether nothing is in field `index`.
+    pub fn is_empty(&self, index: usize) -> bool {
+        self.fields.get(index).is_none_or(|field| field.value.is_empty())
+    }
+
+    /// Whether field `index` marks an untouched row.
+    pub fn is_marked(&self, index: usize) -> Result<bool, CsvError> {
+        let text = self.fields.get(index).map_or("", |field| field.value.as_ref());
+        is_mark(text).map_err(|problem| self.error(index, problem))
+    }
+
+    /// Counts a row without a position.
+    pub fn count_without_position(&mut self) {
+        self.dialect.without_position += 1;
     }
 
     /// The time in field `index`, in seconds.

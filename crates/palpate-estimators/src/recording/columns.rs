@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::marks::{Decimal, Separator};
+use super::untouched::TimeSpan;
 
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::SensorKind;
@@ -34,6 +35,12 @@ pub struct Columns {
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
     pub time: Option<ValueColumn>,
+    /// Column that marks the rows in which nothing touched, if there is one.
+    #[serde(default)]
+    pub untouched: Option<Column>,
+    /// Times in which nothing touched.
+    #[serde(default)]
+    pub untouched_times: Vec<TimeSpan>,
     /// Separator of the fields; `None` for what the first line tells.
     #[serde(default)]
     pub separator: Option<Separator>,
@@ -191,6 +198,8 @@ impl Columns {
             force: None,
             nuisance: None,
             time: None,
+            untouched: None,
+            untouched_times: Vec::new(),
             separator: None,
             decimal: None,
         }
@@ -249,6 +258,8 @@ impl Columns {
             force: Some(ForceColumn { values: force, need: Need::Optional }),
             nuisance: None,
             time: None,
+            untouched: None,
+            untouched_times: Vec::new(),
             separator: None,
             decimal: None,
         }

@@ -8,6 +8,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 use super::marks::{Decimal, Separator};
+use super::untouched::TimeSpan;
 
 /// A CSV file that cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]
@@ -183,6 +184,29 @@ pub enum CsvProblem {
         second: usize,
         /// The first one's heading.
         example: String,
+    },
+    /// A field of the column that marks untouched rows says neither yes nor no.
+    #[error(
+        "`{text}` does not say whether the row is untouched; write 1, true or yes where it is, and 0, false, no or nothing where it is not"
+    )]
+    NotAMark {
+        /// The field.
+        text: String,
+    },
+    /// Times are untouched, but the file has none.
+    #[error(
+        "`untouched_times` says when nothing touched, but the rows have no time; name its column as `time` in [recording]"
+    )]
+    NoTimes,
+    /// No row has a time at which nothing is to have touched.
+    #[error("no row has a time within the untouched {span}; the rows are from {from_s} s to {to_s} s")]
+    NothingUntouched {
+        /// The times in which nothing touched.
+        span: TimeSpan,
+        /// Least time of a row, in seconds.
+        from_s: f64,
+        /// Greatest time of a row, in seconds.
+        to_s: f64,
     },
     /// A field of the time column is neither a number nor a timestamp.
     #[error(

@@ -42,9 +42,10 @@ pub fn read(source: &str, bytes: impl Read, schema: &Schema) -> Result<Recording
     };
     let mut clock = Clock::default();
     let (rows, dialect) = file.rows(columns, find, |cells, (contact, channels, time)| {
-        let row = contact.row(cells, schema)?;
-        Ok(Row { time_s: time.read(cells, &mut clock)?, reading: channels.reading(cells)?, ..row })
+        let time_s = time.read(cells, &mut clock)?;
+        Ok(Row { reading: channels.reading(cells)?, ..contact.row(cells, schema, time_s)? })
     })?;
+    schema.check_untouched_times(source, &rows)?;
     Ok(schema.recording(source, rows, vec![file.digest], [dialect]))
 }
 
@@ -69,17 +70,19 @@ pub fn read_pair(
         |head| Ok((ChannelFields::find(head, columns)?, TimeField::find(head, columns)?)),
         |cells, (channels, time)| Ok((channels.reading(cells)?, time.read(cells, &mut clock)?)),
     )?;
+    let mut times_s = reading_rows.iter().map(|(_, time_s)| *time_s);
     let (contact_rows, contact_dialect) = contacts.rows(
         columns,
         |head| ContactFields::find(head, columns),
-        |cells, contact| contact.row(cells, schema),
+        |cells, contact| contact.row(cells, schema, times_s.next().flatten()),
     )?;
     if reading_rows.len() != contact_rows.len() {
         let problem = CsvProblem::RowsDiffer { readings: reading_rows.len(), contacts: contact_rows.len() };
         return Err(problem.in_file(contacts.source));
     }
     let rows = reading_rows.into_iter().zip(contact_rows);
-    let rows = rows.map(|((reading, time_s), contact)| Row { reading, time_s, ..contact }).collect();
+    let rows: Vec<Row> = rows.map(|((reading, _), contact)| Row { reading, ..contact }).collect();
+    schema.check_untouched_times(readings.source, &rows)?;
     let digests = vec![readings.digest, contacts.digest];
     Ok(schema.recording(&source, rows, digests, [reading_dialect, contact_dialect]))
 }
@@ -92,6 +95,22 @@ impl Schema<'_> {
         } else {
             Err(CsvProblem::ChannelCount { columns, sensors }.in_file(source))
         }
+    }
+
+    /// Checks that every span of untouched times holds a row.
+    fn check_untouched_times(&self, source: &str, rows: &[Row]) -> Result<(), CsvError> {
+        for span in &self.columns.untouched_times {
+            let times = || rows.iter().filter_map(|row| row.time_s);
+            if times().next().is_none() {
+                return Err(CsvProblem::NoTimes.in_file(source));
+            }
+            if !times().any(|time_s| span.contains(time_s)) {
+                let (from_s, to_s) =
+                    (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+                return Err(CsvProblem::NothingUntouched { span: *span, from_s, to_s }.in_file(source));
+            }
+        }
+        Ok(())
     }
 
     fn recording(
@@ -159,6 +178,7 @@ struct ContactFields {
     frame: Frame,
     force: Option<(usize, Unit)>,
     nuisance: Option<(usize, Unit)>,
+    untouched: Option<usize>,
 }
 
 impl ContactFields {
@@ -182,14 +202,16 @@ impl ContactFields {
             Ok((head.find_values(values, "nuisance_unit", header)?, values.unit))
         };
         let nuisance = columns.nuisance.as_ref().map(&mut find).transpose()?;
-        Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisance })
+        let untouched = columns.untouched.as_ref().map(|column| head.find(column, header)).transpose()?;
+        Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisance, untouched })
     }
 
-    /// The row of a contact, its reading still empty.
-    fn row(&self, cells: &mut Cells, schema: &Schema) -> Result<Row, CsvError> {
-        let x_m = cells.number(self.x, self.position_unit)?;
-        let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
-        let position = self.frame.position(x_m, y_m);
+    /// The row of a contact at a time, its reading still empty.
+    fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<Row, CsvError> {
+        if self.is_untouched(cells, schema, time_s)? {
+            return self.untouched_row(cells, schema, time_s);
+        }
+        let position = self.position(cells)?;
         let extent = schema.extent;
         if !extent.contains(position) {
             let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
@@ -198,7 +220,57 @@ impl ContactFields {
         let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let force_n = force_n.or(schema.known_force_n);
-        Ok(Row { position, force_n, nuisance, time_s: None, reading: Vec::new() })
+        Ok(Row { position, force_n, nuisance, time_s, reading: Vec::new() })
+    }
+
+    fn position(&self, cells: &mut Cells) -> Result<Position, CsvError> {
+        let x_m = cells.number(self.x, self.position_unit)?;
+        let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
+        Ok(self.frame.position(x_m, y_m))
+    }
+
+    /// Whether nothing touched: the row is marked, its time is among those in which nothing did, its force is 0, or it has
+    /// neither position nor force.
+    fn is_untouched(
+        &self,
+        cells: &mut Cells,
+        schema: &Schema,
+        time_s: Option<f64>,
+    ) -> Result<bool, CsvError> {
+        let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;
+        let is_time = |time_s| schema.columns.untouched_times.iter().any(|span| span.contains(time_s));
+        if marked || time_s.is_some_and(is_time) {
+            return Ok(true);
+        }
+        let force_n = match self.force {
+            Some((field, unit)) if !cells.is_empty(field) => Some(cells.number(field, unit)?),
+            _ => None,
+        };
+        if force_n.is_none_or(|force_n| force_n == 0.0) && self.has_no_position(cells) {
+            cells.count_without_position();
+            return Ok(true);
+        }
+        Ok(force_n == Some(0.0))
+    }
+
+    fn has_no_position(&self, cells: &Cells) -> bool {
+        cells.is_empty(self.x) && self.y.is_none_or(|y| cells.is_empty(y))
+    }
+
+    /// The row of no contact: its position means nothing, and is kept where it is one of the surface.
+    fn untouched_row(
+        &self,
+        cells: &mut Cells,
+        schema: &Schema,
+        time_s: Option<f64>,
+    ) -> Result<Row, CsvError> {
+        let position = if self.has_no_position(cells) { None } else { Some(self.position(cells)?) };
+        let position = position.filter(|position| schema.extent.contains(*position)).unwrap_or_default();
+        let nuisance = match self.nuisance {
+            Some((field, unit)) if !cells.is_empty(field) => Some(cells.number(field, unit)?),
+            _ => None,
+        };
+        Ok(Row { position, force_n: Some(0.0), nuisance, time_s, reading: Vec::new() })
     }
 }
 
@@ -509,7 +581,8 @@ impl<'a> TimedParser<'a> {
         let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
         let Some((mut cells, fields)) = next else { return Ok(None) };
         let time_s = fields.time.read(&mut cells, clock)?;
-        let row = fields.contact.as_ref().map(|contact| contact.row(&mut cells, schema)).transpose()?;
+        let row =
+            fields.contact.as_ref().map(|contact| contact.row(&mut cells, schema, time_s)).transpose()?;
         // A force that nobody knows is not 0: something touched.
         let truth = row.map(|Row { position, force_n, .. }| Contact {
             position,

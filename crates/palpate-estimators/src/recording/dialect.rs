@@ -29,6 +29,9 @@ pub struct Dialect {
     pub units_in_header: bool,
     /// Whether some text was Windows-1252, not UTF-8.
     pub windows_1252: bool,
+    /// Rows without a position, which were taken as untouched as nothing else said so.
+    #[serde(default)]
+    pub without_position: usize,
 }
 
 impl Dialect {
@@ -115,6 +118,11 @@ impl fmt::Display for Dialect {
         }
         if self.windows_1252 {
             words.push("Windows-1252 text".to_owned());
+        }
+        match self.without_position {
+            0 => {}
+            1 => words.push("1 row without a position, taken as untouched".to_owned()),
+            count => words.push(format!("{count} rows without a position, taken as untouched")),
         }
         f.write_str(&words.join(", "))
     }

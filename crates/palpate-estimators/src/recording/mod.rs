@@ -10,6 +10,7 @@ mod heading;
 mod marks;
 mod table;
 mod timestamp;
+mod untouched;
 mod warnings;
 
 pub use columns::{Column, Columns, ForceColumn, Frame, Header, Need, PositionColumns, ValueColumn};
@@ -20,6 +21,7 @@ pub use dialect::Dialect;
 pub use heading::Heading;
 pub use marks::{Decimal, Separator};
 pub use table::{Content, Table, TableColumn};
+pub use untouched::{TimeSpan, TimeSpanError};
 pub use warnings::Warning;
 
 use serde::{Deserialize, Serialize};

@@ -31,6 +31,8 @@ fn foreign() -> Columns {
         frame: Frame::default(),
         nuisance: None,
         time: None,
+        untouched: None,
+        untouched_times: Vec::new(),
         separator: None,
         decimal: None,
     }
@@ -86,6 +88,52 @@ fn rows_have_times_where_a_column_tells_them() {
     assert_eq!(missing, "bench.csv:1: there is no column `Zeit`; there are `X`, `Pl`, `Pr`, `F`");
     let other = times(&foreign().time("Zeit"), "X,Pl,Pr,F,Zeit\n10,1,2,3,14:03:25\n11,1,2,3,4\n");
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
+}
+
+/// Which rows of a file are untouched, and what is said of it.
+fn untouched(columns: &Columns, text: &str) -> Result<(Vec<bool>, String), String> {
+    let recording = read_as(columns, text.as_bytes()).map_err(|error| error.to_string())?;
+    let said = recording.provenance.dialects.iter().map(ToString::to_string).collect();
+    Ok((recording.rows.iter().map(|row| !row.touches()).collect(), said))
+}
+
+#[test]
+fn untouched_rows_are_marked_by_force_column_or_time_or_found() {
+    // By force 0, wherever the position is.
+    let text = "X,Pl,Pr,F\n10,1,2,3\n-5,1,2,0\n,1,2,0.0\n";
+    let said = "1 row without a position, taken as untouched".to_owned();
+    assert_eq!(untouched(&foreign(), text), Ok((vec![false, true, true], said)));
+    // Found, with or without a column of forces.
+    let said = "2 rows without a position, taken as untouched".to_owned();
+    let expected = Ok((vec![true, false, true], said));
+    assert_eq!(untouched(&foreign(), "X,Pl,Pr,F\n,1,2,\n10,1,2,3\n,1,2,0\n"), expected);
+    let columns = Columns { force: None, ..foreign() };
+    assert_eq!(untouched(&columns, "X,Pl,Pr\n,1,2\n10,1,2\n,1,2\n"), expected);
+    // By a column, whatever the load cell reads then.
+    let marked = Columns { untouched: Some(named("leer")), ..foreign() };
+    let text = "X,Pl,Pr,F,leer\n10,1,2,0.02,ja\n10,1,2,3,\n,1,2,,1\n10,1,2,3,0\n";
+    assert_eq!(untouched(&marked, text), Ok((vec![true, false, true, false], String::new())));
+    // By time.
+    let spans = ["0 s..1 s", "3 s.."].map(|span| span.parse().unwrap()).to_vec();
+    let timed = Columns { untouched_times: spans, ..foreign() }.time("t");
+    let text = "X,Pl,Pr,F,t\n10,1,2,0.1,0\n10,1,2,3,2\n11,1,2,,3\n";
+    assert_eq!(untouched(&timed, text), Ok((vec![true, false, true], String::new())));
+}
+
+#[test]
+fn what_cannot_mark_untouched_rows_is_refused() {
+    let marked = Columns { untouched: Some(named("empty")), ..foreign() };
+    let spans = vec!["95 s..".parse().unwrap()];
+    let timed = Columns { untouched_times: spans, ..foreign() };
+    let refused = [
+        untouched(&marked, "X,Pl,Pr,F,empty\n10,1,2,3,perhaps\n"),
+        untouched(&marked, "X,Pl,Pr,F\n10,1,2,3\n"),
+        untouched(&timed, "X,Pl,Pr,F\n10,1,2,3\n"),
+        untouched(&timed, "X,Pl,Pr,F,time_s\n10,1,2,3,0\n10,1,2,3,60\n"),
+        untouched(&foreign(), "X,Pl,Pr,F\n,1,2,3\n"),
+        untouched(&foreign(), "X,Pl,Pr,F\n10,1,2,\n"),
+    ];
+    insta::assert_snapshot!(refused.map(Result::unwrap_err).join("\n"));
 }
 
 /// A spreadsheet's export of a bench with `foreign` columns, and the same numbers as plain CSV.

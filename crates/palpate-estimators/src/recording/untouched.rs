@@ -1,0 +1,114 @@
+//! Rows in which nothing touched, as a file or its rig marks them.
+
+use super::csv_error::CsvProblem;
+use palpate_mechanics::units::{Dimension, Quantity};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// Times from one to another, either of which may be left out, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeSpan {
+    /// The first of them; `None` from the beginning on.
+    pub from_s: Option<f64>,
+    /// The last of them; `None` to the end.
+    pub to_s: Option<f64>,
+}
+
+impl TimeSpan {
+    /// Whether a time is within it.
+    pub fn contains(&self, time_s: f64) -> bool {
+        self.from_s.is_none_or(|from_s| from_s <= time_s) && self.to_s.is_none_or(|to_s| time_s <= to_s)
+    }
+}
+
+impl fmt::Display for TimeSpan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = |time_s: Option<f64>| time_s.map_or_else(String::new, |time_s| format!("{time_s} s"));
+        write!(f, "{}..{}", end(self.from_s), end(self.to_s))
+    }
+}
+
+/// A span of time that is not written as one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{text}` is not a span of time{}; write it as in \"0 s..10 s\", \"95 s..\" or \"..2 min\"",
+    reason(because)
+)]
+pub struct TimeSpanError {
+    /// The text.
+    pub text: String,
+    /// What is wrong with one of its ends; empty where the whole is.
+    pub because: String,
+}
+
+fn reason(because: &str) -> String {
+    if because.is_empty() { String::new() } else { format!(" ({because})") }
+}
+
+impl FromStr for TimeSpan {
+    type Err = TimeSpanError;
+
+    /// Reads `0 s..10 s`, `0..10 s`, `95 s..` and `..2 min`.
+    fn from_str(text: &str) -> Result<Self, TimeSpanError> {
+        let refuse = |because: String| TimeSpanError { text: text.to_owned(), because };
+        let (from, to) = text.split_once("..").ok_or_else(|| refuse(String::new()))?;
+        let (from, to) = (from.trim(), to.trim());
+        let end = |text: &str| -> Result<Option<f64>, TimeSpanError> {
+            match text {
+                "" => Ok(None),
+                text => Quantity::parse_as(text, Dimension::Time)
+                    .map(Some)
+                    .map_err(|error| refuse(error.to_string())),
+            }
+        };
+        let to_s = end(to)?;
+        // The unit behind the end holds for both.
+        let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
+        let from_s = if from.parse::<f64>().is_ok() { end(&format!("{from} {unit}"))? } else { end(from)? };
+        match (from_s, to_s) {
+            (None, None) => Err(refuse("it has neither a beginning nor an end".to_owned())),
+            (Some(from_s), Some(to_s)) if from_s > to_s => {
+                Err(refuse(format!("{from_s} s is later than {to_s} s")))
+            }
+            (from_s, to_s) => Ok(Self { from_s, to_s }),
+        }
+    }
+}
+
+/// Whether a field of the column that marks untouched rows marks one.
+pub(super) fn is_mark(text: &str) -> Result<bool, CsvProblem> {
+    const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
+    const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];
+    let is = |word: &&str| text.eq_ignore_ascii_case(word);
+    match (YES.iter().any(|word| is(&word)), NO.iter().any(|word| is(&word))) {
+        (true, _) => Ok(true),
+        (_, true) => Ok(false),
+        _ => Err(CsvProblem::NotAMark { text: text.to_owned() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_of_time_are_read_as_people_write_them() {
+        let read = |text: &str| TimeSpan::from_str(text).map(|span| (span.from_s, span.to_s));
+        assert_eq!(read("0 s..10 s"), Ok((Some(0.0), Some(10.0))));
+        assert_eq!(read(" 0 .. 2 min"), Ok((Some(0.0), Some(120.0))));
+        assert_eq!(read("95 s.."), Ok((Some(95.0), None)));
+        assert_eq!(read("..500 ms"), Ok((None, Some(0.5))));
+        let refused = ["10 s", "..", "5..", "0..10", "0 mm..10 s", "9 s..1 s", "nan s..1 s"];
+        insta::assert_snapshot!(refused.map(|text| read(text).unwrap_err().to_string()).join("\n"));
+    }
+
+    #[test]
+    fn marks_are_read_as_people_write_them() {
+        let read = |text| is_mark(text).ok();
+        assert_eq!(["1", "TRUE", "x", "Ja"].map(read), [Some(true); 4]);
+        assert_eq!(["", "0", "false", "Nein"].map(read), [Some(false); 4]);
+        assert_eq!(["2", "maybe"].map(read), [None; 2]);
+    }
+}
