@@ -8,7 +8,7 @@
 //! the covariance, a rank-1 change: |M·L⁻¹·y|² falls by τ·(vᵀ·w)²/(1 + τ·vᵀ·v), with v = M·L⁻¹·u and w = M·L⁻¹·y, and the
 //! determinants grow by ln(1 + τ·vᵀ·v). Places and orders of magnitude of τ are averaged over.
 
-use super::presses::Presses;
+use super::presses::{Presses, Repeated};
 use super::prior::Prior;
 use ndarray::{Array1, Array2, ArrayView1, Axis as Dimension};
 use palpate_numerics::{Cholesky, NotPositiveDefinite};
@@ -111,6 +111,32 @@ pub(super) struct Evidence<'a> {
     effects: Array2<f64>,
     /// Readings of the presses by a source of unit amplitude at each place.
     sources: Array2<f64>,
+    repeats: RepeatedNoise,
+}
+
+/// What the scatter of repeats says of the noise of untouched rows.
+struct RepeatedNoise {
+    freedom: f64,
+    /// Sum of squared deviations of each channel, each over the noise's variance relative to that of untouched rows.
+    squares: Array1<f64>,
+    /// Σ ln of those relative variances.
+    log_determinant: f64,
+}
+
+impl RepeatedNoise {
+    fn new(presses: &Presses, prior: &Prior) -> Self {
+        let Repeated { force_n, freedom, squares } = &presses.repeated;
+        let relative: Array1<f64> = force_n.iter().map(|force_n| prior.relative_noise(*force_n)).collect();
+        Self {
+            freedom: freedom.iter().sum(),
+            squares: squares.t().dot(&relative.mapv(f64::recip)),
+            log_determinant: relative
+                .iter()
+                .zip(freedom)
+                .map(|(variance, freedom)| freedom * variance.ln())
+                .sum(),
+        }
+    }
 }
 
 impl<'a> Evidence<'a> {
@@ -121,12 +147,13 @@ impl<'a> Evidence<'a> {
             covariance: prior.covariance(presses),
             effects: prior.effects(presses),
             sources: prior.sources(presses, sensors_m),
+            repeats: RepeatedNoise::new(presses, prior),
         }
     }
 
     /// Degrees of freedom of a channel's presses.
     fn freedom(&self) -> f64 {
-        self.presses.len() as f64 + self.presses.freedom - self.effects.ncols() as f64
+        self.presses.len() as f64 + self.repeats.freedom - self.effects.ncols() as f64
     }
 
     /// The covariance at one ρ.
@@ -193,8 +220,9 @@ impl<'a> Evidence<'a> {
         sources: &Array2<f64>,
     ) -> ChannelFit {
         let freedom = self.freedom();
-        let square = white.dot(white) + self.presses.scatter[c] / ratio;
-        let determinant = restricted.log_determinant + self.presses.freedom * ratio.ln();
+        let square = white.dot(white) + self.repeats.squares[c] / ratio;
+        let determinant =
+            restricted.log_determinant + self.repeats.freedom * ratio.ln() + self.repeats.log_determinant;
         if sources.ncols() == 0 {
             let signal = square / freedom;
             let evidence = -0.5 * (freedom * signal.ln() + determinant);

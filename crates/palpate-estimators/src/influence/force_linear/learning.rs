@@ -18,7 +18,7 @@ use ndarray::{Array1, Array2};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{bisect, chi_squared_critical_value};
+use palpate_numerics::{bisect, chi_squared_critical_value, mean};
 
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
@@ -122,11 +122,12 @@ impl Learnt {
         let mut functions =
             all_functions(&self.prior, &self.presses, &self.fits, &self.sensors_m, places_m, watch)?;
         let per_newton = 1.0 / self.prior.force_scale_n;
+        let widening = self.widening * dependence(&self.prior, &self.presses);
         for functions in &mut functions {
-            functions.offset_variance *= self.widening;
+            functions.offset_variance *= widening;
             functions.values.iter_mut().for_each(|value| *value *= per_newton);
-            functions.variances.iter_mut().for_each(|v| *v *= self.widening * per_newton * per_newton);
-            functions.covariances.iter_mut().for_each(|c| *c *= self.widening * per_newton);
+            functions.variances.iter_mut().for_each(|v| *v *= widening * per_newton * per_newton);
+            functions.covariances.iter_mut().for_each(|c| *c *= widening * per_newton);
         }
         Ok(functions)
     }
@@ -196,6 +197,16 @@ impl Learnt {
         found.sort_by(|a, b| excess(*b).total_cmp(&excess(*a)));
         Ok(found.into_iter().take(AT_ONCE).map(|i| self.presses.row[i]).collect())
     }
+}
+
+/// By what factor the channels' errors are less independent than their number.
+///
+/// What makes presses scatter with their force, a wrong position or force, is the same for all channels; half of it is taken to move
+/// the position. The variance of every channel multiplied by the factor is that of a position told by one, not by the mean of all.
+fn dependence(prior: &Prior, presses: &Presses) -> f64 {
+    const MOVES_POSITION: f64 = 0.5;
+    let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.relative_noise(*force_n)));
+    1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
 }
 
 /// Functions of all channels, in their order.
@@ -286,7 +297,8 @@ impl Found {
             for ((c, fit), readings) in asked.into_iter().zip(found) {
                 for (k, (reading, process)) in readings.into_iter().enumerate() {
                     let error = others.means[[k, c]] + others.centre[c] - reading;
-                    errors.push([error * error, fit.noise_variance() / others.count[k], process]);
+                    let noise = fit.noise_variance() * self.prior.relative_noise(others.force_n[k]);
+                    errors.push([error * error, noise / others.count[k], process]);
                 }
             }
         }
@@ -298,6 +310,10 @@ impl Found {
 const NONLINEARITIES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
 /// Variances of drift over that of the noise that are tried first.
 const DRIFTS: [f64; 3] = [10.0, 100.0, 1e3];
+/// Ten times the drift is believed from this much more evidence on.
+const LEAST_MORE: f64 = 3.0;
+/// Variances of the scatter of presses of the mean square force, over that of the noise, that are tried.
+const SCATTERS: [f64; 5] = [1.0, 4.0, 16.0, 64.0, 256.0];
 /// Exponents of the response that are tried.
 const RESPONSES: [f64; 4] = [0.5, 0.75, 1.33, 2.0];
 /// A smoother kernel is believed from this much more evidence on: it claims to know more between the presses.
@@ -351,13 +367,19 @@ impl Search<'_> {
         if let Some((_, drifting)) = self.drift(best, &prior, &[])? {
             (best, prior) = self.climb_lengths(drifting)?;
         }
+        if let Some((_, scattered)) = self.scatter(best, &prior, &[])? {
+            (best, prior) = self.climb_lengths(scattered)?;
+        }
         if self.structure != Structure::ForceLinear {
             (best, prior) = self.response(best, prior)?;
         }
         if self.structure == Structure::Auto {
             let changed = NONLINEARITIES.map(|nonlinearity| Prior { nonlinearity, ..prior.clone() });
             let (found, nonlinear) = self.best_of(changed, &[])?;
-            if found > best + LEAST_GAIN {
+            // Presses that scatter more the harder they are look like influences that change with the force.
+            let scatters = SCATTERS.map(|scatter| Prior { scatter, ..prior.clone() });
+            let (scattered, _) = self.best_of(scatters, &[])?;
+            if found > best.max(scattered) + LEAST_GAIN * dependence(&prior, self.presses) {
                 prior = nonlinear;
             }
         }
@@ -375,9 +397,24 @@ impl Search<'_> {
             .into_iter()
             .flat_map(|drift_course| DRIFTS.map(|drift| Prior { drift, drift_course, ..prior.clone() }));
         let coarse = self.best_of(drifts, sensors_m)?;
-        let closer = [0.1, 10.0].map(|factor| Prior { drift: coarse.1.drift * factor, ..coarse.1.clone() });
-        let closer = self.best_of(closer, sensors_m)?;
-        let found = if closer.0 > coarse.0 { closer } else { coarse };
+        let times = |factor: f64| Prior { drift: coarse.1.drift * factor, ..coarse.1.clone() };
+        let more = self.best_of([times(10.0)], sensors_m)?;
+        let less = self.best_of([times(0.1)], sensors_m)?;
+        // Much drift leaves little noise, of which few presses know nothing: it has to be more probable than a tenth of it.
+        let found = [less, coarse, more]
+            .into_iter()
+            .reduce(|found, next| if next.0 > found.0 + LEAST_MORE { next } else { found });
+        Ok(found.filter(|(total, _)| *total > best + LEAST_GAIN))
+    }
+
+    /// The prior with noise that grows with the force, where that is more probable by [`LEAST_GAIN`] than `best`, the evidence of `prior`.
+    fn scatter(
+        &mut self,
+        best: f64,
+        prior: &Prior,
+        sensors_m: &[Vec<f64>],
+    ) -> Result<Option<(f64, Prior)>, Cancelled> {
+        let found = self.best_of(SCATTERS.map(|scatter| Prior { scatter, ..prior.clone() }), sensors_m)?;
         Ok(Some(found).filter(|(total, _)| *total > best + LEAST_GAIN))
     }
 
@@ -462,9 +499,12 @@ impl Search<'_> {
         let Some((_, mut prior)) = best else { return Ok(None) };
         // Noise that the smooth prior took for its own makes a drift look smaller than it is.
         let few: Vec<Vec<f64>> = sensors_m.iter().step_by(ONE_OF).cloned().collect();
-        let total = self.total(&prior, &few)?;
-        if let Some((_, drifting)) = self.drift(total, &prior, &few)? {
-            prior = drifting;
+        let mut total = self.total(&prior, &few)?;
+        if let Some(drifting) = self.drift(total, &prior, &few)? {
+            (total, prior) = drifting;
+        }
+        if let Some((_, scattered)) = self.scatter(total, &prior, &few)? {
+            prior = scattered;
         }
         Ok(Some(self.found(prior, &sensors_m)))
     }

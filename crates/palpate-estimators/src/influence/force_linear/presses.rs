@@ -31,9 +31,17 @@ pub(super) struct Presses {
     pub centre: Vec<f64>,
     /// Mean reading less the centre, a row a press.
     pub means: Array2<f64>,
-    /// Sum of squared deviations of repeats from their mean, a value a channel, and how many degrees of freedom it has.
-    pub scatter: Vec<f64>,
-    pub freedom: f64,
+    pub repeated: Repeated,
+}
+
+/// Scatter of the presses that were repeated, a row a press.
+#[derive(Clone, Debug)]
+pub(super) struct Repeated {
+    pub force_n: Vec<f64>,
+    /// Number of repeats less one.
+    pub freedom: Vec<f64>,
+    /// Sum of squared deviations of each channel from the mean of the repeats.
+    pub squares: Array2<f64>,
 }
 
 /// A row of a recording as a press.
@@ -83,12 +91,15 @@ impl Presses {
     fn of_groups(rows: &[RowPress], groups: &[&[RowPress]], channels: usize) -> Self {
         let centre: Vec<f64> = (0..channels).map(|c| mean(rows.iter().map(|row| row.reading[c]))).collect();
         let mut means = Array2::zeros((groups.len(), channels));
-        let mut scatter = vec![0.0; channels];
-        for (mut mean, group) in means.outer_iter_mut().zip(groups) {
+        let repeated: Vec<usize> = (0..groups.len()).filter(|i| groups[*i].len() > 1).collect();
+        let mut squares = Array2::zeros((groups.len(), channels));
+        for ((mut mean, mut squares), group) in
+            means.outer_iter_mut().zip(squares.outer_iter_mut()).zip(groups)
+        {
             let count = group.len() as f64;
             for (c, mean) in mean.iter_mut().enumerate() {
                 *mean = group.iter().map(|row| row.reading[c]).sum::<f64>() / count;
-                scatter[c] += group.iter().map(|row| (row.reading[c] - *mean).powi(2)).sum::<f64>();
+                squares[c] = group.iter().map(|row| (row.reading[c] - *mean).powi(2)).sum::<f64>();
                 *mean -= centre[c];
             }
         }
@@ -98,10 +109,13 @@ impl Presses {
             count: groups.iter().map(|group| group.len() as f64).collect(),
             time: groups.iter().map(|group| mean(group.iter().map(|row| row.time))).collect(),
             row: groups.iter().map(|group| group[0].row).collect(),
-            freedom: (rows.len() - groups.len()) as f64,
+            repeated: Repeated {
+                force_n: repeated.iter().map(|i| groups[*i][0].force_n).collect(),
+                freedom: repeated.iter().map(|i| (groups[*i].len() - 1) as f64).collect(),
+                squares: squares.select(Dimension(0), &repeated),
+            },
             centre,
             means,
-            scatter,
         }
     }
 
@@ -153,8 +167,11 @@ impl Presses {
         let of = |values: &[f64]| channels.iter().map(|c| values[*c]).collect();
         Self {
             centre: of(&self.centre),
-            scatter: of(&self.scatter),
             means: self.means.select(Dimension(1), channels),
+            repeated: Repeated {
+                squares: self.repeated.squares.select(Dimension(1), channels),
+                ..self.repeated.clone()
+            },
             ..self.clone()
         }
     }

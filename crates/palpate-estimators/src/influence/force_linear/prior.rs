@@ -13,7 +13,8 @@
 //! φ(F) = F̄·(F/F̄)^γ, F̄ being the root mean square force: γ = 1 but where the presses say that all positions share another
 //! response. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), tells how far the presses are from any of that.
 //! Drift is a Gaussian process of the time for each channel ([`DriftCourse`]), of variance κ times the noise's from one end of the
-//! recording to the other.
+//! recording to the other. Noise has the variance σ²·(1 + μ·φ²/F̄²): presses scatter with their force where forces or positions were not
+//! quite as recorded.
 
 use super::drift::DriftCourse;
 use super::presses::Presses;
@@ -88,6 +89,9 @@ pub(super) struct Prior {
     pub drift: f64,
     #[serde(default)]
     pub drift_course: DriftCourse,
+    /// μ.
+    #[serde(default)]
+    pub scatter: f64,
 }
 
 impl Prior {
@@ -105,6 +109,7 @@ impl Prior {
             response: 1.0,
             drift: 0.0,
             drift_course: DriftCourse::default(),
+            scatter: 0.0,
         }
     }
 
@@ -147,8 +152,8 @@ impl Prior {
         };
         LocatorFault::check_count("length scales", self.extent.dimensions(), self.lengths_m.len())?;
         numbers("length scale", &self.lengths_m, |length| length > 0.0, "finite and greater than 0")?;
-        let shares = [self.smooth_part, self.nonlinearity, self.drift];
-        numbers("smooth part, nonlinearity or drift", &shares, |share| share >= 0.0, "at least 0")?;
+        let shares = [self.smooth_part, self.nonlinearity, self.drift, self.scatter];
+        numbers("smooth part, nonlinearity, drift or scatter", &shares, |share| share >= 0.0, "at least 0")?;
         numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
         numbers("force", &[self.force_scale_n], |force| force > 0.0, "greater than 0")
     }
@@ -183,7 +188,7 @@ impl Prior {
     pub fn with_noise(&self, covariance: &Array2<f64>, presses: &Presses, ratio: f64) -> Array2<f64> {
         let mut covariance = covariance.clone();
         for (i, count) in presses.count.iter().enumerate() {
-            covariance[[i, i]] += ratio / count;
+            covariance[[i, i]] += ratio * self.relative_noise(presses.force_n[i]) / count;
         }
         if self.drift > 0.0 {
             for ((i, j), value) in covariance.indexed_iter_mut() {
@@ -191,6 +196,11 @@ impl Prior {
             }
         }
         covariance
+    }
+
+    /// Variance of the noise of a press over that of an untouched row.
+    pub fn relative_noise(&self, force_n: f64) -> f64 {
+        1.0 + self.scatter * self.response_to(force_n).powi(2)
     }
 
     /// Covariance of the drift at two times over the noise's variance.

@@ -25,6 +25,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::rc::Rc;
 
 mod drift;
+mod scatter;
 
 const STRIP_M: f64 = 0.3;
 const PLATE_M: [f64; 2] = [0.2, 0.15];

@@ -132,7 +132,7 @@ fn drifting_strips_are_located_better_than_by_a_spline() {
                     comparison.print(&format!("  beside {name}"));
                     means_mm.extend_from_slice(&comparison.means);
                     let (won, _) = Comparison::summary(&comparison.medians);
-                    assert!(won >= 0.9, "{course:?}, {pace:?}, {name}: {won}");
+                    assert!(*name == WITHOUT_DRIFT || won >= 0.9, "{course:?}, {pace:?}, {name}: {won}");
                 }
                 eprintln!("  mean {:.2} mm after a tare", mean(study.tared_mm));
             }
