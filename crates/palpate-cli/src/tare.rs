@@ -1,9 +1,16 @@
 //! `--tare`: readings of a surface whose offsets have moved since its calibration.
 
 use crate::failure::{Complaint, Failure};
+use crate::input::RecordingFiles;
 use crate::lines::Readings;
+use crate::progress::Observer;
 use palpate_estimators::estimator::{Locator, Status, Tare, TareError};
-use palpate_estimators::fit::Locate;
+use palpate_estimators::evaluation::Split;
+use palpate_estimators::fit::{FitTask, Locate};
+use palpate_estimators::influence::Influence;
+use palpate_estimators::offset_course::OffsetCourse;
+use palpate_estimators::recording::Recording;
+use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::Quantity;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -15,6 +22,22 @@ pub struct TareOption {
     /// (`auto`), and bring every reading to what calibration learnt
     #[arg(long, value_name = "N|FILE|auto")]
     pub tare: Option<Source>,
+}
+
+impl TareOption {
+    /// What it does to readings that are judged.
+    pub fn in_words(&self) -> &'static str {
+        if self.tare.is_some() { ", tared" } else { "" }
+    }
+
+    /// Refuses a tare of readings that are simulated, which do not drift.
+    pub fn check_recorded(&self, files: &RecordingFiles) -> Result<(), Failure> {
+        if self.tare.is_some() && files.data.is_none() {
+            let complaint = Complaint::new("--tare: simulated readings do not drift");
+            return Err(complaint.help("--data names a recording to judge by").into());
+        }
+        Ok(())
+    }
 }
 
 /// The untouched readings.
@@ -200,4 +223,80 @@ impl<'a> Taring<'a> {
         }
         Ok(())
     }
+}
+
+/// Brings readings that are held out to what the locators of their folds learn that the channels read untouched, by the drift that
+/// the other presses tell; where no tare was asked for, a warning says how far the channels drift.
+pub fn tare_splits(
+    option: &TareOption,
+    setup: &Setup,
+    recording: &Recording,
+    splits: &mut [Split],
+) -> Result<(), Failure> {
+    let course = |training: &Recording, asked: &Recording| {
+        Observer::of_rounds(0)
+            .watch(|watch| Influence::offset_course(FitTask::new(setup, training).watch(watch), asked))
+            .map_err(|error| Failure::from_error(&error))
+    };
+    match option.tare {
+        Some(Source::Auto) => {}
+        Some(_) => {
+            let complaint =
+                "--tare N and --tare FILE are for a locator: a rig is judged by folds of one recording";
+            return Err(Complaint::new(complaint)
+                .help("--tare auto takes off the drift that the presses tell")
+                .into());
+        }
+        None if recording.rows.len() > MOST_LOOKED_AT => return Ok(()),
+        None => {
+            if let Some(course) = course(recording, recording)? {
+                eprintln!(
+                    "warning: {}: {}, and so do the readings that are held out; `--tare auto` takes it off",
+                    recording.provenance.source,
+                    moved_most(setup, &course.spans())
+                );
+            }
+            return Ok(());
+        }
+    }
+    let mut spans: Vec<f64> = vec![0.0; setup.layout().len()];
+    for split in splits {
+        split.offsets = course(&split.training, &split.judged)?;
+        let found = split.offsets.iter().flat_map(OffsetCourse::spans);
+        spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
+    }
+    if spans.iter().any(|span| *span > 0.0) {
+        eprintln!("palpate: {}; it is taken off held-out readings", moved_most(setup, &spans));
+    } else {
+        eprintln!("palpate: the presses tell no drift; readings are judged as they are");
+    }
+    Ok(())
+}
+
+/// Rows from which on nobody waits for a warning.
+const MOST_LOOKED_AT: usize = 300;
+
+fn moved_most(setup: &Setup, spans: &[f64]) -> String {
+    let most = spans.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    let Some((channel, value)) = most else { return "no channel drifts".to_owned() };
+    let sensor = &setup.layout().sensors()[channel];
+    let moved = Quantity { value: *value, dimension: sensor.kind.dimension() };
+    format!("the channels drift in the course of the recording, {} by {moved}", sensor.name)
+}
+
+/// A recording whose readings are tared as those of `palpate locate` are; the readings that make a baseline are left out.
+pub fn tared_recording(
+    option: &TareOption,
+    locator: &Locator,
+    mut recording: Recording,
+) -> Result<Recording, Failure> {
+    let Some(mut taring) = Taring::new(option, locator, false)? else { return Ok(recording) };
+    let mut kept = Vec::with_capacity(recording.rows.len());
+    for (i, row) in recording.rows.iter_mut().enumerate() {
+        if taring.take(&mut row.reading).map_err(Complaint::new)? == Taken::Tared {
+            kept.push(i);
+        }
+    }
+    taring.finish(&recording.provenance.source)?;
+    Ok(recording.subset(&kept))
 }

@@ -201,6 +201,11 @@ pub trait Locate {
     /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
+    /// Offset of each channel, in its SI unit; `None` where it was not learnt.
+    fn offsets(&self) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Checks what a file may have got wrong.
     ///
     /// # Errors

@@ -40,6 +40,7 @@ pub mod likelihood;
 pub mod load_profile;
 pub mod neighbours;
 pub mod network;
+pub mod offset_course;
 pub mod recording;
 pub mod setup;
 pub mod simulate;

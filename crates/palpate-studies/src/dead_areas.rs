@@ -248,7 +248,7 @@ impl ArraySensor {
         let trial = |k: u64| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(k));
             let training = self.recording(&self.presses, seed, &mut rng);
-            Split { training, judged: self.recording(&judged, seed, &mut rng) }
+            Split { training, judged: self.recording(&judged, seed, &mut rng), offsets: None }
         };
         (0..count).map(trial).collect()
     }

@@ -7,6 +7,7 @@ use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::output::Table;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
+use crate::tare::{TareOption, tare_splits};
 use crate::{input, output, progress, tables};
 use palpate_estimators::estimator::{Comparison, contenders};
 use palpate_estimators::evaluation::{Evaluation, Split, evaluate_splits, limit_ratio, percentage_error};
@@ -40,6 +41,8 @@ pub struct Arguments {
     /// Seed of simulation and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    tare: TareOption,
     /// Folder for a report, with `errors.csv`, the errors of each position, and `trials.csv`, those of each trial
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -54,6 +57,7 @@ pub struct Arguments {
 type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    arguments.tare.check_recorded(&arguments.files)?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
@@ -74,6 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "trials": trials.len(),
             "readings": readings,
             "seed": arguments.seed,
+            "tared": arguments.tare.tare.is_some(),
             "length_mm": rig.setup.surface().extent().length_m() * 1e3,
             "tolerance_mm": arguments.tolerance * 1e3,
             "estimators": estimators.collect::<Vec<_>>(),
@@ -163,9 +168,12 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each");
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
-    let trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
+    let recording = recording.in_order();
+    let mut trials = Split::by_folds(&recording, usize::from(arguments.folds)).map_err(Complaint::new)?;
+    tare_splits(&arguments.tare, &rig.setup, &recording, &mut trials)?;
+    let tared = arguments.tare.in_words();
     let cross_validated =
-        |data: &str| format!("{data}, cross-validated in {} folds by position", arguments.folds);
+        |data: &str| format!("{data}, cross-validated in {} folds by position{tared}", arguments.folds);
     let source = cross_validated(&tables::source_in_words(&recording.provenance));
     let data = recording.provenance.source;
     Ok(Trials { source, how: cross_validated(&data), data, trials })

@@ -7,11 +7,13 @@ use crate::json::object;
 use crate::output::Table;
 use crate::progress::Observer;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
+use crate::tare::{TareOption, tare_splits, tared_recording};
 use crate::{input, output, tables};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
-use palpate_estimators::evaluation::{ErrorSummary, Evaluation, Portion, cross_validate, percentage_error};
-use palpate_estimators::fit::FitTask;
+use palpate_estimators::evaluation::{
+    ErrorSummary, Evaluation, Portion, Split, evaluate_splits, percentage_error,
+};
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::surface::Extent;
@@ -39,6 +41,8 @@ pub struct Arguments {
     /// Seed of simulation and fits
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    tare: TareOption,
     /// Folder for a report, with `errors.csv`, the errors of each position
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -89,6 +93,7 @@ struct Answers {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    arguments.tare.check_recorded(&arguments.files)?;
     let answers = match RigOrLocator::read(&arguments.subject)? {
         RigOrLocator::Rig(rig) => cross_validated(arguments, rig)?,
         RigOrLocator::Locator(locator) => located(arguments, locator)?,
@@ -121,6 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         "data": &answers.recording.source,
         "folds": folds,
         "seed": arguments.seed,
+        "tared": arguments.tare.tare.is_some(),
         "length_mm": evaluation.extent.length_m() * 1e3,
         "tolerance_mm": arguments.tolerance * 1e3,
         "effective_percent": evaluation.effective_percent(arguments.tolerance),
@@ -133,7 +139,7 @@ fn errors_table(arguments: &Arguments, answers: &Answers) -> CsvTable {
     let how = match &answers.subject {
         RigOrLocator::Locator(_) => "located".to_owned(),
         RigOrLocator::Rig(_) => format!("cross-validated in {} folds by position", arguments.folds),
-    };
+    } + arguments.tare.in_words();
     let (subject, data) = (arguments.subject.display(), tables::source_in_words(&answers.recording));
     let comment = format!("errors of {subject} on {data}, {how}, seed {}", arguments.seed);
     let extent = answers.evaluation.extent;
@@ -153,10 +159,14 @@ fn cross_validated(arguments: &Arguments, rig: Box<Rig>) -> Result<Answers, Fail
     };
     let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
     arguments.memory.check(&rig.estimator, &rig.setup, &recording)?;
-    let task = FitTask::new(&rig.setup, &recording).seed(seed);
-    let evaluation = Observer::of_rounds(folds as u64 * rig.estimator.most_rounds())
-        .watch(|watch| cross_validate(&rig.estimator, task.watch(watch), folds))
-        .map_err(|error| Failure::from_error(&error))?;
+    let recording = recording.in_order();
+    let mut splits = Split::by_folds(&recording, folds).map_err(Complaint::new)?;
+    tare_splits(&arguments.tare, &rig.setup, &recording, &mut splits)?;
+    let Rig { setup, estimator, .. } = &*rig;
+    let evaluation = Observer::of_rounds(folds as u64 * estimator.most_rounds())
+        .watch(|watch| evaluate_splits(setup, estimator, &splits, seed, &|| 0.0, watch))
+        .map_err(|error| Failure::from_error(&error))?
+        .evaluation;
     Ok(Answers { evaluation, recording: recording.provenance, subject: RigOrLocator::Rig(rig) })
 }
 
@@ -165,7 +175,7 @@ fn located(arguments: &Arguments, locator: Box<Locator>) -> Result<Answers, Fail
     let recording = match arguments.files.read(&locator.setup)? {
         Some(recording) => {
             warn_of_training_data(&locator, &recording);
-            recording
+            tared_recording(&arguments.tare, &locator, recording)?
         }
         None => simulated(&locator, arguments.seed)?,
     };
@@ -243,7 +253,7 @@ fn print(
     let how = match folds {
         Some(folds) => format!("cross-validated in {folds} folds by position"),
         None => "located".to_owned(),
-    };
+    } + arguments.tare.in_words();
     let count = errors.first().map_or(0, |errors| errors.count);
     let (subject, data) = (arguments.subject.display(), &answers.recording.source);
     output::say(format!("{subject}: {count} readings of {data}, {how}\n"))?;

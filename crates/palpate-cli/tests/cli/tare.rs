@@ -121,6 +121,60 @@ fn bad_tares_are_refused() {
     said(&run(folder.path(), &["locate", "neighbours.json", "few.csv", "--tare", "2"]));
 }
 
+/// A recording of presses whose offsets move in the course of it, some of its untouched rows without position and force.
+fn drifting(board: &mut Board) -> String {
+    let mut csv = String::new();
+    for part in 0..12 {
+        board.move_steadily(3.0);
+        let place_mm = |i: i32| 15.0 + 18.0 * f64::from((5 * part + i) % 16);
+        let mut touches: Vec<Touch> = (0..5)
+            .map(|i| Touch { position_mm: place_mm(i), force_n: 1.0 + f64::from((3 * part + i) % 4) })
+            .collect();
+        touches.push(Touch::NONE);
+        let text = board.recording(&touches).replace("0.000,0.0000,", ",,");
+        csv += if csv.is_empty() { &text } else { text.split_once('\n').unwrap().1 };
+    }
+    csv
+}
+
+#[test]
+fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
+    let (folder, mut board) = fitted();
+    let file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    file("drift.csv", &drifting(&mut board));
+    let mean_mm = |command: &[&str]| {
+        let options = ["rig.toml", "--data", "drift.csv", "--json"];
+        let output = run(folder.path(), &[&command[..1], &options, &command[1..]].concat());
+        let json: serde_json::Value = serde_json::from_str(&said(&output)).unwrap();
+        let errors = json["errors"].get(0).or(json["estimators"].get(0)).unwrap();
+        let mean_mm = errors["error_mm"]["mean"].as_f64().unwrap();
+        (mean_mm, json["tared"].as_bool().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (raw_mm, _, warned) = mean_mm(&["evaluate"]);
+    assert!(warned.contains("drift.csv: 12 rows without a position, taken as untouched"), "{warned}");
+    assert!(warned.contains("`--tare auto` takes it off"), "{warned}");
+    let (tared_mm, tared, told) = mean_mm(&["evaluate", "--tare", "auto"]);
+    assert!(tared && told.contains("it is taken off held-out readings"), "{told}");
+    println!("mean error {raw_mm:.2} mm, {tared_mm:.2} mm with --tare auto");
+    assert!(tared_mm < 0.4 * raw_mm, "{tared_mm} mm, {raw_mm} mm");
+    let (compared_mm, tared, _) = mean_mm(&["compare", "--only", "influence", "--tare", "auto"]);
+    assert!(tared && (compared_mm / tared_mm - 1.0).abs() < 1e-9, "{compared_mm} mm, {tared_mm} mm");
+    let refused =
+        complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
+    assert!(refused.contains("--tare auto takes off the drift"), "{refused}");
+    // A locator is judged as it is asked.
+    file("untouched.csv", &board.recording(&[Touch::NONE; 40]));
+    let touches: Vec<Touch> = (0..40).map(|_| board.touch()).collect();
+    file("later.csv", &board.recording(&touches));
+    let judged = |tare: &[&str]| {
+        let arguments = [&["evaluate", "board.json", "--data", "later.csv", "--json"], tare].concat();
+        let json: serde_json::Value = serde_json::from_str(&said(&run(folder.path(), &arguments))).unwrap();
+        json["errors"][0]["error_mm"]["mean"].as_f64().unwrap()
+    };
+    let (raw_mm, tared_mm) = (judged(&[]), judged(&["--tare", "untouched.csv"]));
+    assert!(tared_mm < 0.4 * raw_mm, "{tared_mm} mm, {raw_mm} mm");
+}
+
 #[test]
 fn a_track_is_tared_too() {
     let folder = folder(MOVING_LOAD);

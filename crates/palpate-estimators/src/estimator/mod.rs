@@ -230,6 +230,10 @@ impl Locate for Method {
         self.as_locate().locate(reading)
     }
 
+    fn offsets(&self) -> Option<Vec<f64>> {
+        self.as_locate().offsets()
+    }
+
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         self.as_locate().check(setup)
     }

@@ -121,7 +121,7 @@ impl Calibration {
         } else {
             simulate_at(&self.pressed, &self.presses, 1, seed)?
         };
-        Ok(Split { training, judged: recording.subset(touched) })
+        Ok(Split { training, judged: recording.subset(touched), offsets: None })
     }
 
     /// Simulates, fits and judges.
@@ -147,7 +147,7 @@ impl Calibration {
         watch: Watch,
         fit: impl FnOnce(FitTask) -> Result<Fitted<M>, E>,
     ) -> Result<Calibrated<M>, EvaluationError<E>> {
-        let Split { training, judged } = self.simulate(seed)?;
+        let Split { training, judged, .. } = self.simulate(seed)?;
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         let locator = fit(task).map_err(EvaluationError::Fit)?;
         Ok(Calibrated { seed, evaluation: Evaluation::new(&locator, &judged)?, locator })
@@ -168,7 +168,7 @@ impl Calibration {
         let (Some(&seed), true) = (seeds.first(), self.is_faultless()) else {
             return seeds.into_iter().map(|seed| self.run(estimator, seed, watch)).collect();
         };
-        let Split { training, judged } = self.simulate(seed)?;
+        let Split { training, judged, .. } = self.simulate(seed)?;
         let mut queue = SeedList::new(seeds);
         let task = FitTask { setup: &self.known, recording: &training, seed, watch };
         estimator.fit_many(task, &mut queue).map_err(EvaluationError::Fit)?;

@@ -7,6 +7,7 @@ pub use palpate_numerics::{median, percentile};
 
 use crate::fit::{Fit, FitTask, Fitted, Locate, ReadingError};
 use crate::load_profile::Cells;
+use crate::offset_course::OffsetCourse;
 use crate::recording::{Fold, Recording, TooFewPositions};
 use crate::setup::Setup;
 use crate::simulate::SimulateError;
@@ -309,6 +310,8 @@ pub struct Split {
     pub training: Recording,
     /// Recording to judge by.
     pub judged: Recording,
+    /// Offsets at the rows to judge by, to be brought to those that a locator learns; `None` to judge by the readings as they are.
+    pub offsets: Option<OffsetCourse>,
 }
 
 /// An evaluation over some splits together, and the time it took.
@@ -332,6 +335,7 @@ impl Split {
         let split = |fold: &Fold| Self {
             training: recording.subset(&fold.training),
             judged: recording.subset(&fold.held_out),
+            offsets: None,
         };
         Ok(folds.iter().map(split).collect())
     }
@@ -356,7 +360,11 @@ pub fn evaluate_splits<E: Fit>(
         let task = FitTask { setup, recording: &split.training, seed, watch };
         let locator = estimator.fit_task(task).map_err(EvaluationError::Fit)?;
         let fitted = clock();
-        let part = Evaluation::new(&locator, &split.judged)?;
+        let tared = split
+            .offsets
+            .as_ref()
+            .map(|course| course.tared(&split.judged, locator.method.offsets().as_deref()));
+        let part = Evaluation::new(&locator, tared.as_ref().unwrap_or(&split.judged))?;
         (fitting_s, locating_s) = (fitting_s + (fitted - start), locating_s + (clock() - fitted));
         evaluation.located.extend(part.located);
     }

@@ -24,6 +24,8 @@ pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
 use crate::fit::{Fit, FitTask, Locate, LocatorFault};
 use crate::lightest_touch::LightestTouch;
+use crate::offset_course::OffsetCourse;
+use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{FalseAlarmRate, LINE_PLACES, StatusRule, unknowns};
 use measured::{MeasuredInfluence, MeasuredLocator};
@@ -92,6 +94,21 @@ impl Influence {
         )
     }
 
+    /// Offsets of the channels at the rows of `asked`, told by the task's presses where these drift; `None` of a surface with a model,
+    /// of rows without times or forces, and where the presses tell no drift.
+    ///
+    /// # Errors
+    /// [`InfluenceFitError`] where influence functions cannot be learnt, or the watch stopped it.
+    pub fn offset_course(
+        task: FitTask,
+        asked: &Recording,
+    ) -> Result<Option<OffsetCourse>, InfluenceFitError> {
+        if task.setup.surface().model().is_some() {
+            return Ok(None);
+        }
+        Ok(force_linear::offset_course(task, asked)?)
+    }
+
     /// Whether the settings suit a surface without mechanics; "corrected" is then the recording alone, as there is nothing to
     /// correct.
     fn check_measured(&self) -> Result<(), InfluenceFitError> {
@@ -149,16 +166,6 @@ impl InfluenceLocator {
 }
 
 impl InfluenceLocator {
-    /// Offset of each channel, in its SI unit; `None` where it was not learnt.
-    pub fn offsets(&self) -> Option<Vec<f64>> {
-        match self {
-            Self::Beam(beam) => Some(beam.offsets().to_vec()),
-            Self::Plane(plane) => Some(plane.offsets().to_vec()),
-            Self::ForceLinear(linear) => Some(linear.offsets()),
-            Self::Measured(_) => None,
-        }
-    }
-
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
@@ -177,6 +184,15 @@ impl Locate for InfluenceLocator {
             Self::Plane(plane) => plane.locate(reading),
             Self::ForceLinear(linear) => linear.locate(reading),
             Self::Measured(measured) => measured.locate(reading),
+        }
+    }
+
+    fn offsets(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Beam(beam) => Some(beam.offsets().to_vec()),
+            Self::Plane(plane) => Some(plane.offsets().to_vec()),
+            Self::ForceLinear(linear) => Some(linear.offsets()),
+            Self::Measured(_) => None,
         }
     }
 

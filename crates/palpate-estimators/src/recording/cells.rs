@@ -155,7 +155,7 @@ impl<'a> Cells<'a> {
     /// Whether field `index` marks an untouched row.
     pub fn is_marked(&self, index: usize) -> Result<bool, CsvError> {
         let text = self.fields.get(index).map_or("", |field| field.value.as_ref());
-        is_mark(text).map_err(|problem| self.error(index, problem))
+        is_mark(text).ok_or_else(|| self.error(index, CsvProblem::NotAMark { text: text.to_owned() }))
     }
 
     /// Counts a row without a position.

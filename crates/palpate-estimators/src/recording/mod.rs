@@ -139,6 +139,15 @@ impl Recording {
         self.rows.iter().map(|row| row.time_s).collect()
     }
 
+    /// The same with the number of each row as its time where some row has none, so that parts of it keep their order.
+    #[must_use]
+    pub fn in_order(mut self) -> Self {
+        if self.times_s().is_none() {
+            self.rows.iter_mut().enumerate().for_each(|(i, row)| row.time_s = Some(i as f64));
+        }
+        self
+    }
+
     /// Every position that was touched, once, sorted by x and then y.
     pub fn distinct_positions(&self) -> Vec<Position> {
         let touched = self.rows.iter().filter(|row| row.touches());

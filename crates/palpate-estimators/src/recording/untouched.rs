@@ -1,6 +1,5 @@
 //! Rows in which nothing touched, as a file or its rig marks them.
 
-use super::csv_error::CsvProblem;
 use palpate_mechanics::units::{Dimension, Quantity};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -77,15 +76,15 @@ impl FromStr for TimeSpan {
     }
 }
 
-/// Whether a field of the column that marks untouched rows marks one.
-pub(super) fn is_mark(text: &str) -> Result<bool, CsvProblem> {
+/// Whether a field of the column that marks untouched rows marks one; `None` where it says neither yes nor no.
+pub(super) fn is_mark(text: &str) -> Option<bool> {
     const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
     const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];
     let is = |word: &&str| text.eq_ignore_ascii_case(word);
-    match (YES.iter().any(|word| is(&word)), NO.iter().any(|word| is(&word))) {
-        (true, _) => Ok(true),
-        (_, true) => Ok(false),
-        _ => Err(CsvProblem::NotAMark { text: text.to_owned() }),
+    match (YES.iter().any(|word| is(word)), NO.iter().any(|word| is(word))) {
+        (true, _) => Some(true),
+        (_, true) => Some(false),
+        _ => None,
     }
 }
 
@@ -106,9 +105,8 @@ mod tests {
 
     #[test]
     fn marks_are_read_as_people_write_them() {
-        let read = |text| is_mark(text).ok();
-        assert_eq!(["1", "TRUE", "x", "Ja"].map(read), [Some(true); 4]);
-        assert_eq!(["", "0", "false", "Nein"].map(read), [Some(false); 4]);
-        assert_eq!(["2", "maybe"].map(read), [None; 2]);
+        assert_eq!(["1", "TRUE", "x", "Ja"].map(is_mark), [Some(true); 4]);
+        assert_eq!(["", "0", "false", "Nein"].map(is_mark), [Some(false); 4]);
+        assert_eq!(["2", "maybe"].map(is_mark), [None; 2]);
     }
 }

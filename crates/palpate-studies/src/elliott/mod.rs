@@ -219,8 +219,11 @@ impl Elliott {
         let mut judged = Vec::new();
         for &count in &self.components {
             let reduce = |recording| setup.reduction.reduced(recording, count);
-            let trial =
-                Split { training: reduce(&setup.trial.training), judged: reduce(&setup.trial.judged) };
+            let trial = Split {
+                training: reduce(&setup.trial.training),
+                judged: reduce(&setup.trial.judged),
+                offsets: None,
+            };
             let recording = reduce(&setup.moving.recording);
             let moving = TimedRecording { recording, ..setup.moving.clone() };
             let reduced = without_model(whole, raw_layout(count)).map_err(RigSimulationError::from)?;

@@ -55,6 +55,13 @@ impl Board {
         }
     }
 
+    /// Moves every offset by so many counts, every second one downwards.
+    pub fn move_steadily(&mut self, counts: f64) {
+        self.offsets.iter_mut().enumerate().for_each(|(c, offset)| {
+            *offset += if c % 2 == 0 { counts } else { -counts };
+        });
+    }
+
     /// A number between 0 and 1 (D. Knuth's linear congruential generator, its upper half).
     pub fn uniform(&mut self) -> f64 {
         self.state =

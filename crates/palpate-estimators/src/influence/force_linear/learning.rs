@@ -7,7 +7,7 @@
 
 use super::drift::DriftCourse;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
-use super::posterior::{Functions, functions, of_equal_ratio, readings};
+use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
 use crate::influence::config::Structure;
@@ -130,6 +130,20 @@ impl Learnt {
             functions.covariances.iter_mut().for_each(|c| *c *= widening * per_newton);
         }
         Ok(functions)
+    }
+
+    /// Offset of every channel in use at each of some times, as shares of the recording; `None` where no drift was found.
+    pub fn offsets_at(&self, times: &[f64]) -> Result<Option<Vec<Vec<f64>>>, MeasuredError> {
+        if self.prior.drift == 0.0 {
+            return Ok(None);
+        }
+        let mut all = vec![Vec::new(); self.fits.len()];
+        for channels in of_equal_ratio(&self.fits) {
+            let asked: Vec<_> = channels.iter().map(|c| (*c, &self.fits[*c])).collect();
+            let found = offsets(&self.prior, &self.presses, &asked, &self.sensors_m, times)?;
+            channels.into_iter().zip(found).for_each(|(c, offsets)| all[c] = offsets);
+        }
+        Ok(Some(all))
     }
 
     /// First rows of presses that are further off what all others say of them than noise is in one of a hundred recordings.

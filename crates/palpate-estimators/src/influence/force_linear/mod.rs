@@ -19,12 +19,14 @@ use super::config::Structure;
 use super::grid::Axis;
 use super::measured::MeasuredError;
 use crate::fit::FitTask;
+use crate::offset_course::OffsetCourse;
+use crate::recording::Recording;
 use crate::status::FalseAlarmRate;
 use learning::Learnt;
 use locator::{Stored, Tables};
 use palpate_mechanics::surface::Extent;
-use palpate_numerics::mean_and_variance;
-use presses::Presses;
+use palpate_numerics::{mean, mean_and_variance};
+use presses::{Presses, shares};
 use prior::Prior;
 
 /// Distinct positions without which a reading cannot be a function of anything.
@@ -78,6 +80,22 @@ pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLin
     .into_locator();
     locator.limit_residuals(recording);
     Ok(Some(locator))
+}
+
+/// Offsets at the rows of `asked`, told by the presses of a recording; `None` where its rows have no times, or tell no drift.
+pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<OffsetCourse>, MeasuredError> {
+    let FitTask { setup, recording, watch, .. } = task;
+    let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
+    let Some(learnt) = Learnt::new(setup, recording, Structure::Auto, watch)? else { return Ok(None) };
+    let Some(at_rows) = learnt.offsets_at(&shares(&asked_s, &own_s))? else { return Ok(None) };
+    let Some(own) = learnt.offsets_at(&shares(&own_s, &own_s))? else { return Ok(None) };
+    let channels = recording.channels.len();
+    let mut course = OffsetCourse { at_rows: vec![None; channels], means: vec![None; channels] };
+    for ((c, at_rows), own) in learnt.live.iter().zip(at_rows).zip(own) {
+        course.at_rows[*c] = Some(at_rows);
+        course.means[*c] = Some(mean(own));
+    }
+    Ok(Some(course))
 }
 
 /// The grid: the span of the positions that were pressed and half their largest gap beyond.

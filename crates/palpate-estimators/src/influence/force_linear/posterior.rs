@@ -45,8 +45,10 @@ struct Functional<'a> {
 const END: f64 = 1.0;
 
 impl<'a> Functional<'a> {
-    /// The offset at the recording's end.
-    const OFFSET: Self = Self { time: Some(END), response: 0.0, place_m: &[] };
+    /// The offset at a time.
+    fn offset_at(time: f64) -> Self {
+        Self { time: Some(time), response: 0.0, place_m: &[] }
+    }
 
     /// The influence at a place, of unit response.
     fn influence(place_m: &'a Vec<f64>) -> Self {
@@ -143,7 +145,7 @@ pub(super) fn functions(
     for block in places_m.chunks(BLOCK) {
         watch.round()?;
         let influences = block.iter().map(Functional::influence);
-        let asked: Vec<Functional> = std::iter::once(Functional::OFFSET).chain(influences).collect();
+        let asked: Vec<Functional> = std::iter::once(Functional::offset_at(END)).chain(influences).collect();
         for (moments, out) in told.moments(&asked).into_iter().zip(&mut functions) {
             let (offset, influences) = (moments[0], &moments[1..]);
             if out.values.is_empty() {
@@ -172,6 +174,22 @@ pub(super) fn readings(
         moments.iter().map(|moments| (presses.centre[*c] + moments.mean, moments.variance)).collect()
     };
     Ok(channels.iter().zip(moments).map(of_channel).collect())
+}
+
+/// Offset of some channels, which share a ratio, at each of some times.
+pub(super) fn offsets(
+    prior: &Prior,
+    presses: &Presses,
+    channels: &[(usize, &ChannelFit)],
+    sensors_m: &[Vec<f64>],
+    times: &[f64],
+) -> Result<Vec<Vec<f64>>, MeasuredError> {
+    let told = Posterior::new(prior, presses, channels, sensors_m)?;
+    let asked: Vec<Functional> = times.iter().map(|time| Functional::offset_at(*time)).collect();
+    let of_channel = |((c, _), moments): (&(usize, &ChannelFit), Vec<Moments>)| {
+        moments.iter().map(|moments| presses.centre[*c] + moments.mean).collect()
+    };
+    Ok(channels.iter().zip(told.moments(&asked)).map(of_channel).collect())
 }
 
 /// Processes of some channels that share a ratio, as presses tell them.

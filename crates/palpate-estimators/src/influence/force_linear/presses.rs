@@ -203,11 +203,16 @@ impl Presses {
 fn relative_times(recording: &Recording) -> Vec<f64> {
     let by_order = || (0..recording.rows.len()).map(|row| row as f64).collect();
     let times: Vec<f64> = recording.times_s().unwrap_or_else(by_order);
-    let (first, last) = times
+    shares(&times, &times)
+}
+
+/// Times as shares of those of a recording: 0 at its first or before, 1 at its last or later.
+pub(super) fn shares(times: &[f64], of: &[f64]) -> Vec<f64> {
+    let (first, last) = of
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(first, last), time| (first.min(*time), last.max(*time)));
     let span = if last > first { last - first } else { 1.0 };
-    times.iter().map(|time| (time - first) / span).collect()
+    times.iter().map(|time| ((time - first) / span).clamp(0.0, 1.0)).collect()
 }
 
 pub(super) fn compare(a: &[f64], b: &[f64]) -> Ordering {
