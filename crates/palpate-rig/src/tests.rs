@@ -270,6 +270,7 @@ fn a_bad_recording_section_is_refused_with_a_caret() {
             ("position = \"X\"", "x = \"X\"\ny = \"Y\""),
             ("position = \"X\"", "position = \"X\"\nheader = false"),
             ("position = \"X\"", "position = \"X\"\nchannel_unit = \"mm\""),
+            ("position = \"X\"", "position = \"X\"\nuntouched_times = [\"0 s..5 s\", \"10 s\"]"),
             ("force = \"F\"\n", ""),
         ],
     );
@@ -320,6 +321,8 @@ fn every_key_can_be_said() {
         order = "fixed"
         initial_weights = 0.1
         [recording]
+        untouched = 8
+        untouched_times = ["0 s..10 s", "95 s.."]
         header = false
         position = 1
         position_unit = "m"

@@ -208,53 +208,50 @@ impl ContactFields {
 
     /// The row of a contact at a time, its reading still empty.
     fn row(&self, cells: &mut Cells, schema: &Schema, time_s: Option<f64>) -> Result<Row, CsvError> {
-        if self.is_untouched(cells, schema, time_s)? {
-            return self.untouched_row(cells, schema, time_s);
-        }
         let position = self.position(cells)?;
+        let is_marked = self.is_marked(cells, schema, time_s)?;
+        let force_n = match self.force {
+            Some((field, unit)) if !(cells.is_empty(field) && (is_marked || position.is_none())) => {
+                Some(cells.number(field, unit)?)
+            }
+            _ => None,
+        };
+        let is_found = position.is_none() && force_n.is_none_or(|force_n| force_n == 0.0);
+        if is_found && !is_marked {
+            cells.count_without_position();
+        }
+        if is_marked || is_found || force_n == Some(0.0) {
+            return self.untouched_row(cells, schema, time_s, position);
+        }
+        // The error of a field that is empty.
+        let position = position.map_or_else(|| self.coordinates(cells), Ok)?;
         let extent = schema.extent;
         if !extent.contains(position) {
             let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
             return Err(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent }));
         }
-        let force_n = self.force.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
         let force_n = force_n.or(schema.known_force_n);
         Ok(Row { position, force_n, nuisance, time_s, reading: Vec::new() })
     }
 
-    fn position(&self, cells: &mut Cells) -> Result<Position, CsvError> {
+    /// The position; `None` where its fields are empty.
+    fn position(&self, cells: &mut Cells) -> Result<Option<Position>, CsvError> {
+        let is_empty = cells.is_empty(self.x) && self.y.is_none_or(|y| cells.is_empty(y));
+        if is_empty { Ok(None) } else { self.coordinates(cells).map(Some) }
+    }
+
+    fn coordinates(&self, cells: &mut Cells) -> Result<Position, CsvError> {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
         Ok(self.frame.position(x_m, y_m))
     }
 
-    /// Whether nothing touched: the row is marked, its time is among those in which nothing did, its force is 0, or it has
-    /// neither position nor force.
-    fn is_untouched(
-        &self,
-        cells: &mut Cells,
-        schema: &Schema,
-        time_s: Option<f64>,
-    ) -> Result<bool, CsvError> {
-        let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;
+    /// Whether the row is marked as untouched, or its time is among those in which nothing touched.
+    fn is_marked(&self, cells: &Cells, schema: &Schema, time_s: Option<f64>) -> Result<bool, CsvError> {
         let is_time = |time_s| schema.columns.untouched_times.iter().any(|span| span.contains(time_s));
-        if marked || time_s.is_some_and(is_time) {
-            return Ok(true);
-        }
-        let force_n = match self.force {
-            Some((field, unit)) if !cells.is_empty(field) => Some(cells.number(field, unit)?),
-            _ => None,
-        };
-        if force_n.is_none_or(|force_n| force_n == 0.0) && self.has_no_position(cells) {
-            cells.count_without_position();
-            return Ok(true);
-        }
-        Ok(force_n == Some(0.0))
-    }
-
-    fn has_no_position(&self, cells: &Cells) -> bool {
-        cells.is_empty(self.x) && self.y.is_none_or(|y| cells.is_empty(y))
+        let marked = self.untouched.map_or(Ok(false), |field| cells.is_marked(field))?;
+        Ok(marked || time_s.is_some_and(is_time))
     }
 
     /// The row of no contact: its position means nothing, and is kept where it is one of the surface.
@@ -263,8 +260,8 @@ impl ContactFields {
         cells: &mut Cells,
         schema: &Schema,
         time_s: Option<f64>,
+        position: Option<Position>,
     ) -> Result<Row, CsvError> {
-        let position = if self.has_no_position(cells) { None } else { Some(self.position(cells)?) };
         let position = position.filter(|position| schema.extent.contains(*position)).unwrap_or_default();
         let nuisance = match self.nuisance {
             Some((field, unit)) if !cells.is_empty(field) => Some(cells.number(field, unit)?),

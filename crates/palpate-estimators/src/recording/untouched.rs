@@ -80,12 +80,11 @@ impl FromStr for TimeSpan {
 pub(super) fn is_mark(text: &str) -> Option<bool> {
     const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
     const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];
-    let is = |word: &&str| text.eq_ignore_ascii_case(word);
-    match (YES.iter().any(|word| is(word)), NO.iter().any(|word| is(word))) {
-        (true, _) => Some(true),
-        (_, true) => Some(false),
-        _ => None,
+    let is_one_of = |words: &[&str]| words.iter().any(|word| text.eq_ignore_ascii_case(word));
+    if is_one_of(&YES) {
+        return Some(true);
     }
+    is_one_of(&NO).then_some(false)
 }
 
 #[cfg(test)]
