@@ -1,7 +1,7 @@
 //! Surfaces without a model. `cargo bench -p palpate --bench measured`: microseconds an estimate with its uncertainty, on a plane of 15 channels and on lines of 2 and 6, each with a
 //! nuisance coordinate; beside them a sum of the likelihood over every node of the same table. One core, CPU time, medians.
 //!
-//! `cargo bench -p palpate --bench measured -- rows`: seconds and peak memory of the fit of every estimator that takes so many rows to 100,000 rows at 20,000
+//! `cargo bench -p palpate --bench measured -- rows`: seconds and peak memory of the fit of every estimator to 100,000 rows at 20,000
 //! positions, each in a process of its own, with what was estimated before, and the error beside that of a fit to every 33rd row.
 
 use cpu_time::ThreadTime;
@@ -162,7 +162,7 @@ const MANY: [usize; 3] = [160, 125, 5];
 
 fn every_estimator_with_many_rows() {
     let this = std::env::current_exe().expect("it runs");
-    for kind in ["influence", "gaussian-process", "neighbours", "centroid", "network-lm"] {
+    for kind in ["influence", "gaussian-process", "neighbours", "centroid", "network-lm", "network"] {
         let status = std::process::Command::new(&this).args(["fit", kind]).status();
         assert!(status.is_ok_and(|status| status.success()), "{kind} failed");
     }

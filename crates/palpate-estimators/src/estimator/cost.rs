@@ -62,7 +62,10 @@ impl Estimator {
                 let weights = nodes * (sizes.channels + 3.0);
                 FitCost {
                     memory_bytes: 3.0 * NUMBER * sizes.rows * (sizes.channels + 2.0),
-                    seconds: f64::from(network.training.max_epochs) * sizes.rows * weights / LOOPS,
+                    seconds: f64::from(network.training.most_epochs(recording.rows.len()))
+                        * sizes.rows
+                        * weights
+                        / LOOPS,
                 }
             }
             Self::NetworkLm(levenberg) => {

@@ -276,7 +276,7 @@ impl<'t, V: Vector<N>, const N: usize, const FIRST: usize, const UPPER: usize> G
             let Some(occupant) = &mut self.occupants[lane] else { continue };
             occupant.epochs += 1;
             let Occupant { seed, epochs } = *occupant;
-            let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), self.task.rule) else {
+            let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), self.task) else {
                 continue;
             };
             let weights = self.layers.iter().flat_map(|layer| &layer.weights);

@@ -4,8 +4,14 @@
 //! low bits, and a sorting network sorts all lanes at once: minimum and maximum are single instructions, where
 //! Fisher and Yates' exchanges would need a scattered store a lane and presentation. With n = 30 the 27 random bits of
 //! two keys coincide once in 300,000 epochs; then the lower number goes first, a bias far below what matters.
+//!
+//! Beyond [`MOST_SORTED`] patterns the keys have too few random bits left, and the network's exchanges fill more memory than the patterns:
+//! there Fisher and Yates' exchanges (Knuth, TAOCP vol. 2, 3.4.2, algorithm P) draw the order.
 
 use palpate_numerics::simd::LOOK_UP;
+
+/// Patterns up to which random keys are sorted: as many bits of a key are random as number its pattern.
+const MOST_SORTED: usize = 1 << 16;
 
 /// The generator xoshiro128++ 1.0 (Blackman and Vigna, ACM TOMS 47, 2021), N streams side by side.
 #[derive(Clone, Debug)]
@@ -102,19 +108,28 @@ pub(super) struct OrderDrawer {
     patterns: usize,
     /// Covers the pattern number in a key.
     mask: u32,
-    exchanges: Vec<(u32, u32)>,
+    method: Method,
+}
+
+/// Way to a random permutation.
+enum Method {
+    /// By sorting random keys with a network of these exchanges.
+    Sort(Vec<(u32, u32)>),
+    /// By exchanges with random partners.
+    Shuffle,
 }
 
 impl OrderDrawer {
     pub(super) fn new(patterns: usize) -> Self {
-        let mask = column_len(patterns) as u32 - 1;
-        Self { patterns, mask, exchanges: exchanges(patterns) }
+        let method = if patterns > MOST_SORTED { Method::Shuffle } else { Method::Sort(exchanges(patterns)) };
+        Self { patterns, mask: column_len(patterns) as u32 - 1, method }
     }
 
     /// Fills `order` (one row a presentation, one column a lane) with a fresh permutation a lane. The pattern's number
     /// is a pick's low bits, which is what the patterns are looked up by; the bits above it are left as they were drawn.
     #[inline(always)]
     pub(super) fn draw<const N: usize>(&self, streams: &mut Streams<N>, order: &mut [[u32; N]]) {
+        let Method::Sort(exchanges) = &self.method else { return shuffle(streams, order) };
         // A copy of its own lets the generator's state stay in registers.
         let mut local = streams.clone();
         for (pattern, row) in order.iter_mut().enumerate() {
@@ -124,7 +139,7 @@ impl OrderDrawer {
             }
         }
         *streams = local;
-        for &(i, j) in &self.exchanges {
+        for &(i, j) in exchanges {
             let (i, j) = (i as usize, j as usize);
             let (low, high) = (order[i], order[j]);
             for l in 0..N {
@@ -134,8 +149,11 @@ impl OrderDrawer {
         }
     }
 
-    /// The same for one stream, by an ordinary sort.
+    /// The same for one stream, its keys sorted by an ordinary sort.
     pub(super) fn draw_one(&self, stream: &mut Streams<1>, order: &mut [u32]) {
+        if matches!(self.method, Method::Shuffle) {
+            return shuffle(stream, order.as_chunks_mut().0);
+        }
         for (pattern, key) in order.iter_mut().enumerate() {
             *key = (stream.next()[0] & !self.mask) | pattern as u32;
         }
@@ -147,6 +165,22 @@ impl OrderDrawer {
 
     pub(super) fn patterns(&self) -> usize {
         self.patterns
+    }
+}
+
+/// Fisher and Yates' shuffle of every lane. A partner is the high word of a product, which prefers none by more than one part in 2³²/n.
+fn shuffle<const N: usize>(streams: &mut Streams<N>, order: &mut [[u32; N]]) {
+    for (pattern, row) in order.iter_mut().enumerate() {
+        *row = [pattern as u32; N];
+    }
+    for last in (1..order.len()).rev() {
+        let random = streams.next();
+        for l in 0..N {
+            let partner = (u64::from(random[l]) * (last as u64 + 1)) >> 32;
+            let picked = order[partner as usize][l];
+            order[partner as usize][l] = order[last][l];
+            order[last][l] = picked;
+        }
     }
 }
 
@@ -172,8 +206,8 @@ mod tests {
     }
 
     #[test]
-    fn the_network_sorts_what_an_ordinary_sort_sorts() {
-        for patterns in (1..=40).chain([100, 257]) {
+    fn every_lane_draws_the_order_of_its_stream_alone() {
+        for patterns in (1..=40).chain([100, 257, MOST_SORTED + 1]) {
             let drawer = OrderDrawer::new(patterns);
             let mut lanes = Streams::<4>::unseeded();
             let mut singles: Vec<_> = (0..4).map(Streams::seeded).collect();
@@ -196,18 +230,23 @@ mod tests {
     }
 
     #[test]
-    fn every_pattern_comes_first_equally_often() {
-        let drawer = OrderDrawer::new(10);
-        let mut stream = Streams::seeded(1);
-        let mut order = [0; 10];
-        let mut first = [0; 10];
-        for _ in 0..20_000 {
-            drawer.draw_one(&mut stream, &mut order);
-            first[order[0] as usize] += 1;
+    fn every_pattern_comes_first_and_last_equally_often() {
+        let shuffled = OrderDrawer { method: Method::Shuffle, ..OrderDrawer::new(10) };
+        for drawer in [OrderDrawer::new(10), shuffled] {
+            let mut stream = Streams::seeded(1);
+            let mut order = [0; 10];
+            let mut at_end = [[0; 10]; 2];
+            for _ in 0..20_000 {
+                drawer.draw_one(&mut stream, &mut order);
+                at_end[0][order[0] as usize] += 1;
+                at_end[1][order[9] as usize] += 1;
+            }
+            for counts in at_end {
+                // χ² with 9 degrees of freedom exceeds 27.9 once in a thousand times.
+                let chi_squared: f64 = counts.iter().map(|n| f64::from(n - 2000).powi(2) / 2000.0).sum();
+                assert!(chi_squared < 27.9, "{counts:?}");
+            }
         }
-        // χ² with 9 degrees of freedom exceeds 27.9 once in a thousand times.
-        let chi_squared: f64 = first.iter().map(|count| f64::from(count - 2000).powi(2) / 2000.0).sum();
-        assert!(chi_squared < 27.9, "{first:?}");
     }
 
     #[test]

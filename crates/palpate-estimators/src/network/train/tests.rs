@@ -174,3 +174,16 @@ fn one_update_goes_down_the_gradient_of_finite_differences() {
         }
     }
 }
+
+#[test]
+fn more_patterns_than_keys_can_number_give_the_twins_bits() {
+    compare_with_twin(&config(2), &patterns((1 << 16) + 1, 2, 1), 2);
+}
+
+#[test]
+fn training_on_many_patterns_is_capped_by_presentations() {
+    let rule = BackPropagation::default();
+    assert_eq!(rule.most_epochs(1 << 16), rule.max_epochs);
+    assert_eq!(rule.most_epochs(100_000), 2000);
+    assert_eq!(BackPropagation { max_epochs: 5, ..rule }.most_epochs(100_000), 5);
+}

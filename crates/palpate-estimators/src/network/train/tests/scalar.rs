@@ -44,7 +44,7 @@ pub(super) fn train<V: Vector<1>>(task: &TrainingTask, seed: u64) -> TrainedNetw
         }
         epochs += 1;
         let [error] = error.to_array();
-        if let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), task.rule) {
+        if let Some(outcome) = TrainingOutcome::after_epoch(epochs, error.to_f64(), task) {
             return TrainedNetwork { topology: task.topology.clone(), weights: network.weights(), outcome };
         }
     }
