@@ -66,7 +66,7 @@ pub(crate) struct NetworkKeys {
     pub momentum: Option<Fraction>,
     /// Training converges when the sum of squared output errors over an epoch is at most this; 1e-5 unless said otherwise.
     pub aggregate_error: Option<Positive<Number>>,
-    /// Training is capped after this many epochs; 1000000 unless said otherwise.
+    /// Training is capped after this many epochs, and with more than 65,536 rows after 200 million presentations; 1000000 unless said otherwise.
     pub max_epochs: Option<Count<1, { u32::MAX as i64 }>>,
     /// Order in which patterns are presented; `shuffled` unless said otherwise.
     pub order: Option<PresentationOrder>,

@@ -22,7 +22,7 @@ use palpate_numerics::{bisect, chi_squared_critical_value, mean};
 
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
-/// Presses that are learnt from; the time grows with their cube, and so many tell all that there is.
+/// Presses that are learnt from, as the time grows with their cube; more are condensed to so many.
 pub(crate) const MOST_PRESSES: usize = 1000;
 /// Distinct positions from which on every fifth can be held out.
 const LEAST_TO_JUDGE: usize = 6;
@@ -31,7 +31,10 @@ const FOLDS: usize = 5;
 
 /// Prior, noise and presses of a surface, as a recording tells them.
 pub(super) struct Learnt {
-    pub presses: Presses,
+    /// All of them.
+    pub pressed: Presses,
+    /// Those that stand for them.
+    presses: Presses,
     pub prior: Prior,
     /// The channels that change, from 0.
     pub live: Vec<usize>,
@@ -51,6 +54,7 @@ impl Learnt {
         setup: &Setup,
         recording: &Recording,
         structure: Structure,
+        most_presses: usize,
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
         /// Rounds in which presses are set aside, and the share of all rows that may be.
@@ -58,7 +62,9 @@ impl Learnt {
         const MOST_SET_ASIDE: f64 = 0.1;
         let mut set_aside = Vec::new();
         for _ in 0..ROUNDS {
-            let Some(learnt) = Self::without_rows(setup, recording, structure, &set_aside, watch)? else {
+            let Some(learnt) =
+                Self::without_rows(setup, recording, structure, most_presses, &set_aside, watch)?
+            else {
                 return Ok(None);
             };
             let outliers = learnt.outliers()?;
@@ -69,34 +75,40 @@ impl Learnt {
             set_aside.extend(outliers);
             set_aside.sort_unstable();
         }
-        Self::without_rows(setup, recording, structure, &set_aside, watch)
+        Self::without_rows(setup, recording, structure, most_presses, &set_aside, watch)
     }
 
     fn without_rows(
         setup: &Setup,
         recording: &Recording,
         structure: Structure,
+        most_presses: usize,
         set_aside: &[usize],
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
         let presses_of = |repeats| Presses::of_recording(setup, recording, repeats, set_aside);
-        let Some(presses) = presses_of(Repeats::Consecutive) else { return Ok(None) };
-        let live = presses.changing_channels();
-        if presses.distinct_forces() < 2 || live.is_empty() {
+        let Some(pressed) = presses_of(Repeats::Consecutive) else { return Ok(None) };
+        let live = pressed.changing_channels();
+        if pressed.distinct_forces() < 2 || live.is_empty() {
             return Ok(None);
         }
-        let presses = presses.of_channels(&live);
-        let searched = presses.thinned(MOST_SEARCHED);
+        let pressed = pressed.of_channels(&live);
+        let searched = pressed.thinned(MOST_SEARCHED);
         let extent = setup.surface().extent();
         let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
         let mut search = Search { presses: &searched, extent, structure, watch, decades };
         let smooth = search.smooth()?;
-        // Repeats tell more as one than spread over the recording, but for drift.
-        let presses = match presses_of(Repeats::All) {
-            Some(merged) if presses.len() > MOST_PRESSES && smooth.prior.drift == 0.0 => {
-                merged.of_channels(&live).thinned(MOST_PRESSES)
-            }
-            _ => presses.thinned(MOST_PRESSES),
+        let presses = if pressed.len() <= most_presses {
+            pressed.clone()
+        } else if smooth.prior.drift > 0.0 {
+            let Found { prior, fits, .. } = &smooth;
+            let still = pressed.without_drift(&pressed.thinned(most_presses), prior, fits)?;
+            still.condensed(prior, fits, most_presses, watch)?
+        } else {
+            // Repeats tell of the noise, which near positions do not.
+            let merged = presses_of(Repeats::All).map(|merged| merged.of_channels(&live));
+            let merged = merged.as_ref().unwrap_or(&pressed);
+            merged.condensed(&smooth.prior, &smooth.fits, most_presses, watch)?
         };
         let mut judged = vec![Judged::new(smooth, &presses, watch)?];
         if presses.positions_m().len() >= LEAST_TO_JUDGE
@@ -109,7 +121,7 @@ impl Learnt {
             return Ok(None);
         };
         let set_aside = set_aside.to_vec();
-        Ok(Some(Self { presses, prior, live, fits, sensors_m, widening, set_aside }))
+        Ok(Some(Self { pressed, presses, prior, live, fits, sensors_m, widening, set_aside }))
     }
 
     /// Standard deviation of each channel's noise.
@@ -150,7 +162,12 @@ impl Learnt {
     ///
     /// Each press is predicted from the others (Rasmussen and Williams, eq. 5.12), and its error taken over a deviation that it has no
     /// part in (externally studentized residuals; Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1).
+    ///
+    /// Presses that stand for others have averaged what is wrong with a row, and name none.
     fn outliers(&self) -> Result<Vec<usize>, MeasuredError> {
+        if self.presses.len() < self.pressed.len() {
+            return Ok(Vec::new());
+        }
         const TAIL: f64 = 1e-2;
         /// The worst are set aside first; others may be none without them.
         const AT_ONCE: usize = 3;

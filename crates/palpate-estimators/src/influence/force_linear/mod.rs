@@ -3,6 +3,7 @@
 //!
 //! Learnt from the presses ([`learning`]) and inverted over a grid of places ([`locator`]).
 
+mod condensed;
 mod drift;
 mod evidence;
 mod learning;
@@ -40,11 +41,20 @@ const HARDEST: f64 = 3.0;
 /// Learns the influence functions and offsets of a surface without a model; `None` where the presses do not tell them apart, as
 /// they have no forces or all the same one, and unless the structure is force-linear by demand, where they speak against it.
 pub(super) fn fit(task: FitTask, structure: Structure) -> Result<Option<ForceLinearLocator>, MeasuredError> {
+    fit_condensed(task, structure, MOST_PRESSES)
+}
+
+/// [`fit`], more presses than `most` condensed to so many.
+fn fit_condensed(
+    task: FitTask,
+    structure: Structure,
+    most: usize,
+) -> Result<Option<ForceLinearLocator>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
     recording.check_distinct_positions(LEAST_POSITIONS)?;
     let extent = setup.surface().extent();
-    let Some(learnt) = Learnt::new(setup, recording, structure, watch)? else { return Ok(None) };
-    let (presses, prior) = (&learnt.presses, &learnt.prior);
+    let Some(learnt) = Learnt::new(setup, recording, structure, most, watch)? else { return Ok(None) };
+    let (presses, prior) = (&learnt.pressed, &learnt.prior);
     if structure == Structure::Auto && !prior.is_separable() {
         return Ok(None);
     }

@@ -130,6 +130,11 @@ impl Prior {
         if self.response == 1.0 { relative } else { relative.signum() * relative.abs().powf(self.response) }
     }
 
+    /// The force of which φ/F̄ is `response`.
+    pub fn force_of_relative_response(&self, response: f64) -> f64 {
+        self.force_scale_n * response.signum() * response.abs().powf(1.0 / self.response)
+    }
+
     /// φ, in newtons.
     pub fn response_n(&self, force_n: f64) -> f64 {
         self.response_to(force_n) * self.force_scale_n

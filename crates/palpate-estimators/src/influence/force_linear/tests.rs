@@ -3,7 +3,9 @@
 
 use super::locator::{Stored, Tables};
 use super::posterior::Functions;
-use super::{ForceLinearLocator, fit};
+use super::presses::{Presses, Repeats};
+use super::prior::Prior;
+use super::{ForceLinearLocator, evidence, fit, fit_condensed, posterior};
 use crate::fit::Fit;
 use crate::fit::{FitTask, Locate};
 use crate::influence::{Influence, InfluenceFitError, InfluenceLocator, Structure};
@@ -18,6 +20,7 @@ use palpate_mechanics::surface::{
     BeamSection, BeamSupport, BeamSupportKind, SupportedBeam, SupportedBeamSpec,
 };
 use palpate_mechanics::surface::{Extent, Plate, Surface};
+use palpate_numerics::watch::Watch;
 use palpate_numerics::{Cholesky, mean, median};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -609,4 +612,73 @@ fn bounds_lose_nothing_of_the_sum_over_all_cells() {
             assert!(apart_m < 0.1 * sd_m + 1e-5, "{apart_m} m of {sd_m} m: {fast:?} {all:?}");
         }
     }
+}
+
+/// Noise and signal of a gauge.
+const GAUGE_FIT: evidence::ChannelFit =
+    evidence::ChannelFit { ratio: 1e-4, signal: 1e4, evidence: 0.0, sources: Vec::new() };
+
+/// Functions of the first gauge at places along a strip, as presses tell them under a smooth prior.
+fn functions_of(presses: &Presses, prior: &Prior) -> Functions {
+    let places_m: Vec<Vec<f64>> = (0..50).map(|i| vec![STRIP_M * f64::from(i) / 49.0]).collect();
+    posterior::functions(prior, presses, &[(0, &GAUGE_FIT)], &[], &places_m, Watch::NONE).unwrap().remove(0)
+}
+
+#[test]
+fn presses_of_the_same_places_are_condensed_without_loss() {
+    let bench = Bench::strip(3, 120, 15);
+    let presses =
+        Presses::of_recording(&bench.setup(), &bench.recording(), Repeats::Consecutive, &[]).unwrap();
+    for response in [1.0, 0.7] {
+        let prior = Prior { response, ..Prior::smooth(bench.extent, &presses) };
+        let condensed = presses.condensed(&prior, &vec![GAUGE_FIT; GAUGES], 30, Watch::NONE).unwrap();
+        assert_eq!((presses.len(), condensed.len()), (120, 30));
+        let rows = |presses: &Presses| presses.len() as f64 + presses.freedom;
+        assert_eq!(rows(&presses), rows(&condensed));
+        let [all, few] = [&presses, &condensed].map(|presses| functions_of(presses, &prior));
+        let same = |a: f64, b: f64| (a - b).abs() < 1e-7 * a.abs().max(1.0);
+        assert!(same(all.offset, few.offset) && same(all.offset_variance, few.offset_variance));
+        for k in 0..all.values.len() {
+            assert!(same(all.values[k], few.values[k]), "{} {}", all.values[k], few.values[k]);
+            assert!(same(all.variances[k], few.variances[k]));
+        }
+    }
+}
+
+#[test]
+fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
+    let mut bench = Bench::plate(1);
+    bench.presses = bench.touches(900);
+    let touches = bench.touches(400);
+    let (setup, recording) = (bench.setup(), bench.recording());
+    let of = |most| {
+        fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, most).unwrap().unwrap()
+    };
+    let exact = of(usize::MAX);
+    assert_eq!(exact.presses(), 900);
+    let [exact_mm, condensed_mm] = [exact, of(300)].map(|locator| mean(errors_mm(&locator, &touches).0));
+    eprintln!("plate, 900 presses: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 300 in their place");
+    assert!(condensed_mm < 1.03 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
+
+#[test]
+fn drift_is_taken_off_many_presses() {
+    let mut bench = Bench::strip(2, 600, 600);
+    let touches = bench.touches(200);
+    let walk = drift(&mut bench, 12.0);
+    let (setup, recording) = (bench.setup(), bench.recording());
+    let of = |most| {
+        fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, most).unwrap().unwrap()
+    };
+    let mut later = touches;
+    for row in &mut later {
+        row.reading.iter_mut().zip(&walk).for_each(|(value, walk)| *value += walk);
+    }
+    let exact = of(usize::MAX);
+    assert_eq!(exact.drifts().len(), GAUGES);
+    let [exact_mm, condensed_mm] = [exact, of(300)].map(|locator| mean(errors_mm(&locator, &later).0));
+    eprintln!(
+        "strip, 600 presses under drift: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 300 in their place"
+    );
+    assert!(condensed_mm < 1.1 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
 }

@@ -1,0 +1,304 @@
+//! Few presses in place of many, such that every reading counts.
+//!
+//! Of all presses at one position under the responses φ_i, with weights w_i, offset and influence depend on the sums of w, w·φ, w·φ²,
+//! w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half the weight, that lie on the line of least squares of y over φ, have the
+//! same sums: nothing is lost.
+//!
+//! Where there are too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses each, takes off
+//! what the positions within a cell change, so that one press is left, at x̄, the mean of the positions by w·φ², and the root mean square
+//! φ_r. It reads
+//!
+//! y = ô + φ_r·(f̂(x̄) + Σ w·φ·(y − ô − φ·f̂(x)) / Σ w·φ²),
+//!
+//! and what the cells tell of the offset whatever the influence is a press without force that reads ô, of weight Σ w·(1 − φ̄²/φ_r²).
+
+use super::evidence::{ChannelFit, Evidence};
+use super::posterior::of_equal_ratio;
+use super::presses::{Presses, compare};
+use super::prior::Prior;
+use crate::influence::measured::MeasuredError;
+use ndarray::{Array1, Array2};
+use palpate_numerics::NotPositiveDefinite;
+use palpate_numerics::watch::Watch;
+
+impl Presses {
+    /// No more than about `most` presses that tell of a separable prior without drift what all of these tell; `fits` are the noise and
+    /// signal of their channels.
+    pub fn condensed(
+        &self,
+        prior: &Prior,
+        fits: &[ChannelFit],
+        most: usize,
+        watch: Watch,
+    ) -> Result<Self, MeasuredError> {
+        /// Estimates, each from the presses that the last one left.
+        const ROUNDS: usize = 2;
+        let all = All { presses: self, responses: prior.responses(self), prior };
+        let (untouched, touched): (Vec<usize>, Vec<usize>) =
+            (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
+        let untouched = (!untouched.is_empty()).then_some(untouched);
+        let pairs = all.cells(&touched, most / 2);
+        let mut few = self.select(&[]);
+        pairs.iter().chain(&untouched).for_each(|cell| few.add_pair(&all, cell));
+        if pairs.iter().all(|cell| all.is_one_place(cell)) {
+            return Ok(few);
+        }
+        let cells = all.cells(&touched, most);
+        for _ in 0..ROUNDS {
+            let estimate = Estimate::new(few, prior, fits)?;
+            few = self.select(&[]);
+            let mut of_offset = 0.0;
+            for cell in &cells {
+                watch.round()?;
+                of_offset += few.add_cell(&all, cell, &estimate);
+            }
+            if of_offset > 0.0 {
+                few.push(vec![0.0; prior.lengths_m.len()], 0.0, of_offset, &estimate.offsets);
+            }
+            untouched.iter().for_each(|cell| few.add_pair(&all, cell));
+        }
+        Ok(few)
+    }
+
+    /// The readings less the drift that some of the presses tell, all as if they had been read at the recording's end.
+    pub fn without_drift(
+        &self,
+        some: &Self,
+        prior: &Prior,
+        fits: &[ChannelFit],
+    ) -> Result<Self, NotPositiveDefinite> {
+        let mut still = Self { time: vec![1.0; self.len()], ..self.clone() };
+        for channels in of_equal_ratio(fits) {
+            let ratio = fits[channels[0]].ratio;
+            let restricted = Evidence::new(some, prior, &[]).restricted(ratio)?;
+            let (white, _) = restricted.residuals(some.means.clone());
+            let weights: Vec<Array1<f64>> = channels
+                .iter()
+                .map(|c| restricted.cholesky.solve_upper(&white.column(*c).to_owned()))
+                .collect();
+            for (i, time) in self.time.iter().enumerate() {
+                let to_end: Array1<f64> =
+                    some.time.iter().map(|other| ratio * prior.drift * (other - time.min(*other))).collect();
+                for (c, weights) in channels.iter().zip(&weights) {
+                    still.means[[i, *c]] += to_end.dot(weights);
+                }
+            }
+        }
+        Ok(still)
+    }
+
+    fn push(&mut self, position_m: Vec<f64>, force_n: f64, count: f64, reading: &Array1<f64>) {
+        self.positions_m.push(position_m);
+        self.force_n.push(force_n);
+        self.count.push(count);
+        self.time.push(1.0);
+        self.row.push(0);
+        self.means.push_row(reading.view()).expect("as many channels as all presses have");
+    }
+
+    /// Adds the two presses of a cell that lie on its line of least squares, or one where its forces are all the same.
+    fn add_pair(&mut self, all: &All, cell: &[usize]) {
+        let sums = Sums::new(all, cell);
+        let spread = sums.spread();
+        let mean_of = |c: usize| all.mean(cell, |i| all.presses.means[[i, c]]);
+        let slope_of = |c: usize| {
+            let product = |i: usize| (all.responses[i] - sums.response) * all.presses.means[[i, c]];
+            if spread > 0.0 { all.mean(cell, product) / (spread * spread) } else { 0.0 }
+        };
+        let channels = 0..self.means.ncols();
+        let means: Array1<f64> = channels.clone().map(mean_of).collect();
+        let slopes: Array1<f64> = channels.clone().map(slope_of).collect();
+        let ends: &[f64] = if spread > 0.0 { &[-1.0, 1.0] } else { &[0.0] };
+        for end in ends {
+            let force_n = all.prior.force_of_relative_response(sums.response + end * spread);
+            let reading = &means + end * spread * &slopes;
+            self.push(sums.position_m.clone(), force_n, sums.weight / ends.len() as f64, &reading);
+        }
+        if all.is_one_place(cell) {
+            self.freedom += (cell.len() - ends.len()) as f64;
+            for c in channels {
+                let left = |i: usize| {
+                    all.presses.means[[i, c]] - means[c] - slopes[c] * (all.responses[i] - sums.response)
+                };
+                self.scatter[c] += sums.weight * all.mean(cell, |i| left(i).powi(2));
+            }
+        }
+    }
+
+    /// Adds the one press of a cell; the weight of what the cell tells of the offset.
+    fn add_cell(&mut self, all: &All, cell: &[usize], estimate: &Estimate) -> f64 {
+        let sums = Sums::new(all, cell);
+        let response = sums.mean_square.sqrt();
+        let influences = estimate.influences_at(all, cell);
+        let at_middle = estimate.influences(all.prior, &sums.position_m);
+        let reading = (0..at_middle.len())
+            .map(|c| {
+                let offset = estimate.offsets[c];
+                let left = |i: usize, influence: f64| {
+                    all.presses.means[[i, c]] - offset - all.responses[i] * influence
+                };
+                let products = cell
+                    .iter()
+                    .enumerate()
+                    .map(|(k, i)| all.presses.count[*i] * all.responses[*i] * left(*i, influences[[k, c]]));
+                let rest = products.sum::<f64>() / (sums.weight * sums.mean_square);
+                offset + response * (at_middle[c] + rest)
+            })
+            .collect();
+        self.push(
+            sums.position_m.clone(),
+            all.prior.force_of_relative_response(response),
+            sums.weight,
+            &reading,
+        );
+        sums.weight * sums.spread().powi(2) / sums.mean_square
+    }
+}
+
+/// All presses, with φ/F̄ of each.
+struct All<'a> {
+    presses: &'a Presses,
+    responses: Vec<f64>,
+    prior: &'a Prior,
+}
+
+impl All<'_> {
+    /// Mean of a value over a cell.
+    fn mean(&self, cell: &[usize], value: impl Fn(usize) -> f64) -> f64 {
+        let (sum, weight) = cell.iter().fold((0.0, 0.0), |(sum, weight), i| {
+            let own = self.presses.count[*i];
+            (sum + own * value(*i), weight + own)
+        });
+        sum / weight
+    }
+
+    fn is_one_place(&self, cell: &[usize]) -> bool {
+        cell.iter().all(|i| self.presses.positions_m[*i] == self.presses.positions_m[cell[0]])
+    }
+
+    /// Cells of near positions, no more than `most`; each position has one of its own where so many suffice. Presses at the same
+    /// position follow each other in a cell.
+    fn cells(&self, touched: &[usize], most: usize) -> Vec<Vec<usize>> {
+        let position_m = |i: usize| self.presses.positions_m[i].as_slice();
+        let mut touched = touched.to_vec();
+        touched.sort_by(|a, b| compare(position_m(*a), position_m(*b)));
+        let places: Vec<&[usize]> = touched.chunk_by(|a, b| position_m(*a) == position_m(*b)).collect();
+        let mut cells = Vec::new();
+        let mut open = vec![(places, most.max(1))];
+        while let Some((mut places, share)) = open.pop() {
+            if share == 1 || places.len() <= 1 {
+                cells.extend((!places.is_empty()).then(|| places.concat()));
+                continue;
+            }
+            let at = |place: &[usize], k: usize| position_m(place[0])[k] / self.prior.lengths_m[k];
+            let width = |k: usize| {
+                let coordinates = places.iter().map(|place| at(place, k));
+                coordinates.clone().fold(f64::NEG_INFINITY, f64::max)
+                    - coordinates.fold(f64::INFINITY, f64::min)
+            };
+            let widest =
+                (0..self.prior.lengths_m.len()).max_by(|a, b| width(*a).total_cmp(&width(*b))).unwrap_or(0);
+            places.sort_by(|a, b| at(a, widest).total_cmp(&at(b, widest)));
+            let low_share = share / 2;
+            let high = places.split_off((places.len() * low_share / share).max(1));
+            open.push((high, share - low_share));
+            open.push((places, low_share));
+        }
+        cells
+    }
+}
+
+/// What a cell's presses have in common.
+struct Sums {
+    position_m: Vec<f64>,
+    weight: f64,
+    /// Mean of φ/F̄, and of its square.
+    response: f64,
+    mean_square: f64,
+}
+
+impl Sums {
+    fn new(all: &All, cell: &[usize]) -> Self {
+        let mean_square = all.mean(cell, |i| all.responses[i].powi(2));
+        let first_m = &all.presses.positions_m[cell[0]];
+        let coordinate = |k: usize| match mean_square {
+            0.0 => first_m[k],
+            _ => {
+                let product = |i: usize| all.responses[i].powi(2) * all.presses.positions_m[i][k];
+                all.mean(cell, product) / mean_square
+            }
+        };
+        Self {
+            position_m: if all.is_one_place(cell) {
+                first_m.clone()
+            } else {
+                (0..first_m.len()).map(coordinate).collect()
+            },
+            weight: cell.iter().map(|i| all.presses.count[*i]).sum(),
+            response: all.mean(cell, |i| all.responses[i]),
+            mean_square,
+        }
+    }
+
+    /// Standard deviation of φ/F̄; 0 where all are the same but for rounding.
+    fn spread(&self) -> f64 {
+        const ROUNDING: f64 = 1e-12;
+        let variance = self.mean_square - self.response * self.response;
+        if variance > ROUNDING * self.mean_square { variance.sqrt() } else { 0.0 }
+    }
+}
+
+/// Means of offsets and influences of unit response, as some presses tell them.
+struct Estimate {
+    presses: Presses,
+    responses: Vec<f64>,
+    offsets: Array1<f64>,
+    /// Coefficients of the polynomials, and A⁻¹·(y − H·β), a column a channel.
+    polynomials: Array2<f64>,
+    weights: Array2<f64>,
+}
+
+impl Estimate {
+    fn new(presses: Presses, prior: &Prior, fits: &[ChannelFit]) -> Result<Self, NotPositiveDefinite> {
+        let mut coefficients = Array2::zeros((1 + prior.polynomials(), fits.len()));
+        let mut weights = Array2::zeros((presses.len(), fits.len()));
+        let evidence = Evidence::new(&presses, prior, &[]);
+        for channels in of_equal_ratio(fits) {
+            let restricted = evidence.restricted(fits[channels[0]].ratio)?;
+            let (white, own) = restricted.residuals(presses.means.clone());
+            for c in channels {
+                coefficients.column_mut(c).assign(&own.column(c));
+                weights.column_mut(c).assign(&restricted.cholesky.solve_upper(&white.column(c).to_owned()));
+            }
+        }
+        let (offsets, polynomials) = coefficients.view().split_at(ndarray::Axis(0), 1);
+        Ok(Self {
+            responses: prior.responses(&presses),
+            offsets: offsets.row(0).to_owned(),
+            polynomials: polynomials.to_owned(),
+            weights,
+            presses,
+        })
+    }
+
+    /// f̂ of every channel at a place.
+    fn influences(&self, prior: &Prior, place_m: &[f64]) -> Array1<f64> {
+        let covariance = prior.influence_covariance(&self.presses, &self.responses, place_m);
+        covariance.dot(&self.weights) + Array1::from(prior.polynomials_at(place_m)).dot(&self.polynomials)
+    }
+
+    /// The same where each press of a cell is.
+    fn influences_at(&self, all: &All, cell: &[usize]) -> Array2<f64> {
+        let mut influences = Array2::zeros((cell.len(), self.offsets.len()));
+        for (k, i) in cell.iter().enumerate() {
+            let own_m = &all.presses.positions_m[*i];
+            let row = match k.checked_sub(1).filter(|before| all.presses.positions_m[cell[*before]] == *own_m)
+            {
+                Some(before) => influences.row(before).to_owned(),
+                None => self.influences(all.prior, own_m),
+            };
+            influences.row_mut(k).assign(&row);
+        }
+        influences
+    }
+}
