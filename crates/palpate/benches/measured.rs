@@ -2,7 +2,7 @@
 //! nuisance coordinate; beside them a sum of the likelihood over every node of the same table. One core, CPU time, medians.
 //!
 //! `cargo bench -p palpate --bench measured -- rows`: seconds and peak memory of the fit of every estimator to 100,000 rows at 20,000
-//! positions, each in a process of its own, with what was estimated before, and the error beside that of a fit to every 33rd row.
+//! positions, each in a process of its own, with what was estimated before, and the error beside that of the exact fit to so few of the rows that it can be had.
 
 use cpu_time::ThreadTime;
 use palpate_core::ContactEstimate;
@@ -10,6 +10,7 @@ use palpate_estimators::estimator::{Estimator, contenders};
 use palpate_estimators::fit::Fit;
 use palpate_estimators::fit::{FitTask, Locate};
 use palpate_estimators::influence::measured::{MeasuredInfluence, MeasuredLocator, Scale};
+use palpate_estimators::influence::{Influence, Structure};
 use palpate_estimators::recording::{Recording, Row};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
@@ -23,7 +24,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 const ROUNDS: usize = 3;
 const READINGS: usize = 100;
 
-/// Bench: what its channels read of a contact at a position, in metres, and a depth, in millimetres.
+/// Bench: what its channels read of a contact at a position, in metres, and a depth, in millimetres, or a force, in newtons.
 struct Bench {
     name: &'static str,
     extent: Extent,
@@ -32,6 +33,14 @@ struct Bench {
     /// Positions along and across, and depths.
     presses: [usize; 3],
     noise: f64,
+    second: Second,
+}
+
+/// What a press is recorded with beside its position.
+#[derive(Clone, Copy)]
+enum Second {
+    DepthMm,
+    ForceN,
 }
 
 fn main() {
@@ -51,6 +60,7 @@ fn main() {
             clean: field,
             presses: [20, 15, 5],
             noise: 0.02,
+            second: Second::DepthMm,
         },
         Bench {
             name: "plane, 15 channels, little noise",
@@ -59,6 +69,7 @@ fn main() {
             clean: field,
             presses: [20, 15, 5],
             noise: 0.002,
+            second: Second::DepthMm,
         },
         Bench {
             name: "line, 2 channels",
@@ -67,6 +78,7 @@ fn main() {
             clean: pressure,
             presses: [41, 1, 8],
             noise: 0.02,
+            second: Second::DepthMm,
         },
         Bench {
             name: "line, 6 channels",
@@ -75,6 +87,7 @@ fn main() {
             clean: pressure,
             presses: [41, 1, 8],
             noise: 0.02,
+            second: Second::DepthMm,
         },
         Bench {
             name: "line, 6 channels, little noise",
@@ -83,6 +96,7 @@ fn main() {
             clean: pressure,
             presses: [41, 1, 8],
             noise: 0.001,
+            second: Second::DepthMm,
         },
     ];
     for bench in &benches {
@@ -101,6 +115,11 @@ fn field(at: Position, depth_mm: f64, channel: usize) -> f64 {
     300.0 * depth_mm.powf(1.3) * (3.0 * r[2] * r[axis] - own) / square.powf(2.5)
 }
 
+/// Offset and force times influence of an elastic pad over the same magnetometers.
+fn elastic(at: Position, force_n: f64, channel: usize) -> f64 {
+    0.3 * channel as f64 + force_n * field(at, 1.5, channel)
+}
+
 /// Pressure at places along a channel, that rises with the depth faster than it does.
 fn pressure(at: Position, depth_mm: f64, channel: usize) -> f64 {
     let u = at.x_m / 0.1 - [0.0, 1.0, 0.2, 0.4, 0.6, 0.8][channel];
@@ -115,8 +134,8 @@ impl Bench {
         };
         Row {
             position,
-            force_n: None,
-            nuisance: Some(depth_mm),
+            force_n: matches!(self.second, Second::ForceN).then_some(depth_mm),
+            nuisance: matches!(self.second, Second::DepthMm).then_some(depth_mm),
             time_s: None,
             reading: (0..self.channels).map(noisy).collect(),
         }
@@ -160,9 +179,16 @@ impl Bench {
 /// Rows, and positions, of a large recording.
 const MANY: [usize; 3] = [160, 125, 5];
 
+/// The estimator of surfaces that read offset + force × influence, by the name of its structure.
+const FORCE_LINEAR: &str = "force-linear";
+/// Rows to which Gaussian processes are fitted exactly, and presses to which influence functions of recorded forces are.
+const EXACT: [usize; 2] = [4000, 1000];
+
 fn every_estimator_with_many_rows() {
     let this = std::env::current_exe().expect("it runs");
-    for kind in ["influence", "gaussian-process", "neighbours", "centroid", "network-lm", "network"] {
+    let kinds =
+        [FORCE_LINEAR, "influence", "gaussian-process", "neighbours", "centroid", "network-lm", "network"];
+    for kind in kinds {
         let status = std::process::Command::new(&this).args(["fit", kind]).status();
         assert!(status.is_ok_and(|status| status.success()), "{kind} failed");
     }
@@ -170,12 +196,23 @@ fn every_estimator_with_many_rows() {
 
 fn fit_many_rows(kind: &str) {
     let extent = Extent::plane(0.03, 0.03).expect("it has sides");
-    let bench = Bench { name: "", extent, channels: 15, clean: field, presses: MANY, noise: 0.02 };
+    let (clean, second, exact): (fn(Position, f64, usize) -> f64, _, _) = match kind {
+        FORCE_LINEAR => (elastic, Second::ForceN, EXACT[1]),
+        _ => (field, Second::DepthMm, EXACT[0]),
+    };
+    let bench = Bench { name: "", extent, channels: 15, clean, presses: MANY, noise: 0.02, second };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let (setup, recording) = (bench.setup(), bench.calibration(&mut rng));
     let touches = bench.touches(&mut rng);
-    let estimators = contenders(&setup, &Estimator::default(), recording.rows.len());
-    let estimator = estimators.into_iter().find(|other| other.kind() == kind).expect("it suits a plane");
+    let estimator = match kind {
+        FORCE_LINEAR => {
+            Estimator::Influence(Influence { structure: Structure::ForceLinear, ..Influence::default() })
+        }
+        _ => contenders(&setup, &Estimator::default(), recording.rows.len())
+            .into_iter()
+            .find(|other| other.kind() == kind)
+            .expect("it suits a plane"),
+    };
     let cost = estimator.fit_cost(&setup, &recording);
     let fitted = |recording: &Recording| {
         let start = ThreadTime::now();
@@ -187,14 +224,18 @@ fn fit_many_rows(kind: &str) {
     let (seconds, (median_mm, mean_mm)) = fitted(&recording);
     let peak_mb = peak_memory_mb();
     let mut few = recording.clone();
-    few.rows = few.rows.into_iter().step_by(33).collect();
+    // A prime apart, round and round, so that every depth is among them.
+    let rows = recording.rows.len();
+    few.rows = (0..exact).map(|i| recording.rows[i * 7919 % rows].clone()).collect();
+    let few_cost = estimator.fit_cost(&setup, &few);
     let (few_seconds, (few_median_mm, few_mean_mm)) = fitted(&few);
     println!(
-        "{kind}: {} rows fitted in {seconds:.1} s with {peak_mb:.0} MB at most (estimated {:.0} s, {:.0} MB), error {median_mm:.4} / {mean_mm:.4} mm; {} rows in {few_seconds:.1} s, error {few_median_mm:.4} / {few_mean_mm:.4} mm",
-        recording.rows.len(),
+        "{kind}: {rows} rows fitted in {seconds:.1} s with {peak_mb:.0} MB at most (estimated {:.0} s, {:.0} MB), error {median_mm:.4} / {mean_mm:.4} mm; {exact} rows in {few_seconds:.1} s (estimated {:.1} s), error {few_median_mm:.4} / {few_mean_mm:.4} mm; ratio {:.3} / {:.3}",
         cost.seconds,
         cost.memory_bytes / 1e6,
-        few.rows.len()
+        few_cost.seconds,
+        median_mm / few_median_mm,
+        mean_mm / few_mean_mm,
     );
 }
 
