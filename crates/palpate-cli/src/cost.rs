@@ -3,7 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::progress::duration;
-use palpate_estimators::estimator::{Estimator, FitCost};
+use palpate_estimators::estimator::{Estimator, FitCost, contenders};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 
@@ -23,12 +23,28 @@ impl MemoryLimit {
     pub fn check(&self, estimator: &Estimator, setup: &Setup, recording: &Recording) -> Result<(), Failure> {
         let cost = estimator.fit_cost(setup, recording);
         if let Some(why) = self.refusal(estimator, cost) {
-            return Err(Complaint::new(why).help(REMEDY).into());
+            return Err(Complaint::new(why).help(self.remedy(estimator, setup, recording)).into());
         }
         if cost.memory_bytes > NOTICEABLE.memory_bytes || cost.seconds > NOTICEABLE.seconds {
             eprintln!("{}: {}", estimator.kind(), in_words(cost));
         }
         Ok(())
+    }
+
+    /// Advice where memory is short, with the estimators that need no more than there may be.
+    fn remedy(&self, own: &Estimator, setup: &Setup, recording: &Recording) -> String {
+        let others = contenders(setup, own, recording.rows.len());
+        let suits = |other: &&Estimator| {
+            other.kind() != own.kind() && self.refusal(other, other.fit_cost(setup, recording)).is_none()
+        };
+        let kinds: Vec<&str> = others.iter().filter(suits).map(Estimator::kind).collect();
+        match kinds[..] {
+            [] => "raise the limit, or leave rows out".into(),
+            _ => format!(
+                "raise the limit, leave rows out, or name an estimator that keeps less: {}",
+                kinds.join(", ")
+            ),
+        }
     }
 
     /// Reason why an estimator may not be fitted; `None` where it may.
@@ -41,10 +57,6 @@ impl MemoryLimit {
         ))
     }
 }
-
-/// Advice where memory is short.
-const REMEDY: &str =
-    "raise the limit, leave rows out, or name an estimator that keeps less: centroid, neighbours, network-lm";
 
 /// "about 2 min 10 s and 600 MB"
 fn in_words(cost: FitCost) -> String {

@@ -7,11 +7,20 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Whether some work has seen that it is to stop.
+static SEEN: AtomicBool = AtomicBool::new(false);
+/// Work that does not see it for so long cannot be asked, and is ended with the process.
+const PATIENCE: Duration = Duration::from_millis(900);
 
-/// Makes Ctrl-C (and a polite kill) ask long work to stop, and end the process the second time.
+/// Makes Ctrl-C (and a polite kill) ask long work to stop, and end the process the second time, or where nothing listens.
 pub fn install_interrupt_handler() {
     let installed = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+        let again = INTERRUPTED.swap(true, Ordering::Relaxed);
+        if !again {
+            std::thread::sleep(PATIENCE);
+        }
+        if again || !SEEN.load(Ordering::Relaxed) {
+            eprintln!("stopped");
             std::process::exit(130);
         }
     });
@@ -22,7 +31,11 @@ pub fn install_interrupt_handler() {
 
 /// True once Ctrl-C was pressed.
 pub fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::Relaxed)
+    let interrupted = INTERRUPTED.load(Ordering::Relaxed);
+    if interrupted {
+        SEEN.store(true, Ordering::Relaxed);
+    }
+    interrupted
 }
 
 /// A bar of `length` steps on stderr.

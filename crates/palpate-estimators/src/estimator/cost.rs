@@ -4,11 +4,12 @@
 
 use super::{CHOICE_FOLDS, Estimator};
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
-use crate::influence::{self, Influence, Structure};
+use crate::influence::{Influence, Structure, force_linear, learning};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::{neighbours, network};
-use palpate_numerics::regression::{INDUCING, MOST_EXACT};
+use palpate_mechanics::surface::Extent;
+use palpate_numerics::regression::{INDUCING, MOST_EVALUATIONS, MOST_EXACT};
 use std::collections::HashSet;
 
 /// Memory and time that a fit will take.
@@ -114,10 +115,9 @@ impl Sizes {
 
     /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
     fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
-        /// Evaluations of the evidence, each a factor and an inverse.
-        const EVALUATIONS: f64 = 60.0;
         let searched = points.min(search_points as f64);
-        let search = EVALUATIONS * 2.0 * searched.powi(3) / PRODUCTS;
+        // Each a factor and an inverse.
+        let search = MOST_EVALUATIONS as f64 * 2.0 * searched.powi(3) / PRODUCTS;
         let rows = 4.0 * NUMBER * points * (coordinates + outputs);
         if points <= MOST_EXACT as f64 {
             return FitCost {
@@ -134,24 +134,16 @@ impl Sizes {
 
     fn influence(&self, influence: &Influence, setup: &Setup, recording: &Recording) -> FitCost {
         let extent = setup.surface().extent();
-        // Other tables than those of the free structure have fewer.
-        let nodes = most_nodes(extent) as f64;
-        let has_model = setup.surface().model().is_some();
-        let is_free = !has_model
-            && (influence.structure == Structure::Free
-                || self.has_nuisance
-                || recording.rows.iter().any(|row| row.force_n.is_none()));
-        if !is_free {
-            let learnt = if has_model { influence::MOST_LEARNT } else { influence::MOST_PRESSES };
-            let presses = self.presses.min(learnt as f64);
-            let factors = 6.0 * self.channels * presses.powi(3) / PRODUCTS;
-            return FitCost {
-                memory_bytes: NUMBER * (6.0 * presses * presses + nodes * (presses + 4.0 * self.channels)),
-                seconds: 10.0 * presses.min(400.0).powi(3) / PRODUCTS * self.channels
-                    + factors
-                    + self.channels * nodes * presses * presses / 2.0 / LOOPS,
-            };
+        let is_free = influence.structure == Structure::Free
+            || self.has_nuisance
+            || recording.rows.iter().any(|row| row.force_n.is_none());
+        if setup.surface().model().is_some() {
+            return self.over_a_model(extent);
         }
+        if !is_free {
+            return self.force_linear(extent);
+        }
+        let nodes = most_nodes(extent) as f64;
         let has_depth = self.has_nuisance || recording.rows.iter().any(|row| row.force_n.is_some());
         let depth = if has_depth { most_nuisance_nodes(extent) as f64 } else { 1.0 };
         let coordinates = (extent.dimensions() + usize::from(has_depth)) as f64;
@@ -169,5 +161,30 @@ impl Sizes {
         };
         // A fifth of the presses is held out of a second process.
         process.and(FitCost { memory_bytes: 0.0, ..process }).and(table)
+    }
+
+    /// Influence functions that are learnt over those of a model.
+    fn over_a_model(&self, extent: Extent) -> FitCost {
+        let presses = self.presses.min(learning::MOST_LEARNT as f64);
+        let nodes = most_nodes(extent) as f64;
+        FitCost {
+            memory_bytes: NUMBER * (6.0 * presses * presses + nodes * (presses + 4.0 * self.channels)),
+            seconds: self.channels * presses * presses * (presses / 3.0 + nodes / 2.0) / PRODUCTS,
+        }
+    }
+
+    /// Influence functions of presses with forces: two priors are judged, each by as many factors as there are folds, and each channel
+    /// has one of its own; residuals of every press are another.
+    fn force_linear(&self, extent: Extent) -> FitCost {
+        let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
+        let nodes = force_linear::most_nodes(extent) as f64;
+        let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
+        let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
+        FitCost {
+            memory_bytes: NUMBER * (10.0 * presses * presses + 4.0 * nodes * self.channels)
+                + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),
+            seconds: self.channels * (factors + nodes * presses * presses / 2.0) / PRODUCTS
+                + self.presses * presses * 2e-8,
+        }
     }
 }

@@ -4,9 +4,9 @@
 mod beam;
 mod channels;
 mod config;
-mod force_linear;
+pub(crate) mod force_linear;
 mod grid;
-mod learning;
+pub(crate) mod learning;
 pub mod measured;
 mod moments;
 mod noise;
@@ -15,10 +15,8 @@ mod prior;
 
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
-pub(crate) use force_linear::MOST_PRESSES;
 pub use force_linear::{ForceLinearLocator, Source};
 pub use grid::Axis;
-pub(crate) use learning::MOST_LEARNT;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 

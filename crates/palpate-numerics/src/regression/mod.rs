@@ -37,6 +37,7 @@ pub use groups::Samples;
 pub use kernel::{Hyperparameters, Kernel, Trend};
 pub use posterior::{GaussianProcess, MOST_EXACT, PosteriorFault, PredictionScratch};
 pub use reduced::INDUCING;
+pub use search::MOST_EVALUATIONS;
 pub use search::Regression;
 
 use crate::NotPositiveDefinite;

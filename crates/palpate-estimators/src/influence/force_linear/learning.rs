@@ -27,7 +27,7 @@ pub(crate) const MOST_PRESSES: usize = 1000;
 /// Distinct positions from which on every fifth can be held out.
 const LEAST_TO_JUDGE: usize = 6;
 /// Every fifth position is held out.
-const FOLDS: usize = 5;
+pub(crate) const FOLDS: usize = 5;
 
 /// Prior, noise and presses of a surface, as a recording tells them.
 pub(super) struct Learnt {

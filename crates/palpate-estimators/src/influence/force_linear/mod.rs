@@ -12,7 +12,7 @@ mod posterior;
 mod presses;
 mod prior;
 
-pub(crate) use learning::MOST_PRESSES;
+pub(crate) use learning::{FOLDS, MOST_PRESSES};
 pub use locator::ForceLinearLocator;
 pub use prior::Source;
 
@@ -35,6 +35,15 @@ const LEAST_POSITIONS: usize = 2;
 /// Most nodes along a line, and along either axis of a plane.
 const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 60;
+
+/// Most nodes of the table over the positions of a surface.
+pub(crate) const fn most_nodes(extent: Extent) -> usize {
+    match extent {
+        Extent::Line { .. } => MOST_ALONG,
+        Extent::Plane { .. } => MOST_OF_PLANE * MOST_OF_PLANE,
+    }
+}
+
 /// Forces up to this many times the greatest of the calibration are looked for.
 const HARDEST: f64 = 3.0;
 
