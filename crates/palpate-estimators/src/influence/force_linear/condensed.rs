@@ -1,6 +1,6 @@
 //! Few presses in place of many, such that every reading counts.
 //!
-//! Of all presses at one position under the responses φ_i, with weights w_i, offset and influence depend on the sums of w, w·φ, w·φ²,
+//! Of all presses at one position under the responses φ_i, with weights w_i (rows over the variance of one), offset and influence depend on the sums of w, w·φ, w·φ²,
 //! w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half the weight, that lie on the line of least squares of y over φ, have the
 //! same sums: nothing is lost.
 //!
@@ -60,33 +60,6 @@ impl Presses {
         Ok(few)
     }
 
-    /// The readings less the drift that some of the presses tell, all as if they had been read at the recording's end.
-    pub fn without_drift(
-        &self,
-        some: &Self,
-        prior: &Prior,
-        fits: &[ChannelFit],
-    ) -> Result<Self, NotPositiveDefinite> {
-        let mut still = Self { time: vec![1.0; self.len()], ..self.clone() };
-        for channels in of_equal_ratio(fits) {
-            let ratio = fits[channels[0]].ratio;
-            let restricted = Evidence::new(some, prior, &[]).restricted(ratio)?;
-            let (white, _) = restricted.residuals(some.means.clone());
-            let weights: Vec<Array1<f64>> = channels
-                .iter()
-                .map(|c| restricted.cholesky.solve_upper(&white.column(*c).to_owned()))
-                .collect();
-            for (i, time) in self.time.iter().enumerate() {
-                let to_end: Array1<f64> =
-                    some.time.iter().map(|other| ratio * prior.drift * (other - time.min(*other))).collect();
-                for (c, weights) in channels.iter().zip(&weights) {
-                    still.means[[i, *c]] += to_end.dot(weights);
-                }
-            }
-        }
-        Ok(still)
-    }
-
     fn push(&mut self, position_m: Vec<f64>, force_n: f64, count: f64, reading: &Array1<f64>) {
         self.positions_m.push(position_m);
         self.force_n.push(force_n);
@@ -112,16 +85,27 @@ impl Presses {
         for end in ends {
             let force_n = all.prior.force_of_relative_response(sums.response + end * spread);
             let reading = &means + end * spread * &slopes;
-            self.push(sums.position_m.clone(), force_n, sums.weight / ends.len() as f64, &reading);
+            self.push(
+                sums.position_m.clone(),
+                force_n,
+                all.count_of(sums.weight / ends.len() as f64, force_n),
+                &reading,
+            );
         }
         if all.is_one_place(cell) {
-            self.freedom += (cell.len() - ends.len()) as f64;
-            for c in channels {
-                let left = |i: usize| {
-                    all.presses.means[[i, c]] - means[c] - slopes[c] * (all.responses[i] - sums.response)
-                };
-                self.scatter[c] += sums.weight * all.mean(cell, |i| left(i).powi(2));
-            }
+            let squares: Array1<f64> = channels
+                .map(|c| {
+                    let left = |i: usize| {
+                        all.presses.means[[i, c]] - means[c] - slopes[c] * (all.responses[i] - sums.response)
+                    };
+                    sums.weight * all.mean(cell, |i| left(i).powi(2))
+                })
+                .collect();
+            let force_n = all.prior.force_of_relative_response(sums.mean_square.sqrt());
+            self.repeated.force_n.push(force_n);
+            self.repeated.freedom.push((cell.len() - ends.len()) as f64);
+            let squares = squares * all.prior.relative_noise(force_n);
+            self.repeated.squares.push_row(squares.view()).expect("as many channels as all presses have");
         }
     }
 
@@ -140,17 +124,13 @@ impl Presses {
                 let products = cell
                     .iter()
                     .enumerate()
-                    .map(|(k, i)| all.presses.count[*i] * all.responses[*i] * left(*i, influences[[k, c]]));
+                    .map(|(k, i)| all.weight(*i) * all.responses[*i] * left(*i, influences[[k, c]]));
                 let rest = products.sum::<f64>() / (sums.weight * sums.mean_square);
                 offset + response * (at_middle[c] + rest)
             })
             .collect();
-        self.push(
-            sums.position_m.clone(),
-            all.prior.force_of_relative_response(response),
-            sums.weight,
-            &reading,
-        );
+        let force_n = all.prior.force_of_relative_response(response);
+        self.push(sums.position_m.clone(), force_n, all.count_of(sums.weight, force_n), &reading);
         sums.weight * sums.spread().powi(2) / sums.mean_square
     }
 }
@@ -166,10 +146,20 @@ impl All<'_> {
     /// Mean of a value over a cell.
     fn mean(&self, cell: &[usize], value: impl Fn(usize) -> f64) -> f64 {
         let (sum, weight) = cell.iter().fold((0.0, 0.0), |(sum, weight), i| {
-            let own = self.presses.count[*i];
+            let own = self.weight(*i);
             (sum + own * value(*i), weight + own)
         });
         sum / weight
+    }
+
+    /// Rows of a press over the variance of one, relative to that of an untouched board.
+    fn weight(&self, i: usize) -> f64 {
+        self.presses.count[i] / self.prior.relative_noise(self.presses.force_n[i])
+    }
+
+    /// Rows of a press under a force that have this weight.
+    fn count_of(&self, weight: f64, force_n: f64) -> f64 {
+        weight * self.prior.relative_noise(force_n)
     }
 
     fn is_one_place(&self, cell: &[usize]) -> bool {
@@ -234,7 +224,7 @@ impl Sums {
             } else {
                 (0..first_m.len()).map(coordinate).collect()
             },
-            weight: cell.iter().map(|i| all.presses.count[*i]).sum(),
+            weight: cell.iter().map(|i| all.weight(*i)).sum(),
             response: all.mean(cell, |i| all.responses[i]),
             mean_square,
         }

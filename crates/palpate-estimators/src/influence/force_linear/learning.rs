@@ -101,9 +101,8 @@ impl Learnt {
         let presses = if pressed.len() <= most_presses {
             pressed.clone()
         } else if smooth.prior.drift > 0.0 {
-            let Found { prior, fits, .. } = &smooth;
-            let still = pressed.without_drift(&pressed.thinned(most_presses), prior, fits)?;
-            still.condensed(prior, fits, most_presses, watch)?
+            // Presses at one position that were made at different times are not one press.
+            pressed.thinned(most_presses)
         } else {
             // Repeats tell of the noise, which near positions do not.
             let merged = presses_of(Repeats::All).map(|merged| merged.of_channels(&live));

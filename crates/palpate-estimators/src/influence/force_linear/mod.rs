@@ -105,7 +105,9 @@ fn fit_condensed(
 pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<OffsetCourse>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
-    let Some(learnt) = Learnt::new(setup, recording, Structure::Auto, watch)? else { return Ok(None) };
+    let Some(learnt) = Learnt::new(setup, recording, Structure::Auto, MOST_PRESSES, watch)? else {
+        return Ok(None);
+    };
     let Some(at_rows) = learnt.offsets_at(&shares(&asked_s, &own_s))? else { return Ok(None) };
     let Some(own) = learnt.offsets_at(&shares(&own_s, &own_s))? else { return Ok(None) };
     let channels = recording.channels.len();

@@ -159,3 +159,23 @@ fn drift_is_found_where_there_is_any() {
         }
     }
 }
+
+#[test]
+fn drift_is_told_by_some_of_many_presses() {
+    let mut bench = Bench::strip(2, 600, 600);
+    let touches = bench.touches(200);
+    let (_, ends) = drift(&mut bench, Course::Walk, Pace::Even);
+    let (setup, recording) = (bench.setup(), bench.recording());
+    let of = |most| {
+        fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, most).unwrap().unwrap()
+    };
+    let later = moved(&touches, &ends);
+    let exact = of(usize::MAX);
+    assert_eq!(exact.drifts().len(), GAUGES);
+    let [exact_mm, condensed_mm] = [exact, of(300)].map(|locator| mean(errors_mm(&locator, &later).0));
+    eprintln!(
+        "strip, 600 presses under drift: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 300 in their place"
+    );
+    // As half of the readings tell.
+    assert!(condensed_mm < 1.1 * 2.0_f64.sqrt() * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
+}
