@@ -37,26 +37,78 @@ pub fn normal_cdf(z: f64) -> f64 {
 /// Part of a standard normal distribution between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalPart {
-    /// Its probability.
-    pub share: f64,
+    /// ln of its probability, also where that is no number any more.
+    pub ln_share: f64,
     /// Mean of the distribution that is cut off at both ends.
     pub mean: f64,
     /// Its variance.
     pub variance: f64,
 }
 
-/// The part of a standard normal distribution from `from` to `to`, exact in the tails; one of less than 10⁻¹² is the point next to 0.
+/// The part of a standard normal distribution from `from` to a greater `to`, however far out or narrow.
 pub fn normal_between(from: f64, to: f64) -> NormalPart {
-    const POINT: f64 = 1e-12;
-    let density = |z: f64| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    /// From here on the tail is that of its continued fraction.
+    const TAIL: f64 = 6.0;
+    /// Beyond this nothing is left.
+    const ALL: f64 = 9.0;
+    /// In a part that is narrower, and not far out, the density is even.
+    const NARROW: f64 = 1e-4;
+    if from > TAIL {
+        return upper_tail(from, to);
+    }
+    if to < -TAIL {
+        let part = upper_tail(-to, -from);
+        return NormalPart { mean: -part.mean, ..part };
+    }
+    if from < -ALL && to > ALL {
+        return NormalPart { ln_share: 0.0, mean: 0.0, variance: 1.0 };
+    }
+    if to - from < NARROW {
+        let mean = 0.5 * (from + to);
+        let ln_share = (to - from).ln() - 0.5 * mean * mean - ROOT_TWO_PI.ln();
+        return NormalPart { ln_share, mean, variance: (to - from) * (to - from) / 12.0 };
+    }
+    let density = |z: f64| (-0.5 * z * z).exp() / ROOT_TWO_PI;
     let share =
         if from > 0.0 { normal_cdf(-from) - normal_cdf(-to) } else { normal_cdf(to) - normal_cdf(from) };
-    if share < POINT {
-        return NormalPart { share, mean: if from > 0.0 { from } else { to.min(0.0) }, variance: 0.0 };
-    }
     let (low, high) = (density(from) / share, density(to) / share);
+    // An end at infinity has no density.
+    let term = |z: f64, density: f64| if density > 0.0 { z * density } else { 0.0 };
     let mean = low - high;
-    NormalPart { share, mean, variance: (1.0 + from * low - to * high - mean * mean).max(0.0) }
+    let variance = (1.0 + term(from, low) - term(to, high) - mean * mean).max(0.0);
+    NormalPart { ln_share: share.ln(), mean, variance }
+}
+
+const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
+
+/// The part from `from`, far above 0, to `to`: with m(z) = Φ(−z)/φ(z) (Mills' ratio) the share is φ(from)·(m(from) − r·m(to)),
+/// r = φ(to)/φ(from).
+fn upper_tail(from: f64, to: f64) -> NormalPart {
+    // The density falls by the factor e over 1/from: a part that is narrow beside that is even.
+    let fall = (to - from) * from;
+    if fall < 1e-3 {
+        let (width, mean) = (to - from, 0.5 * (from + to));
+        let ln_share = width.ln() - 0.5 * mean * mean - ROOT_TWO_PI.ln();
+        return NormalPart { ln_share, mean, variance: width * width / 12.0 };
+    }
+    let ratio = (-0.5 * (to - from) * (to + from)).exp();
+    let left = mills_ratio(from) - if ratio > 0.0 { ratio * mills_ratio(to) } else { 0.0 };
+    let mean = (1.0 - ratio) / left;
+    // Cut off far out it is an exponential one, whose deviation is its mean less its start.
+    let above = mean - from;
+    let variance = if from > 1e3 && ratio == 0.0 {
+        above * above
+    } else {
+        let end = if ratio > 0.0 { to * ratio } else { 0.0 };
+        (1.0 + (from - end) / left - mean * mean).max(0.0)
+    };
+    NormalPart { ln_share: left.ln() - 0.5 * from * from - ROOT_TWO_PI.ln(), mean, variance }
+}
+
+/// Φ(−z)/φ(z) for z of at least 6, by its continued fraction (Abramowitz and Stegun, 26.2.14).
+fn mills_ratio(z: f64) -> f64 {
+    const LEVELS: usize = 16;
+    1.0 / (1..=LEVELS).rev().fold(z, |below, level| z + level as f64 / below)
 }
 
 /// The z with Φ(z) = `share`, for a share between 0 and 1, by bisection to the last bits.
@@ -92,6 +144,56 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ln of the share, mean and variance by a plain sum over the part.
+    fn summed(from: f64, to: f64) -> [f64; 3] {
+        const STEPS: usize = 400_000;
+        let to = to.min(from.max(0.0) + 40.0);
+        let width = (to - from) / STEPS as f64;
+        let peak = 0.0_f64.clamp(from, to);
+        let mut sums = [0.0; 3];
+        for i in 0..STEPS {
+            let z = from + (i as f64 + 0.5) * width;
+            let weight = (-0.5 * (z - peak) * (z + peak)).exp() * width;
+            let off = z - peak;
+            [weight, weight * off, weight * off * off]
+                .iter()
+                .zip(&mut sums)
+                .for_each(|(term, sum)| *sum += term);
+        }
+        let mean = sums[1] / sums[0];
+        [sums[0].ln() - 0.5 * peak * peak - ROOT_TWO_PI.ln(), peak + mean, sums[2] / sums[0] - mean * mean]
+    }
+
+    #[test]
+    fn parts_of_a_normal_distribution_are_those_of_a_plain_sum() {
+        for (from, to) in [
+            (-1.0, 2.0),
+            (-20.0, 0.3),
+            (0.5, 0.50005),
+            (4.0, 9.0),
+            (5.99, 40.0),
+            (6.01, 40.0),
+            (6.01, 6.4),
+            (30.0, 30.00001),
+            (55.0, 60.0),
+            (300.0, 300.01),
+        ] {
+            let [ln_share, mean, variance] = summed(from, to);
+            let mirrored = normal_between(-to, -from);
+            for (part, sign) in [(normal_between(from, to), 1.0), (mirrored, -1.0)] {
+                assert!((part.ln_share - ln_share).abs() < 1e-6, "{from} {to}: {part:?} {ln_share}");
+                assert!((sign * part.mean - mean).abs() < 1e-6, "{from} {to}: {part:?} {mean}");
+                assert!((part.variance / variance - 1.0).abs() < 1e-3, "{from} {to}: {part:?} {variance}");
+            }
+        }
+        let far = normal_between(1e6, f64::INFINITY);
+        assert!((far.mean - 1e6 - 1e-6).abs() < 1e-9 && far.ln_share.is_finite(), "{far:?}");
+        let whole = normal_between(f64::NEG_INFINITY, f64::INFINITY);
+        assert_eq!((whole.ln_share, whole.mean, whole.variance), (0.0, 0.0, 1.0));
+        let half = normal_between(0.0, f64::INFINITY);
+        assert!((half.mean - (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-12, "{half:?}");
+    }
 
     #[test]
     fn tables_are_met() {

@@ -99,7 +99,9 @@ fn main() {
             second: Second::DepthMm,
         },
     ];
-    for bench in &benches {
+    let only = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
+    for bench in benches.iter().filter(|bench| only.as_ref().is_none_or(|only| bench.name.starts_with(only)))
+    {
         report(bench);
     }
 }
@@ -259,25 +261,24 @@ fn report(bench: &Bench) {
     let every = touches.iter().step_by(10).cloned().collect::<Vec<Row>>();
     let obvious_us = microseconds(&every, |reading| of_every_node(&locator, reading));
     let (median_mm, mean_mm) = errors_mm(&touches, |reading| locator.locate(reading).contact.position);
-    let table = &locator.table;
+    let table = locator.table();
     println!(
-        "{}: {} presses fitted in {fit_s:.1} s, table {} x {} x {}, cells cut {}; estimate {ours_us:.1} us, error {median_mm:.4} / {mean_mm:.4} mm; sum over every node {obvious_us:.0} us, {:.0} times as long",
+        "{}: {} presses fitted in {fit_s:.1} s, table {} x {} x {}, estimate {ours_us:.1} us, error {median_mm:.4} / {mean_mm:.4} mm; sum over every node {obvious_us:.0} us, {:.0} times as long",
         bench.name,
         recording.rows.len(),
         table.x.count,
         table.y.count,
         table.nuisance.count,
-        table.parts,
         obvious_us / ours_us
     );
 }
 
 /// Posterior mean over the nodes of a table, each as likely as any other beforehand.
 fn of_every_node(locator: &MeasuredLocator, reading: &[f64]) -> ContactEstimate {
-    let (table, whitening) = (&locator.table, &locator.whitening);
+    let (table, whitening) = (locator.table(), locator.whitening());
     let scaled: Vec<f64> = reading
         .iter()
-        .map(|value| if locator.readings == Scale::Logarithm { value.ln() } else { *value })
+        .map(|value| if locator.readings() == Scale::Logarithm { value.ln() } else { *value })
         .collect();
     let channels = scaled.len();
     let whitened: Vec<f64> = whitening

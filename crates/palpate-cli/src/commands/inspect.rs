@@ -319,10 +319,10 @@ fn influences(linear: &ForceLinearLocator) -> String {
 }
 
 fn learnt(measured: &MeasuredLocator) -> String {
-    let table = &measured.table;
+    let table = measured.table();
     let counts = [table.x.count, table.y.count, table.nuisance.count];
     let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
-    let nuisance = match measured.role {
+    let nuisance = match measured.role() {
         NuisanceRole::None => "",
         NuisanceRole::Force => " and force",
         NuisanceRole::Other => " and the nuisance coordinate",

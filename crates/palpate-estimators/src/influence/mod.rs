@@ -6,6 +6,7 @@ mod channels;
 mod config;
 pub(crate) mod force_linear;
 mod grid;
+mod inversion;
 pub(crate) mod learning;
 pub mod measured;
 mod moments;

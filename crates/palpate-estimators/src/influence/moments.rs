@@ -23,15 +23,6 @@ impl Moments {
         self.second[5] += weight * variance_n2;
     }
 
-    /// The sums of all.
-    pub fn total(all: impl Iterator<Item = Self>) -> Self {
-        all.fold(Self::default(), |a, b| Self {
-            weight: a.weight + b.weight,
-            first: std::array::from_fn(|k| a.first[k] + b.first[k]),
-            second: std::array::from_fn(|k| a.second[k] + b.second[k]),
-        })
-    }
-
     /// The mean of x, y and W, and their covariance xx, xy, xf, yy, yf, ff; NaN where nothing was added.
     pub fn mean_and_covariance(&self) -> ([f64; 3], [f64; 6]) {
         let mean = self.first.map(|sum| sum / self.weight);

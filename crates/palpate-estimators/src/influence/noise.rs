@@ -35,11 +35,6 @@ impl Whitening {
         Ok(Self { matrix: matrix.iter().copied().collect(), signal, gain: noise.gain })
     }
 
-    /// Whitening of channels that are white already, and of a process that knows everything.
-    pub(super) fn unit(channels: usize) -> Self {
-        Self { matrix: Vec::new(), signal: vec![0.0; channels], gain: 0.0 }
-    }
-
     /// The same for noise, gain and signal of `factor` times the deviation.
     pub(super) fn widened(mut self, factor: f64) -> Self {
         self.gain *= factor;

@@ -12,9 +12,12 @@
 
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
+use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{
-    Axis, CUT, GridPosterior, PartOfCell, ToldForce, check_axes, neighbours, parts_of, weights_around,
+use crate::influence::grid::{Axis, check_axes};
+use crate::influence::inversion::{
+    Cells, Equations, Explain, Explained, Inversion, LANES, Lanes, Layers, Look, Slopes, ToldForce, Unknowns,
+    in_lanes,
 };
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
@@ -26,6 +29,7 @@ use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::{Extent, ResponseFunction, ResponseGradient};
 use palpate_numerics::normal_between;
 use palpate_numerics::regression::Kernel;
+use palpate_numerics::simd;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -107,10 +111,14 @@ pub struct ForceLinearLocator {
     stored: Stored,
     /// Expected φ of a contact, and its precision.
     expected: [f64; 2],
-    /// For each place half the longest way to a neighbour's line, per newton and over the noise.
-    reaches: Vec<f64>,
+    /// f, v and β, eight channels side by side.
+    layers: Layers,
+    /// ω.
+    open: Vec<Lanes>,
     /// Bounds of what each place costs a reading.
     scan: Scan,
+    /// How far the influences of each place are from those of its neighbours along and across, at most, per newton and over the noise.
+    ways: Vec<[f64; 2]>,
     /// The largest square of a relative reading of noise alone.
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
@@ -119,11 +127,11 @@ pub struct ForceLinearLocator {
 
 /// Contacts are expected to have forces that spread this many times as far as those of the presses.
 const FORCE_SPREAD: f64 = 2.0;
-/// A finely cut cell has about this relative length, so that sums over it are integrals.
-const FINE: f64 = 1.0;
-/// The finest cut along a line, and along each axis of a plane.
-const MOST_PARTS: usize = 24;
-const MOST_PARTS_OF_PLANE: usize = 8;
+/// Layers of f, v and β.
+const VALUES: usize = 0;
+const VARIANCES: usize = 1;
+const COVARIANCES: usize = 2;
+const LAYERS: usize = 3;
 
 impl Stored {
     pub fn into_locator(self) -> ForceLinearLocator {
@@ -132,14 +140,19 @@ impl Stored {
                 None => [self.mean_force_n, (FORCE_SPREAD * self.force_sd_n).powi(-2)],
                 Some(_) => [0.0; 2],
             },
-            stored: self,
-            reaches: Vec::new(),
+            layers: Layers::new([self.x, self.y], LAYERS, self.live.len(), |place, layer, channel| {
+                let Tables { values, variances, covariances, .. } = &self.functions;
+                [values, variances, covariances][layer][place * self.live.len() + channel]
+            }),
+            open: in_lanes(&self.functions.offset_variances),
             scan: Scan::default(),
+            ways: Vec::new(),
             noise_bound: 0.0,
             detection_bound: 0.0,
+            stored: self,
         };
-        locator.find_reaches();
-        locator.scan = Scan::new(&locator);
+        locator.find_ways();
+        locator.scan = locator.new_scan();
         locator.bound_noise();
         locator
     }
@@ -210,17 +223,6 @@ struct Place<'a> {
     values: &'a [f64],
     variances: &'a [f64],
     covariances: &'a [f64],
-}
-
-/// A place as a reading sees it.
-#[derive(Clone, Copy, Debug)]
-struct Explained {
-    /// χ² at the force of the least misfit.
-    misfit: f64,
-    /// −2·ln of the posterior density, less a constant.
-    cost: f64,
-    force_n: f64,
-    force_variance_n2: f64,
 }
 
 impl ForceLinearLocator {
@@ -308,8 +310,7 @@ impl ForceLinearLocator {
             taken: self.detection_bound,
         };
         let signal = move |Contact { position, force_n }: Contact| {
-            let mut buffer = Buffer::default();
-            let values = self.place_at(position, &mut buffer).values;
+            let values = self.influences_at(position);
             let open = &self.stored.functions.offset_variances;
             let square: f64 = values.iter().zip(open).map(|(f, open)| f * f / (1.0 + open)).sum();
             self.stored.prior.response_n(force_n) * square.sqrt()
@@ -317,12 +318,15 @@ impl ForceLinearLocator {
         LightestTouch::new(detection, self.stored.false_alarm_rate, Box::new(signal))
     }
 
-    /// The influences at a position; beyond the grid those of its edge.
-    fn place_at<'b>(&self, position: Position, buffer: &'b mut Buffer) -> Place<'b> {
-        let [x, y] = self.axes();
+    /// The influences at a position, over the noise; beyond the grid those of its edge.
+    fn influences_at(&self, position: Position) -> Vec<f64> {
         let node =
             |axis: Axis, at_m: f64| ((at_m - axis.start) / axis.step).clamp(0.0, (axis.count - 1) as f64);
-        self.between(node(x, position.x_m), node(y, position.y_m), buffer)
+        let [x, y] = self.axes();
+        let mut values = Vec::new();
+        let at = [node(x, position.x_m), node(y, position.y_m)];
+        self.layers.between(at, VALUES..VALUES + 1, &mut values);
+        values.as_flattened()[..self.stored.live.len()].to_vec()
     }
 
     fn axes(&self) -> [Axis; 2] {
@@ -344,14 +348,42 @@ impl ForceLinearLocator {
         }
     }
 
-    /// Finds the reaches of the places.
-    fn find_reaches(&mut self) {
+    /// Finds the ways from each place to its neighbours.
+    fn find_ways(&mut self) {
         let [x, y] = self.axes();
-        let reach = |place: usize| {
-            let ways = neighbours([x, y], place).map(|other| self.way_between(place, other));
-            0.5 * ways.fold(0.0, f64::max)
-        };
-        self.reaches = (0..x.count * y.count).map(reach).collect();
+        self.ways = (0..x.count * y.count)
+            .map(|place| {
+                let (i, j) = (place / y.count, place % y.count);
+                let most = |others: [Option<usize>; 2]| {
+                    others
+                        .into_iter()
+                        .flatten()
+                        .map(|other| self.way_between(place, other))
+                        .fold(0.0, f64::max)
+                };
+                let along = [(i > 0).then(|| place - y.count), (i + 1 < x.count).then(|| place + y.count)];
+                let across = [(j > 0).then(|| place - 1), (j + 1 < y.count).then(|| place + 1)];
+                [most(along), most(across)]
+            })
+            .collect();
+    }
+
+    fn new_scan(&self) -> Scan {
+        let live = self.stored.live.len();
+        Scan::new(self.places(), live, self.expected, self.known_response_n(), |place, c| {
+            let Place { values, variances, covariances } = self.place(place);
+            let (noise, open) = (self.noise(), self.stored.functions.offset_variances[c]);
+            let (v, beta) = (variances[c], covariances[c]);
+            let hardest_n = self.known_response_n().unwrap_or(self.stored.hardest_n);
+            let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
+            let told = if v > 0.0 { beta * beta / v } else { 0.0 };
+            (values[c], [noise + (open - told).max(0.0), hardest.max(noise + open)])
+        })
+    }
+
+    /// Places of the grid.
+    fn places(&self) -> usize {
+        self.stored.x.count * self.stored.y.count
     }
 
     /// How far, per newton and over the noise, the influences of one place are from those of another; from any multiple of them
@@ -379,7 +411,7 @@ impl ForceLinearLocator {
             });
             if fd > 0.0 { fd * fd / ff } else { 0.0 }
         };
-        (0..self.reaches.len()).all(|place| taken(place) <= self.detection_bound)
+        (0..self.places()).all(|place| taken(place) <= self.detection_bound)
     }
 
     /// Bounds of noise: of a reading's square, and of what the best contact takes off it.
@@ -428,7 +460,7 @@ impl ForceLinearLocator {
         let freedom = self.stored.live.len().saturating_sub(self.unknowns());
         let readings = recording.rows.iter().map(|row| row.reading.as_slice());
         self.stored.residual_limit = learnt_misfit_bound(freedom, readings, |reading| {
-            self.posterior(&self.relative(reading)).residual
+            Inversion::new(self.seen(&self.relative(reading))).misfit()
         });
     }
 
@@ -444,244 +476,199 @@ impl ForceLinearLocator {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
-    /// Misfit, cost and force of a place for a reading.
-    ///
-    /// The force is found in steps from about `force_n`, each by the weights of the last.
-    fn explain(&self, relative: &[f64], place: Place, force_n: f64) -> Explained {
-        /// Two steps leave less than a thousandth.
-        const STEPS: usize = 2;
-        const LARGE: f64 = 1e100;
-        let open = &self.stored.functions.offset_variances;
-        let channels = || {
-            let Place { values, variances, covariances } = place;
-            relative.iter().zip(values).zip(variances.iter().zip(covariances).zip(open))
-        };
-        let noise = self.noise();
-        let variance = |force_n: f64, ((v, beta), open): ((&f64, &f64), &f64)| {
-            noise + (open + force_n * (2.0 * beta + force_n * v)).max(0.0)
-        };
-        // Least squares of the force by the weights of the last one: Σ f·d/S and Σ f²/S, with what is expected of it.
-        let [expected_n, precision] = self.expected;
-        let sums = |force_n: f64| {
-            channels().fold((expected_n * precision, precision), |(fd, ff), ((d, f), left_open)| {
-                let scaled = f / variance(force_n, left_open);
-                (fd + scaled * d, ff + scaled * f)
-            })
-        };
-        let hardest_n = self.stored.hardest_n;
-        let held = |(fd, ff): (f64, f64)| if ff > 0.0 { (fd / ff).clamp(0.0, hardest_n) } else { 0.0 };
-        let known = self.known_response_n();
-        let force_n = known.unwrap_or_else(|| (0..STEPS).fold(force_n, |force_n, _| held(sums(force_n))));
-        let (mut misfit, mut determinant, mut log_determinant) = (0.0, 1.0, 0.0);
-        for ((d, f), left_open) in channels() {
-            let variance = variance(force_n, left_open);
-            misfit += (d - force_n * f).powi(2) / variance;
-            determinant *= variance;
-            // One logarithm for many channels, but before their product overflows.
-            if determinant > LARGE {
-                log_determinant += determinant.ln();
-                determinant = 1.0;
-            }
-        }
-        log_determinant += determinant.ln();
-        let cost = misfit + log_determinant;
-        if known.is_some() {
-            return Explained { misfit, cost, force_n, force_variance_n2: 0.0 };
-        }
-        // The force's own density: normal about that of the least squares, cut off at 0 and at the hardest.
-        let (fd, ff) = sums(force_n);
-        if ff <= 0.0 {
-            return Explained { misfit, cost: f64::INFINITY, force_n, force_variance_n2: 0.0 };
-        }
-        let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
-        let part = normal_between((0.0 - free_n) / sd_n, (hardest_n - free_n) / sd_n);
-        // The misfit was taken at the force within the bounds; the integral is relative to the free one.
-        let with_force = misfit + (force_n - expected_n).powi(2) * precision;
-        let free_misfit = with_force - (force_n - free_n).powi(2) * ff;
-        let cost = free_misfit + log_determinant - 2.0 * (part.share * sd_n).ln();
-        Explained {
-            misfit,
-            cost,
-            force_n: free_n + sd_n * part.mean,
-            force_variance_n2: part.variance * sd_n * sd_n,
-        }
-    }
-
     /// φ of the known force.
     fn known_response_n(&self) -> Option<f64> {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
     }
 
-    /// The posterior of a reading, less offsets and over the noise.
-    fn posterior(&self, relative: &[f64]) -> GridPosterior {
-        let axes = self.axes();
-        let told = self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known);
-        let mut posterior = GridPosterior::new(axes, told);
-        let bounds: Vec<Bound> =
-            (0..self.reaches.len()).map(|place| self.scan.bound(place, relative)).collect();
-        let Some(mut best) = (0..bounds.len()).min_by(|a, b| bounds[*a].cost.total_cmp(&bounds[*b].cost))
-        else {
-            return posterior;
-        };
-        let mut buffer = Buffer::default();
-        let cost_at = |place: usize| self.explain(relative, self.place(place), bounds[place].force_n).cost;
-        let mut least = cost_at(best);
-        for (place, bound) in bounds.iter().enumerate() {
-            if bound.cost < least {
-                let cost = cost_at(place);
-                if cost < least {
-                    (best, least) = (place, cost);
-                }
-            }
-        }
-        for (x, y) in parts_of(axes, self.parts_of_cell(best, bounds[best].force_n), best) {
-            let part = self.explain(relative, self.between(x, y, &mut buffer), bounds[best].force_n);
-            least = least.min(part.cost);
-        }
-        for (place, bound) in bounds.iter().enumerate() {
-            let within =
-                |misfit: f64, force_n: f64| (misfit.sqrt() - self.reaches[place] * force_n).max(0.0).powi(2);
-            if within(bound.misfit, bound.force_n) + (bound.cost - bound.misfit) > least + CUT {
-                continue;
-            }
-            let found = self.explain(relative, self.place(place), bound.force_n);
-            if within(found.misfit, found.force_n) + (found.cost - found.misfit) > least + CUT {
-                continue;
-            }
-            let parts = self.parts_of_cell(place, found.force_n);
-            posterior.add_cell(place, parts, |x, y| {
-                self.part(relative, self.between(x, y, &mut buffer), found.force_n, least)
-            });
-        }
-        posterior
+    /// A reading, less offsets and over the noise, ready to be explained.
+    fn seen(&self, relative: &[f64]) -> Seen<'_> {
+        Seen { locator: self, reading: in_lanes(relative), between: Vec::new(), slopes: Vec::new() }
     }
 
-    /// The estimate of a reading summed over every cell, cut as finely as any: what the bounds must not change.
+    /// Source of the force of an estimate.
+    fn told_force(&self) -> ToldForce {
+        self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known)
+    }
+
+    /// The estimate of a relative reading.
+    fn estimate(&self, relative: &[f64]) -> Estimate {
+        Inversion::new(self.seen(relative)).estimate(self.told_force(), self.stored.residual_limit)
+    }
+
+    /// The contact of a reading, summed over the whole grid.
     #[cfg(test)]
-    pub fn locate_over_all_cells(&self, reading: &[f64]) -> Estimate {
-        let relative = &self.relative(reading);
-        let told = self.stored.known_force_n.map_or(ToldForce::Estimated, ToldForce::Known);
-        let mut posterior = GridPosterior::new(self.axes(), told);
-        let force_n = self.expected[0];
-        let costs =
-            (0..self.reaches.len()).map(|place| self.explain(relative, self.place(place), force_n).cost);
-        let least = costs.fold(f64::INFINITY, f64::min);
-        let mut buffer = Buffer::default();
-        for place in 0..self.reaches.len() {
-            posterior.add_cell(place, self.most_parts(), |x, y| {
-                self.part(relative, self.between(x, y, &mut buffer), force_n, least)
-            });
-        }
-        posterior.estimate(self.stored.residual_limit)
-    }
-
-    /// Into how many parts the cell of a place is cut along each axis for a contact of about this force.
-    fn parts_of_cell(&self, place: usize, force_n: f64) -> usize {
-        ((2.0 * self.reaches[place] * force_n / FINE).ceil().min(self.most_parts() as f64) as usize).max(1)
-    }
-
-    /// The finest cut of a cell.
-    fn most_parts(&self) -> usize {
-        if self.stored.y.count > 1 { MOST_PARTS_OF_PLANE } else { MOST_PARTS }
-    }
-
-    /// A place as part of a cell; its weight is relative to that of the cost `least`.
-    fn part(&self, relative: &[f64], place: Place, force_n: f64, least: f64) -> PartOfCell {
-        let part = self.explain(relative, place, force_n);
-        let (force_n, force_variance_n2) =
-            self.stored.prior.force_of_response(part.force_n, part.force_variance_n2);
-        let weight = (-0.5 * (part.cost - least)).exp();
-        PartOfCell { weight, force_n, force_variance_n2, residual: part.misfit }
-    }
-
-    /// The influences at (x, y), in nodes, by cubic interpolation through four places each way.
-    fn between<'b>(&self, x: f64, y: f64, buffer: &'b mut Buffer) -> Place<'b> {
-        let live = self.stored.live.len();
-        buffer.0.iter_mut().for_each(|list| {
-            list.clear();
-            list.resize(live, 0.0);
-        });
-        let [values, variances, covariances] = &mut buffer.0;
-        for (place, weight) in weights_around(self.axes(), (x, y)) {
-            let place = self.place(place);
-            for (out, from) in [
-                (&mut *values, place.values),
-                (&mut *variances, place.variances),
-                (&mut *covariances, place.covariances),
-            ] {
-                out.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
-            }
-        }
-        variances.iter_mut().for_each(|variance| *variance = variance.max(0.0));
-        Place { values, variances, covariances }
+    pub fn summed_everywhere(&self, reading: &[f64], per_node: usize) -> palpate_core::ContactEstimate {
+        Inversion::new(self.seen(&self.relative(reading))).summed_everywhere(self.told_force(), per_node)
     }
 }
 
-/// The least that a place may cost a reading, without the weights of its force: those of the largest variance of each channel.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Scan {
-    /// Weights w and w·f of each channel at each place, side by side.
-    weights: Vec<[f64; 2]>,
-    /// Σ w·f² and what is expected of the force, and the least of the determinant and the force's width, at each place.
-    places: Vec<[f64; 2]>,
-    channels: usize,
-    /// Expected φ and its precision, or the known φ.
-    expected: [f64; 2],
-    known: Option<f64>,
+/// A relative reading, and room for what is interpolated to explain it.
+#[derive(Debug)]
+struct Seen<'a> {
+    locator: &'a ForceLinearLocator,
+    reading: Vec<Lanes>,
+    between: Vec<Lanes>,
+    slopes: Vec<Slopes>,
 }
 
-/// Bounds of what a place costs a reading.
-#[derive(Clone, Copy, Debug)]
-struct Bound {
-    misfit: f64,
-    cost: f64,
-    /// About the force of the least misfit.
+/// Sums over the channels of a place, by the variances S of one force.
+struct WeighChannels<'a> {
+    reading: &'a [Lanes],
+    /// f, v and β of the place.
+    functions: [&'a [Lanes]; LAYERS],
+    open: &'a [Lanes],
+    noise: f64,
     force_n: f64,
 }
 
-impl Scan {
-    fn new(locator: &ForceLinearLocator) -> Self {
-        let noise = locator.noise();
-        let known = locator.known_response_n();
-        let hardest_n = known.unwrap_or(locator.stored.hardest_n);
-        let open = &locator.stored.functions.offset_variances;
-        let mut scan = Self { channels: open.len(), expected: locator.expected, known, ..Self::default() };
-        for place in 0..locator.reaches.len() {
-            let Place { values, variances, covariances } = locator.place(place);
-            let (mut ff, mut log_determinant) = (locator.expected[1], 0.0);
-            for (c, open) in open.iter().enumerate() {
-                let (f, v, beta) = (values[c], variances[c], covariances[c]);
-                let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
-                let weight = 1.0 / hardest.max(noise + open);
-                let told = if v > 0.0 { beta * beta / v } else { 0.0 };
-                log_determinant += (noise + (open - told).max(0.0)).ln();
-                ff += weight * f * f;
-                scan.weights.push([weight, weight * f]);
-            }
-            let width = if known.is_some() { 0.0 } else { ff.max(f64::MIN_POSITIVE).ln() };
-            scan.places.push([ff, log_determinant + width]);
-        }
-        scan
-    }
+/// Σ d²/S, Σ f·d/S, Σ f²/S and ln Π S, S relative to the noise.
+#[derive(Clone, Copy, Debug)]
+struct Weighed {
+    dd: f64,
+    fd: f64,
+    ff: f64,
+    log_determinant: f64,
+}
 
-    fn bound(&self, place: usize, relative: &[f64]) -> Bound {
-        let [expected_n, precision] = self.expected;
-        let weights = &self.weights[place * self.channels..(place + 1) * self.channels];
-        let start = (precision * expected_n * expected_n, precision * expected_n);
-        let (dd, fd) = weights
-            .iter()
-            .zip(relative)
-            .fold(start, |(dd, fd), ([weight, scaled], d)| (dd + weight * d * d, fd + scaled * d));
-        let [ff, constant] = self.places[place];
-        let force_n = self.known.unwrap_or(if ff > 0.0 { fd / ff } else { 0.0 });
-        let misfit = (dd + force_n * (force_n * ff - 2.0 * fd)).max(0.0);
-        Bound { misfit, cost: misfit + constant, force_n: force_n.max(0.0) }
+impl simd::Kernel for WeighChannels<'_> {
+    type Output = Weighed;
+    const FUSED: bool = false;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: simd::Simd>(self) -> Weighed {
+        const LARGE: f64 = 1e30;
+        let Self { reading, functions: [values, variances, covariances], open, noise, force_n } = self;
+        let mut sums = [[0.0; LANES]; 3];
+        // One logarithm for many channels, but before their product overflows.
+        let (mut product, mut log_determinant) = ([1.0; LANES], 0.0);
+        for g in 0..reading.len() {
+            for l in 0..LANES {
+                let (v, beta) = (variances[g][l].max(0.0), covariances[g][l]);
+                let spread = (open[g][l] + force_n * (2.0 * beta + force_n * v)).max(0.0);
+                let weight = 1.0 / (noise + spread);
+                let (d, f) = (reading[g][l], values[g][l]);
+                sums[0][l] += weight * d * d;
+                sums[1][l] += weight * f * d;
+                sums[2][l] += weight * f * f;
+                product[l] *= 1.0 + spread / noise;
+            }
+            if product.iter().any(|product| *product > LARGE) {
+                log_determinant += product.iter().map(|product| product.ln()).sum::<f64>();
+                product = [1.0; LANES];
+            }
+        }
+        let [low, high] = [0, 4].map(|i| product[i] * product[i + 1] * product[i + 2] * product[i + 3]);
+        let [dd, fd, ff] = sums.map(|lanes| lanes.iter().sum());
+        log_determinant += low.ln() + high.ln();
+        Weighed { dd, fd, ff, log_determinant }
     }
 }
 
-/// A place between those of the grid: f, v and β of each channel.
-#[derive(Default)]
-struct Buffer([Vec<f64>; 3]);
+impl Seen<'_> {
+    fn weighed(&self, force_n: f64) -> Weighed {
+        let ForceLinearLocator { open, layers, .. } = self.locator;
+        let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
+        let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
+        let noise = self.locator.noise();
+        simd::run_loops(WeighChannels { reading: &self.reading, functions, open, noise, force_n })
+    }
+}
+
+impl Explain for Seen<'_> {
+    fn axes(&self) -> [Axis; 2] {
+        self.locator.axes()
+    }
+
+    fn cells(&self) -> Cells {
+        Cells::new(self.axes().map(|axis| axis.count), 1)
+    }
+
+    fn scan(&self, looks: &mut Vec<Look>) {
+        self.locator.scan.look(&self.reading, looks);
+    }
+
+    fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {
+        self.locator.ways[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
+    }
+
+    /// Of φ.
+    fn range(&self) -> Option<(f64, f64)> {
+        self.locator.known_response_n().is_none().then_some((0.0, self.locator.stored.hardest_n))
+    }
+
+    fn equations(&mut self, [x, y, response_n]: Unknowns, near: Unknowns) -> Equations {
+        let ForceLinearLocator { layers, open, expected, .. } = self.locator;
+        layers.slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
+        let place = near[0].round() as usize * self.locator.stored.y.count + near[1].round() as usize;
+        let [variances, covariances] =
+            [VARIANCES, COVARIANCES].map(|layer| layers.at(place, layer..layer + 1));
+        let (noise, near_n) = (self.locator.noise(), near[2]);
+        let channels = (0..self.reading.len()).map(|g| {
+            let [f, along, across] = &self.slopes[g];
+            let weights = std::array::from_fn(|l| {
+                let spread = open[g][l] + near_n * (2.0 * covariances[g][l] + near_n * variances[g][l]);
+                1.0 / (noise + spread.max(0.0))
+            });
+            let residual = std::array::from_fn(|l| self.reading[g][l] - response_n * f[l]);
+            (
+                weights,
+                residual,
+                [along.map(|slope| response_n * slope), across.map(|slope| response_n * slope), *f],
+            )
+        });
+        let equations = Equations::of(channels);
+        if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
+    }
+
+    /// φ is found in steps from about `latent`, each by the variances of the last.
+    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
+        /// Two steps leave less than a thousandth.
+        const STEPS: usize = 2;
+        let [x, y] = self.axes();
+        let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
+        self.locator.layers.between(place, 0..LAYERS, &mut self.between);
+        let Some((least_n, hardest_n)) = self.range() else {
+            let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
+            let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
+            return Explained {
+                misfit,
+                cost: misfit + log_determinant + margin,
+                latent,
+                latent_variance: 0.0,
+            };
+        };
+        // Least squares of φ by the weights of the last one, with what is expected of it.
+        let [expected_n, precision] = self.locator.expected;
+        let told = |Weighed { fd, ff, .. }: Weighed| (fd + expected_n * precision, ff + precision);
+        let response_n = (0..STEPS).fold(latent, |response_n, _| {
+            let (fd, ff) = told(self.weighed(response_n));
+            if ff > 0.0 { (fd / ff).clamp(least_n, hardest_n) } else { least_n }
+        });
+        let weighed = self.weighed(response_n);
+        let misfit = (weighed.dd + response_n * (response_n * weighed.ff - 2.0 * weighed.fd)).max(0.0);
+        // The density of φ: normal about that of the least squares, cut off at 0 and at the hardest.
+        let (fd, ff) = told(weighed);
+        if ff.is_nan() || ff <= 0.0 {
+            return Explained { misfit, cost: f64::INFINITY, latent: response_n, latent_variance: 0.0 };
+        }
+        let (free_n, sd_n) = (fd / ff, ff.sqrt().recip());
+        let part = normal_between((least_n - free_n) / sd_n, (hardest_n - free_n) / sd_n);
+        // The misfit was taken at φ within the bounds; the integral is relative to the free one.
+        let with_expected = misfit + (response_n - expected_n).powi(2) * precision;
+        let free_misfit = with_expected - (response_n - free_n).powi(2) * ff;
+        Explained {
+            misfit,
+            cost: free_misfit + weighed.log_determinant - 2.0 * (part.ln_share + sd_n.ln()) + margin,
+            latent: free_n + sd_n * part.mean,
+            latent_variance: part.variance * sd_n * sd_n,
+        }
+    }
+
+    fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
+        self.locator.stored.prior.force_of_response(latent, variance)
+    }
+}
 
 /// Reading of a channel less its offset, over its noise, as a function of the contact.
 struct LearntResponse<'a> {
@@ -691,7 +678,7 @@ struct LearntResponse<'a> {
 
 impl LearntResponse<'_> {
     fn influence(&self, position: Position) -> f64 {
-        self.locator.place_at(position, &mut Buffer::default()).values[self.channel]
+        self.locator.influences_at(position)[self.channel]
     }
 }
 
@@ -724,7 +711,7 @@ impl ResponseFunction for LearntResponse<'_> {
 impl Locate for ForceLinearLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
         let relative = self.relative(reading);
-        let estimate = self.posterior(&relative).estimate(self.stored.residual_limit);
+        let estimate = self.estimate(&relative);
         if self.is_no_contact(&relative) {
             // The most probable place of a contact that would be too light to be told from noise.
             return Estimate::of_contact(estimate.contact, Status::NoContact);

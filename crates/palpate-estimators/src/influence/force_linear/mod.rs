@@ -11,6 +11,7 @@ mod locator;
 mod posterior;
 mod presses;
 mod prior;
+mod scan;
 
 pub(crate) use learning::{FOLDS, MOST_PRESSES};
 pub use locator::ForceLinearLocator;
@@ -126,7 +127,7 @@ fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
         let values = positions_m.iter().map(|position_m| position_m[k]).collect();
         // Beside a point sensor influences bend within no length at all.
         let length_m = if prior.source.is_some() { 0.0 } else { prior.lengths_m[k] };
-        Axis::over(values, (0.0, size_m), length_m, most)
+        Axis::of_positions(values, size_m, length_m, most)
     };
     match extent.width_m() {
         None => [axis(0, extent.length_m(), MOST_ALONG), Axis::NONE],

@@ -592,7 +592,8 @@ fn the_determinant_of_many_gauges_does_not_overflow() {
 }
 
 #[test]
-fn bounds_lose_nothing_of_the_sum_over_all_cells() {
+fn estimates_are_those_of_a_plain_sum_over_the_grid() {
+    const PER_NODE: usize = 40;
     let mut bench = Bench::strip(9, 25, 9);
     let touches = bench.touches(40);
     let mut precise = Bench::strip(10, 60, 15);
@@ -605,11 +606,16 @@ fn bounds_lose_nothing_of_the_sum_over_all_cells() {
     for (bench, touches) in [(&bench, &touches), (&precise, &precise.presses.clone())] {
         let locator = bench.fit(Structure::Auto).unwrap();
         for row in touches {
-            let [fast, all] = [locator.locate(&row.reading), locator.locate_over_all_cells(&row.reading)];
-            let sd_m = all.contact.uncertainty.unwrap().covariance[0].sqrt();
-            let apart_m = fast.contact.position.distance_m(all.contact.position);
-            assert!(fast.contact.uncertainty.is_some(), "{fast:?} {all:?}");
-            assert!(apart_m < 0.1 * sd_m + 1e-5, "{apart_m} m of {sd_m} m: {fast:?} {all:?}");
+            let (found, all) =
+                (locator.locate(&row.reading), locator.summed_everywhere(&row.reading, PER_NODE));
+            let sd_m = all.uncertainty.unwrap().covariance[0].sqrt();
+            let apart_m = found.contact.position.distance_m(all.position);
+            assert!(found.contact.uncertainty.is_some(), "{found:?} {all:?}");
+            // Of several modes the estimate is but one.
+            assert!(
+                found.status == Status::Ambiguous || apart_m < 0.1 * sd_m + 1e-5,
+                "{apart_m} m of {sd_m} m: {found:?} {all:?}"
+            );
         }
     }
 }

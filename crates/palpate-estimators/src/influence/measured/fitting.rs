@@ -1,11 +1,12 @@
 //! From a recording to a locator: presses, regression, noise, how far it misses positions that were held out, table.
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
-use super::locator::{MeasuredLocator, NuisanceRole};
+use super::locator::{MeasuredLocator, NuisanceRole, Stored};
 use super::presses::{Presses, nuisance_coordinate};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
 use crate::influence::grid::Axis;
+use crate::influence::inversion::Layers;
 use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -24,6 +25,8 @@ const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_OF_NUISANCE: usize = 64;
 const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
+/// What a table misses between its nodes, over the noise, hardly matters below this.
+const MOST_MISSED: f64 = 0.2;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
 
@@ -67,23 +70,27 @@ impl Fit for MeasuredInfluence {
             None => whitening,
         };
         let axes = presses.axes(&process, setup);
-        let coarse = presses.table(axes, &process, &whitening, watch)?;
-        let finer = presses.finer(axes, coarse.too_coarse());
-        let table = if finer == axes { coarse } else { presses.table(finer, &process, &whitening, watch)? };
-        // Nearly noiseless readings are compared no more sharply than the table's finest cut can tell.
-        let factor = table.too_coarse();
-        let (table, whitening) = (table.widened(factor), whitening.widened(factor));
-        let mut locator = MeasuredLocator {
+        let mut table = presses.table(axes, &process, &whitening, watch)?;
+        let mut missed = presses.missed(&table, &process, &whitening);
+        let finer = presses.finer(axes, missed);
+        if finer != axes {
+            table = presses.table(finer, &process, &whitening, watch)?;
+            missed = presses.missed(&table, &process, &whitening);
+        }
+        // What the table misses between its nodes is noise to a reading.
+        let factor = missed[0].hypot(missed[1]).hypot(1.0);
+        let locator = Stored {
             readings: presses.readings,
-            whitening,
-            table,
+            whitening: whitening.widened(factor),
+            table: table.widened(factor),
             role,
             nuisance: presses.nuisance,
             residual_limit: f64::INFINITY,
             force_n: setup.force_n(),
-        };
-        locator.residual_limit = residual_limit(&locator, recording);
-        Ok(locator)
+        }
+        .into_locator();
+        let limit = residual_limit(&locator, recording);
+        Ok(locator.with_residual_limit(limit))
     }
 }
 
@@ -125,56 +132,98 @@ impl Presses {
             if node % 64 == 0 {
                 watch.round()?;
             }
-            let place = node / nuisance.count;
-            let mut at = vec![x.value((place / y.count) as f64)];
-            at.extend(
-                (process.coordinates() - usize::from(self.has_nuisance) == 2)
-                    .then(|| y.value((place % y.count) as f64)),
-            );
-            at.extend(self.has_nuisance.then(|| nuisance.value((node % nuisance.count) as f64)));
-            variances.push(process.tabulate_into(&at, &mut mean, &mut scratch));
+            let (place, along_line) = (node / nuisance.count, node % nuisance.count);
+            let at = [place / y.count, place % y.count, along_line].map(|node| node as f64);
+            variances.push(process.tabulate_into(&self.coordinates_at(axes, at), &mut mean, &mut scratch));
             whitening.apply(&mean, &mut white);
             means.extend_from_slice(&white);
         }
-        Ok(Table::new(axes, means, variances, channels))
+        Ok(Table { x, y, nuisance, means, variances })
     }
 
-    /// The axes of position with about `factor` times the nodes, as far as there may be so many.
-    fn finer(&self, [x, y, nuisance]: [Axis; 3], factor: f64) -> [Axis; 3] {
-        let most = if y.count > 1 { MOST_OF_PLANE } else { MOST_ALONG };
-        [x.finer(factor, most), y.finer(factor, most), nuisance]
+    /// Coordinates of the process at (x, y, nuisance), in nodes.
+    fn coordinates_at(&self, [x, y, nuisance]: [Axis; 3], at: [f64; 3]) -> Vec<f64> {
+        let positions = self.coordinates.ncols() - usize::from(self.has_nuisance);
+        let mut coordinates = vec![x.value(at[0])];
+        coordinates.extend((positions == 2).then(|| y.value(at[1])));
+        coordinates.extend(self.has_nuisance.then(|| nuisance.value(at[2])));
+        coordinates
+    }
+
+    /// By how much a channel of a table is off the process, over the noise: in the middle between places, and between nodes of the nuisance
+    /// coordinate.
+    fn missed(&self, table: &Table, process: &GaussianProcess, whitening: &Whitening) -> [f64; 2] {
+        /// Places that are tried.
+        const TRIED: usize = 300;
+        let Table { x, y, nuisance, .. } = table;
+        let channels = whitening.channels();
+        let layers =
+            Layers::new([*x, *y], nuisance.count, channels, |place, node, c| table.mean(place, node, c));
+        let half = |axis: &Axis, node: usize| node as f64 + if node + 1 < axis.count { 0.5 } else { 0.0 };
+        let (mut raw, mut white, mut between) = (vec![0.0; channels], vec![0.0; channels], Vec::new());
+        let mut scratch = process.scratch();
+        let mut squares = [0.0; 2];
+        let nodes = table.places() * nuisance.count;
+        let every = nodes.div_ceil(TRIED).max(1);
+        for node in (0..nodes).step_by(every) {
+            let (place, k) = (node / nuisance.count, node % nuisance.count);
+            let (i, j) = (place / y.count, place % y.count);
+            let next = (k + 1).min(nuisance.count - 1);
+            let middles = [[half(x, i), half(y, j), k as f64], [i as f64, j as f64, half(nuisance, k)]];
+            for (square, at) in squares.iter_mut().zip(middles) {
+                process.mean_into(&self.coordinates_at([*x, *y, *nuisance], at), &mut raw, &mut scratch);
+                whitening.apply(&raw, &mut white);
+                layers.between([at[0], at[1]], k..next + 1, &mut between);
+                let part = at[2] - k as f64;
+                let (from, to) = (&between[..layers.groups()], &between[(next - k) * layers.groups()..]);
+                let pairs = from.as_flattened().iter().zip(to.as_flattened());
+                *square +=
+                    white.iter().zip(pairs).map(|(w, (a, b))| (w - a - part * (b - a)).powi(2)).sum::<f64>();
+            }
+        }
+        let count = (nodes.div_ceil(every) * channels) as f64;
+        squares.map(|square| (square / count).sqrt())
+    }
+
+    /// Axes with so many more nodes that a table misses less, as far as there may be so many: cubic interpolation between places errs as the
+    /// fourth power of their distance, straight lines along the nuisance coordinate as the second.
+    fn finer(&self, [x, y, nuisance]: [Axis; 3], missed: [f64; 2]) -> [Axis; 3] {
+        let is_plane = y.count > 1;
+        let (most, most_nuisance) = if is_plane {
+            (MOST_OF_PLANE, MOST_OF_NUISANCE_OF_PLANE)
+        } else {
+            (MOST_ALONG, MOST_OF_NUISANCE)
+        };
+        let [places, nodes] = missed.map(|missed| missed / MOST_MISSED);
+        let places = places.sqrt().sqrt();
+        [x.finer(places, most), y.finer(places, most), nuisance.finer(nodes.sqrt(), most_nuisance)]
     }
 
     fn axes(&self, process: &GaussianProcess, setup: &Setup) -> [Axis; 3] {
         let extent = setup.surface().extent();
         let lengths = &process.hyperparameters().length_scales;
-        let axis = |k: usize, bounds, most| {
-            let values = self.coordinates.column(k).to_vec();
-            Axis::over(values, bounds, lengths[k], most)
-        };
+        let values = |k: usize| self.coordinates.column(k).to_vec();
+        let positions = |k: usize, side_m: f64, most| Axis::of_positions(values(k), side_m, lengths[k], most);
         let most = match extent {
             Extent::Line { .. } => MOST_ALONG,
             Extent::Plane { .. } => MOST_OF_PLANE,
         };
-        let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
-        let along = axis(0, (0.0, extent.length_m()), most);
-        let across = extent.width_m().map(|width_m| axis(1, (0.0, width_m), MOST_OF_PLANE));
-        let nuisance = self
-            .has_nuisance
-            .then(|| axis(self.coordinates.ncols() - 1, everywhere, most_nuisance_nodes(extent)));
+        let along = positions(0, extent.length_m(), most);
+        let across = extent.width_m().map(|width_m| positions(1, width_m, MOST_OF_PLANE));
+        let last = self.coordinates.ncols() - 1;
+        let nuisance =
+            self.has_nuisance.then(|| Axis::over(values(last), lengths[last], most_nuisance_nodes(extent)));
         [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
     }
 }
 
 /// The squared residual beyond which no contact explains a reading.
 fn residual_limit(locator: &MeasuredLocator, recording: &Recording) -> f64 {
-    let table = &locator.table;
+    let table = locator.table();
     let fitted = [table.x, table.y, table.nuisance].iter().filter(|axis| axis.count > 1).count();
-    let freedom = locator.whitening.channels().saturating_sub(fitted).max(1);
+    let freedom = locator.whitening().channels().saturating_sub(fitted).max(1);
     let readings = recording.rows.iter().map(|row| row.reading.as_slice());
-    learnt_misfit_bound(freedom, readings, |reading| {
-        locator.whitened(reading).map_or(f64::NAN, |whitened| locator.residual(&whitened))
-    })
+    learnt_misfit_bound(freedom, readings, |reading| locator.misfit(reading))
 }
 
 /// Distinct positions from which on some can be held out.

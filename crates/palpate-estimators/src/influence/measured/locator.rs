@@ -1,9 +1,14 @@
-//! The locator of a measured surface: probabilities of places, gathered cell by cell of the table, and the estimate that they give.
+//! The locator of a measured surface: its table, and how well the places and nuisance coordinates of the table explain a reading.
 
 use super::config::Scale;
-use super::table::{Line, LineBuffer, Table};
+use super::scan::Scan;
+use super::table::{Line, Marginal, Stretch, Table, WhiteNoise};
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{CUT, GridPosterior, PartOfCell, ToldForce, check_axes, middle, parts_of};
+use crate::influence::grid::{Axis, check_axes, middle};
+use crate::influence::inversion::{
+    Cells, Equations, Explain, Explained, Inversion, Lanes, Layers, Look, Slopes, ToldForce, Unknowns,
+    in_lanes,
+};
 use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
@@ -20,10 +25,10 @@ pub enum NuisanceRole {
     Other,
 }
 
-/// Readings as a learnt function of position and nuisance coordinate, and its inversion.
+/// The part of a locator that its file holds.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MeasuredLocator {
+pub(super) struct Stored {
     /// On which scale readings are compared.
     pub readings: Scale,
     /// Whitening of scaled readings to channels of unit noise.
@@ -40,139 +45,360 @@ pub struct MeasuredLocator {
     pub force_n: Option<f64>,
 }
 
+/// Readings as a learnt function of position and nuisance coordinate, and its inversion.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct MeasuredLocator {
+    stored: Stored,
+    search: Search,
+}
+
+/// A table that is ready to be searched.
+#[derive(Clone, Debug, PartialEq)]
+struct Search {
+    /// Means, a layer a node of the nuisance coordinate.
+    means: Layers,
+    /// v, the nodes of the nuisance coordinate in the place of channels.
+    variances: Layers,
+    noise: WhiteNoise,
+    cells: Cells,
+    scan: Scan,
+    /// How far the reading moves from a place to the next along and across, at most, for each node of the nuisance coordinate.
+    lengths: Vec<[f64; 2]>,
+}
+
+/// Nodes of a cell along either axis of a plane, where every place has a line of nodes; elsewhere 1.
+const STRIDE: usize = 3;
+/// Nodes of the nuisance coordinate that are looked at first, to either side of where it is thought to be.
+const NEAR: usize = 1;
+/// Beyond a node whose squared residual is this much above the least, the nuisance coordinate has no probability worth adding up: e⁻¹⁰.
+const NEGLIGIBLE: f64 = 20.0;
+/// A gain beyond this many standard deviations is not looked for.
+const MOST_GAIN: f64 = 6.0;
+
+impl Search {
+    fn new(table: &Table, whitening: &Whitening) -> Self {
+        let Table { x, y, nuisance, .. } = table;
+        let axes = [*x, *y];
+        let stride = if y.count > 1 && nuisance.count > 1 { STRIDE } else { 1 };
+        let cells = Cells::new([x.count, y.count], stride);
+        let mut search = Self {
+            means: Layers::new(axes, nuisance.count, table.channels(), |place, node, c| {
+                table.mean(place, node, c)
+            }),
+            variances: Layers::new(axes, 1, nuisance.count, |place, _, node| {
+                table.variances[place * nuisance.count + node]
+            }),
+            noise: WhiteNoise::new(whitening),
+            cells,
+            scan: Scan::new(table, whitening, cells),
+            lengths: Vec::new(),
+        };
+        search.find_lengths(axes, nuisance.count);
+        search
+    }
+
+    /// The nodes of a place.
+    fn line(&self, place: usize, nodes: usize) -> Line<'_> {
+        Line {
+            means: self.means.at(place, 0..nodes),
+            variances: &self.variances.at(place, 0..1).as_flattened()[..nodes],
+        }
+    }
+
+    /// From each node of a place to the line of the next along, and across, or of the last.
+    fn find_lengths(&mut self, [x, y]: [Axis; 2], nodes: usize) {
+        let unit = self.noise.unit();
+        let groups = self.means.groups();
+        let mut stretches = Vec::new();
+        let mut ways = vec![[0.0; 2]; x.count * y.count * nodes];
+        for place in 0..x.count * y.count {
+            let (i, j) = (place / y.count, place % y.count);
+            let next = [(i + 1 < x.count).then_some(place + y.count), (j + 1 < y.count).then_some(place + 1)];
+            for (k, other) in next.into_iter().enumerate() {
+                let Some(other) = other else { continue };
+                let to = self.line(other, nodes);
+                for node in 0..nodes {
+                    let mean = &self.means.at(place, node..node + 1)[..groups];
+                    ways[place * nodes + node][k] = to.residual(mean, &unit, &mut stretches).sqrt();
+                }
+            }
+        }
+        self.lengths = ways.clone();
+        for place in 0..x.count * y.count {
+            let before =
+                [(place / y.count > 0).then(|| place - y.count), (place % y.count > 0).then(|| place - 1)];
+            for (k, other) in before.into_iter().enumerate() {
+                let Some(other) = other else { continue };
+                for node in 0..nodes {
+                    let most = &mut self.lengths[place * nodes + node][k];
+                    *most = most.max(ways[other * nodes + node][k]);
+                }
+            }
+        }
+    }
+}
+
 impl MeasuredLocator {
-    /// The least squared residual of a whitened reading, over the variances.
-    pub(super) fn residual(&self, whitened: &[f64]) -> f64 {
-        posterior(self, whitened).residual
+    /// The learnt readings.
+    pub fn table(&self) -> &Table {
+        &self.stored.table
+    }
+
+    /// Whitening of scaled readings to channels of unit noise.
+    pub fn whitening(&self) -> &Whitening {
+        &self.stored.whitening
+    }
+
+    /// Scale on which readings are compared.
+    pub fn readings(&self) -> Scale {
+        self.stored.readings
+    }
+
+    /// Role of the nuisance coordinate.
+    pub fn role(&self) -> NuisanceRole {
+        self.stored.role
+    }
+
+    /// Scale on which the nuisance coordinate is held.
+    pub fn nuisance(&self) -> Scale {
+        self.stored.nuisance
+    }
+
+    /// The same, which takes readings of a greater squared residual for none of a contact.
+    pub(super) fn with_residual_limit(mut self, limit: f64) -> Self {
+        self.stored.residual_limit = limit;
+        self
+    }
+
+    /// The least squared residual of a reading, over the variances; NaN where the reading is off its scale.
+    pub(super) fn misfit(&self, reading: &[f64]) -> f64 {
+        self.seen(reading).map_or(f64::NAN, |seen| Inversion::new(seen).misfit())
+    }
+
+    /// The contact of a reading, summed over the whole grid.
+    #[cfg(test)]
+    pub(super) fn summed_everywhere(
+        &self,
+        reading: &[f64],
+        per_node: usize,
+    ) -> palpate_core::ContactEstimate {
+        Inversion::new(self.seen(reading).expect("on its scale"))
+            .summed_everywhere(self.told_force(), per_node)
     }
 
     /// Source of the force of an estimate.
     fn told_force(&self) -> ToldForce {
-        match (self.role, self.force_n) {
+        match (self.stored.role, self.stored.force_n) {
             (NuisanceRole::Force, _) => ToldForce::Estimated,
             (_, Some(force_n)) => ToldForce::Known(force_n),
             (_, None) => ToldForce::Untold,
         }
     }
 
-    /// The nuisance coordinate at `node`, off its scale.
-    fn force_at(&self, node: f64) -> f64 {
-        self.nuisance.undo(self.table.nuisance.value(node))
-    }
-
-    /// The variance of the nuisance coordinate, off its scale, when that of `node` is `variance`.
-    fn force_spread(&self, node: f64, variance: f64) -> f64 {
-        let slope = self.table.nuisance.step
-            * match self.nuisance {
-                Scale::Linear => 1.0,
-                Scale::Logarithm => self.force_at(node),
-            };
-        variance * slope * slope
-    }
-
     /// The reading on its scale, whitened; `None` where it is off the scale.
-    pub(super) fn whitened(&self, reading: &[f64]) -> Option<Vec<f64>> {
-        let scaled =
-            reading.iter().map(|value| self.readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
-        let mut whitened = vec![0.0; self.whitening.channels()];
-        self.whitening.apply(&scaled, &mut whitened);
-        Some(whitened)
+    fn seen(&self, reading: &[f64]) -> Option<Seen<'_>> {
+        let Stored { readings, whitening, .. } = &self.stored;
+        let scaled = reading.iter().map(|value| readings.scaled(*value)).collect::<Option<Vec<f64>>>()?;
+        let mut whitened = vec![0.0; whitening.channels()];
+        whitening.apply(&scaled, &mut whitened);
+        Some(Seen {
+            locator: self,
+            reading: in_lanes(&whitened),
+            means: Vec::new(),
+            variances: Vec::new(),
+            slopes: Vec::new(),
+            stretches: Vec::new(),
+        })
     }
 }
 
 impl Locate for MeasuredLocator {
     fn locate(&self, reading: &[f64]) -> Estimate {
-        match self.whitened(reading) {
-            Some(whitened) => posterior(self, &whitened).estimate(self.residual_limit),
-            None => Estimate::of_position(middle([self.table.x, self.table.y]), Status::OutsideModel),
+        let Stored { table, residual_limit, .. } = &self.stored;
+        match self.seen(reading) {
+            Some(seen) => Inversion::new(seen).estimate(self.told_force(), *residual_limit),
+            None => Estimate::of_position(middle([table.x, table.y]), Status::OutsideModel),
         }
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        let (table, channels) = (&self.table, setup.layout().len());
-        LocatorFault::check_count("whitened channels", channels, self.whitening.channels())?;
-        LocatorFault::check_count("whitening weights", channels * channels, self.whitening.matrix.len())?;
+        LocatorFault::check_count("whitened channels", setup.layout().len(), self.stored.whitening.channels())
+    }
+}
+
+impl Stored {
+    pub fn into_locator(self) -> MeasuredLocator {
+        MeasuredLocator { search: Search::new(&self.table, &self.whitening), stored: self }
+    }
+
+    /// Checks what a file may have got wrong.
+    fn check(&self) -> Result<(), LocatorFault> {
+        let Self { table, whitening, .. } = self;
+        let numbers = |what, list: &[f64], good: fn(f64) -> bool, bound| {
+            LocatorFault::check_numbers(what, list.iter().copied(), good, bound)
+        };
+        let channels = whitening.channels();
+        LocatorFault::check_count("whitening weights", channels * channels, whitening.matrix.len())?;
         check_axes(&[table.x, table.y, table.nuisance])?;
-        let places = table.x.count.saturating_mul(table.y.count);
-        let nodes = places.saturating_mul(table.nuisance.count);
+        let nodes = table.x.count.saturating_mul(table.y.count).saturating_mul(table.nuisance.count);
         LocatorFault::check_count("table variances", nodes, table.variances.len())?;
         LocatorFault::check_count("table means", nodes.saturating_mul(channels), table.means.len())?;
-        LocatorFault::check_count("table reaches", places, table.reaches.len())?;
-        LocatorFault::check_numbers(
-            "table part",
-            [table.parts as f64],
-            |p| (1.0..=64.0).contains(&p),
-            "1 to 64",
-        )?;
-        let matrix = self.whitening.matrix.iter().copied();
-        LocatorFault::check_numbers("whitening weight", matrix, |_| true, "finite")?;
-        LocatorFault::check_numbers("table mean", table.means.iter().copied(), |_| true, "finite")?;
-        let positive = [&table.variances, &table.reaches, &self.whitening.signal];
-        for (what, values) in ["table variance", "table reach", "signal variance"].into_iter().zip(positive) {
-            LocatorFault::check_numbers(what, values.iter().copied(), |v| v >= 0.0, "finite and at least 0")?;
-        }
-        LocatorFault::check_numbers("residual limit", [self.residual_limit], |v| v > 0.0, "greater than 0")?;
+        numbers("whitening weight", &whitening.matrix, |_| true, "finite")?;
+        numbers("table mean", &table.means, |_| true, "finite")?;
+        numbers("table variance", &table.variances, |v| v >= 0.0, "finite and at least 0")?;
+        numbers("signal variance", &whitening.signal, |v| v >= 0.0, "finite and at least 0")?;
+        numbers("gain", &[whitening.gain], |gain| gain >= 0.0, "finite and at least 0")?;
+        numbers("residual limit", &[self.residual_limit], |v| v > 0.0, "greater than 0")?;
         LocatorFault::check_numbers("force", self.force_n, |force| force > 0.0, "finite and greater than 0")
     }
 }
 
-/// A place, and how well it explains the reading.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    place: usize,
-    residual: f64,
-}
+impl TryFrom<Stored> for MeasuredLocator {
+    type Error = LocatorFault;
 
-impl Candidate {
-    /// Whether somewhere `reach` closer, in deviations, could matter beside the residual `least`.
-    fn within(&self, reach: f64, least: f64) -> bool {
-        let closest = (self.residual.sqrt() - reach).max(0.0);
-        closest * closest <= least + CUT
+    fn try_from(stored: Stored) -> Result<Self, LocatorFault> {
+        stored.check()?;
+        Ok(stored.into_locator())
     }
 }
 
-/// Posterior of a whitened reading: the middles of blocks of places first, then the places of blocks that could matter, and of
-/// those the cells that could, cut finely.
-fn posterior(locator: &MeasuredLocator, reading: &[f64]) -> GridPosterior {
-    let (table, noise) = (&locator.table, &locator.whitening);
-    let look = |place: usize| Candidate { place, residual: table.line(place).residual(reading, noise) };
-    let nearest = |candidate: &mut dyn Iterator<Item = Candidate>| {
-        candidate.min_by(|a, b| a.residual.total_cmp(&b.residual))
-    };
-    let mut posterior = GridPosterior::new([table.x, table.y], locator.told_force());
-    let blocks: Vec<Candidate> = table.blocks().map(look).collect();
-    let Some(block) = nearest(&mut blocks.iter().copied()) else { return posterior };
-    let Some(best) = nearest(&mut table.block(block.place).map(look)) else { return posterior };
-    let mut buffer = LineBuffer::default();
-    let mut least = best.residual;
-    for (x, y) in parts_of([table.x, table.y], table.parts, best.place) {
-        least = least.min(table.line_between(x, y, &mut buffer).residual(reading, noise));
+impl From<MeasuredLocator> for Stored {
+    fn from(locator: MeasuredLocator) -> Self {
+        locator.stored
     }
-    // From a block's middle to its other places is twice the reach, and from there half as far as that again.
-    for block in blocks.iter().filter(|block| block.within(3.5 * table.reaches[block.place], least)) {
-        for candidate in table.block(block.place).map(look) {
-            if candidate.within(table.reaches[candidate.place], least) {
-                let part =
-                    |x, y| part_of_cell(locator, table.line_between(x, y, &mut buffer), reading, least);
-                posterior.add_cell(candidate.place, table.parts, part);
+}
+
+/// A whitened reading, and room for what is interpolated to explain it.
+#[derive(Debug)]
+struct Seen<'a> {
+    locator: &'a MeasuredLocator,
+    reading: Vec<Lanes>,
+    means: Vec<Lanes>,
+    variances: Vec<Lanes>,
+    slopes: Vec<Slopes>,
+    stretches: Vec<Stretch>,
+}
+
+impl Seen<'_> {
+    /// The least squared residual of a place and the integral over some nodes of its line; `None` where others may matter.
+    fn explain_by(&mut self, place: [f64; 2], nodes: std::ops::Range<usize>) -> Option<(f64, Marginal)> {
+        let Search { means, noise, .. } = &self.locator.search;
+        means.between(place, nodes.clone(), &mut self.means);
+        let variances = &self.variances.as_flattened()[nodes.clone()];
+        let line = Line { means: &self.means, variances };
+        let (misfit, mut marginal) = line.explain(&self.reading, noise, &mut self.stretches);
+        let negligible = misfit + NEGLIGIBLE;
+        let (Some(below), Some(above)) = (self.stretches.first(), self.stretches.last()) else { return None };
+        let is_open = nodes.start > 0 && below.residual_at(0.0) < negligible
+            || nodes.end < self.nodes() && above.residual_at(1.0) < negligible;
+        marginal.shift(nodes.start as f64);
+        (!is_open).then_some((misfit, marginal))
+    }
+
+    /// Nodes of the nuisance coordinate.
+    fn nodes(&self) -> usize {
+        self.locator.stored.table.nuisance.count
+    }
+}
+
+impl Explain for Seen<'_> {
+    fn axes(&self) -> [Axis; 2] {
+        let Table { x, y, .. } = &self.locator.stored.table;
+        [*x, *y]
+    }
+
+    fn cells(&self) -> Cells {
+        self.locator.search.cells
+    }
+
+    fn scan(&self, looks: &mut Vec<Look>) {
+        self.locator.search.scan.look(&self.reading, looks);
+    }
+
+    fn lengths(&self, [x, y]: [usize; 2], latent: f64) -> [f64; 2] {
+        let nodes = self.nodes();
+        let place = x * self.locator.stored.table.y.count + y;
+        let lengths = &self.locator.search.lengths[place * nodes..(place + 1) * nodes];
+        let [below, above] =
+            [latent.floor(), latent.ceil()].map(|node| lengths[(node.max(0.0) as usize).min(nodes - 1)]);
+        [0, 1].map(|k| below[k].max(above[k]))
+    }
+
+    /// Of the nuisance coordinate, in nodes, or of a gain, in standard deviations.
+    fn range(&self) -> Option<(f64, f64)> {
+        let nodes = self.nodes();
+        let gain = self.locator.search.noise.gain > 0.0;
+        if nodes > 1 { Some((0.0, (nodes - 1) as f64)) } else { gain.then_some((-MOST_GAIN, MOST_GAIN)) }
+    }
+
+    fn equations(&mut self, [x, y, latent]: Unknowns, near: Unknowns) -> Equations {
+        let Search { means, variances, noise, .. } = &self.locator.search;
+        let nodes = self.nodes();
+        let first = |node: f64| (node.max(0.0) as usize).min(nodes.saturating_sub(2));
+        let used = first(latent)..(first(latent) + 2).min(nodes);
+        means.slopes([x, y], used.clone(), &mut self.slopes);
+        let place = near[0].round() as usize * self.axes()[1].count + near[1].round() as usize;
+        let around = &variances.at(place, 0..1).as_flattened()[..nodes];
+        let share = |node: f64| {
+            let (from, to) = (around[first(node)], around[(first(node) + 1).min(nodes - 1)]);
+            from + (node - first(node) as f64).clamp(0.0, 1.0) * (to - from)
+        };
+        let groups = self.reading.len();
+        let (v, t) = (if nodes > 1 { share(near[2]) } else { around[0] }, latent - used.start as f64);
+        let gain = if nodes > 1 { 0.0 } else { noise.gain };
+        let channels = (0..groups).map(|g| {
+            let (from, to) = (&self.slopes[g], &self.slopes[(used.len() - 1) * groups + g]);
+            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
+            let mut derivatives = [[0.0; 8]; 3];
+            let mut residual = self.reading[g];
+            for l in 0..residual.len() {
+                let between = |k: usize| from[k][l] + t * (to[k][l] - from[k][l]);
+                let (mean, scale) =
+                    if nodes > 1 { (between(0), 1.0) } else { (from[0][l], 1.0 + gain * latent) };
+                residual[l] -= scale * mean;
+                derivatives[2][l] = if nodes > 1 { to[0][l] - from[0][l] } else { gain * mean };
+                for k in 0..2 {
+                    derivatives[k][l] = if nodes > 1 { between(k + 1) } else { scale * from[k + 1][l] };
+                }
             }
+            (weights, residual, derivatives)
+        });
+        let equations = Equations::of(channels);
+        if gain > 0.0 { equations.with_expected(latent, [0.0, 1.0]) } else { equations }
+    }
+
+    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
+        let nodes = self.nodes();
+        self.locator.search.variances.between(place, 0..1, &mut self.variances);
+        self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
+        let first = (latent.max(0.0) as usize).min(nodes.saturating_sub(2));
+        let near = first.saturating_sub(NEAR)..(first + NEAR + 2).min(nodes);
+        let (misfit, marginal) =
+            self.explain_by(place, near).or_else(|| self.explain_by(place, 0..nodes)).unwrap_or_default();
+        let Marginal { weight, nuisance, nuisance_square } = marginal;
+        let latent = nuisance / weight;
+        let [x, y] = self.axes();
+        Explained {
+            misfit,
+            cost: misfit - 2.0 * weight.ln() + x.margin_cost(place[0]) + y.margin_cost(place[1]),
+            latent: if nodes > 1 { latent } else { 0.0 },
+            latent_variance: (nuisance_square / weight - latent * latent).max(0.0),
         }
     }
-    posterior
-}
 
-/// Weight, force and residual of a part of a cell, relative to the residual `reference`.
-fn part_of_cell(locator: &MeasuredLocator, line: Line, reading: &[f64], reference: f64) -> PartOfCell {
-    let marginal = line.marginal(reading, &locator.whitening, reference);
-    if marginal.weight <= 0.0 {
-        return PartOfCell::default();
-    }
-    let node = marginal.nuisance / marginal.weight;
-    let spread = (marginal.nuisance_square / marginal.weight - node * node).max(0.0);
-    PartOfCell {
-        weight: marginal.weight,
-        force_n: locator.force_at(node),
-        force_variance_n2: locator.force_spread(node, spread),
-        residual: line.residual(reading, &locator.whitening),
+    /// The nuisance coordinate off its scale, where it is the force.
+    fn force(&self, latent: f64, variance: f64) -> (f64, f64) {
+        let Stored { table, nuisance, role, .. } = &self.locator.stored;
+        if *role != NuisanceRole::Force {
+            return (0.0, 0.0);
+        }
+        let force_n = nuisance.undo(table.nuisance.value(latent));
+        let slope = table.nuisance.step
+            * match nuisance {
+                Scale::Linear => 1.0,
+                Scale::Logarithm => force_n,
+            };
+        (force_n, variance * slope * slope)
     }
 }

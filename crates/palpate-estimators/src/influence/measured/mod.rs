@@ -19,6 +19,7 @@ mod config;
 mod fitting;
 mod locator;
 mod presses;
+mod scan;
 mod table;
 
 pub use config::{MeasuredError, MeasuredInfluence, Scale};

@@ -3,9 +3,11 @@
 //! Along the nuisance coordinate the mean is taken as straight between two nodes, so the integral over it is that of a normal density
 //! along a straight line through the space of readings: a density across it times a share along it.
 
-use crate::influence::grid::{Axis, neighbours, weights_around};
+use crate::influence::grid::Axis;
+use crate::influence::inversion::{LANES, Lanes, in_lanes};
 use crate::influence::noise::Whitening;
 use palpate_numerics::normal_between;
+use palpate_numerics::simd::{Kernel, Simd, run_loops};
 use std::f64::consts::PI;
 
 /// Whitened mean readings and their relative variance at the nodes of a grid.
@@ -24,46 +26,12 @@ pub struct Table {
     pub means: Vec<f64>,
     /// v: the process's variance over its signal's, 0 to 1, node by node.
     pub variances: Vec<f64>,
-    /// For each place (x, y), half the longest whitened distance from one of its nodes to the line of a neighbouring
-    /// place: about how far the line of anywhere in the place's cell can lie from the place's own.
-    pub reaches: Vec<f64>,
-    /// Into how many parts each cell is cut along each axis when a reading is located within it.
-    pub parts: usize,
 }
 
-/// A finely cut cell has about this whitened length, so that sums over it are integrals.
-const FINE: f64 = 1.2;
-/// The finest cut.
-const MOST_PARTS: usize = 12;
-
 impl Table {
-    /// From means and variances at the nodes.
-    pub(super) fn new(
-        [x, y, nuisance]: [Axis; 3],
-        means: Vec<f64>,
-        variances: Vec<f64>,
-        channels: usize,
-    ) -> Self {
-        let mut table = Self { x, y, nuisance, means, variances, reaches: Vec::new(), parts: 1 };
-        let unit = Whitening::unit(channels);
-        table.reaches = (0..table.places()).map(|place| table.reach(place, &unit)).collect();
-        table.parts = ((table.cell_length() / FINE).ceil().min(MOST_PARTS as f64) as usize).max(1);
-        table
-    }
-
-    /// The whitened length of a typical cell.
-    fn cell_length(&self) -> f64 {
-        2.0 * self.reaches.iter().sum::<f64>() / self.reaches.len().max(1) as f64
-    }
-
-    /// By how much noise of unit deviation is too small for the finest cut; 1 where it is not.
-    pub(super) fn too_coarse(&self) -> f64 {
-        (self.cell_length() / (FINE * MOST_PARTS as f64)).max(1.0)
-    }
-
     /// The same for noise of `factor` times the deviation.
     pub(super) fn widened(mut self, factor: f64) -> Self {
-        self.means.iter_mut().chain(&mut self.reaches).for_each(|value| *value /= factor);
+        self.means.iter_mut().for_each(|value| *value /= factor);
         self
     }
 
@@ -72,79 +40,44 @@ impl Table {
         self.x.count * self.y.count
     }
 
-    /// The middle of every block of 3 places, or of 3×3.
-    pub(super) fn blocks(&self) -> impl Iterator<Item = usize> + use<> {
-        let across = self.y.count;
-        let middles = |count: usize| (0..count).step_by(3).map(move |start| (start + 1).min(count - 1));
-        middles(self.x.count).flat_map(move |x| middles(across).map(move |y| x * across + y))
-    }
-
-    /// The places of the block around `middle`.
-    pub(super) fn block(&self, middle: usize) -> impl Iterator<Item = usize> + use<> {
-        let across = self.y.count;
-        let range = |at: usize, count: usize| at / 3 * 3..(at / 3 * 3 + 3).min(count);
-        let (columns, rows) = (range(middle / across, self.x.count), range(middle % across, across));
-        columns.flat_map(move |x| rows.clone().map(move |y| x * across + y))
-    }
-
-    /// The nodes of one place.
-    pub(super) fn line(&self, place: usize) -> Line<'_> {
-        let nodes = self.nuisance.count;
-        let width = nodes * self.channels();
-        Line {
-            means: &self.means[place * width..(place + 1) * width],
-            variances: &self.variances[place * nodes..(place + 1) * nodes],
-        }
-    }
-
     /// Channels of a reading.
     pub(super) fn channels(&self) -> usize {
         self.means.len() / self.variances.len().max(1)
     }
 
-    /// The line at (x, y) between places, in nodes from the first, by cubic interpolation through four places each way.
-    pub(super) fn line_between<'a>(&self, x: f64, y: f64, buffer: &'a mut LineBuffer) -> Line<'a> {
-        buffer.means.clear();
-        buffer.means.resize(self.nuisance.count * self.channels(), 0.0);
-        buffer.variances.clear();
-        buffer.variances.resize(self.nuisance.count, 0.0);
-        for (place, weight) in weights_around([self.x, self.y], (x, y)) {
-            let line = self.line(place);
-            let add = |sums: &mut [f64], values: &[f64]| {
-                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-            };
-            add(&mut buffer.means, line.means);
-            add(&mut buffer.variances, line.variances);
-        }
-        buffer.variances.iter_mut().for_each(|v| *v = v.max(0.0));
-        Line { means: &buffer.means, variances: &buffer.variances }
+    /// The mean of a channel at a node of a place.
+    pub(super) fn mean(&self, place: usize, node: usize, channel: usize) -> f64 {
+        self.means[(place * self.nuisance.count + node) * self.channels() + channel]
     }
-
-    fn reach(&self, place: usize, unit: &Whitening) -> f64 {
-        let here = self.line(place);
-        let to_line = |mean: &[f64], other| self.line(other).residual(mean, unit);
-        let distances = here
-            .means
-            .chunks_exact(unit.channels().max(1))
-            .flat_map(|mean| neighbours([self.x, self.y], place).map(move |other| to_line(mean, other)));
-        0.5 * distances.fold(0.0, f64::max).sqrt()
-    }
-}
-
-/// Room for an interpolated line.
-#[derive(Clone, Debug, Default)]
-pub(super) struct LineBuffer {
-    means: Vec<f64>,
-    variances: Vec<f64>,
 }
 
 /// Nodes of one place along the nuisance coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line<'a> {
-    /// Whitened means, node by node.
-    pub means: &'a [f64],
+    /// Whitened means, eight channels side by side, node by node.
+    pub means: &'a [Lanes],
     /// v at each node.
     pub variances: &'a [f64],
+}
+
+/// Noise of whitened channels, eight side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct WhiteNoise {
+    /// d: the signal's variance over the noise's.
+    pub signal: Vec<Lanes>,
+    /// γ: the deviation of a gain that all channels share.
+    pub gain: f64,
+}
+
+impl WhiteNoise {
+    pub fn new(whitening: &Whitening) -> Self {
+        Self { signal: in_lanes(&whitening.signal), gain: whitening.gain }
+    }
+
+    /// The same of a process that knows everything, and without a gain.
+    pub fn unit(&self) -> Self {
+        Self { signal: vec![[0.0; LANES]; self.signal.len()], gain: 0.0 }
+    }
 }
 
 /// Probability of a place: the likelihood integrated over the nuisance coordinate.
@@ -157,54 +90,91 @@ pub(super) struct Marginal {
     pub nuisance_square: f64,
 }
 
+impl Marginal {
+    /// The same of a nuisance coordinate that is so many nodes further.
+    pub fn shift(&mut self, nodes: f64) {
+        self.nuisance_square += nodes * (2.0 * self.nuisance + nodes * self.weight);
+        self.nuisance += nodes * self.weight;
+    }
+}
+
 /// A stretch between two nodes, as seen from a reading.
 ///
 /// With a = z − μ₀ and d = μ₁ − μ₀, both divided by the standard deviations: |a − s·d|² for s from 0 to 1.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+pub(super) struct Stretch {
     /// |a|², a·d, |d|².
     aa: f64,
     ad: f64,
     dd: f64,
 }
 
-impl<'a> Line<'a> {
-    /// The least squared residual of the whitened reading, over the variance of noise and process.
-    pub fn residual(self, reading: &[f64], noise: &Whitening) -> f64 {
-        let residuals = self.stretches(reading, noise).map(|stretch| stretch.residual_at(stretch.foot()));
-        residuals.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The integral over the nuisance coordinate, relative to the likelihood of the residual `reference`.
-    pub fn marginal(self, reading: &[f64], noise: &Whitening, reference: f64) -> Marginal {
+impl Line<'_> {
+    /// The least squared residual of the whitened reading, over the variance of noise and process, and the integral over the
+    /// nuisance coordinate relative to the likelihood of that residual.
+    pub fn explain(
+        self,
+        reading: &[Lanes],
+        noise: &WhiteNoise,
+        stretches: &mut Vec<Stretch>,
+    ) -> (f64, Marginal) {
+        let least = self.residual(reading, noise, stretches);
         let mut sum = Marginal::default();
-        for (i, stretch) in self.stretches(reading, noise).enumerate() {
-            let Share { weight, middle, spread } = stretch.integral(reference);
+        for (i, stretch) in stretches.iter().enumerate() {
+            let Share { weight, middle, spread } = stretch.integral(least);
             let nuisance = i as f64 + middle;
             sum.weight += weight;
             sum.nuisance += weight * nuisance;
             sum.nuisance_square += weight * (nuisance * nuisance + spread);
         }
-        sum
+        (least, sum)
     }
 
-    /// From each node to the next; one of no length where there is a single node.
-    fn stretches(self, reading: &'a [f64], noise: &'a Whitening) -> impl Iterator<Item = Stretch> + 'a {
-        let (channels, nodes) = (noise.channels(), self.variances.len());
-        let node = move |i: usize| &self.means[i * channels..(i + 1) * channels];
-        (0..nodes.saturating_sub(1).max(1)).map(move |i| {
+    /// The least squared residual; `stretches` become those of the line.
+    pub fn residual(self, reading: &[Lanes], noise: &WhiteNoise, stretches: &mut Vec<Stretch>) -> f64 {
+        run_loops(FindStretches { line: self, reading, signal: &noise.signal, out: stretches });
+        if let ([stretch], true) = (&mut stretches[..], noise.gain > 0.0) {
+            stretch.explain_by_gain(reading, self, noise);
+        }
+        stretches.iter().map(|stretch| stretch.residual_at(stretch.foot())).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Finds the stretches from each node of a line to the next; one of no length where there is a single node.
+struct FindStretches<'a> {
+    line: Line<'a>,
+    reading: &'a [Lanes],
+    signal: &'a [Lanes],
+    out: &'a mut Vec<Stretch>,
+}
+
+impl Kernel for FindStretches<'_> {
+    type Output = ();
+    const FUSED: bool = false;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { line: Line { means, variances }, reading, signal, out } = self;
+        let (groups, nodes) = (reading.len(), variances.len());
+        out.clear();
+        for i in 0..nodes.saturating_sub(1).max(1) {
             let next = (i + 1).min(nodes - 1);
-            let share = 0.5 * (self.variances[i] + self.variances[next]);
-            let mut stretch = Stretch { aa: 0.0, ad: 0.0, dd: 0.0 };
-            for (((z, from), to), signal) in reading.iter().zip(node(i)).zip(node(next)).zip(&noise.signal) {
-                let variance = 1.0 + share * signal;
-                let (a, d) = (z - from, to - from);
-                stretch.aa += a * a / variance;
-                stretch.ad += a * d / variance;
-                stretch.dd += d * d / variance;
+            let share = 0.5 * (variances[i] + variances[next]);
+            let mut sums = [[0.0; LANES]; 3];
+            for g in 0..groups {
+                let (z, signal) = (&reading[g], &signal[g]);
+                let (from, to) = (&means[i * groups + g], &means[next * groups + g]);
+                for l in 0..LANES {
+                    let weight = 1.0 / (1.0 + share * signal[l]);
+                    let (a, d) = (z[l] - from[l], to[l] - from[l]);
+                    sums[0][l] += a * a * weight;
+                    sums[1][l] += a * d * weight;
+                    sums[2][l] += d * d * weight;
+                }
             }
-            if noise.gain > 0.0 { stretch.with_gain(reading, node(i), share, noise) } else { stretch }
-        })
+            let [aa, ad, dd] = sums.map(|lanes| lanes.iter().sum());
+            out.push(Stretch { aa, ad, dd });
+        }
     }
 }
 
@@ -225,17 +195,16 @@ const SHORT: f64 = 1e-4;
 impl Stretch {
     /// With a gain that scatters by γ about 1: the covariance grows by γ²·μ·μᵀ, so with V the variances,
     /// |a|² becomes |a|² − γ²·(μᵀ·V⁻¹·a)²/(1 + γ²·μᵀ·V⁻¹·μ) (Sherman and Morrison). For a stretch of no length only.
-    fn with_gain(mut self, reading: &[f64], mean: &[f64], share: f64, noise: &Whitening) -> Self {
+    fn explain_by_gain(&mut self, reading: &[Lanes], line: Line, noise: &WhiteNoise) {
         let (mut mm, mut ma) = (0.0, 0.0);
-        for ((z, mean), signal) in reading.iter().zip(mean).zip(&noise.signal) {
-            let scaled = mean / (1.0 + share * signal);
+        let channels = reading.as_flattened().iter().zip(line.means.as_flattened());
+        for ((z, mean), signal) in channels.zip(noise.signal.as_flattened()) {
+            let scaled = mean / (1.0 + line.variances[0] * signal);
             mm += mean * scaled;
             ma += (z - mean) * scaled;
         }
         let gain2 = noise.gain * noise.gain;
-        let growth = 1.0 + gain2 * mm;
-        self.aa = (self.aa - gain2 * ma * ma / growth).max(0.0);
-        self
+        self.aa = (self.aa - gain2 * ma * ma / (1.0 + gain2 * mm)).max(0.0);
     }
 
     /// The s of the least residual.
@@ -243,7 +212,8 @@ impl Stretch {
         if self.dd > 0.0 { (self.ad / self.dd).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    fn residual_at(self, s: f64) -> f64 {
+    /// The squared residual at s.
+    pub fn residual_at(self, s: f64) -> f64 {
         (self.aa - 2.0 * s * self.ad + s * s * self.dd).max(0.0)
     }
 
@@ -265,7 +235,7 @@ impl Stretch {
         let (from, to) = (-middle * length, (1.0 - middle) * length);
         let part = normal_between(from, to);
         Share {
-            weight: (2.0 * PI).sqrt() / length * part.share * scale(across),
+            weight: ((2.0 * PI).sqrt().ln() + part.ln_share - 0.5 * (across - reference)).exp() / length,
             middle: (middle + part.mean / length).clamp(0.0, 1.0),
             spread: part.variance / (length * length),
         }

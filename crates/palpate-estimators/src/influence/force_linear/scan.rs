@@ -1,0 +1,111 @@
+//! The least that places may cost a reading, eight places side by side.
+//!
+//! With the weights w of the largest variances that a place's influences may have, the least misfit over forces is
+//! Σ w·d² − (Σ w·f·d)²/Σ w·f²: two products a channel and place. The time is that of reading the table of them once from memory.
+
+use crate::influence::inversion::{LANES, Lanes, Look};
+use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+
+/// Products of every place, in blocks of eight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Scan {
+    places: usize,
+    channels: usize,
+    /// w, channel by channel.
+    weights: Vec<Lanes>,
+    /// w·f, channel by channel.
+    products: Vec<Lanes>,
+    /// Σ w·f² and the precision that φ is expected with.
+    squares: Vec<Lanes>,
+    /// The least of the determinant and of the width of φ's density, −2·ln.
+    constants: Vec<Lanes>,
+    /// Expected φ and its precision, or the known φ.
+    expected: [f64; 2],
+    known: Option<f64>,
+}
+
+impl Scan {
+    /// `channel` tells f of a channel at a place, and the least and the greatest variance that its readings may have there.
+    pub fn new(
+        places: usize,
+        channels: usize,
+        expected: [f64; 2],
+        known: Option<f64>,
+        channel: impl Fn(usize, usize) -> (f64, [f64; 2]),
+    ) -> Self {
+        let blocks = places.div_ceil(LANES);
+        let mut scan = Self {
+            places,
+            channels,
+            weights: vec![[0.0; LANES]; blocks * channels],
+            products: vec![[0.0; LANES]; blocks * channels],
+            squares: vec![[f64::MIN_POSITIVE; LANES]; blocks],
+            constants: vec![[0.0; LANES]; blocks],
+            expected,
+            known,
+        };
+        for place in 0..places {
+            let (block, lane) = (place / LANES, place % LANES);
+            let (mut square, mut log_determinant) = (expected[1], 0.0);
+            for c in 0..channels {
+                let (f, [least, most]) = channel(place, c);
+                scan.weights[block * channels + c][lane] = 1.0 / most;
+                scan.products[block * channels + c][lane] = f / most;
+                square += f * f / most;
+                log_determinant += least.ln();
+            }
+            scan.squares[block][lane] = square.max(f64::MIN_POSITIVE);
+            let width = if known.is_some() { 0.0 } else { scan.squares[block][lane].ln() };
+            scan.constants[block][lane] = log_determinant + width;
+        }
+        scan
+    }
+
+    /// Looks at every place.
+    pub fn look(&self, reading: &[Lanes], looks: &mut Vec<Look>) {
+        let reading = &reading.as_flattened()[..self.channels];
+        InstructionSet::best().run(LookAtPlaces { scan: self, reading, looks });
+    }
+
+    /// The least misfit and cost of each place of a block, and φ there.
+    #[inline(always)]
+    fn block<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+        let of_block = block * self.channels..(block + 1) * self.channels;
+        let channels = self.weights[of_block.clone()].iter().zip(&self.products[of_block]).zip(reading);
+        let [expected, precision] = self.expected;
+        let mut dd = V::splat(precision * expected * expected);
+        let mut fd = V::splat(precision * expected);
+        for ((weights, products), d) in channels {
+            dd = V::load(weights).mul_add(V::splat(d * d), dd);
+            fd = V::load(products).mul_add(V::splat(*d), fd);
+        }
+        let ff = V::load(&self.squares[block]);
+        let response = self.known.map_or(fd / ff, V::splat);
+        let zero = V::splat(0.0);
+        let misfit = (dd + response * (response * ff - (fd + fd))).max(zero);
+        [misfit, misfit + V::load(&self.constants[block]), response.max(zero)]
+    }
+}
+
+struct LookAtPlaces<'a> {
+    scan: &'a Scan,
+    reading: &'a [f64],
+    looks: &'a mut Vec<Look>,
+}
+
+impl Kernel for LookAtPlaces<'_> {
+    type Output = ();
+    const FUSED: bool = true;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { scan, reading, looks } = self;
+        looks.clear();
+        for block in 0..scan.places.div_ceil(LANES) {
+            let [misfits, costs, latents] = scan.block::<S::F64>(block, reading).map(Vector::to_array);
+            for l in 0..LANES.min(scan.places - LANES * block) {
+                looks.push(Look { misfit: misfits[l], cost: costs[l], latent: latents[l] });
+            }
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! Numbers of every channel at the nodes of a grid, in layers, and between the nodes.
+
+use crate::influence::grid::Axis;
+use palpate_numerics::simd::{Kernel, Simd, run_loops};
+use std::ops::Range;
+
+/// Channels that are worked on side by side.
+pub(in crate::influence) const LANES: usize = 8;
+
+/// Eight channels.
+pub(in crate::influence) type Lanes = [f64; LANES];
+
+/// Numbers in groups of eight, the last filled up with zeros.
+pub(in crate::influence) fn in_lanes(numbers: &[f64]) -> Vec<Lanes> {
+    let group = |numbers: &[f64]| std::array::from_fn(|l| numbers.get(l).copied().unwrap_or(0.0));
+    numbers.chunks(LANES).map(group).collect()
+}
+
+/// Layers of numbers, one a channel, over the places of a grid.
+///
+/// Eight channels stand side by side in a group, the groups of a layer one after the other, the layers of a place too; the last group is filled
+/// up with zeros.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::influence) struct Layers {
+    /// Places along and across.
+    counts: [usize; 2],
+    layers: usize,
+    groups: usize,
+    values: Vec<Lanes>,
+}
+
+/// A value and its change by a node along and across, of eight channels.
+pub(in crate::influence) type Slopes = [Lanes; 3];
+
+impl Layers {
+    /// `layers` of `channels` numbers, told by `at` a place, a layer and a channel.
+    pub fn new(
+        axes: [Axis; 2],
+        layers: usize,
+        channels: usize,
+        at: impl Fn(usize, usize, usize) -> f64,
+    ) -> Self {
+        let counts = axes.map(|axis| axis.count);
+        let groups = channels.div_ceil(LANES);
+        let places = counts[0] * counts[1];
+        let mut values = vec![[0.0; LANES]; places * layers * groups];
+        for (i, lanes) in values.iter_mut().enumerate() {
+            let (place, layer, group) = (i / groups / layers, i / groups % layers, i % groups);
+            let of_group = (LANES * group)..(LANES * (group + 1)).min(channels);
+            lanes.iter_mut().zip(of_group).for_each(|(lane, channel)| *lane = at(place, layer, channel));
+        }
+        Self { counts, layers, groups, values }
+    }
+
+    /// Groups of eight channels.
+    pub fn groups(&self) -> usize {
+        self.groups
+    }
+
+    /// The groups of some layers of a place.
+    pub fn at(&self, place: usize, layers: Range<usize>) -> &[Lanes] {
+        let first = place * self.layers;
+        &self.values[(first + layers.start) * self.groups..(first + layers.end) * self.groups]
+    }
+
+    /// Some layers at (x, y), in nodes, by cubic interpolation through four places each way, into `out`.
+    pub fn between(&self, [x, y]: [f64; 2], layers: Range<usize>, out: &mut Vec<Lanes>) {
+        out.clear();
+        out.resize(layers.len() * self.groups, [0.0; LANES]);
+        let along = Stencil::new(x, self.counts[0]);
+        let across = Stencil::new(y, self.counts[1]);
+        run_loops(Between { table: self, along, across, layers, out });
+    }
+
+    /// The same with slopes.
+    pub fn slopes(&self, [x, y]: [f64; 2], layers: Range<usize>, out: &mut Vec<Slopes>) {
+        out.clear();
+        out.resize(layers.len() * self.groups, [[0.0; LANES]; 3]);
+        let along = Stencil::new(x, self.counts[0]);
+        let across = Stencil::new(y, self.counts[1]);
+        run_loops(BetweenWithSlopes { table: self, along, across, layers, out });
+    }
+}
+
+/// Lagrange's weights of up to four nodes around a place, and their change by a node.
+#[derive(Clone, Copy, Debug)]
+struct Stencil {
+    first: usize,
+    used: usize,
+    weights: [f64; 4],
+    slopes: [f64; 4],
+}
+
+impl Stencil {
+    fn new(place: f64, count: usize) -> Self {
+        let used = count.min(4);
+        let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
+        let t = place - first as f64;
+        let (weights, slopes) = match used {
+            1 => ([1.0, 0.0, 0.0, 0.0], [0.0; 4]),
+            2 => ([1.0 - t, t, 0.0, 0.0], [-1.0, 1.0, 0.0, 0.0]),
+            3 => {
+                let weights = [0.5 * (t - 1.0) * (t - 2.0), -t * (t - 2.0), 0.5 * t * (t - 1.0), 0.0];
+                (weights, [t - 1.5, 2.0 - 2.0 * t, t - 0.5, 0.0])
+            }
+            _ => {
+                let [a, b, c] = [t - 1.0, t - 2.0, t - 3.0];
+                let weights = [-a * b * c / 6.0, 0.5 * t * b * c, -0.5 * t * a * c, t * a * b / 6.0];
+                let slopes = [
+                    -(a * b + a * c + b * c) / 6.0,
+                    0.5 * (t * b + t * c + b * c),
+                    -0.5 * (t * a + t * c + a * c),
+                    (t * a + t * b + a * b) / 6.0,
+                ];
+                (weights, slopes)
+            }
+        };
+        Self { first, used, weights, slopes }
+    }
+}
+
+struct Between<'a> {
+    table: &'a Layers,
+    along: Stencil,
+    across: Stencil,
+    layers: Range<usize>,
+    out: &'a mut [Lanes],
+}
+
+impl Kernel for Between<'_> {
+    type Output = ();
+    const FUSED: bool = false;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { table, along, across, layers, out } = self;
+        for i in 0..along.used {
+            for j in 0..across.used {
+                let place = (along.first + i) * table.counts[1] + across.first + j;
+                let weight = along.weights[i] * across.weights[j];
+                for (sum, lanes) in out.iter_mut().zip(table.at(place, layers.clone())) {
+                    for l in 0..LANES {
+                        sum[l] += weight * lanes[l];
+                    }
+                }
+            }
+        }
+    }
+}
+
+struct BetweenWithSlopes<'a> {
+    table: &'a Layers,
+    along: Stencil,
+    across: Stencil,
+    layers: Range<usize>,
+    out: &'a mut [Slopes],
+}
+
+impl Kernel for BetweenWithSlopes<'_> {
+    type Output = ();
+    const FUSED: bool = false;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { table, along, across, layers, out } = self;
+        for i in 0..along.used {
+            for j in 0..across.used {
+                let place = (along.first + i) * table.counts[1] + across.first + j;
+                let weights = [
+                    along.weights[i] * across.weights[j],
+                    along.slopes[i] * across.weights[j],
+                    along.weights[i] * across.slopes[j],
+                ];
+                for (sums, lanes) in out.iter_mut().zip(table.at(place, layers.clone())) {
+                    for k in 0..3 {
+                        for l in 0..LANES {
+                            sums[k][l] += weights[k] * lanes[l];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cubic_table(counts: [usize; 2]) -> Layers {
+        let axis = |count| Axis { count, ..Axis::NONE };
+        let of = |place: usize, layer: usize, channel: usize| {
+            polynomial([(place / counts[1]) as f64, (place % counts[1]) as f64], counts)
+                * (1 + layer + 2 * channel) as f64
+        };
+        Layers::new(counts.map(axis), 2, 9, of)
+    }
+
+    /// As high a degree each way as so many nodes tell, up to the third.
+    fn polynomial([x, y]: [f64; 2], counts: [usize; 2]) -> f64 {
+        let power = |at: f64, count: usize| (0.3 * at + 0.1).powi(count.min(4) as i32 - 1);
+        power(x, counts[0]) * power(y, counts[1])
+    }
+
+    #[test]
+    fn polynomials_that_the_nodes_tell_are_met_between_them_with_their_slopes() {
+        const STEP: f64 = 1e-6;
+        for counts in [[7, 5], [6, 1], [3, 2], [2, 4], [1, 1]] {
+            let table = cubic_table(counts);
+            let ends = counts.map(|count| (count - 1) as f64);
+            for (u, v) in [(0.0, 0.0), (0.13, 0.9), (0.5, 0.31), (1.0, 1.0), (0.77, 0.02)] {
+                let at = [u * ends[0], v * ends[1]];
+                let (mut values, mut slopes) = (Vec::new(), Vec::new());
+                table.between(at, 1..2, &mut values);
+                table.slopes(at, 1..2, &mut slopes);
+                let factor = (2 + 2 * 8) as f64;
+                let exact = |at| factor * polynomial(at, counts);
+                assert!((values[1][0] - exact(at)).abs() < 1e-12, "{counts:?} {at:?}");
+                assert_eq!((values[1][0], values[1][1]), (slopes[1][0][0], 0.0));
+                for k in 0..2 {
+                    let moved = |by: f64| std::array::from_fn(|i| at[i] + if i == k { by } else { 0.0 });
+                    let slope = (exact(moved(STEP)) - exact(moved(-STEP))) / (2.0 * STEP);
+                    assert!((slopes[1][k + 1][0] - slope).abs() < 1e-7, "{counts:?} {at:?} {k}");
+                }
+            }
+        }
+    }
+}

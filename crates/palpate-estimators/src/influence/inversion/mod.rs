@@ -1,0 +1,59 @@
+//! Inversion of readings over a grid of places: where a contact on a surface without a model was, and how sure that is.
+//!
+//! How a reading depends on the place and on one latent number (the nuisance coordinate, the response to the force, a gain) is the business
+//! of [`Explain`]. From there it is the same for every structure, on a line and on a plane: [`Cells`] are looked at from their middles, valleys are followed
+//! down to their [`minima`], and the [`posterior`] is summed around them.
+
+mod cells;
+mod layers;
+mod minima;
+mod posterior;
+
+pub(super) use cells::{Cells, Look};
+pub(super) use layers::{LANES, Lanes, Layers, Slopes, in_lanes};
+pub(super) use minima::Equations;
+pub(super) use posterior::{Inversion, ToldForce};
+
+use super::grid::Axis;
+
+/// Position along and across, in nodes from the first, and the latent number.
+pub(super) type Unknowns = [f64; 3];
+
+/// Place as a reading sees it, whatever the latent number.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Explained {
+    /// The least squared residual, in variances.
+    pub misfit: f64,
+    /// −2·ln of the posterior density of the place, less a constant.
+    pub cost: f64,
+    /// Mean and variance of the latent number there.
+    pub latent: f64,
+    pub latent_variance: f64,
+}
+
+/// One reading, and how well contacts explain it.
+pub(super) trait Explain {
+    /// The grid's axes.
+    fn axes(&self) -> [Axis; 2];
+
+    /// Its cells.
+    fn cells(&self) -> Cells;
+
+    /// About the least that each cell's middle costs, cell by cell.
+    fn scan(&self, looks: &mut Vec<Look>);
+
+    /// How far, over the noise, the reading moves from a node to the next along and across, at most, for this latent number.
+    fn lengths(&self, node: [usize; 2], latent: f64) -> [f64; 2];
+
+    /// The latent number's least and greatest value; `None` where there is nothing to look for.
+    fn range(&self) -> Option<(f64, f64)>;
+
+    /// The normal equations of a contact, with the variances that readings have `near` another.
+    fn equations(&mut self, at: Unknowns, near: Unknowns) -> Equations;
+
+    /// A place, the latent number integrated out; that is about `latent`.
+    fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained;
+
+    /// Mean and variance of the force, from those of the latent number.
+    fn force(&self, latent: f64, variance: f64) -> (f64, f64);
+}

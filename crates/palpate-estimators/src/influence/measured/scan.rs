@@ -1,0 +1,137 @@
+//! How well the middles of a table's cells explain a reading, eight cells side by side.
+//!
+//! With weights w that are the same all along a place's line (those of the largest variance there), |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ w·μ²
+//! takes one product a channel and node. Of two nodes with the squares r₀ and r₁ and the squared distance d², the stretch between them comes
+//! closest at s = (r₀ + d² − r₁)/(2·d²). The time is that of reading the table of products once from memory.
+
+use super::table::Table;
+use crate::influence::inversion::{Cells, LANES, Lanes, Look};
+use crate::influence::noise::Whitening;
+use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+
+/// Products of the middles of cells, in blocks of eight.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Scan {
+    cells: usize,
+    channels: usize,
+    nodes: usize,
+    /// w, channel by channel.
+    weights: Vec<Lanes>,
+    /// w·μ, node by node and channel by channel.
+    products: Vec<Lanes>,
+    /// Σ w·μ² of each node, and Σ w·d² of the way from each node to the next.
+    squares: Vec<Lanes>,
+    ways: Vec<Lanes>,
+    /// γ².
+    gain2: f64,
+}
+
+impl Scan {
+    /// Of the middles of `cells`.
+    pub fn new(table: &Table, whitening: &Whitening, cells: Cells) -> Self {
+        let (channels, nodes) = (table.channels(), table.nuisance.count);
+        let blocks = cells.len().div_ceil(LANES);
+        let mut scan = Self {
+            cells: cells.len(),
+            channels,
+            nodes,
+            weights: vec![[0.0; LANES]; blocks * channels],
+            products: vec![[0.0; LANES]; blocks * nodes * channels],
+            squares: vec![[0.0; LANES]; blocks * nodes],
+            ways: vec![[0.0; LANES]; blocks * nodes],
+            gain2: whitening.gain * whitening.gain,
+        };
+        for cell in 0..cells.len() {
+            let (block, lane) = (cell / LANES, cell % LANES);
+            let [x, y] = cells.middle(cell);
+            let place = x * table.y.count + y;
+            let variances = &table.variances[place * nodes..(place + 1) * nodes];
+            let most = variances.iter().copied().fold(0.0, f64::max);
+            for (c, signal) in whitening.signal.iter().enumerate() {
+                let weight = 1.0 / (1.0 + most * signal);
+                scan.weights[block * channels + c][lane] = weight;
+                for node in 0..nodes {
+                    let mean = table.mean(place, node, c);
+                    let next = table.mean(place, (node + 1).min(nodes - 1), c);
+                    let at = block * nodes + node;
+                    scan.products[at * channels + c][lane] = weight * mean;
+                    scan.squares[at][lane] += weight * mean * mean;
+                    scan.ways[at][lane] += weight * (next - mean) * (next - mean);
+                }
+            }
+        }
+        scan
+    }
+
+    /// Looks at every cell.
+    pub fn look(&self, reading: &[Lanes], looks: &mut Vec<Look>) {
+        InstructionSet::best().run(LookAtCells {
+            scan: self,
+            reading: &reading.as_flattened()[..self.channels],
+            looks,
+        });
+    }
+}
+
+struct LookAtCells<'a> {
+    scan: &'a Scan,
+    reading: &'a [f64],
+    looks: &'a mut Vec<Look>,
+}
+
+impl Kernel for LookAtCells<'_> {
+    type Output = ();
+    const FUSED: bool = true;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { scan, reading, looks } = self;
+        looks.clear();
+        for block in 0..scan.cells.div_ceil(LANES) {
+            let (misfits, latents) = scan.block::<S::F64>(block, reading);
+            let (misfits, latents) = (misfits.to_array(), latents.to_array());
+            for l in 0..LANES.min(scan.cells - LANES * block) {
+                looks.push(Look { misfit: misfits[l], cost: misfits[l], latent: latents[l] });
+            }
+        }
+    }
+}
+
+impl Scan {
+    /// The least squared residual of each cell of a block, and the node of the nuisance coordinate where it is.
+    #[inline(always)]
+    fn block<V: Eight>(&self, block: usize, reading: &[f64]) -> (V, V) {
+        let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));
+        let mut own = zero;
+        for (weights, z) in self.weights[block * self.channels..].iter().zip(reading) {
+            own = V::load(weights).mul_add(V::splat(z * z), own);
+        }
+        let (mut best, mut latent, mut last) = (V::splat(f64::INFINITY), zero, zero);
+        for node in 0..self.nodes {
+            let at = block * self.nodes + node;
+            let mut product = zero;
+            for (products, z) in self.products[at * self.channels..].iter().zip(reading) {
+                product = V::load(products).mul_add(V::splat(*z), product);
+            }
+            let square = V::load(&self.squares[at]);
+            let mut residual = own - two * product + square;
+            if self.gain2 > 0.0 {
+                let (gain2, off) = (V::splat(self.gain2), product - square);
+                residual = residual - gain2 * off * off / (one + gain2 * square);
+            }
+            if node == 0 {
+                (best, last) = (residual, residual);
+                continue;
+            }
+            let way = V::load(&self.ways[at - 1]);
+            let along = V::splat(0.5) * (last + way - residual);
+            let s = (along / way.max(V::splat(f64::MIN_POSITIVE))).max(zero).min(one);
+            let between = last - s * (two * along - s * way);
+            let nearer = between.below(best);
+            best = between.or(nearer, best);
+            latent = (V::splat((node - 1) as f64) + s).or(nearer, latent);
+            last = residual;
+        }
+        (best.max(zero), latent)
+    }
+}
