@@ -120,7 +120,7 @@ pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<O
     Ok(Some(course))
 }
 
-/// The grid: the span of the positions that were pressed and half their largest gap beyond.
+/// The grid: the span of the positions that were pressed and their largest gap beyond.
 fn axes(presses: &Presses, prior: &Prior, extent: Extent) -> [Axis; 2] {
     let positions_m = presses.positions_m();
     let axis = |k: usize, size_m: f64, most: usize| {

@@ -3,7 +3,8 @@
 //! The forward way: reading = f(position, nuisance) + noise, with f a Gaussian process, and *nuisance* whatever else shapes
 //! the reading, is known while calibrating and unknown afterwards: the force, or how deep the surface is indented. A
 //! reading is located by its posterior over position and nuisance coordinate, every value of both within the presses
-//! that were made (and half a gap beyond) held as likely as any other before the reading is seen:
+//! that were made (and half a gap beyond) held as likely as any other before the reading is seen, and positions up to a whole gap
+//! beyond as less likely:
 //!
 //! p(position | reading) ∝ ∫ N(reading; f̄, C + v·S) d nuisance,
 //!
