@@ -5,7 +5,8 @@
 //! little it is bent, and several minima share it. From each minimum the sum goes on to neighbouring tiles as long as they matter. The
 //! prior is flat over the grid, less likely only in its margins.
 
-use super::minima::{Minimum, minima, modes};
+use super::cells::Look;
+use super::minima::{Minimum, floor, minima, modes};
 use super::{Explain, Explained};
 use crate::influence::grid::{Axis, middle};
 use crate::influence::moments::Moments;
@@ -30,6 +31,7 @@ pub(in crate::influence) enum ToldForce {
 #[derive(Debug)]
 pub(in crate::influence) struct Inversion<E> {
     reading: E,
+    looks: Vec<Look>,
     minima: Vec<Minimum>,
 }
 
@@ -64,7 +66,7 @@ impl<E: Explain> Inversion<E> {
         let mut looks = Vec::with_capacity(reading.cells().len());
         reading.scan(&mut looks);
         let minima = minima(&mut reading, &looks);
-        Self { reading, minima }
+        Self { reading, looks, minima }
     }
 
     /// The least squared residual, in variances.
@@ -107,7 +109,7 @@ impl<E: Explain> Inversion<E> {
 
     /// The posterior around a minimum that is alone and nearly normal; `None` of any other.
     fn quadrature(&mut self) -> Option<Posterior> {
-        let Self { reading, minima } = self;
+        let Self { reading, minima, .. } = self;
         let best = minima[0];
         if minima.get(1).is_some_and(|other| other.cost <= best.cost + CUT) {
             return None;
@@ -155,14 +157,15 @@ impl<E: Explain> Inversion<E> {
 
     /// The posterior summed up around every minimum; `None` where it is no number.
     fn sum(&mut self) -> Option<Posterior> {
-        let Self { reading, minima } = self;
+        let Self { reading, looks, minima } = self;
         let axes = reading.axes();
         let modes = modes(reading, minima);
+        let others = candidates(reading, looks, minima);
         let mut posterior =
             Posterior { modes: vec![Probable::default(); minima.len()], ..Posterior::default() };
         let mut slices = [Slices::default(), Slices::default()];
         for i in 0..minima.len() {
-            let (lattice, leaves) = Lattice::around(reading, minima, i);
+            let (lattice, leaves) = Lattice::around(reading, minima, i, &others[i]);
             for Leaf { tile, weight, contact } in leaves {
                 let place = lattice.middle(tile);
                 let is_usual = (0..2).all(|k| axes[k].margin_cost(place[k]) == 0.0);
@@ -240,12 +243,16 @@ fn contact_at<E: Explain>([x, y]: [f64; 2], found: &Explained, reading: &E) -> P
 /// An estimate is the mean without the margins, as contacts hardly ever are beyond where presses were made. How sure it is is told by all.
 #[derive(Clone, Copy, Debug, Default)]
 struct Probable {
+    /// The first contact: sums are taken of what others differ from it, as their squares may be far larger than the variance.
+    origin: Option<[f64; 3]>,
     everywhere: Moments,
     usual: Moments,
 }
 
 impl Probable {
     fn add(&mut self, weight: f64, (contact, force_variance_n2): ProbableContact, is_usual: bool) {
+        let origin = *self.origin.get_or_insert(contact);
+        let contact = std::array::from_fn(|k| contact[k] - origin[k]);
         for moments in std::iter::once(&mut self.everywhere).chain(is_usual.then_some(&mut self.usual)) {
             moments.add(weight, contact);
             moments.add_force_variance(weight, force_variance_n2);
@@ -258,8 +265,10 @@ impl Probable {
         const LEAST_SHARE: f64 = 1e-6;
         let (mean, mut covariance) = self.everywhere.mean_and_covariance();
         let is_usual = self.usual.weight > LEAST_SHARE * self.everywhere.weight;
-        let [x_m, y_m, force_n] = if is_usual { self.usual.mean_and_covariance().0 } else { mean };
-        let [dx, dy, df] = [mean[0] - x_m, mean[1] - y_m, mean[2] - force_n];
+        let found = if is_usual { self.usual.mean_and_covariance().0 } else { mean };
+        let [dx, dy, df] = std::array::from_fn(|k| mean[k] - found[k]);
+        let origin = self.origin.unwrap_or_default();
+        let [x_m, y_m, force_n] = std::array::from_fn(|k| origin[k] + found[k]);
         let squares = [dx * dx, dx * dy, dx * df, dy * dy, dy * df, df * df];
         covariance.iter_mut().zip(squares).for_each(|(value, square)| *value += square);
         let (force_n, covariance) = match told {
@@ -283,6 +292,29 @@ fn nearest(minima: &[Minimum], [x, y]: [f64; 2]) -> usize {
     let square = |minimum: &Minimum| (minimum.at[0] - x).powi(2) + (minimum.at[1] - y).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
     minima.iter().map(square).enumerate().min_by(by_distance).map_or(0, |(i, _)| i)
+}
+
+/// A place that may matter, with about its latent number.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    place: [f64; 2],
+    latent: f64,
+}
+
+/// The middles of cells that may matter beside the best minimum, by the minimum that is nearest.
+fn candidates<E: Explain>(reading: &E, looks: &[Look], minima: &[Minimum]) -> Vec<Vec<Candidate>> {
+    let cells = reading.cells();
+    let mut candidates = vec![Vec::new(); minima.len()];
+    for (cell, Look { misfit, cost, latent }) in looks.iter().enumerate() {
+        let middle = cells.middle(cell);
+        let [along, across] = reading.lengths(middle, *latent);
+        // Half the way to the next middle.
+        if floor(*misfit, 0.5 * along.hypot(across)) + (cost - misfit) <= minima[0].cost + CUT {
+            let place = middle.map(|node| node as f64);
+            candidates[nearest(minima, place)].push(Candidate { place, latent: *latent });
+        }
+    }
+    candidates
 }
 
 /// Tiles of equal size that cover a grid.
@@ -320,12 +352,17 @@ impl Lattice {
     }
 
     /// The tiles around minimum `i` that matter and lie nearest to it, from neighbour to neighbour, their weights relative to that of the best minimum.
-    fn around<E: Explain>(reading: &mut E, minima: &[Minimum], i: usize) -> (Self, Vec<Leaf>) {
+    fn around<E: Explain>(
+        reading: &mut E,
+        minima: &[Minimum],
+        i: usize,
+        others: &[Candidate],
+    ) -> (Self, Vec<Leaf>) {
         let nodes = reading.axes().map(|axis| axis.count);
         let mut steps = Self::fine_steps(reading, &minima[i]);
         loop {
             let lattice = Self::new(nodes, steps);
-            if let Some(leaves) = lattice.leaves(reading, minima, i) {
+            if let Some(leaves) = lattice.leaves(reading, minima, i, others) {
                 return (lattice, leaves);
             }
             steps = steps.map(|step| 2.0 * step);
@@ -333,42 +370,66 @@ impl Lattice {
     }
 
     /// `None` where they reach too far.
-    fn leaves<E: Explain>(self, reading: &mut E, minima: &[Minimum], i: usize) -> Option<Vec<Leaf>> {
+    fn leaves<E: Explain>(
+        self,
+        reading: &mut E,
+        minima: &[Minimum],
+        i: usize,
+        others: &[Candidate],
+    ) -> Option<Vec<Leaf>> {
         let Minimum { at, .. } = minima[i];
         let best = minima[0].cost;
-        let start = [0, 1].map(|k| {
-            let tile = if self.steps[k] > 0.0 { (at[k] / self.steps[k]) as usize } else { 0 };
-            tile.min(self.counts[k] - 1)
-        });
+        let start = self.tile([at[0], at[1]]);
         let corner = start.map(|tile| tile.saturating_sub(MOST_TILES));
         let seen_at = |tile: [usize; 2]| (tile[0] - corner[0]) * (2 * MOST_TILES + 1) + (tile[1] - corner[1]);
         let wide = |k: usize| (start[k] + MOST_TILES + 1).min(self.counts[k]) - corner[k];
+        let is_near = |tile: [usize; 2]| (0..2).all(|k| tile[k].abs_diff(start[k]) <= MOST_TILES);
         let mut seen = vec![false; (wide(0) - 1) * (2 * MOST_TILES + 1) + wide(1)];
         seen[seen_at(start)] = true;
         let (mut open, mut leaves) = (vec![(start, at[2])], Vec::new());
-        while let Some((tile, latent)) = open.pop() {
-            let place = self.middle(tile);
-            let found = reading.explain(place, latent);
-            // The tile of the minimum itself counts however far its middle is.
-            let matters = found.cost <= best + CUT || tile == start;
-            if !matters || minima.len() > 1 && nearest(minima, place) != i {
-                continue;
-            }
-            let weight = (0.5 * (best - found.cost)).exp() * self.area();
-            if weight > 0.0 {
-                leaves.push(Leaf { tile, weight, contact: contact_at(place, &found, reading) });
-            }
-            let around = |k: usize| tile[k].saturating_sub(1)..(tile[k] + 2).min(self.counts[k]);
-            for next in around(0).flat_map(|x| around(1).map(move |y| [x, y])) {
-                if (0..2).any(|k| next[k].abs_diff(start[k]) > MOST_TILES) {
-                    return None;
+        let mut others = others.iter();
+        loop {
+            while let Some((tile, latent)) = open.pop() {
+                let place = self.middle(tile);
+                let found = reading.explain(place, latent);
+                // The tile of the minimum itself counts however far its middle is.
+                let matters = found.cost <= best + CUT || tile == start;
+                if !matters || minima.len() > 1 && nearest(minima, place) != i {
+                    continue;
                 }
-                if !std::mem::replace(&mut seen[seen_at(next)], true) {
-                    open.push((next, found.latent));
+                let weight = (0.5 * (best - found.cost)).exp() * self.area();
+                if weight > 0.0 {
+                    leaves.push(Leaf { tile, weight, contact: contact_at(place, &found, reading) });
                 }
+                let around = |k: usize| tile[k].saturating_sub(1)..(tile[k] + 2).min(self.counts[k]);
+                for next in around(0).flat_map(|x| around(1).map(move |y| [x, y])) {
+                    if !is_near(next) {
+                        return None;
+                    }
+                    if !std::mem::replace(&mut seen[seen_at(next)], true) {
+                        open.push((next, found.latent));
+                    }
+                }
+            }
+            // Whatever else may matter, apart from all that was reached.
+            let Some(Candidate { place, latent }) = others.next() else { return Some(leaves) };
+            let tile = self.tile(*place);
+            if is_near(tile) {
+                if !std::mem::replace(&mut seen[seen_at(tile)], true) {
+                    open.push((tile, *latent));
+                }
+            } else if reading.explain(*place, *latent).cost <= best + CUT {
+                return None;
             }
         }
-        Some(leaves)
+    }
+
+    /// The tile of a place.
+    fn tile(self, place: [f64; 2]) -> [usize; 2] {
+        [0, 1].map(|k| {
+            let tile = if self.steps[k] > 0.0 { (place[k] / self.steps[k]) as usize } else { 0 };
+            tile.min(self.counts[k] - 1)
+        })
     }
 
     fn middle(self, tile: [usize; 2]) -> [f64; 2] {
