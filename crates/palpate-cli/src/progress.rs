@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-/// Whether some work has seen that it is to stop.
+/// True once some work has seen that it is to stop.
 static SEEN: AtomicBool = AtomicBool::new(false);
 /// Work that does not see it for so long cannot be asked, and is ended with the process.
 const PATIENCE: Duration = Duration::from_millis(900);

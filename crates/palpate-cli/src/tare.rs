@@ -25,7 +25,7 @@ pub struct TareOption {
 }
 
 impl TareOption {
-    /// What it does to readings that are judged.
+    /// Words behind a description of readings that are judged.
     pub fn in_words(&self) -> &'static str {
         if self.tare.is_some() { ", tared" } else { "" }
     }

@@ -148,6 +148,30 @@ impl Quantity {
             Err(error) => Err(error),
         }
     }
+
+    /// Reads the two ends of a span, either of which may be empty, as quantities of the dimension `wanted`: a plain number at the
+    /// beginning has the unit of the end.
+    ///
+    /// ```
+    /// use palpate_mechanics::units::{Dimension, Quantity};
+    ///
+    /// assert_eq!(Quantity::parse_span(["0", "100 mm"], Dimension::Length), Ok([Some(0.0), Some(0.1)]));
+    /// assert_eq!(Quantity::parse_span(["95 s", ""], Dimension::Time), Ok([Some(95.0), None]));
+    /// ```
+    ///
+    /// # Errors
+    /// [`UnitError`] of the end that is wrong.
+    pub fn parse_span([from, to]: [&str; 2], wanted: Dimension) -> Result<[Option<f64>; 2], UnitError> {
+        let end = |text: &str| -> Result<Option<f64>, UnitError> {
+            if text.is_empty() { Ok(None) } else { Self::parse_as(text, wanted).map(Some) }
+        };
+        let (from, to) = (from.trim(), to.trim());
+        let to_value = end(to)?;
+        let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
+        let from_value =
+            if from.parse::<f64>().is_ok() { end(&format!("{from} {unit}"))? } else { end(from)? };
+        Ok([from_value, to_value])
+    }
 }
 
 impl FromStr for Quantity {

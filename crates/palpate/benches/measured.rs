@@ -36,7 +36,7 @@ struct Bench {
     second: Second,
 }
 
-/// What a press is recorded with beside its position.
+/// Column of a press beside its position.
 #[derive(Clone, Copy)]
 enum Second {
     DepthMm,

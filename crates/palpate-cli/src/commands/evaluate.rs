@@ -17,7 +17,7 @@ use palpate_estimators::evaluation::{
 use palpate_estimators::recording::{Provenance, Recording};
 use palpate_estimators::simulate::simulate_at;
 use palpate_mechanics::surface::Extent;
-use palpate_mechanics::units::{Dimension, Quantity};
+use palpate_mechanics::units::{Dimension, Quantity, format_length_mm};
 use palpate_report::{EvaluationReport, Judged, evaluation_report};
 use palpate_rig::Rig;
 use std::path::PathBuf;
@@ -205,22 +205,15 @@ fn warn_of_training_data(locator: &Locator, recording: &Recording) {
 fn portion(text: &str) -> Result<Portion, String> {
     const EXAMPLE: &str = "write it as in `0 mm..100 mm` or `0..100 mm`";
     let (from, to) = text.split_once("..").ok_or_else(|| format!("`{text}` has no `..`; {EXAMPLE}"))?;
-    let (from, to) = (from.trim(), to.trim());
-    if from.is_empty() || to.is_empty() {
-        return Err(format!("`{text}` needs a length on either side of `..`; {EXAMPLE}"));
-    }
-    let to_m = Quantity::parse_as(to, Dimension::Length).map_err(|error| format!("{error}; {EXAMPLE}"))?;
-    // The unit behind the end holds for both.
-    let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
-    let from = if from.parse::<f64>().is_ok() { format!("{from} {unit}") } else { from.to_owned() };
-    let from_m =
-        Quantity::parse_as(&from, Dimension::Length).map_err(|error| format!("{error}; {EXAMPLE}"))?;
-    match (from_m, to_m) {
-        (from_m, _) if from_m < 0.0 => {
-            Err(format!("`{text}` begins at {from}; it must begin at 0 or beyond"))
+    let ends_m =
+        Quantity::parse_span([from, to], Dimension::Length).map_err(|error| format!("{error}; {EXAMPLE}"))?;
+    match ends_m {
+        [Some(from_m), Some(_)] if from_m < 0.0 => {
+            Err(format!("`{text}` begins at {}; it must begin at 0 or beyond", format_length_mm(from_m)))
         }
-        (from_m, to_m) if from_m < to_m => Ok(Portion { from_m, to_m }),
-        _ => Err(format!("`{text}` must end beyond where it begins")),
+        [Some(from_m), Some(to_m)] if from_m < to_m => Ok(Portion { from_m, to_m }),
+        [Some(_), Some(_)] => Err(format!("`{text}` must end beyond where it begins")),
+        _ => Err(format!("`{text}` needs a length on either side of `..`; {EXAMPLE}")),
     }
 }
 

@@ -74,6 +74,24 @@ impl Axis {
     }
 }
 
+/// Whether a place, in nodes, is in a margin.
+pub(super) fn is_margin(axes: [Axis; 2], place: [f64; 2]) -> bool {
+    (0..2).any(|k| axes[k].margin_cost(place[k]) > 0.0)
+}
+
+/// Greatest of a distance from a place to its two neighbours along, and across; `distance` is asked for the neighbour's number. Place (x, y) of a grid is
+/// number x·count_y + y.
+pub(super) fn greatest_distances(
+    [x, y]: [Axis; 2],
+    place: usize,
+    mut distance: impl FnMut(usize) -> f64,
+) -> [f64; 2] {
+    let (i, j) = (place / y.count, place % y.count);
+    let along = [(i > 0).then(|| place - y.count), (i + 1 < x.count).then(|| place + y.count)];
+    let across = [(j > 0).then(|| place - 1), (j + 1 < y.count).then(|| place + 1)];
+    [along, across].map(|others| others.into_iter().flatten().map(&mut distance).fold(0.0, f64::max))
+}
+
 impl Axis {
     /// −2·ln of how much less likely a contact at `place`, in nodes, is than one in the middle: in a margin it falls exponentially, to a tenth at
     /// the end.

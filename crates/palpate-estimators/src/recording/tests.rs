@@ -90,7 +90,7 @@ fn rows_have_times_where_a_column_tells_them() {
     assert!(other.unwrap_err().to_string().starts_with("bench.csv:3:5: `4` is written in another way"));
 }
 
-/// Which rows of a file are untouched, and what is said of it.
+/// Rows of a file that are untouched, and the remarks on it.
 fn untouched(columns: &Columns, text: &str) -> Result<(Vec<bool>, String), String> {
     let recording = read_as(columns, text.as_bytes()).map_err(|error| error.to_string())?;
     let said = recording.provenance.dialects.iter().map(ToString::to_string).collect();

@@ -38,7 +38,7 @@ impl fmt::Display for TimeSpan {
 pub struct TimeSpanError {
     /// The text.
     pub text: String,
-    /// What is wrong with one of its ends; empty where the whole is.
+    /// Fault of one of its ends; empty where the whole is wrong.
     pub because: String,
 }
 
@@ -53,19 +53,8 @@ impl FromStr for TimeSpan {
     fn from_str(text: &str) -> Result<Self, TimeSpanError> {
         let refuse = |because: String| TimeSpanError { text: text.to_owned(), because };
         let (from, to) = text.split_once("..").ok_or_else(|| refuse(String::new()))?;
-        let (from, to) = (from.trim(), to.trim());
-        let end = |text: &str| -> Result<Option<f64>, TimeSpanError> {
-            match text {
-                "" => Ok(None),
-                text => Quantity::parse_as(text, Dimension::Time)
-                    .map(Some)
-                    .map_err(|error| refuse(error.to_string())),
-            }
-        };
-        let to_s = end(to)?;
-        // The unit behind the end holds for both.
-        let unit = to.trim_start_matches(|c: char| c.is_ascii_digit() || "+-.eE ".contains(c));
-        let from_s = if from.parse::<f64>().is_ok() { end(&format!("{from} {unit}"))? } else { end(from)? };
+        let [from_s, to_s] =
+            Quantity::parse_span([from, to], Dimension::Time).map_err(|error| refuse(error.to_string()))?;
         match (from_s, to_s) {
             (None, None) => Err(refuse("it has neither a beginning nor an end".to_owned())),
             (Some(from_s), Some(to_s)) if from_s > to_s => {

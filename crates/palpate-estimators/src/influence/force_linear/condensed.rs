@@ -1,10 +1,10 @@
 //! Few presses in place of many, such that every reading counts.
 //!
-//! Of all presses at one position under the responses φ_i, with weights w_i (rows over the variance of one), offset and influence depend on the sums of w, w·φ, w·φ²,
-//! w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half the weight, that lie on the line of least squares of y over φ, have the
+//! Of all presses at one position under the responses φ_i, with weights w_i (rows over the variance of one), offset and influence depend on
+//! the sums of w, w·φ, w·φ², w·y and w·φ·y alone. Two presses at φ̄ ± sd(φ), each of half the weight, that lie on the line of least squares of y over φ, have the
 //! same sums: nothing is lost.
 //!
-//! Where there are too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses each, takes off
+//! With too many positions for that, neighbours share a cell. An estimate ô, f̂ from fewer cells, two presses each, takes off
 //! what the positions within a cell change, so that one press is left, at x̄, the mean of the positions by w·φ², and the root mean square
 //! φ_r. It reads
 //!
@@ -198,7 +198,7 @@ impl All<'_> {
     }
 }
 
-/// What a cell's presses have in common.
+/// Sums over the presses of a cell.
 struct Sums {
     position_m: Vec<f64>,
     weight: f64,

@@ -1,4 +1,4 @@
-//! How the offsets of channels move in the course of a recording.
+//! Drift of the channels' offsets in the course of a recording.
 
 use palpate_numerics::regression::Kernel;
 use serde::{Deserialize, Serialize};

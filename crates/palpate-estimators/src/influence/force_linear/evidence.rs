@@ -114,7 +114,7 @@ pub(super) struct Evidence<'a> {
     repeats: RepeatedNoise,
 }
 
-/// What the scatter of repeats says of the noise of untouched rows.
+/// Noise of untouched rows as the scatter of repeats tells it.
 struct RepeatedNoise {
     freedom: f64,
     /// Sum of squared deviations of each channel, each over the noise's variance relative to that of untouched rows.

@@ -229,10 +229,9 @@ impl Learnt {
     }
 }
 
-/// By what factor the channels' errors are less independent than their number.
+/// Factor by which the channels' errors are less independent than their number.
 ///
-/// What makes presses scatter with their force, a wrong position or force, is the same for all channels; half of it is taken to move
-/// the position. The variance of every channel multiplied by the factor is that of a position told by one, not by the mean of all.
+/// A wrong position or force makes presses scatter with their force, in all channels alike; half of it is taken to move the position. The variance of every channel multiplied by the factor is that of a position told by one, not by the mean of all.
 fn dependence(prior: &Prior, presses: &Presses) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
     let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.relative_noise(*force_n)));

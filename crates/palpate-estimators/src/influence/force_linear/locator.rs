@@ -14,11 +14,12 @@ use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{Axis, check_axes};
+use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::{
-    Cells, Equations, Explain, Explained, Inversion, LANES, Lanes, Layers, Look, Slopes, ToldForce, Unknowns,
-    in_lanes,
+    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, ToldForce, look_at_cells,
 };
+use crate::influence::lanes::{LANES, Lanes, in_lanes};
+use crate::influence::levenberg::{Equations, Unknowns};
 use crate::lightest_touch::LightestTouch;
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -117,8 +118,8 @@ pub struct ForceLinearLocator {
     open: Vec<Lanes>,
     /// Bounds of what each place costs a reading.
     scan: Scan,
-    /// How far the influences of each place are from those of its neighbours along and across, at most, per newton and over the noise.
-    ways: Vec<[f64; 2]>,
+    /// Greatest distance of the influences of each place from those of its neighbours along and across, per newton and over the noise.
+    lengths: Vec<[f64; 2]>,
     /// The largest square of a relative reading of noise alone.
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
@@ -146,12 +147,12 @@ impl Stored {
             }),
             open: in_lanes(&self.functions.offset_variances),
             scan: Scan::default(),
-            ways: Vec::new(),
+            lengths: Vec::new(),
             noise_bound: 0.0,
             detection_bound: 0.0,
             stored: self,
         };
-        locator.find_ways();
+        locator.find_lengths();
         locator.scan = locator.new_scan();
         locator.bound_noise();
         locator
@@ -325,7 +326,7 @@ impl ForceLinearLocator {
         let [x, y] = self.axes();
         let mut values = Vec::new();
         let at = [node(x, position.x_m), node(y, position.y_m)];
-        self.layers.between(at, VALUES..VALUES + 1, &mut values);
+        self.layers.interpolate(at, VALUES..VALUES + 1, &mut values);
         values.as_flattened()[..self.stored.live.len()].to_vec()
     }
 
@@ -349,23 +350,10 @@ impl ForceLinearLocator {
     }
 
     /// Finds the ways from each place to its neighbours.
-    fn find_ways(&mut self) {
-        let [x, y] = self.axes();
-        self.ways = (0..x.count * y.count)
-            .map(|place| {
-                let (i, j) = (place / y.count, place % y.count);
-                let most = |others: [Option<usize>; 2]| {
-                    others
-                        .into_iter()
-                        .flatten()
-                        .map(|other| self.way_between(place, other))
-                        .fold(0.0, f64::max)
-                };
-                let along = [(i > 0).then(|| place - y.count), (i + 1 < x.count).then(|| place + y.count)];
-                let across = [(j > 0).then(|| place - 1), (j + 1 < y.count).then(|| place + 1)];
-                [most(along), most(across)]
-            })
-            .collect();
+    fn find_lengths(&mut self) {
+        let distances =
+            |place: usize| greatest_distances(self.axes(), place, |other| self.way_between(place, other));
+        self.lengths = (0..self.places()).map(distances).collect();
     }
 
     fn new_scan(&self) -> Scan {
@@ -585,11 +573,11 @@ impl Explain for Seen<'_> {
     }
 
     fn scan(&self, looks: &mut Vec<Look>) {
-        self.locator.scan.look(&self.reading, looks);
+        look_at_cells(&self.locator.scan, &self.reading, self.locator.stored.live.len(), looks);
     }
 
     fn lengths(&self, [x, y]: [usize; 2], response_n: f64) -> [f64; 2] {
-        self.locator.ways[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
+        self.locator.lengths[x * self.locator.stored.y.count + y].map(|way| way * response_n.abs())
     }
 
     /// Of φ.
@@ -599,10 +587,10 @@ impl Explain for Seen<'_> {
 
     fn equations(&mut self, [x, y, response_n]: Unknowns, near: Unknowns) -> Equations {
         let ForceLinearLocator { layers, open, expected, .. } = self.locator;
-        layers.slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
+        layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
         let place = near[0].round() as usize * self.locator.stored.y.count + near[1].round() as usize;
         let [variances, covariances] =
-            [VARIANCES, COVARIANCES].map(|layer| layers.at(place, layer..layer + 1));
+            [VARIANCES, COVARIANCES].map(|layer| layers.groups_of(place, layer..layer + 1));
         let (noise, near_n) = (self.locator.noise(), near[2]);
         let channels = (0..self.reading.len()).map(|g| {
             let [f, along, across] = &self.slopes[g];
@@ -617,7 +605,7 @@ impl Explain for Seen<'_> {
                 [along.map(|slope| response_n * slope), across.map(|slope| response_n * slope), *f],
             )
         });
-        let equations = Equations::of(channels);
+        let equations = Equations::new(channels);
         if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
     }
 
@@ -627,7 +615,7 @@ impl Explain for Seen<'_> {
         const STEPS: usize = 2;
         let [x, y] = self.axes();
         let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
-        self.locator.layers.between(place, 0..LAYERS, &mut self.between);
+        self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
         let Some((least_n, hardest_n)) = self.range() else {
             let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
             let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);

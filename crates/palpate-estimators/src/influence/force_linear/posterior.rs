@@ -64,7 +64,7 @@ impl<'a> Functional<'a> {
     }
 }
 
-/// What the presses have to do with functionals.
+/// Functionals of a channel's process, with their effects and their covariance with the presses.
 struct Functionals<'a> {
     asked: &'a [Functional<'a>],
     /// h, q × functionals.

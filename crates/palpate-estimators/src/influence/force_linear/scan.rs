@@ -1,10 +1,11 @@
-//! The least that places may cost a reading, eight places side by side.
+//! Lower bounds of what places cost a reading, eight places side by side.
 //!
 //! With the weights w of the largest variances that a place's influences may have, the least misfit over forces is
 //! Σ w·d² − (Σ w·f·d)²/Σ w·f²: two products a channel and place. The time is that of reading the table of them once from memory.
 
-use crate::influence::inversion::{LANES, Lanes, Look};
-use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+use crate::influence::inversion::CellBlocks;
+use crate::influence::lanes::{LANES, Lanes};
+use palpate_numerics::simd::Eight;
 
 /// Products of every place, in blocks of eight.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,16 +61,16 @@ impl Scan {
         }
         scan
     }
+}
 
-    /// Looks at every place.
-    pub fn look(&self, reading: &[Lanes], looks: &mut Vec<Look>) {
-        let reading = &reading.as_flattened()[..self.channels];
-        InstructionSet::best().run(LookAtPlaces { scan: self, reading, looks });
+impl CellBlocks for Scan {
+    fn cells(&self) -> usize {
+        self.places
     }
 
     /// The least misfit and cost of each place of a block, and φ there.
     #[inline(always)]
-    fn block<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
+    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let of_block = block * self.channels..(block + 1) * self.channels;
         let channels = self.weights[of_block.clone()].iter().zip(&self.products[of_block]).zip(reading);
         let [expected, precision] = self.expected;
@@ -84,28 +85,5 @@ impl Scan {
         let zero = V::splat(0.0);
         let misfit = (dd + response * (response * ff - (fd + fd))).max(zero);
         [misfit, misfit + V::load(&self.constants[block]), response.max(zero)]
-    }
-}
-
-struct LookAtPlaces<'a> {
-    scan: &'a Scan,
-    reading: &'a [f64],
-    looks: &'a mut Vec<Look>,
-}
-
-impl Kernel for LookAtPlaces<'_> {
-    type Output = ();
-    const FUSED: bool = true;
-
-    #[inline(always)] // Compiled for the instructions of its caller.
-    fn run<S: Simd>(self) {
-        let Self { scan, reading, looks } = self;
-        looks.clear();
-        for block in 0..scan.places.div_ceil(LANES) {
-            let [misfits, costs, latents] = scan.block::<S::F64>(block, reading).map(Vector::to_array);
-            for l in 0..LANES.min(scan.places - LANES * block) {
-                looks.push(Look { misfit: misfits[l], cost: costs[l], latent: latents[l] });
-            }
-        }
     }
 }

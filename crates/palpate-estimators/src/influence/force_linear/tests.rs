@@ -232,7 +232,7 @@ struct Regression {
     drift: Drift,
 }
 
-/// What a regression takes the offsets for.
+/// Model of the offsets in a regression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Drift {
     /// They stay.

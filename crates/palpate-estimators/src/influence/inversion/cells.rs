@@ -1,4 +1,7 @@
-//! Cells of a grid, and which of them a reading speaks for.
+//! Cells of a grid, and how a reading looks from their middles, eight cells side by side.
+
+use crate::influence::lanes::{LANES, Lanes};
+use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
 
 /// Nodes of a grid in cells of the same size, each around its middle node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,16 +15,13 @@ pub(in crate::influence) struct Cells {
 /// A cell as a reading sees it from its middle.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::influence) struct Look {
-    /// About the least squared residual, in variances.
+    /// Least squared residual, in variances, about.
     pub misfit: f64,
     /// The same with what else the middle costs.
     pub cost: f64,
     /// The latent number there.
     pub latent: f64,
 }
-
-/// Span of a cell, or of a part of it, along and across, in nodes.
-pub(super) type Span = [(f64, f64); 2];
 
 impl Cells {
     /// Of a grid of so many nodes, `stride` of them to a cell along every axis that varies.
@@ -39,19 +39,21 @@ impl Cells {
         self.counts().iter().product()
     }
 
-    fn at(self, cell: usize) -> [usize; 2] {
+    /// Number of a cell along and across.
+    fn indices(self, cell: usize) -> [usize; 2] {
         let across = self.counts()[1];
         [cell / across, cell % across]
     }
 
     /// The node in the middle of a cell, along and across.
     pub fn middle(self, cell: usize) -> [usize; 2] {
-        let at = self.at(cell);
+        let at = self.indices(cell);
         [0, 1].map(|k| (at[k] * self.stride[k] + self.stride[k] / 2).min(self.nodes[k] - 1))
     }
 
-    pub(super) fn span(self, cell: usize) -> Span {
-        let at = self.at(cell);
+    /// The part of the grid that is nearer to a cell than to others.
+    pub(super) fn span(self, cell: usize) -> [(f64, f64); 2] {
+        let at = self.indices(cell);
         [0, 1].map(|k| {
             let [from, to] = [at[k], at[k] + 1].map(|cells| (cells * self.stride[k]) as f64 - 0.5);
             (from.max(0.0), to.min((self.nodes[k] - 1) as f64))
@@ -63,7 +65,7 @@ impl Cells {
         let counts = self.counts();
         let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         let is_valley = |cell: &usize| {
-            let [i, j] = self.at(*cell);
+            let [i, j] = self.indices(*cell);
             let cost = looks[*cell].cost;
             let mut others = around(i, counts[0])
                 .flat_map(|i| around(j, counts[1]).map(move |j| i * counts[1] + j))
@@ -77,5 +79,49 @@ impl Cells {
         valleys.sort_by(|a, b| looks[*a].cost.total_cmp(&looks[*b].cost));
         valleys.truncate(most);
         valleys
+    }
+}
+
+/// Numbers of the middles of cells, in blocks of eight, by which a reading looks at them.
+pub(in crate::influence) trait CellBlocks {
+    /// Number of cells.
+    fn cells(&self) -> usize;
+
+    /// The misfit, the cost and the latent number of each cell of a block, for the channels of a reading.
+    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3];
+}
+
+/// Looks at every cell; `reading` is that of so many `channels`.
+pub(in crate::influence) fn look_at_cells(
+    blocks: &impl CellBlocks,
+    reading: &[Lanes],
+    channels: usize,
+    looks: &mut Vec<Look>,
+) {
+    let reading = &reading.as_flattened()[..channels];
+    InstructionSet::best().run(LookAtCells { blocks, reading, looks });
+}
+
+struct LookAtCells<'a, C> {
+    blocks: &'a C,
+    reading: &'a [f64],
+    looks: &'a mut Vec<Look>,
+}
+
+impl<C: CellBlocks> Kernel for LookAtCells<'_, C> {
+    type Output = ();
+    const FUSED: bool = true;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) {
+        let Self { blocks, reading, looks } = self;
+        looks.clear();
+        for block in 0..blocks.cells().div_ceil(LANES) {
+            let [misfits, costs, latents] =
+                blocks.look::<S::F64>(block, reading).map(|eight| eight.to_array());
+            for l in 0..LANES.min(blocks.cells() - LANES * block) {
+                looks.push(Look { misfit: misfits[l], cost: costs[l], latent: latents[l] });
+            }
+        }
     }
 }

@@ -1,20 +1,9 @@
 //! Numbers of every channel at the nodes of a grid, in layers, and between the nodes.
 
 use crate::influence::grid::Axis;
+use crate::influence::lanes::{LANES, Lanes};
 use palpate_numerics::simd::{Kernel, Simd, run_loops};
 use std::ops::Range;
-
-/// Channels that are worked on side by side.
-pub(in crate::influence) const LANES: usize = 8;
-
-/// Eight channels.
-pub(in crate::influence) type Lanes = [f64; LANES];
-
-/// Numbers in groups of eight, the last filled up with zeros.
-pub(in crate::influence) fn in_lanes(numbers: &[f64]) -> Vec<Lanes> {
-    let group = |numbers: &[f64]| std::array::from_fn(|l| numbers.get(l).copied().unwrap_or(0.0));
-    numbers.chunks(LANES).map(group).collect()
-}
 
 /// Layers of numbers, one a channel, over the places of a grid.
 ///
@@ -58,27 +47,37 @@ impl Layers {
     }
 
     /// The groups of some layers of a place.
-    pub fn at(&self, place: usize, layers: Range<usize>) -> &[Lanes] {
+    pub fn groups_of(&self, place: usize, layers: Range<usize>) -> &[Lanes] {
         let first = place * self.layers;
         &self.values[(first + layers.start) * self.groups..(first + layers.end) * self.groups]
     }
 
     /// Some layers at (x, y), in nodes, by cubic interpolation through four places each way, into `out`.
-    pub fn between(&self, [x, y]: [f64; 2], layers: Range<usize>, out: &mut Vec<Lanes>) {
+    pub fn interpolate(&self, at: [f64; 2], layers: Range<usize>, out: &mut Vec<Lanes>) {
         out.clear();
         out.resize(layers.len() * self.groups, [0.0; LANES]);
-        let along = Stencil::new(x, self.counts[0]);
-        let across = Stencil::new(y, self.counts[1]);
-        run_loops(Between { table: self, along, across, layers, out });
+        self.interpolate_by(at, layers, out.as_chunks_mut().0, |[x, y], i, j| [x.weights[i] * y.weights[j]]);
     }
 
     /// The same with slopes.
-    pub fn slopes(&self, [x, y]: [f64; 2], layers: Range<usize>, out: &mut Vec<Slopes>) {
+    pub fn interpolate_slopes(&self, at: [f64; 2], layers: Range<usize>, out: &mut Vec<Slopes>) {
         out.clear();
         out.resize(layers.len() * self.groups, [[0.0; LANES]; 3]);
-        let along = Stencil::new(x, self.counts[0]);
-        let across = Stencil::new(y, self.counts[1]);
-        run_loops(BetweenWithSlopes { table: self, along, across, layers, out });
+        self.interpolate_by(at, layers, out, |[x, y], i, j| {
+            [x.weights[i] * y.weights[j], x.slopes[i] * y.weights[j], x.weights[i] * y.slopes[j]]
+        });
+    }
+
+    /// Sums of K weights each.
+    fn interpolate_by<const K: usize>(
+        &self,
+        [x, y]: [f64; 2],
+        layers: Range<usize>,
+        out: &mut [[Lanes; K]],
+        weights: impl Fn(&[Stencil; 2], usize, usize) -> [f64; K],
+    ) {
+        let stencils = [Stencil::new(x, self.counts[0]), Stencil::new(y, self.counts[1])];
+        run_loops(Interpolate { table: self, stencils, layers, weights, out });
     }
 }
 
@@ -119,60 +118,29 @@ impl Stencil {
     }
 }
 
-struct Between<'a> {
+struct Interpolate<'a, W, const K: usize> {
     table: &'a Layers,
-    along: Stencil,
-    across: Stencil,
+    stencils: [Stencil; 2],
     layers: Range<usize>,
-    out: &'a mut [Lanes],
+    /// Weights of node (i, j) of the stencils.
+    weights: W,
+    out: &'a mut [[Lanes; K]],
 }
 
-impl Kernel for Between<'_> {
+impl<W: Fn(&[Stencil; 2], usize, usize) -> [f64; K], const K: usize> Kernel for Interpolate<'_, W, K> {
     type Output = ();
     const FUSED: bool = false;
 
     #[inline(always)] // Compiled for the instructions of its caller.
     fn run<S: Simd>(self) {
-        let Self { table, along, across, layers, out } = self;
+        let Self { table, stencils, layers, weights, out } = self;
+        let [along, across] = &stencils;
         for i in 0..along.used {
             for j in 0..across.used {
                 let place = (along.first + i) * table.counts[1] + across.first + j;
-                let weight = along.weights[i] * across.weights[j];
-                for (sum, lanes) in out.iter_mut().zip(table.at(place, layers.clone())) {
-                    for l in 0..LANES {
-                        sum[l] += weight * lanes[l];
-                    }
-                }
-            }
-        }
-    }
-}
-
-struct BetweenWithSlopes<'a> {
-    table: &'a Layers,
-    along: Stencil,
-    across: Stencil,
-    layers: Range<usize>,
-    out: &'a mut [Slopes],
-}
-
-impl Kernel for BetweenWithSlopes<'_> {
-    type Output = ();
-    const FUSED: bool = false;
-
-    #[inline(always)] // Compiled for the instructions of its caller.
-    fn run<S: Simd>(self) {
-        let Self { table, along, across, layers, out } = self;
-        for i in 0..along.used {
-            for j in 0..across.used {
-                let place = (along.first + i) * table.counts[1] + across.first + j;
-                let weights = [
-                    along.weights[i] * across.weights[j],
-                    along.slopes[i] * across.weights[j],
-                    along.weights[i] * across.slopes[j],
-                ];
-                for (sums, lanes) in out.iter_mut().zip(table.at(place, layers.clone())) {
-                    for k in 0..3 {
+                let weights = weights(&stencils, i, j);
+                for (sums, lanes) in out.iter_mut().zip(table.groups_of(place, layers.clone())) {
+                    for k in 0..K {
                         for l in 0..LANES {
                             sums[k][l] += weights[k] * lanes[l];
                         }
@@ -211,8 +179,8 @@ mod tests {
             for (u, v) in [(0.0, 0.0), (0.13, 0.9), (0.5, 0.31), (1.0, 1.0), (0.77, 0.02)] {
                 let at = [u * ends[0], v * ends[1]];
                 let (mut values, mut slopes) = (Vec::new(), Vec::new());
-                table.between(at, 1..2, &mut values);
-                table.slopes(at, 1..2, &mut slopes);
+                table.interpolate(at, 1..2, &mut values);
+                table.interpolate_slopes(at, 1..2, &mut slopes);
                 let factor = (2 + 2 * 8) as f64;
                 let exact = |at| factor * polynomial(at, counts);
                 assert!((values[1][0] - exact(at)).abs() < 1e-12, "{counts:?} {at:?}");

@@ -1,7 +1,7 @@
 //! Inversion of readings over a grid of places: where a contact on a surface without a model was, and how sure that is.
 //!
-//! How a reading depends on the place and on one latent number (the nuisance coordinate, the response to the force, a gain) is the business
-//! of [`Explain`]. From there it is the same for every structure, on a line and on a plane: [`Cells`] are looked at from their middles, valleys are followed
+//! [`Explain`] tells how a reading depends on the place and on one latent number: the nuisance coordinate, the response to the force, or a
+//! gain. All else is the same for every structure, on a line and on a plane: [`Cells`] are looked at from their middles, valleys are followed
 //! down to their [`minima`], and the [`posterior`] is summed around them.
 
 mod cells;
@@ -9,15 +9,12 @@ mod layers;
 mod minima;
 mod posterior;
 
-pub(super) use cells::{Cells, Look};
-pub(super) use layers::{LANES, Lanes, Layers, Slopes, in_lanes};
-pub(super) use minima::Equations;
+pub(super) use cells::{CellBlocks, Cells, Look, look_at_cells};
+pub(super) use layers::{Layers, Slopes};
 pub(super) use posterior::{Inversion, ToldForce};
 
 use super::grid::Axis;
-
-/// Position along and across, in nodes from the first, and the latent number.
-pub(super) type Unknowns = [f64; 3];
+use super::levenberg::{Equations, Unknowns};
 
 /// Place as a reading sees it, whatever the latent number.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +28,7 @@ pub(super) struct Explained {
     pub latent_variance: f64,
 }
 
-/// One reading, and how well contacts explain it.
+/// A reading with what contacts explain of it; positions along and across are in nodes from the first.
 pub(super) trait Explain {
     /// The grid's axes.
     fn axes(&self) -> [Axis; 2];
@@ -39,10 +36,10 @@ pub(super) trait Explain {
     /// Its cells.
     fn cells(&self) -> Cells;
 
-    /// About the least that each cell's middle costs, cell by cell.
+    /// Lower bounds of what the middles of the cells cost, about, cell by cell.
     fn scan(&self, looks: &mut Vec<Look>);
 
-    /// How far, over the noise, the reading moves from a node to the next along and across, at most, for this latent number.
+    /// Greatest way of the reading, over the noise, from a node to the next along and across, for this latent number.
     fn lengths(&self, node: [usize; 2], latent: f64) -> [f64; 2];
 
     /// The latent number's least and greatest value; `None` where there is nothing to look for.

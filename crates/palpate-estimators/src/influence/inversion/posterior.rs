@@ -8,7 +8,7 @@
 use super::cells::Look;
 use super::minima::{Minimum, floor, minima, modes};
 use super::{Explain, Explained};
-use crate::influence::grid::{Axis, middle};
+use crate::influence::grid::{Axis, is_margin, middle};
 use crate::influence::moments::Moments;
 use crate::status::OTHER_PLACE;
 use palpate_core::{BoundedList, ContactEstimate, Estimate, Mode, Status, Uncertainty};
@@ -35,11 +35,11 @@ pub(in crate::influence) struct Inversion<E> {
     minima: Vec<Minimum>,
 }
 
-/// So many standard deviations from an edge, the edge does not matter.
+/// Standard deviations from an edge beyond which the edge does not matter.
 const CLEAR: f64 = 3.0;
 /// A cost this much above the least has no probability worth adding up: e⁻⁸.
 const CUT: f64 = 16.0;
-/// By how much, of a paraboloid's rise, the cost may differ from it.
+/// Greatest difference of the cost from a paraboloid, as a share of the paraboloid's rise.
 const MOST_BENT: f64 = 1.0 / 3.0;
 /// A tile stands for its middle when readings move no further within it, over the noise.
 const FINE: f64 = 1.0;
@@ -165,12 +165,12 @@ impl<E: Explain> Inversion<E> {
             Posterior { modes: vec![Probable::default(); minima.len()], ..Posterior::default() };
         let mut slices = [Slices::default(), Slices::default()];
         for i in 0..minima.len() {
-            let (lattice, leaves) = Lattice::around(reading, minima, i, &others[i]);
+            let (lattice, leaves) = Lattice::cover(reading, minima, i, &others[i]);
             for Leaf { tile, weight, contact } in leaves {
                 let place = lattice.middle(tile);
-                let is_usual = (0..2).all(|k| axes[k].margin_cost(place[k]) == 0.0);
-                for around in [&mut posterior.all, &mut posterior.modes[modes[i]]] {
-                    around.add(weight, contact, is_usual);
+                let is_usual = !is_margin(axes, place);
+                for sums in [&mut posterior.all, &mut posterior.modes[modes[i]]] {
+                    sums.add(weight, contact, is_usual);
                 }
                 for (k, slices) in slices.iter_mut().enumerate() {
                     slices.add(lattice.span(tile, k), weight);
@@ -210,7 +210,7 @@ impl<E: Explain> Inversion<E> {
             let found = self.reading.explain(place, best.at[2]);
             let weight = (0.5 * (best.cost - found.cost)).exp();
             if weight > 0.0 {
-                let is_usual = (0..2).all(|k| axes[k].margin_cost(place[k]) == 0.0);
+                let is_usual = !is_margin(axes, place);
                 all.add(weight, contact_at(place, &found, &self.reading), is_usual);
             }
         }
@@ -231,7 +231,7 @@ struct Posterior {
 /// Position and force of a contact, and the force's variance.
 type ProbableContact = ([f64; 3], f64);
 
-/// What a place tells of the contact.
+/// Contact at a place.
 fn contact_at<E: Explain>([x, y]: [f64; 2], found: &Explained, reading: &E) -> ProbableContact {
     let [x_axis, y_axis] = reading.axes();
     let (force_n, variance_n2) = reading.force(found.latent, found.latent_variance);
@@ -287,7 +287,7 @@ impl Probable {
     }
 }
 
-/// Which minimum is nearest to a place.
+/// Number of the minimum that is nearest to a place.
 fn nearest(minima: &[Minimum], [x, y]: [f64; 2]) -> usize {
     let square = |minimum: &Minimum| (minimum.at[0] - x).powi(2) + (minimum.at[1] - y).powi(2);
     let by_distance = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
@@ -352,7 +352,7 @@ impl Lattice {
     }
 
     /// The tiles around minimum `i` that matter and lie nearest to it, from neighbour to neighbour, their weights relative to that of the best minimum.
-    fn around<E: Explain>(
+    fn cover<E: Explain>(
         reading: &mut E,
         minima: &[Minimum],
         i: usize,
@@ -450,7 +450,7 @@ impl Lattice {
 /// Weights that are spread evenly over spans, which may overlap.
 #[derive(Clone, Debug, Default)]
 struct Slices {
-    /// Where a span begins or ends, with the change of the density there.
+    /// Ends of the spans, with the change of the density there.
     ends: Vec<(f64, f64)>,
 }
 

@@ -25,7 +25,7 @@ const MOST_ALONG: usize = 400;
 const MOST_OF_PLANE: usize = 80;
 const MOST_OF_NUISANCE: usize = 64;
 const MOST_OF_NUISANCE_OF_PLANE: usize = 16;
-/// What a table misses between its nodes, over the noise, hardly matters below this.
+/// Error of a table between its nodes, over the noise, below which it hardly matters.
 const MOST_MISSED: f64 = 0.2;
 /// The least variance of noise, over the signal's.
 const LEAST_NOISE: f64 = 1e-10;
@@ -150,8 +150,7 @@ impl Presses {
         coordinates
     }
 
-    /// By how much a channel of a table is off the process, over the noise: in the middle between places, and between nodes of the nuisance
-    /// coordinate.
+    /// Error of a channel of a table, over the noise: in the middle between places, and between nodes of the nuisance coordinate.
     fn missed(&self, table: &Table, process: &GaussianProcess, whitening: &Whitening) -> [f64; 2] {
         /// Places that are tried.
         const TRIED: usize = 300;
@@ -173,7 +172,7 @@ impl Presses {
             for (square, at) in squares.iter_mut().zip(middles) {
                 process.mean_into(&self.coordinates_at([*x, *y, *nuisance], at), &mut raw, &mut scratch);
                 whitening.apply(&raw, &mut white);
-                layers.between([at[0], at[1]], k..next + 1, &mut between);
+                layers.interpolate([at[0], at[1]], k..next + 1, &mut between);
                 let part = at[2] - k as f64;
                 let (from, to) = (&between[..layers.groups()], &between[(next - k) * layers.groups()..]);
                 let pairs = from.as_flattened().iter().zip(to.as_flattened());

@@ -1,14 +1,15 @@
-//! The locator of a measured surface: its table, and how well the places and nuisance coordinates of the table explain a reading.
+//! The locator of a measured surface: its table, and what the places and nuisance coordinates of the table explain of a reading.
 
 use super::config::Scale;
 use super::scan::Scan;
 use super::table::{Line, Marginal, Stretch, Table, WhiteNoise};
 use crate::fit::{Locate, LocatorFault};
-use crate::influence::grid::{Axis, check_axes, middle};
+use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
-    Cells, Equations, Explain, Explained, Inversion, Lanes, Layers, Look, Slopes, ToldForce, Unknowns,
-    in_lanes,
+    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, ToldForce, look_at_cells,
 };
+use crate::influence::lanes::{LANES, Lanes, in_lanes};
+use crate::influence::levenberg::{Equations, Unknowns};
 use crate::influence::noise::Whitening;
 use crate::setup::Setup;
 use palpate_core::{Estimate, Status};
@@ -63,7 +64,7 @@ struct Search {
     noise: WhiteNoise,
     cells: Cells,
     scan: Scan,
-    /// How far the reading moves from a place to the next along and across, at most, for each node of the nuisance coordinate.
+    /// Greatest way of the reading from a place to the next along and across, for each node of the nuisance coordinate.
     lengths: Vec<[f64; 2]>,
 }
 
@@ -101,41 +102,24 @@ impl Search {
     /// The nodes of a place.
     fn line(&self, place: usize, nodes: usize) -> Line<'_> {
         Line {
-            means: self.means.at(place, 0..nodes),
-            variances: &self.variances.at(place, 0..1).as_flattened()[..nodes],
+            means: self.means.groups_of(place, 0..nodes),
+            variances: &self.variances.groups_of(place, 0..1).as_flattened()[..nodes],
         }
     }
 
-    /// From each node of a place to the line of the next along, and across, or of the last.
-    fn find_lengths(&mut self, [x, y]: [Axis; 2], nodes: usize) {
+    /// From each node of a place to the lines of its neighbours.
+    fn find_lengths(&mut self, axes: [Axis; 2], nodes: usize) {
         let unit = self.noise.unit();
-        let groups = self.means.groups();
         let mut stretches = Vec::new();
-        let mut ways = vec![[0.0; 2]; x.count * y.count * nodes];
-        for place in 0..x.count * y.count {
-            let (i, j) = (place / y.count, place % y.count);
-            let next = [(i + 1 < x.count).then_some(place + y.count), (j + 1 < y.count).then_some(place + 1)];
-            for (k, other) in next.into_iter().enumerate() {
-                let Some(other) = other else { continue };
-                let to = self.line(other, nodes);
-                for node in 0..nodes {
-                    let mean = &self.means.at(place, node..node + 1)[..groups];
-                    ways[place * nodes + node][k] = to.residual(mean, &unit, &mut stretches).sqrt();
-                }
-            }
-        }
-        self.lengths = ways.clone();
-        for place in 0..x.count * y.count {
-            let before =
-                [(place / y.count > 0).then(|| place - y.count), (place % y.count > 0).then(|| place - 1)];
-            for (k, other) in before.into_iter().enumerate() {
-                let Some(other) = other else { continue };
-                for node in 0..nodes {
-                    let most = &mut self.lengths[place * nodes + node][k];
-                    *most = most.max(ways[other * nodes + node][k]);
-                }
-            }
-        }
+        self.lengths = (0..axes[0].count * axes[1].count * nodes)
+            .map(|i| {
+                let (place, node) = (i / nodes, i % nodes);
+                let mean = self.means.groups_of(place, node..node + 1);
+                greatest_distances(axes, place, |other| {
+                    self.line(other, nodes).residual(mean, &unit, &mut stretches).sqrt()
+                })
+            })
+            .collect();
     }
 }
 
@@ -284,7 +268,7 @@ impl Seen<'_> {
     /// The least squared residual of a place and the integral over some nodes of its line; `None` where others may matter.
     fn explain_by(&mut self, place: [f64; 2], nodes: std::ops::Range<usize>) -> Option<(f64, Marginal)> {
         let Search { means, noise, .. } = &self.locator.search;
-        means.between(place, nodes.clone(), &mut self.means);
+        means.interpolate(place, nodes.clone(), &mut self.means);
         let variances = &self.variances.as_flattened()[nodes.clone()];
         let line = Line { means: &self.means, variances };
         let (misfit, mut marginal) = line.explain(&self.reading, noise, &mut self.stretches);
@@ -294,6 +278,52 @@ impl Seen<'_> {
             || nodes.end < self.nodes() && above.residual_at(1.0) < negligible;
         marginal.shift(nodes.start as f64);
         (!is_open).then_some((misfit, marginal))
+    }
+
+    /// The stretch of a line that a node of the nuisance coordinate is in, and where in it.
+    fn stretch(&self, node: f64) -> (usize, f64) {
+        let first = (node.max(0.0) as usize).min(self.nodes().saturating_sub(2));
+        (first, node - first as f64)
+    }
+
+    /// The equations where the latent number is the nuisance coordinate, straight between two nodes; `variances` are those of a line, and
+    /// taken at the node `near`.
+    fn equations_of_line(&mut self, [x, y, latent]: Unknowns, variances: &[f64], near: f64) -> Equations {
+        let Search { means, noise, .. } = &self.locator.search;
+        let (first, t) = self.stretch(latent);
+        means.interpolate_slopes([x, y], first..first + 2, &mut self.slopes);
+        let (of_near, share) = self.stretch(near);
+        let v = variances[of_near] + share * (variances[of_near + 1] - variances[of_near]);
+        let (from, to) = self.slopes.split_at(self.reading.len());
+        let channels = (0..self.reading.len()).map(|g| {
+            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
+            let mut between = from[g];
+            for k in 0..3 {
+                for l in 0..LANES {
+                    between[k][l] += t * (to[g][k][l] - from[g][k][l]);
+                }
+            }
+            let [mean, along, across] = between;
+            let residual = std::array::from_fn(|l| self.reading[g][l] - mean[l]);
+            let by_node = std::array::from_fn(|l| to[g][0][l] - from[g][0][l]);
+            (weights, residual, [along, across, by_node])
+        });
+        Equations::new(channels)
+    }
+
+    /// The equations where the latent number is a gain, in standard deviations.
+    fn equations_of_gain(&mut self, [x, y, latent]: Unknowns, v: f64) -> Equations {
+        let Search { means, noise, .. } = &self.locator.search;
+        means.interpolate_slopes([x, y], 0..1, &mut self.slopes);
+        let scale = 1.0 + noise.gain * latent;
+        let channels = (0..self.reading.len()).map(|g| {
+            let [mean, along, across] = &self.slopes[g];
+            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
+            let residual = std::array::from_fn(|l| self.reading[g][l] - scale * mean[l]);
+            let times = |slopes: &Lanes, factor: f64| slopes.map(|slope| factor * slope);
+            (weights, residual, [times(along, scale), times(across, scale), times(mean, noise.gain)])
+        });
+        Equations::new(channels).with_expected(latent, [0.0, 1.0])
     }
 
     /// Nodes of the nuisance coordinate.
@@ -313,7 +343,12 @@ impl Explain for Seen<'_> {
     }
 
     fn scan(&self, looks: &mut Vec<Look>) {
-        self.locator.search.scan.look(&self.reading, looks);
+        look_at_cells(
+            &self.locator.search.scan,
+            &self.reading,
+            self.locator.stored.whitening.channels(),
+            looks,
+        );
     }
 
     fn lengths(&self, [x, y]: [usize; 2], latent: f64) -> [f64; 2] {
@@ -332,47 +367,21 @@ impl Explain for Seen<'_> {
         if nodes > 1 { Some((0.0, (nodes - 1) as f64)) } else { gain.then_some((-MOST_GAIN, MOST_GAIN)) }
     }
 
-    fn equations(&mut self, [x, y, latent]: Unknowns, near: Unknowns) -> Equations {
-        let Search { means, variances, noise, .. } = &self.locator.search;
-        let nodes = self.nodes();
-        let first = |node: f64| (node.max(0.0) as usize).min(nodes.saturating_sub(2));
-        let used = first(latent)..(first(latent) + 2).min(nodes);
-        means.slopes([x, y], used.clone(), &mut self.slopes);
+    fn equations(&mut self, at: Unknowns, near: Unknowns) -> Equations {
         let place = near[0].round() as usize * self.axes()[1].count + near[1].round() as usize;
-        let around = &variances.at(place, 0..1).as_flattened()[..nodes];
-        let share = |node: f64| {
-            let (from, to) = (around[first(node)], around[(first(node) + 1).min(nodes - 1)]);
-            from + (node - first(node) as f64).clamp(0.0, 1.0) * (to - from)
-        };
-        let groups = self.reading.len();
-        let (v, t) = (if nodes > 1 { share(near[2]) } else { around[0] }, latent - used.start as f64);
-        let gain = if nodes > 1 { 0.0 } else { noise.gain };
-        let channels = (0..groups).map(|g| {
-            let (from, to) = (&self.slopes[g], &self.slopes[(used.len() - 1) * groups + g]);
-            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
-            let mut derivatives = [[0.0; 8]; 3];
-            let mut residual = self.reading[g];
-            for l in 0..residual.len() {
-                let between = |k: usize| from[k][l] + t * (to[k][l] - from[k][l]);
-                let (mean, scale) =
-                    if nodes > 1 { (between(0), 1.0) } else { (from[0][l], 1.0 + gain * latent) };
-                residual[l] -= scale * mean;
-                derivatives[2][l] = if nodes > 1 { to[0][l] - from[0][l] } else { gain * mean };
-                for k in 0..2 {
-                    derivatives[k][l] = if nodes > 1 { between(k + 1) } else { scale * from[k + 1][l] };
-                }
-            }
-            (weights, residual, derivatives)
-        });
-        let equations = Equations::of(channels);
-        if gain > 0.0 { equations.with_expected(latent, [0.0, 1.0]) } else { equations }
+        let variances = self.locator.search.variances.groups_of(place, 0..1).as_flattened();
+        if self.nodes() > 1 {
+            self.equations_of_line(at, variances, near[2])
+        } else {
+            self.equations_of_gain(at, variances[0])
+        }
     }
 
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
         let nodes = self.nodes();
-        self.locator.search.variances.between(place, 0..1, &mut self.variances);
+        self.locator.search.variances.interpolate(place, 0..1, &mut self.variances);
         self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
-        let first = (latent.max(0.0) as usize).min(nodes.saturating_sub(2));
+        let (first, _) = self.stretch(latent);
         let near = first.saturating_sub(NEAR)..(first + NEAR + 2).min(nodes);
         let (misfit, marginal) =
             self.explain_by(place, near).or_else(|| self.explain_by(place, 0..nodes)).unwrap_or_default();

@@ -1,13 +1,14 @@
-//! How well the middles of a table's cells explain a reading, eight cells side by side.
+//! Misfit of the middles of a table's cells to a reading, eight cells side by side.
 //!
 //! With weights w that are the same all along a place's line (those of the largest variance there), |z − μ|² = Σ w·z² − 2·Σ w·μ·z + Σ w·μ²
 //! takes one product a channel and node. Of two nodes with the squares r₀ and r₁ and the squared distance d², the stretch between them comes
 //! closest at s = (r₀ + d² − r₁)/(2·d²). The time is that of reading the table of products once from memory.
 
 use super::table::Table;
-use crate::influence::inversion::{Cells, LANES, Lanes, Look};
+use crate::influence::inversion::{CellBlocks, Cells};
+use crate::influence::lanes::{LANES, Lanes};
 use crate::influence::noise::Whitening;
-use palpate_numerics::simd::{Eight, InstructionSet, Kernel, Simd, Vector};
+use palpate_numerics::simd::Eight;
 
 /// Products of the middles of cells, in blocks of eight.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,45 +63,16 @@ impl Scan {
         }
         scan
     }
+}
 
-    /// Looks at every cell.
-    pub fn look(&self, reading: &[Lanes], looks: &mut Vec<Look>) {
-        InstructionSet::best().run(LookAtCells {
-            scan: self,
-            reading: &reading.as_flattened()[..self.channels],
-            looks,
-        });
+impl CellBlocks for Scan {
+    fn cells(&self) -> usize {
+        self.cells
     }
-}
 
-struct LookAtCells<'a> {
-    scan: &'a Scan,
-    reading: &'a [f64],
-    looks: &'a mut Vec<Look>,
-}
-
-impl Kernel for LookAtCells<'_> {
-    type Output = ();
-    const FUSED: bool = true;
-
-    #[inline(always)] // Compiled for the instructions of its caller.
-    fn run<S: Simd>(self) {
-        let Self { scan, reading, looks } = self;
-        looks.clear();
-        for block in 0..scan.cells.div_ceil(LANES) {
-            let (misfits, latents) = scan.block::<S::F64>(block, reading);
-            let (misfits, latents) = (misfits.to_array(), latents.to_array());
-            for l in 0..LANES.min(scan.cells - LANES * block) {
-                looks.push(Look { misfit: misfits[l], cost: misfits[l], latent: latents[l] });
-            }
-        }
-    }
-}
-
-impl Scan {
     /// The least squared residual of each cell of a block, and the node of the nuisance coordinate where it is.
     #[inline(always)]
-    fn block<V: Eight>(&self, block: usize, reading: &[f64]) -> (V, V) {
+    fn look<V: Eight>(&self, block: usize, reading: &[f64]) -> [V; 3] {
         let (zero, one, two) = (V::splat(0.0), V::splat(1.0), V::splat(2.0));
         let mut own = zero;
         for (weights, z) in self.weights[block * self.channels..].iter().zip(reading) {
@@ -132,6 +104,7 @@ impl Scan {
             latent = (V::splat((node - 1) as f64) + s).or(nearer, latent);
             last = residual;
         }
-        (best.max(zero), latent)
+        let misfit = best.max(zero);
+        [misfit, misfit, latent]
     }
 }

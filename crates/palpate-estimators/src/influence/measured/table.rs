@@ -4,7 +4,7 @@
 //! along a straight line through the space of readings: a density across it times a share along it.
 
 use crate::influence::grid::Axis;
-use crate::influence::inversion::{LANES, Lanes, in_lanes};
+use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::noise::Whitening;
 use palpate_numerics::normal_between;
 use palpate_numerics::simd::{Kernel, Simd, run_loops};

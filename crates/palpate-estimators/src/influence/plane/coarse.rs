@@ -3,8 +3,9 @@
 //! Symbols as in [`super::search`]. A cell is two nodes of the table long and wide, and the odd nodes are their middles: no
 //! middle lies on an edge, where a support may hide every contact.
 
-use super::table::{Lanes, Patches, PlaneTable};
+use super::table::{Patches, PlaneTable};
 use crate::influence::config::ForceBelief;
+use crate::influence::lanes::Lanes;
 
 /// Valleys from which a refinement starts, at most.
 pub(super) const MOST_VALLEYS: usize = 6;

@@ -8,7 +8,8 @@
 //! reading is left out with all that it holds. The prior is flat over the surface, and in the size of the signal.
 
 use super::coarse::{MOST_VALLEYS, Profile};
-use super::search::{Minimum, Search, Unknowns};
+use super::search::{Minimum, Search};
+use crate::influence::levenberg::Unknowns;
 use crate::influence::moments::Moments;
 use crate::status::OTHER_PLACE;
 use palpate_core::{ContactEstimate, Estimate, Status, Uncertainty};

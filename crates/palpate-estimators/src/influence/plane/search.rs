@@ -1,17 +1,18 @@
-//! Where one contact on a plane is: whitened search over the table, then Levenberg's steps (K. Levenberg, Quart. Appl. Math. 2, 1944,
-//! with Marquardt's scaling by the diagonal).
+//! Search for one contact on a plane: coarse over the whitened table, then by Levenberg's steps.
 //!
 //! Symbols: d whitened reading (less offsets, over the noise), f whitened influence, W force, (x, y) position,
 //! e = d − W·f the residual, w weights 1/(1 + v) with v the calibration's variance of a reading over the noise's,
 //! χ²(x, y, W) = Σ w·e² (+ the force's own misfit where it is believed to be near a value).
 
 use super::coarse::{Coarse, MOST_VALLEYS, Profile};
-use super::table::{Lanes, Patches, PlaneTable};
+use super::table::{Patches, PlaneTable};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
+use crate::influence::lanes::{LANES, Lanes};
+use crate::influence::levenberg::{Equations, Unknowns, descend};
 use crate::status::{StatusRule, unknowns};
 use palpate_mechanics::contact::{Contact, Position};
-use palpate_numerics::small::{Ldl, Matrix, add_outer};
+use palpate_numerics::small::{Matrix, add_outer};
 
 /// A table that is ready to be searched: whitened, and without the channels that are left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,9 +38,6 @@ pub(super) struct Search {
     pub size_m: [f64; 2],
     pub rule: StatusRule,
 }
-
-/// x and y in metres, and the force in newtons.
-pub(super) type Unknowns = [f64; 3];
 
 /// A minimum of the misfit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -250,43 +248,18 @@ impl Search {
         let (weights, variances) =
             (self.nearest_groups(&self.weights, near), self.nearest_groups(&self.variances, near));
         let harder = (force_n > self.weights_force_n).then_some(force_n * force_n);
-        let mut sums = [[0.0; 8]; 10];
-        for (group, chunk) in whitened.chunks(8).enumerate() {
+        let channels = whitened.chunks(LANES).enumerate().map(|(group, chunk)| {
             let values = self.patches.values(&place, group);
-            let mut d = [0.0; 8];
-            d[..chunk.len()].copy_from_slice(chunk);
-            for lane in 0..8 {
-                let weight = match harder {
-                    None => weights[group][lane],
-                    Some(scale) => 1.0 / (1.0 + scale * variances[group][lane]),
-                };
-                let (f, gx, gy) =
-                    (values.f[lane], force_n * values.along[lane], force_n * values.across[lane]);
-                let e = d[lane] - force_n * f;
-                let (we, wx, wy) = (weight * e, weight * gx, weight * gy);
-                let terms = [
-                    we * e,
-                    we * gx,
-                    we * gy,
-                    we * f,
-                    wx * gx,
-                    wx * gy,
-                    wx * f,
-                    wy * gy,
-                    wy * f,
-                    weight * f * f,
-                ];
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    sum[lane] += term;
-                }
-            }
-        }
-        let [misfit, ex, ey, ef, xx, xy, xf, yy, yf, ff] = sums.map(|lanes| lanes.iter().sum::<f64>());
-        let mut equations = Equations {
-            misfit,
-            right: [ex, ey, ef],
-            information: [[xx, xy, xf], [xy, yy, yf], [xf, yf, ff]],
-        };
+            let mut e = [0.0; LANES];
+            e[..chunk.len()].copy_from_slice(chunk);
+            e.iter_mut().zip(values.f).for_each(|(e, f)| *e -= force_n * f);
+            let weights = match harder {
+                None => weights[group],
+                Some(scale) => variances[group].map(|v| 1.0 / (1.0 + scale * v)),
+            };
+            (weights, e, [values.along.map(|g| force_n * g), values.across.map(|g| force_n * g), values.f])
+        });
+        let mut equations = Equations::new(channels);
         if let ForceBelief::Normal { mean_n, sd_n } = self.force {
             equations.misfit += ((force_n - mean_n) / sd_n).powi(2);
             equations.right[2] -= (force_n - mean_n) / (sd_n * sd_n);
@@ -296,70 +269,20 @@ impl Search {
     }
 }
 
-/// JᵀwJ and Jᵀwe at some unknowns.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Equations {
-    pub misfit: f64,
-    pub right: [f64; 3],
-    pub information: Matrix<3>,
-}
-
 const NOWHERE: Minimum = Minimum { at: [0.0; 3], misfit: f64::INFINITY, information: [[0.0; 3]; 3] };
 
-/// Steps, those that were refused included.
-const MOST_STEPS: usize = 40;
 /// A step that lowers the misfit by less than this, a fiftieth of a standard deviation, is the last one.
 const SMALL: f64 = 4e-4;
 
 impl Search {
     /// The minimum near a place.
     pub fn refine(&self, whitened: &[f64], start_m: [f64; 2]) -> Minimum {
-        let mut at: Unknowns = [start_m[0], start_m[1], self.best_force(whitened, start_m)];
+        let start = [start_m[0], start_m[1], self.best_force(whitened, start_m)];
+        let force = self.force.known_n().map_or((0.0, f64::INFINITY), |force_n| (force_n, force_n));
+        let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), force];
         // Within one refinement the calibration's variances stay, so that misfits can be compared.
-        let mut here = self.equations(whitened, at, Some(start_m));
-        let mut damping = 1e-3;
-        for _ in 0..MOST_STEPS {
-            let Some(step) = self.step(&here, at, damping) else { break };
-            let next = self.held([at[0] + step[0], at[1] + step[1], at[2] + step[2]]);
-            let moved = [next[0] - at[0], next[1] - at[1], next[2] - at[2]];
-            let gain: f64 = moved.iter().zip(&here.right).map(|(step, right)| step * right).sum();
-            let there = self.equations(whitened, next, Some(start_m));
-            if there.misfit <= here.misfit {
-                (at, here) = (next, there);
-                damping = (0.1 * damping).max(1e-9);
-            } else {
-                damping = (10.0 * damping).max(1e-3);
-            }
-            if gain.abs() <= SMALL {
-                break;
-            }
-        }
+        let (at, _) = descend(start, ends, SMALL, |at| self.equations(whitened, at, Some(start_m)));
         let Equations { misfit, information, .. } = self.equations(whitened, at, None);
         Minimum { at, misfit, information }
-    }
-
-    /// Unknowns on the surface, with a force that presses.
-    fn held(&self, [x_m, y_m, force_n]: Unknowns) -> Unknowns {
-        [x_m.clamp(0.0, self.size_m[0]), y_m.clamp(0.0, self.size_m[1]), force_n.max(0.0)]
-    }
-
-    /// The damped step of those unknowns that are free: at an edge, the one that leads beyond it is not. `None` where no
-    /// unknown is free or the reading tells nothing.
-    fn step(&self, equations: &Equations, at: Unknowns, damping: f64) -> Option<Unknowns> {
-        let ends = [(0.0, self.size_m[0]), (0.0, self.size_m[1]), (0.0, f64::INFINITY)];
-        let mut free = [true; 3];
-        free[2] = self.force.known_n().is_none();
-        for k in 0..3 {
-            let right = equations.right[k];
-            free[k] &= !(at[k] <= ends[k].0 && right < 0.0 || at[k] >= ends[k].1 && right > 0.0);
-        }
-        if free == [false; 3] {
-            return None;
-        }
-        let mut matrix = equations.information;
-        for (k, row) in matrix.iter_mut().enumerate() {
-            row[k] *= 1.0 + damping;
-        }
-        Some(Ldl::of_free(&matrix, free)?.solve(equations.right))
     }
 }

@@ -5,6 +5,7 @@
 //! differences of fourth order of the table's values, so that a table holds nothing but values (Abramowitz and Stegun,
 //! table 25.2, five points; one-sided at the edges).
 
+use crate::influence::lanes::Lanes;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
@@ -78,9 +79,6 @@ impl PlaneTable {
         self.values.iter().skip(sensor).step_by(self.sensors).copied()
     }
 }
-
-/// Numbers of eight sensors.
-pub(super) type Lanes = [f64; 8];
 
 /// The patches of some sensors, in groups of eight, filled up with zeros.
 #[derive(Clone, Debug, PartialEq)]

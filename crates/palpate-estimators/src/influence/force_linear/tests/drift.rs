@@ -79,7 +79,7 @@ struct Study {
     tared_mm: Vec<f64>,
 }
 
-/// What nobody can have.
+/// Name of a regression that is told the drift.
 const WITHOUT_DRIFT: &str = "a spline, the true drift taken off";
 
 impl Study {

@@ -1,0 +1,105 @@
+//! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
+
+use super::lanes::{LANES, Lanes};
+use palpate_numerics::small::{Ldl, Matrix};
+
+/// Position along and across, and the force or whatever else a reading depends on.
+pub(super) type Unknowns = [f64; 3];
+
+/// JᵀV⁻¹J and JᵀV⁻¹e of some unknowns, V the variances, e the residual and J the reading's derivatives.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equations {
+    /// eᵀV⁻¹e.
+    pub misfit: f64,
+    pub right: [f64; 3],
+    pub information: Matrix<3>,
+}
+
+impl Equations {
+    /// From the weights V⁻¹, the residual and the derivatives of groups of channels.
+    #[inline(always)]
+    pub fn new(channels: impl Iterator<Item = (Lanes, Lanes, [Lanes; 3])>) -> Self {
+        let mut sums = [[0.0; LANES]; 10];
+        for (weights, e, [x, y, t]) in channels {
+            for l in 0..LANES {
+                let (we, wx, wy) = (weights[l] * e[l], weights[l] * x[l], weights[l] * y[l]);
+                let terms = [
+                    we * e[l],
+                    we * x[l],
+                    we * y[l],
+                    we * t[l],
+                    wx * x[l],
+                    wx * y[l],
+                    wx * t[l],
+                    wy * y[l],
+                    wy * t[l],
+                    weights[l] * t[l] * t[l],
+                ];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[l] += term;
+                }
+            }
+        }
+        let [misfit, ex, ey, et, xx, xy, xt, yy, yt, tt] = sums.map(|lanes| lanes.iter().sum::<f64>());
+        Self { misfit, right: [ex, ey, et], information: [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]] }
+    }
+
+    /// With what is expected of the last unknown: a normal density of this mean and precision.
+    pub fn with_expected(mut self, unknown: f64, [mean, precision]: [f64; 2]) -> Self {
+        let off = unknown - mean;
+        self.misfit += off * off * precision;
+        self.right[2] -= off * precision;
+        self.information[2][2] += precision;
+        self
+    }
+}
+
+/// Steps, those that were refused included.
+const MOST_STEPS: usize = 40;
+
+/// The minimum near `start`, and its equations; every unknown stays between its ends, and one whose ends are the same is not looked for. A
+/// step that lowers the misfit by less than `small` is the last one.
+pub(super) fn descend(
+    start: Unknowns,
+    ends: [(f64, f64); 3],
+    small: f64,
+    mut equations: impl FnMut(Unknowns) -> Equations,
+) -> (Unknowns, Equations) {
+    let held = |at: Unknowns| std::array::from_fn(|k| at[k].clamp(ends[k].0, ends[k].1));
+    let mut at: Unknowns = held(start);
+    let mut here = equations(at);
+    let mut damping = 1e-3;
+    for _ in 0..MOST_STEPS {
+        let Some(step) = damped_step(&here, at, ends, damping) else { break };
+        let next: Unknowns = held(std::array::from_fn(|k| at[k] + step[k]));
+        let gain: f64 = (0..3).map(|k| (next[k] - at[k]) * here.right[k]).sum();
+        let there = equations(next);
+        if there.misfit <= here.misfit {
+            (at, here) = (next, there);
+            damping = (0.1 * damping).max(1e-9);
+        } else {
+            damping = (10.0 * damping).max(1e-3);
+        }
+        if gain.abs() <= small {
+            break;
+        }
+    }
+    (at, here)
+}
+
+/// The damped step of those unknowns that are free: at an end, the one that leads beyond it is not. `None` where no unknown is free or the
+/// reading tells nothing.
+fn damped_step(equations: &Equations, at: Unknowns, ends: [(f64, f64); 3], damping: f64) -> Option<Unknowns> {
+    let free: [bool; 3] = std::array::from_fn(|k| {
+        let ((least, most), right) = (ends[k], equations.right[k]);
+        least < most && !(at[k] <= least && right < 0.0 || at[k] >= most && right > 0.0)
+    });
+    if free == [false; 3] {
+        return None;
+    }
+    let mut matrix = equations.information;
+    for (k, row) in matrix.iter_mut().enumerate() {
+        row[k] *= 1.0 + damping;
+    }
+    Some(Ldl::of_free(&matrix, free)?.solve(equations.right))
+}
