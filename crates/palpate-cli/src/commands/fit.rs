@@ -1,15 +1,14 @@
 //! `palpate fit`: calibrate an estimator.
 
-use super::inspect::rows;
+use super::learnt;
 use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::{self, Observer};
 use crate::{input, output};
-use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, Method, TimeLimit, Tried, choose};
+use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
-use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
@@ -65,13 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "training diverged after {epochs} epochs; nothing was written: lower the learning rate or the momentum"
         )));
     }
-    let set_aside = match &locator.method {
-        Method::Influence(InfluenceLocator::ForceLinear(linear)) => linear.set_aside(),
-        _ => &[],
-    };
-    if !set_aside.is_empty() {
-        eprintln!("set aside, as no function of the position explains them: {}", rows(set_aside));
-    }
+    let learnt = learnt::of_locator(&locator);
     let json = locator.to_json().map_err(Complaint::new)?;
     output::write_file(&arguments.out, json.as_bytes())?;
     if arguments.json {
@@ -81,8 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "estimator": locator.kind(),
             "seed": arguments.seed,
             "rows": recording.rows.len(),
-            "rows_set_aside": set_aside.iter().map(|row| row + 1).collect::<Vec<_>>(),
             "training"?: training,
+            "learnt"?: learnt.map(|(linear, names)| learnt::json(linear, &names)),
         });
     }
     let ended = training.map_or_else(String::new, |outcome| format!("; {}", in_words(outcome)));
@@ -91,7 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         locator.kind(),
         recording.rows.len(),
         arguments.out.display()
-    ))
+    ))?;
+    let lines = learnt.map(|(linear, names)| learnt::summary(linear, &names)).unwrap_or_default();
+    lines.iter().try_for_each(|line| output::say(format!("  {line}")))
 }
 
 /// The rig with its estimator chosen by cross-validation where it is `auto`, saying why.

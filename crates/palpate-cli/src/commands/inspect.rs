@@ -1,19 +1,20 @@
 //! `palpate inspect`: what any of palpate's files holds, in words.
 
+use super::learnt;
 use crate::failure::Failure;
+use crate::json::object;
 use crate::{input, output};
 use palpate_estimators::arrangement::{Arrangement, Training};
 use palpate_estimators::centroid::Weighing;
 use palpate_estimators::estimator::{Locator, Method};
+use palpate_estimators::influence::InfluenceLocator;
 use palpate_estimators::influence::measured::{MeasuredLocator, NuisanceRole};
-use palpate_estimators::influence::{ForceLinearLocator, InfluenceLocator, Source};
 use palpate_estimators::network::Topology;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::{Extent, SurfaceSpec};
 use palpate_mechanics::units::{Dimension, Quantity, format_count, format_length_mm};
-use palpate_numerics::regression::Kernel;
 use palpate_rig::Rig;
 use std::path::{Path, PathBuf};
 
@@ -25,19 +26,32 @@ pub struct Arguments {
     /// The rig whose recording it is, to read a CSV by
     #[arg(long, value_name = "RIG")]
     rig: Option<PathBuf>,
+    /// Print what is said as JSON, and what a locator of a surface without a model has learnt of it as numbers
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.file;
     let text = input::read_text(path)?;
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let mut fitted = None;
     let lines = match extension.to_ascii_lowercase().as_str() {
         "toml" if text.lines().any(|line| line.trim_start().starts_with("[[arm]]")) => study(path, &text)?,
         "toml" => rig(&input::read_rig(path)?),
         "csv" => csv(path, &text, arguments.rig.as_deref())?,
-        _ => locator(path, &text)?,
+        _ => locator(fitted.insert(input::parse_locator(path, &text)?)),
     };
-    output::say(lines.join("\n"))
+    if !arguments.json {
+        return output::say(lines.join("\n"));
+    }
+    output::say_json(&object! {
+        "palpate": env!("CARGO_PKG_VERSION"),
+        "file": path.display().to_string(),
+        "says": lines,
+        "estimator"?: fitted.as_ref().map(|locator| locator.kind()),
+        "learnt"?: fitted.as_ref().and_then(learnt::of_locator).map(|(linear, names)| learnt::json(linear, &names)),
+    })
 }
 
 fn rig(rig: &Rig) -> Vec<String> {
@@ -157,8 +171,7 @@ fn study(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     Ok(lines)
 }
 
-fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
-    let locator = input::parse_locator(path, text)?;
+fn locator(locator: &Locator) -> Vec<String> {
     let provenance = &locator.provenance;
     let mut lines = vec![format!(
         "a locator, {}, fitted by palpate {}, seed {}",
@@ -167,7 +180,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
         provenance.seed
     )];
     lines.extend(setup(&locator.setup));
-    lines.extend(method(&locator));
+    lines.extend(method(locator));
     lines.push(match locator.false_alarm_rate() {
         Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
         None => "untouched readings are not told from contacts: it does not know what the board reads then"
@@ -178,7 +191,7 @@ fn locator(path: &Path, text: &str) -> Result<Vec<String>, Failure> {
     for digest in &recording.digests {
         lines.push(format!("    sha256 {digest}"));
     }
-    Ok(lines)
+    lines
 }
 
 fn method(locator: &Locator) -> Vec<String> {
@@ -212,9 +225,9 @@ fn method(locator: &Locator) -> Vec<String> {
             plane.table().rows
         )],
         Method::Influence(InfluenceLocator::ForceLinear(linear)) => {
-            force_linear(linear, &locator.setup.layout().names())
+            learnt::in_words(linear, &locator.setup.layout().names())
         }
-        Method::Influence(InfluenceLocator::Measured(measured)) => vec![learnt(measured)],
+        Method::Influence(InfluenceLocator::Measured(measured)) => vec![free(measured)],
         Method::NetworkLm(networks) => networks
             .members
             .iter()
@@ -249,86 +262,20 @@ fn method(locator: &Locator) -> Vec<String> {
     }
 }
 
-fn force_linear(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
-    let channels =
-        linear.channels().map(|(c, offset, noise)| format!("{}: {offset:.4} ± {noise:.2}", names[c]));
-    let presses = format_count(linear.presses() as u64);
-    let mut lines = vec![
-        "reading = offset + force × influence(position), learnt from the recording".to_owned(),
-        response(linear),
-        format!("influence functions: {}, from {presses} presses", influences(linear)),
-        format!("offset and noise of the channels in use: {}", channels.collect::<Vec<_>>().join(", ")),
-    ];
-    let drifts: Vec<String> =
-        linear.drifts().into_iter().map(|(c, sd)| format!("{} by {sd:.1}", names[c])).collect();
-    if !drifts.is_empty() {
-        lines.push(format!(
-            "drift over the recording: {}, taken off; the offsets are those at its end",
-            drifts.join(", ")
-        ));
-    }
-    if !linear.set_aside().is_empty() {
-        lines.push(format!(
-            "set aside, as no function of the position explains them: {}",
-            rows(linear.set_aside())
-        ));
-    }
-    lines
-}
-
-/// Rows of a recording, counted from 1.
-pub fn rows(from_0: &[usize]) -> String {
-    let numbers: Vec<String> = from_0.iter().map(|row| (row + 1).to_string()).collect();
-    format!("{} {}", if numbers.len() == 1 { "row" } else { "rows" }, numbers.join(", "))
-}
-
-fn response(linear: &ForceLinearLocator) -> String {
-    if linear.response() != 1.0 {
-        return format!(
-            "structure: force-monotone; readings follow the force to the power of {:.2}",
-            linear.response()
-        );
-    }
-    match linear.nonlinearity() {
-        0.0 => "structure: force-linear; linear in the force, as far as the presses tell".to_owned(),
-        change => format!(
-            "structure: force-linear; taken as linear in the force, though influences change by some {:.0} % with it",
-            100.0 * change
-        ),
-    }
-}
-
-fn influences(linear: &ForceLinearLocator) -> String {
-    let smooth = linear.correlation().map(|(kernel, lengths_m)| {
-        let lengths: Vec<String> = lengths_m.iter().map(|length_m| format_length_mm(*length_m)).collect();
-        let kernel = match kernel {
-            Kernel::Matern32 => "Matérn 3/2",
-            Kernel::Matern52 => "Matérn 5/2",
-            Kernel::SquaredExponential => "squared exponential",
-        };
-        format!("Gaussian process, {kernel}, length scale {}", lengths.join(" and "))
-    });
-    let Some(source) = linear.source() else { return smooth.unwrap_or_default() };
-    let kind = match source {
-        Source::Strain => "strain",
-        Source::Slope => "slope",
-        Source::Deflection => "deflection",
-    };
-    let rest = smooth.map(|smooth| format!(", and {smooth}")).unwrap_or_default();
-    format!("those of sensors of {kind} at places that the presses tell, polynomials{rest}")
-}
-
-fn learnt(measured: &MeasuredLocator) -> String {
+fn free(measured: &MeasuredLocator) -> String {
     let table = measured.table();
     let counts = [table.x.count, table.y.count, table.nuisance.count];
     let nodes: Vec<String> = counts.iter().filter(|count| **count > 1).map(usize::to_string).collect();
-    let nuisance = match measured.role() {
-        NuisanceRole::None => "",
-        NuisanceRole::Force => " and force",
-        NuisanceRole::Other => " and the nuisance coordinate",
+    let (nuisance, why) = match measured.role() {
+        NuisanceRole::None => ("", "nothing else was recorded that they depend on, or the rig asks for it"),
+        NuisanceRole::Force => (
+            " and force",
+            "they are no multiple of a function of the force, as far as the presses tell, or the rig asks for it",
+        ),
+        NuisanceRole::Other => (" and the nuisance coordinate", "the rig names a nuisance column"),
     };
     format!(
-        "structure: free; readings learnt from the recording as functions of position{nuisance}: {} nodes",
+        "structure: free; readings learnt from the recording as functions of position{nuisance}, since {why}: {} nodes",
         nodes.join(" × ")
     )
 }

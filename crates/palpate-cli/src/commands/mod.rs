@@ -6,6 +6,7 @@ pub mod evaluate;
 pub mod fit;
 pub mod init;
 pub mod inspect;
+mod learnt;
 pub mod limit;
 pub mod locate;
 pub mod profile;

@@ -7,6 +7,7 @@ mod compare;
 mod design;
 mod digit;
 mod init;
+mod learnt;
 mod limit;
 mod plane;
 mod positions;

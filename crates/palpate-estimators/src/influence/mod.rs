@@ -18,7 +18,7 @@ mod prior;
 
 pub use beam::{BeamLikelihood, BeamLocator, FittedInfluence, InfluenceTable, Scratch};
 pub use config::{ForceBelief, Influence, InfluenceFitError, InfluenceSource, Structure};
-pub use force_linear::{ForceLinearLocator, Source};
+pub use force_linear::{DriftCourse, ForceLinearLocator, Scatter, Source};
 pub use grid::Axis;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};

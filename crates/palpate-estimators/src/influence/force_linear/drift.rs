@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Whatever the course, the variance of what the drift changes from the first row to the last is 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::influence) enum DriftCourse {
+pub enum DriftCourse {
     /// A random walk.
     #[default]
     Walk,
@@ -19,10 +19,10 @@ pub(in crate::influence) enum DriftCourse {
 }
 
 impl DriftCourse {
-    pub const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
+    pub(super) const ALL: [Self; 3] = [Self::Walk, Self::Linear, Self::Smooth];
 
     /// Covariance of the drift at two times, but for a constant of the time, which is in the offset.
-    pub fn covariance(self, a: f64, b: f64) -> f64 {
+    pub(super) fn covariance(self, a: f64, b: f64) -> f64 {
         /// Of the smooth course.
         const LENGTH: f64 = 0.5;
         let correlation = |way: f64| Kernel::SquaredExponential.correlation((way / LENGTH) * (way / LENGTH));

@@ -10,10 +10,12 @@
 //! turned back. The determinant belongs there: between presses, where v is large, everything would
 //! explain a reading otherwise.
 
+use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
 use crate::fit::{Locate, LocatorFault};
+use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Layers, Look, Slopes, ToldForce, look_at_cells,
@@ -96,6 +98,9 @@ pub(super) struct Stored {
     pub prior: Prior,
     /// Rows of the recording that were set aside, from 0.
     pub set_aside: Vec<usize>,
+    /// The structure that was asked for.
+    #[serde(default)]
+    pub structure: Structure,
     /// Number of presses that were learnt from.
     pub presses: usize,
     /// Degrees of freedom that tell each channel's noise.
@@ -124,6 +129,15 @@ pub struct ForceLinearLocator {
     noise_bound: f64,
     /// The most that a contact takes off the square of noise alone.
     detection_bound: f64,
+}
+
+/// Scatter of presses that grows in proportion to the response to their force, beside the noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scatter {
+    /// The root mean square force of the presses, in newtons.
+    pub force_n: f64,
+    /// Number of each channel in use, from 0, with the standard deviation of its scatter under this force, in its unit.
+    pub sd: Vec<(usize, f64)>,
 }
 
 /// Contacts are expected to have forces that spread this many times as far as those of the presses.
@@ -241,11 +255,6 @@ impl ForceLinearLocator {
             .then_some((self.stored.prior.kernel, &self.stored.prior.lengths_m))
     }
 
-    /// How far the presses were found from linear: the relative change of an influence with the force; 0 where they agree.
-    pub fn nonlinearity(&self) -> f64 {
-        self.stored.prior.nonlinearity
-    }
-
     /// Offset of each channel, in its unit; 0 of those that are not in use.
     pub fn offsets(&self) -> Vec<f64> {
         let mut offsets = vec![0.0; self.stored.channels];
@@ -273,6 +282,24 @@ impl ForceLinearLocator {
     pub fn drifts(&self) -> Vec<(usize, f64)> {
         let sd = self.stored.prior.drift.sqrt();
         if sd > 0.0 { self.channels().map(|(c, _, noise)| (c, sd * noise)).collect() } else { Vec::new() }
+    }
+
+    /// Course of the drift; `None` where the presses do not tell a drift.
+    pub fn drift_course(&self) -> Option<DriftCourse> {
+        (self.stored.prior.drift > 0.0).then_some(self.stored.prior.drift_course)
+    }
+
+    /// The scatter of presses that grows with their force; `None` where the presses do not tell one.
+    pub fn scatter(&self) -> Option<Scatter> {
+        let Prior { scatter, force_scale_n, .. } = self.stored.prior;
+        let channel = |(c, _, noise): (usize, f64, f64)| (c, scatter.sqrt() * noise);
+        (scatter > 0.0)
+            .then(|| Scatter { force_n: force_scale_n, sd: self.channels().map(channel).collect() })
+    }
+
+    /// The structure that was asked for; what was found is its [`response`](Self::response).
+    pub fn asked_structure(&self) -> Structure {
+        self.stored.structure
     }
 
     /// Rows of the recording, from 0, that were set aside, as no function of the position explains them.

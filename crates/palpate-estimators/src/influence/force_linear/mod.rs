@@ -13,8 +13,9 @@ mod presses;
 mod prior;
 mod scan;
 
+pub use drift::DriftCourse;
 pub(crate) use learning::{FOLDS, MOST_PRESSES};
-pub use locator::ForceLinearLocator;
+pub use locator::{ForceLinearLocator, Scatter};
 pub use prior::Source;
 
 use super::config::Structure;
@@ -93,6 +94,7 @@ fn fit_condensed(
         residual_limit: f64::INFINITY,
         prior: prior.clone(),
         set_aside: learnt.set_aside.clone(),
+        structure,
         presses: presses.len(),
         noise_freedom: presses.noise_freedom(),
         false_alarm_rate: FalseAlarmRate::DEFAULT,

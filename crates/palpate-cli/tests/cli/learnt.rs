@@ -1,0 +1,75 @@
+//! What a recording has told of a surface without a model, said by `fit` and `inspect`.
+
+use crate::support::board::{Board, RIG, Touch};
+use crate::support::command::{folder, run, said};
+use std::fs;
+
+/// A recording of presses at 20 places in which every channel drifts by 3 counts after every sixth press; the forces are recorded with
+/// an error of up to a tenth, and one press is recorded at the wrong end.
+fn disturbed(board: &mut Board) -> String {
+    let mut csv = String::new();
+    for i in 0..120 {
+        if i % 6 == 5 {
+            board.move_steadily(3.0);
+        }
+        let place_mm = 15.0 + 14.0 * f64::from((7 * i) % 20);
+        let force_n = 1.0 + f64::from((3 * i) % 5);
+        let pressed = Touch {
+            position_mm: if i == 49 { 300.0 - place_mm } else { place_mm },
+            force_n: if i % 4 == 0 { 0.0 } else { force_n * (0.9 + 0.2 * board.uniform()) },
+        };
+        let reading = board.reading(pressed).map(|value| format!("{value:.3}")).join(",");
+        let force_n = if i % 4 == 0 { 0.0 } else { force_n };
+        if csv.is_empty() {
+            csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
+        }
+        csv += &format!("{place_mm},{force_n},{reading}\n");
+    }
+    csv
+}
+
+#[test]
+fn drift_scatter_and_what_was_set_aside_are_said() {
+    let (folder, mut board) = (folder(RIG), Board::new(11));
+    fs::write(folder.path().join("presses.csv"), disturbed(&mut board)).unwrap();
+    let fit = ["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"];
+    let fitted = said(&run(folder.path(), &fit));
+    let inspected = said(&run(folder.path(), &["inspect", "board.json"]));
+    let words = inspected.lines().filter(|line| !line.contains("sha256")).collect::<Vec<_>>().join("\n");
+    insta::assert_snapshot!(format!("{fitted}\n{words}"));
+
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        serde_json::from_str(&said(&run(folder.path(), arguments))).unwrap()
+    };
+    let of_fit = json(&[&fit[..], &["--json"]].concat());
+    let of_locator = json(&["inspect", "board.json", "--json"]);
+    assert_eq!(of_fit["learnt"], of_locator["learnt"]);
+    assert_eq!(of_locator["says"].as_array().unwrap().len(), inspected.lines().count());
+    let learnt = &of_locator["learnt"];
+    assert!(learnt["rows_set_aside"].as_array().unwrap().contains(&serde_json::json!(50)), "{learnt}");
+    assert_eq!(learnt["drift_course"], "linear");
+    let channel = &learnt["channels"][0];
+    // 60 counts over the recording; a newton moves the strip by some 30 counts.
+    let drift_sd = channel["drift_sd"].as_f64().unwrap();
+    assert!((15.0..240.0).contains(&drift_sd), "{learnt}");
+    assert!((0.5..15.0).contains(&channel["scatter_sd"].as_f64().unwrap()), "{learnt}");
+
+    let rig = json(&["inspect", "rig.toml", "--json"]);
+    assert_eq!((&rig["says"][0], rig.get("learnt")), (&serde_json::json!("a rig"), None));
+}
+
+#[test]
+fn the_structure_that_was_taken_is_said_with_its_reason() {
+    let (folder, mut board) = (folder(RIG), Board::new(3));
+    fs::write(folder.path().join("presses.csv"), board.calibration(60)).unwrap();
+    let said_of = |structure: &str| {
+        let rig = format!("{RIG}structure = \"{structure}\"\n");
+        fs::write(folder.path().join("rig.toml"), rig).unwrap();
+        said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
+        let inspected = said(&run(folder.path(), &["inspect", "board.json"]));
+        let line = inspected.lines().find(|line| line.starts_with("structure:"));
+        line.unwrap_or_default().to_owned()
+    };
+    let said: Vec<String> = ["auto", "force-linear", "force-monotone", "free"].map(said_of).to_vec();
+    insta::assert_snapshot!(said.join("\n"));
+}
