@@ -37,6 +37,9 @@ pub struct Arguments {
     /// Column of a coordinate that readings depend on and that is unknown in use
     #[arg(long, value_name = "NAME")]
     nuisance: Option<String>,
+    /// Column that marks the rows in which nothing touched, with 1, true or yes
+    #[arg(long, value_name = "NAME")]
+    untouched: Option<String>,
     /// Column of a channel; may be repeated
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
@@ -86,6 +89,7 @@ impl Arguments {
             force: self.force.clone(),
             time: self.time.clone(),
             nuisance: self.nuisance.clone(),
+            untouched: self.untouched.clone(),
             channels: self.channel.clone(),
             separator: self.separator,
             decimal: self.decimal,

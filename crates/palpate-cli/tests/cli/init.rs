@@ -166,3 +166,56 @@ fn what_cannot_be_guessed_is_asked_for() {
     assert!(told.starts_with("rig.toml: position `a`, force `b`, 1 channel `c`\n"), "{told}");
     said(&run(folder.path(), &["fit", "rig.toml", "--data", "nameless.csv", "-o", "locator.json"]));
 }
+
+/// The presses of a spreadsheet with untouched rows between them, as `row` writes these.
+fn with_untouched(presses: &[Press], heading: &str, mark: &str, row: &str) -> String {
+    let mut text = format!("{heading}Position [mm];Kraft [N];DMS 1;DMS 2;DMS 3;DMS 4;DMS 5;DMS 6\r\n");
+    for (i, press) in presses.iter().enumerate() {
+        let gauges = press.gauges.iter().map(|counts| comma(*counts)).collect::<Vec<_>>().join(";");
+        text += &format!("{mark}{};{};{gauges}\r\n", comma(press.at_mm), comma(press.force_n));
+        if i % 4 == 1 {
+            let idle =
+                |k: usize| comma(500.0 + 10.0 * k as f64 + ((i * 7919 + k * 104_729) % 17) as f64 / 10.0);
+            text += &format!("{row}{}\r\n", (0..6).map(idle).collect::<Vec<_>>().join(";"));
+        }
+    }
+    text
+}
+
+#[test]
+fn untouched_rows_may_have_no_position_and_be_marked_by_a_column() {
+    let presses = presses();
+    let files = [
+        ("nothing", with_untouched(&presses, "", "", ";;")),
+        ("zero", with_untouched(&presses, "", "", ";0;")),
+        ("marked", with_untouched(&presses, "unberührt;", "nein;", "ja;0;;")),
+        ("numbered", with_untouched(&presses, "No contact;", "0,0;", "1,0;-999;;")),
+        ("crossed", with_untouched(&presses, "Idle;", ";", "x;;0;")),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (mut rigs, mut located) = (Vec::new(), Vec::new());
+    for (name, text) in &files {
+        let [data, rig, locator] = ["csv", "toml", "json"].map(|extension| format!("{name}.{extension}"));
+        fs::write(folder.join(&data), text).unwrap();
+        let told = said(&run(folder, &["init", &data, "-o", &rig]));
+        let written = fs::read_to_string(folder.join(&rig)).unwrap();
+        let marks = written.lines().filter(|line| line.contains("untouched")).collect::<String>();
+        rigs.push(format!("{}\n{marks}", told.lines().next().unwrap_or_default()));
+        assert!(written.contains("length = \"320 mm\""), "{written}");
+        said(&run(folder, &["fit", &rig, "--data", &data, "-o", &locator]));
+        located.push(said(&run(folder, &["locate", &locator, "nothing.csv"])));
+    }
+    insta::assert_snapshot!(rigs.join("\n"));
+    assert!(located.iter().all(|estimates| *estimates == located[0]));
+    assert_eq!(located[0].lines().filter(|line| line.ends_with("no_contact")).count(), 11, "{}", located[0]);
+
+    // A press without a position is no untouched row.
+    let pressed = files[0].1.replacen(";;", ";2,5;", 1);
+    fs::write(folder.join("pressed.csv"), pressed).unwrap();
+    let refused = complained(&run(folder, &["init", "pressed.csv"]), 2);
+    assert!(refused.contains("pressed.csv:4:1"), "{refused}");
+    let words = ["init", "nothing.csv", "--untouched", "Kraft"];
+    let refused = complained(&run(folder, &words), 2);
+    assert!(refused.contains("column `Kraft [N]` must say 1, true or yes"), "{refused}");
+}

@@ -9,6 +9,7 @@ use super::csv_in::{File, Lines};
 use super::dialect::Dialect;
 use super::marks::{Decimal, Separator};
 use super::timestamp::Clock;
+use super::untouched::is_mark;
 use palpate_mechanics::units::Unit;
 
 /// The columns of a CSV file, and what is in them.
@@ -31,6 +32,30 @@ pub struct TableColumn {
     pub content: Content,
 }
 
+impl TableColumn {
+    /// The number of each row, where no row has anything else; `None` where a row has something else, or none has a number.
+    pub fn numbers(&self) -> Option<Vec<Option<f64>>> {
+        match &self.content {
+            Content::Numbers(numbers) => Some(numbers.iter().copied().map(Some).collect()),
+            Content::Gaps { numbers, .. } => Some(numbers.clone()),
+            _ => None,
+        }
+    }
+
+    /// Whether each row is marked by 1, a yes or the like; `None` where a row has neither that nor a no, 0 or nothing.
+    pub fn marks(&self) -> Option<Vec<bool>> {
+        let mark = |number: Option<f64>| match number {
+            Some(1.0) => Some(true),
+            None | Some(0.0) => Some(false),
+            Some(_) => None,
+        };
+        match &self.content {
+            Content::Marks(marks) => Some(marks.clone()),
+            _ => self.numbers()?.into_iter().map(mark).collect(),
+        }
+    }
+}
+
 /// Content of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
@@ -38,8 +63,17 @@ pub enum Content {
     Empty,
     /// A finite number in every row, as written.
     Numbers(Vec<f64>),
+    /// A finite number in some rows, and nothing in the others.
+    Gaps {
+        /// The number of each row.
+        numbers: Vec<Option<f64>>,
+        /// The line of the first row without one.
+        line: usize,
+    },
     /// A timestamp in every row.
     Times,
+    /// A yes, a no or nothing in every row, as marks of untouched rows are: whether it is a yes.
+    Marks(Vec<bool>),
     /// Anything else.
     Other {
         /// Rows that have a number.
@@ -166,26 +200,49 @@ struct Column {
     dialect: Dialect,
     clock: Clock,
     filled: usize,
-    numbers: Vec<f64>,
+    numbers: Vec<Option<f64>>,
     times: usize,
+    /// Whether each row is marked; nothing from the first that is neither marked nor not.
+    marks: Option<Vec<bool>>,
+    /// The line of the first row without anything.
+    gap: Option<usize>,
     other: Option<(usize, String)>,
 }
 
 impl Column {
     fn new(source: &str, separator: Separator, decimal: Option<Decimal>) -> Self {
         let dialect = Dialect { separator, ..Dialect::new(source, decimal) };
-        Self { dialect, clock: Clock::default(), filled: 0, numbers: Vec::new(), times: 0, other: None }
+        Self {
+            dialect,
+            clock: Clock::default(),
+            filled: 0,
+            numbers: Vec::new(),
+            times: 0,
+            marks: Some(Vec::new()),
+            gap: None,
+            other: None,
+        }
     }
 
     /// Takes the next field; a doubt that would make its numbers a thousand times as large is the caller's to settle.
     fn push(&mut self, line: usize, text: &str) -> Result<(), CsvProblem> {
-        self.filled += usize::from(!text.is_empty());
+        self.marks = self.marks.take().zip(is_mark(text)).map(|(mut marks, mark)| {
+            marks.push(mark);
+            marks
+        });
+        if text.is_empty() {
+            self.gap.get_or_insert(line);
+            self.numbers.push(None);
+            return Ok(());
+        }
+        self.filled += 1;
         let read = if text.contains(':') {
             self.clock.read(text, || Err(CsvProblem::EmptyField)).map(|_| self.times += 1)
         } else {
-            self.dialect.number(text, Unit::NONE).map(|number| self.numbers.push(number))
+            self.dialect.number(text, Unit::NONE).map(|number| self.numbers.push(Some(number)))
         };
-        if self.other.is_none() && (read.is_err() || (self.times > 0 && !self.numbers.is_empty())) {
+        let both = self.times > 0 && self.numbers.iter().any(Option::is_some);
+        if self.other.is_none() && (read.is_err() || both) {
             self.other = Some((line, text.to_owned()));
         }
         match read {
@@ -195,11 +252,17 @@ impl Column {
     }
 
     fn content(self) -> Content {
-        match self.other {
-            _ if self.filled == 0 => Content::Empty,
-            Some((line, text)) => Content::Other { numbers: self.numbers.len(), line, text },
-            None if self.times > 0 => Content::Times,
-            None => Content::Numbers(self.numbers),
+        let Self { filled, numbers, times, marks, gap, other, .. } = self;
+        match (other, gap) {
+            _ if filled == 0 => Content::Empty,
+            (Some((line, text)), _) => match marks {
+                Some(marks) => Content::Marks(marks),
+                None => Content::Other { numbers: numbers.iter().flatten().count(), line, text },
+            },
+            (None, Some(line)) if times > 0 => Content::Other { numbers: 0, line, text: String::new() },
+            (None, None) if times > 0 => Content::Times,
+            (None, Some(line)) => Content::Gaps { numbers, line },
+            (None, None) => Content::Numbers(numbers.into_iter().flatten().collect()),
         }
     }
 }
@@ -214,11 +277,11 @@ mod tests {
 
     #[test]
     fn columns_are_told_by_what_is_in_them() {
-        let text = "\u{feff}sep=;\nOrt [mm];Zeit;Notiz;leer;S1;S2\n;;;;;\n\
-                    1,5;10:00:00;links, oben;;-3;4\n2;10:00:01;;;1e3;n/a\n;;;;;\n";
+        let text = "\u{feff}sep=;\nOrt [mm];Zeit;Notiz;leer;S1;S2;Kraft;frei\n;;;;;;;\n\
+                    1,5;10:00:00;links, oben;;-3;4;;ja\n2;10:00:01;;;1e3;n/a;2,5;\n;;;;;;;\n";
         let table = table(text);
         let headings: Vec<&str> = table.columns.iter().map(|column| column.heading.as_str()).collect();
-        assert_eq!(headings, ["Ort [mm]", "Zeit", "Notiz", "leer", "S1", "S2"]);
+        assert_eq!(headings, ["Ort [mm]", "Zeit", "Notiz", "leer", "S1", "S2", "Kraft", "frei"]);
         assert_eq!((table.header, table.rows), (Header::Present, 2));
         let other = |numbers, line, text: &str| Content::Other { numbers, line, text: text.to_owned() };
         let contents = [
@@ -228,6 +291,8 @@ mod tests {
             Content::Empty,
             Content::Numbers(vec![-3.0, 1000.0]),
             other(1, 5, "n/a"),
+            Content::Gaps { numbers: vec![None, Some(2.5)], line: 4 },
+            Content::Marks(vec![true, false]),
         ];
         assert_eq!(table.columns.into_iter().map(|column| column.content).collect::<Vec<_>>(), contents);
     }

@@ -70,10 +70,12 @@ pub(super) fn is_mark(text: &str) -> Option<bool> {
     const YES: [&str; 7] = ["1", "true", "yes", "y", "x", "ja", "wahr"];
     const NO: [&str; 6] = ["", "0", "false", "no", "nein", "falsch"];
     let is_one_of = |words: &[&str]| words.iter().any(|word| text.eq_ignore_ascii_case(word));
-    if is_one_of(&YES) {
+    // Spreadsheets write numbers with decimals.
+    let number = text.replacen(',', ".", 1).parse::<f64>().ok();
+    if is_one_of(&YES) || number == Some(1.0) {
         return Some(true);
     }
-    is_one_of(&NO).then_some(false)
+    (is_one_of(&NO) || number == Some(0.0)).then_some(false)
 }
 
 #[cfg(test)]
@@ -93,8 +95,8 @@ mod tests {
 
     #[test]
     fn marks_are_read_as_people_write_them() {
-        assert_eq!(["1", "TRUE", "x", "Ja"].map(is_mark), [Some(true); 4]);
-        assert_eq!(["", "0", "false", "Nein"].map(is_mark), [Some(false); 4]);
+        assert_eq!(["1", "TRUE", "x", "Ja", "1,0"].map(is_mark), [Some(true); 5]);
+        assert_eq!(["", "0", "false", "Nein", "0.00"].map(is_mark), [Some(false); 5]);
         assert_eq!(["2", "maybe"].map(is_mark), [None; 2]);
     }
 }

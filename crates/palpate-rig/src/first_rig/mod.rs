@@ -29,6 +29,8 @@ pub struct Hints {
     pub time: Option<String>,
     /// The nuisance coordinate.
     pub nuisance: Option<String>,
+    /// The marks of untouched rows.
+    pub untouched: Option<String>,
     /// The channels; those that are guessed where there are none.
     pub channels: Vec<String>,
     /// Separator of the fields.
@@ -84,6 +86,14 @@ pub enum FirstRigError {
         text: String,
         /// Its line.
         line: usize,
+    },
+    /// A hint names a column that marks no rows.
+    #[error(
+        "--untouched: column `{column}` must say 1, true or yes, or 0, false, no or nothing, in every row"
+    )]
+    NotMarks {
+        /// The heading.
+        column: String,
     },
     /// A hint names a column without numbers.
     #[error("{flag}: column `{column}` has no numbers")]
@@ -206,6 +216,7 @@ impl FirstRig {
         words.extend(self.roles.force.map(|column| format!("force {}", name(column))));
         words.extend(self.roles.time.map(|column| format!("time {}", name(column))));
         words.extend(self.roles.nuisance.map(|column| format!("nuisance {}", name(column))));
+        words.extend(self.roles.untouched.map(|column| format!("untouched rows {}", name(column))));
         let channels = &self.roles.channels;
         let ends = match channels.as_slice() {
             [only] => name(*only),
@@ -316,6 +327,16 @@ impl FirstRig {
                 toml.line(&format!("nuisance_unit = \"{unit}\""), "");
             }
         }
+        if let Some(untouched) = roles.untouched {
+            let marks = self.table.columns[untouched].marks().unwrap_or_default();
+            let count = marks.iter().filter(|mark| **mark).count();
+            let marked = format!("{count} of {} rows, in which nothing touched", marks.len());
+            let comment = match self.hints.untouched {
+                Some(_) => marked,
+                None => format!("a guess by its name: it marks {marked}"),
+            };
+            toml.line(&format!("untouched = {}", self.key(untouched)), &comment);
+        }
         let channels: Vec<String> = roles.channels.iter().map(|column| self.key(*column)).collect();
         toml.line(&format!("channels = [{}]", channels.join(", ")), "");
         for (column, left) in &roles.left {
@@ -357,6 +378,7 @@ impl FirstRig {
             Left::Empty => "there is nothing in it".to_owned(),
             Left::Words => "there are words in it".to_owned(),
             Left::Word { line, text } => format!("`{text}` on line {line} is no number"),
+            Left::Gap { line } => format!("there is nothing in it on line {line}"),
             Left::Unnamed => "it has no name of its own".to_owned(),
             Left::Constant(value) => format!("it is {value} in every row"),
             Left::Dead(value) => format!("it is {value} in every row, which teaches a channel nothing"),
@@ -398,16 +420,32 @@ impl FirstRig {
     /// The stretch of a coordinate that the presses cover, and a surface's that holds it.
     fn side(&self, column: usize) -> Result<Side, FirstRigError> {
         let unit = self.unit(column, Dimension::Length)?;
-        let TableColumn { heading, content } = &self.table.columns[column];
-        let Content::Numbers(numbers) = content else {
+        let heading = &self.table.columns[column].heading;
+        let numbers = self.pressed(column);
+        if numbers.is_empty() {
             return Err(FirstRigError::NoNumbers { flag: "--position", column: heading.clone() });
-        };
-        let (low, high) = range(numbers);
+        }
+        let (low, high) = range(&numbers);
         if low == high {
             return Err(FirstRigError::OnePosition { column: heading.clone(), value: low });
         }
         let metres = |value: f64| unit.parse_si(&value.to_string()).unwrap_or(value);
         Ok(Side::around(metres(low), metres(high)))
+    }
+
+    /// The numbers of a column in rows that are not untouched, where there are any.
+    fn pressed(&self, column: usize) -> Vec<f64> {
+        let numbers = self.table.columns[column].numbers().unwrap_or_default();
+        let forces = self.roles.force.and_then(|force| self.table.columns[force].numbers());
+        let marks = self.roles.untouched.and_then(|untouched| self.table.columns[untouched].marks());
+        let is_touched = |row: usize| {
+            let force = forces.as_ref().and_then(|forces| forces[row]);
+            force != Some(0.0) && !marks.as_ref().is_some_and(|marks| marks[row])
+        };
+        let rows = || numbers.iter().enumerate().filter_map(|(row, number)| Some((row, (*number)?)));
+        let touched: Vec<f64> =
+            rows().filter(|(row, _)| is_touched(*row)).map(|(_, number)| number).collect();
+        if touched.is_empty() { rows().map(|(_, number)| number).collect() } else { touched }
     }
 
     fn looked_at(&self, recording: &Recording) -> Vec<String> {
@@ -419,6 +457,9 @@ impl FirstRig {
                 )),
                 Left::Word { line, text } => {
                     Some(format!("column `{heading}` was left out: `{text}` on line {line} is no number"))
+                }
+                Left::Gap { line } => {
+                    Some(format!("column `{heading}` was left out: there is nothing in it on line {line}"))
                 }
                 Left::Unit(unit) => Some(format!(
                     "column `{heading}` was left out: palpate does not read it in `{unit}`; convert it"

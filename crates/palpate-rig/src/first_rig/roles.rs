@@ -56,6 +56,30 @@ const TIME: &[&str] = &[
     "seconds",
     "sekunden",
 ];
+/// Names of a column that marks untouched rows, their words joined.
+const UNTOUCHED: &[&str] = &[
+    "untouched",
+    "nottouched",
+    "notouch",
+    "nocontact",
+    "idle",
+    "baseline",
+    "tare",
+    "unloaded",
+    "unberührt",
+    "unberuehrt",
+    "unbelastet",
+    "keinkontakt",
+    "ohnekontakt",
+    "keineberührung",
+    "ohneberührung",
+    "ruhe",
+    "ruhelage",
+    "leerlauf",
+    "frei",
+    "nullpunkt",
+    "nulllinie",
+];
 /// Words that may stand beside one of the others and say nothing of their own.
 const FILLERS: &[&str] = &[
     "true", "actual", "measured", "ist", "soll", "contact", "kontakt", "press", "applied", "normal", "axis",
@@ -133,6 +157,8 @@ pub(super) struct Roles {
     pub force: Option<usize>,
     pub time: Option<usize>,
     pub nuisance: Option<usize>,
+    /// The column that marks untouched rows.
+    pub untouched: Option<usize>,
     pub channels: Vec<usize>,
     /// The columns without a role, and why they have none.
     pub left: Vec<(usize, Left)>,
@@ -154,6 +180,10 @@ pub(super) enum Left {
     Word {
         line: usize,
         text: String,
+    },
+    /// A row has nothing.
+    Gap {
+        line: usize,
     },
     /// The name is that of another column, or there is none.
     Unnamed,
@@ -191,13 +221,15 @@ impl Roles {
         let names: Vec<Name> = (0..table.columns.len()).map(|i| Name::new(table, i)).collect();
         let guess = Guess { table, names: &names };
         let told = Told::find(table, hints)?;
+        let untouched = told.untouched.or_else(|| guess.untouched(&told));
         let position = match told.position {
             Some(position) => position,
-            None => guess.position(&told)?,
+            None => guess.position(&told, untouched)?,
         };
         let mut taken = position.columns();
-        taken.extend(told.force.iter().chain(&told.time).chain(&told.nuisance).chain(&told.channels));
-        let force = told.force.or_else(|| guess.force(&taken));
+        let others = told.force.iter().chain(&told.time).chain(&told.nuisance).chain(&untouched);
+        taken.extend(others.chain(&told.channels));
+        let force = told.force.or_else(|| guess.force(&taken, position, untouched));
         taken.extend(force);
         let time = told.time.or_else(|| guess.time(&taken));
         taken.extend(time);
@@ -206,12 +238,12 @@ impl Roles {
             return Err(FirstRigError::NoChannels { columns: described(table) });
         }
         let roles = position.columns().into_iter().chain(force).chain(time).chain(told.nuisance);
-        let roles: Vec<usize> = roles.chain(channels.iter().copied()).collect();
+        let roles: Vec<usize> = roles.chain(untouched).chain(channels.iter().copied()).collect();
         // Separators at the ends of lines make columns that are no columns.
         let blank = |i: &usize| names[*i].words.is_empty() && table.columns[*i].content == Content::Empty;
         let left = (0..names.len()).filter(|i| !roles.contains(i) && !blank(i));
         let left = left.map(|i| (i, guess.reason(i, force.is_some()))).collect();
-        Ok(Self { position, force, time, nuisance: told.nuisance, channels, left })
+        Ok(Self { position, force, time, nuisance: told.nuisance, untouched, channels, left })
     }
 }
 
@@ -221,6 +253,7 @@ struct Told {
     force: Option<usize>,
     time: Option<usize>,
     nuisance: Option<usize>,
+    untouched: Option<usize>,
     channels: Vec<usize>,
 }
 
@@ -229,10 +262,17 @@ impl Told {
         let find = |flag: &'static str, name: &Option<String>| {
             name.as_ref().map(|name| find(table, flag, name)).transpose()
         };
+        // Untouched rows may have nothing there.
         let numbers = |flag: &'static str, name: &Option<String>| {
             let found = find(flag, name)?;
-            found.map(|i| checked(table, flag, i)).transpose()
+            found
+                .map(|i| table.columns[i].numbers().map_or_else(|| checked(table, flag, i), |_| Ok(i)))
+                .transpose()
         };
+        let untouched = find("--untouched", &hints.untouched)?;
+        if let Some(i) = untouched.filter(|i| table.columns[*i].marks().is_none()) {
+            return Err(FirstRigError::NotMarks { column: table.columns[i].heading.clone() });
+        }
         let along = numbers("--position", &hints.position)?;
         let position = match (along, numbers("--x", &hints.x)?, numbers("--y", &hints.y)?) {
             (Some(x), _, _) => Some(PositionRole::Along(x)),
@@ -248,6 +288,7 @@ impl Told {
             force: numbers("--force", &hints.force)?,
             time: find("--time", &hints.time)?,
             nuisance: numbers("--nuisance", &hints.nuisance)?,
+            untouched,
             channels: channels.collect::<Result<_, _>>()?,
         })
     }
@@ -274,7 +315,12 @@ fn checked(table: &Table, flag: &'static str, column: usize) -> Result<usize, Fi
         Content::Other { line, text, .. } => {
             Err(FirstRigError::NotNumbers { flag, column: heading(), text: text.clone(), line: *line })
         }
-        Content::Empty | Content::Times => Err(FirstRigError::NoNumbers { flag, column: heading() }),
+        Content::Gaps { line, .. } => {
+            Err(FirstRigError::NotNumbers { flag, column: heading(), text: String::new(), line: *line })
+        }
+        Content::Empty | Content::Times | Content::Marks(_) => {
+            Err(FirstRigError::NoNumbers { flag, column: heading() })
+        }
     }
 }
 
@@ -288,7 +334,8 @@ pub(super) fn described(table: &Table) -> String {
                 let (low, high) = range(numbers);
                 format!("{low} to {high}")
             }
-            Content::Other { numbers: 0, .. } => "words".to_owned(),
+            Content::Gaps { line, .. } => format!("numbers, but nothing on line {line}"),
+            Content::Other { numbers: 0, .. } | Content::Marks(_) => "words".to_owned(),
             Content::Other { line, text, .. } => format!("numbers, but `{text}` on line {line}"),
         };
         format!("`{}` ({content})", column.heading)
@@ -340,6 +387,12 @@ impl Name {
         self.words.iter().any(|word| names.contains(&word.as_str())) && self.words.iter().all(others)
     }
 
+    /// Whether it says that a row is untouched.
+    fn is_of_untouched(&self) -> bool {
+        let words: Vec<&str> = self.words.iter().map(String::as_str).filter(|word| *word != "is").collect();
+        UNTOUCHED.contains(&words.concat().as_str())
+    }
+
     /// Whether its values can be read as ones of this dimension.
     fn measures(&self, dimension: Dimension) -> bool {
         match (&self.unit, &self.foreign_unit) {
@@ -372,14 +425,38 @@ impl Guess<'_> {
         self.numbers(column).map(range).is_some_and(|(low, high)| low < high)
     }
 
-    fn position(&self, told: &Told) -> Result<PositionRole, FirstRigError> {
+    /// The column of marks that has the name of one, with a mark in some rows and none in others.
+    fn untouched(&self, told: &Told) -> Option<usize> {
         let taken: Vec<usize> = [told.force, told.time, told.nuisance].into_iter().flatten().collect();
+        let taken = [taken.as_slice(), told.channels.as_slice()].concat();
+        let marks = |i: &usize| {
+            let marks = self.table.columns[*i].marks().unwrap_or_default();
+            marks.contains(&true) && marks.contains(&false)
+        };
+        let named = self.columns(&taken, Name::is_of_untouched);
+        named.into_iter().find(marks)
+    }
+
+    /// Columns that have a number in every row, and not always the same; those that have none in some rows where there are no others.
+    fn places(&self, columns: Vec<usize>) -> Vec<usize> {
+        let (full, gaps): (Vec<usize>, Vec<usize>) =
+            columns.into_iter().partition(|i| self.numbers(*i).is_some());
+        let varies_between_gaps = |i: &usize| {
+            let numbers: Vec<f64> =
+                self.table.columns[*i].numbers().unwrap_or_default().into_iter().flatten().collect();
+            !numbers.is_empty() && range(&numbers).0 < range(&numbers).1
+        };
+        let full: Vec<usize> = full.into_iter().filter(|i| self.varies(*i)).collect();
+        if full.is_empty() { gaps.into_iter().filter(varies_between_gaps).collect() } else { full }
+    }
+
+    fn position(&self, told: &Told, untouched: Option<usize>) -> Result<PositionRole, FirstRigError> {
+        let taken: Vec<usize> =
+            [told.force, told.time, told.nuisance, untouched].into_iter().flatten().collect();
         let taken = [taken.as_slice(), told.channels.as_slice()].concat();
         let of = |fit: &dyn Fn(&Name) -> bool| {
             let length = |name: &Name| fit(name) && name.measures(Dimension::Length);
-            let mut columns = self.columns(&taken, length);
-            columns.retain(|i| self.varies(*i));
-            columns
+            self.places(self.columns(&taken, length))
         };
         let x = of(&|name| name.is(&["x"], &[PLACE]));
         let y = of(&|name| name.is(&["y"], &[PLACE]));
@@ -421,14 +498,29 @@ impl Guess<'_> {
         }
     }
 
-    fn force(&self, taken: &[usize]) -> Option<usize> {
+    /// The force; rows without one must be untouched by a mark, or have no position either.
+    fn force(&self, taken: &[usize], position: PositionRole, untouched: Option<usize>) -> Option<usize> {
+        let places: Vec<_> =
+            position.columns().into_iter().map(|i| self.table.columns[i].numbers()).collect();
+        let marks = untouched.and_then(|i| self.table.columns[i].marks());
+        let is_untouched = |row: usize| {
+            let nowhere = places.iter().flatten().all(|numbers| numbers[row].is_none());
+            nowhere || marks.as_ref().is_some_and(|marks| marks[row])
+        };
+        let is_force = |i: &usize| {
+            let numbers = self.table.columns[*i].numbers();
+            let complete = |force: Vec<Option<f64>>| {
+                force.iter().enumerate().all(|(row, force)| force.is_some() || is_untouched(row))
+            };
+            numbers.is_some_and(complete)
+        };
         let named = self.columns(taken, |name| name.is(FORCE, &[]) && name.measures(Dimension::Force));
         let by_unit = || {
             let newtons = |name: &Name| name.unit.is_some_and(|unit| unit.dimension() == Dimension::Force);
             self.columns(taken, |name| newtons(name) && !self.in_family(name))
         };
         let columns = if named.is_empty() { by_unit() } else { named };
-        let columns: Vec<usize> = columns.into_iter().filter(|i| self.numbers(*i).is_some()).collect();
+        let columns: Vec<usize> = columns.into_iter().filter(is_force).collect();
         match columns.as_slice() {
             [only] => Some(*only),
             _ => None,
@@ -479,6 +571,8 @@ impl Guess<'_> {
         };
         match &self.table.columns[column].content {
             Content::Empty => Left::Empty,
+            Content::Marks(_) => Left::Words,
+            Content::Gaps { line, .. } => Left::Gap { line: *line },
             Content::Other { numbers: 0, .. } => Left::Words,
             Content::Other { line, text, .. } => Left::Word { line: *line, text: text.clone() },
             _ if !name.can_be_named => Left::Unnamed,
@@ -519,7 +613,7 @@ fn suffixed(name: &str) -> Option<(&str, Unit)> {
 /// Whether the name is that of something else than a channel.
 fn is_no_channel(name: &Name) -> bool {
     let others = [COUNTERS, CIRCUMSTANCES, TIME, PLACE, FORCE].iter().any(|names| name.is(names, &[]));
-    others || name.is(&["x", "y"], &[PLACE])
+    others || name.is(&["x", "y"], &[PLACE]) || name.is_of_untouched()
 }
 
 /// Whether another column is in the unit of this one, as sensors of one kind are.
