@@ -4,11 +4,10 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::lines::Readings;
 use crate::progress::Observer;
-use palpate_estimators::estimator::{Locator, Status, Tare, TareError};
+use palpate_estimators::estimator::{Locator, Status, Tare, TareError, take_off_drift};
 use palpate_estimators::evaluation::Split;
 use palpate_estimators::fit::{FitTask, Locate};
 use palpate_estimators::influence::Influence;
-use palpate_estimators::offset_course::OffsetCourse;
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::Quantity;
@@ -233,11 +232,6 @@ pub fn tare_splits(
     recording: &Recording,
     splits: &mut [Split],
 ) -> Result<(), Failure> {
-    let course = |training: &Recording, asked: &Recording| {
-        Observer::of_rounds(0)
-            .watch(|watch| Influence::offset_course(FitTask::new(setup, training).watch(watch), asked))
-            .map_err(|error| Failure::from_error(&error))
-    };
     match option.tare {
         Some(Source::Auto) => {}
         Some(_) => {
@@ -249,7 +243,12 @@ pub fn tare_splits(
         }
         None if recording.rows.len() > MOST_LOOKED_AT => return Ok(()),
         None => {
-            if let Some(course) = course(recording, recording)? {
+            let course = Observer::of_rounds(0)
+                .watch(|watch| {
+                    Influence::offset_course(FitTask::new(setup, recording).watch(watch), recording)
+                })
+                .map_err(|error| Failure::from_error(&error))?;
+            if let Some(course) = course {
                 eprintln!(
                     "warning: {}: {}, and so do the readings that are held out; `--tare auto` takes it off",
                     recording.provenance.source,
@@ -259,18 +258,19 @@ pub fn tare_splits(
             return Ok(());
         }
     }
-    let mut spans: Vec<f64> = vec![0.0; setup.layout().len()];
-    for split in splits {
-        split.offsets = course(&split.training, &split.judged)?;
-        let found = split.offsets.iter().flat_map(OffsetCourse::spans);
-        spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
-    }
-    if spans.iter().any(|span| *span > 0.0) {
-        eprintln!("palpate: {}; it is taken off held-out readings", moved_most(setup, &spans));
-    } else {
-        eprintln!("palpate: the presses tell no drift; readings are judged as they are");
+    let spans = Observer::of_rounds(0)
+        .watch(|watch| take_off_drift(setup, splits, watch))
+        .map_err(|error| Failure::from_error(&error))?;
+    match spans {
+        Some(spans) => say_drift(setup, &spans),
+        None => eprintln!("palpate: the presses tell no drift; readings are judged as they are"),
     }
     Ok(())
+}
+
+/// Says how far the channels drift where readings are judged without it.
+pub fn say_drift(setup: &Setup, spans: &[f64]) {
+    eprintln!("palpate: {}; it is taken off held-out readings", moved_most(setup, spans));
 }
 
 /// Rows from which on nobody waits for a warning.

@@ -6,6 +6,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::{self, Observer};
+use crate::tare::say_drift;
 use crate::{input, output};
 use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -100,6 +101,9 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     let go_on = |_| !progress::interrupted();
     let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
     let choice = choose(task, Some(limit)).map_err(|error| Failure::from_error(&error))?;
+    if let Some(spans) = &choice.drift {
+        say_drift(&rig.setup, spans);
+    }
     eprintln!(
         "auto: {}, with the least mean error × interval score at positions held out ({CHOICE_FOLDS} folds)",
         choice.best.kind()

@@ -162,6 +162,16 @@ fn held_out_readings_are_judged_without_the_drift_of_the_recording() {
     let refused =
         complained(&run(folder.path(), &["evaluate", "rig.toml", "--data", "drift.csv", "--tare", "5"]), 2);
     assert!(refused.contains("--tare auto takes off the drift"), "{refused}");
+    // `auto` judges likewise.
+    file("auto.toml", &RIG.replace("\"influence\"", "\"auto\""));
+    let options = ["--data", "drift.csv", "--auto-seconds", "1", "-o", "auto.json"];
+    let fit = run(folder.path(), &[&["fit", "auto.toml"][..], &options].concat());
+    let chosen = String::from_utf8(fit.stderr).unwrap();
+    assert!(chosen.contains("it is taken off held-out readings\nauto: influence, with"), "{chosen}");
+    let tried: Vec<&str> =
+        chosen.lines().find(|line| line.starts_with("influence ")).unwrap().split(' ').collect();
+    let auto_mm: f64 = tried.iter().skip(1).find(|word| !word.is_empty()).unwrap().parse().unwrap();
+    assert!((auto_mm / tared_mm - 1.0).abs() < 1e-2, "{auto_mm} mm, {tared_mm} mm");
     // A locator is judged as it is asked.
     file("untouched.csv", &board.recording(&[Touch::NONE; 40]));
     let touches: Vec<Touch> = (0..40).map(|_| board.touch()).collect();

@@ -32,6 +32,7 @@ use crate::network::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Network, NetworkFitError,
     NetworkLocator, TrainingOutcome,
 };
+use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
@@ -434,6 +435,8 @@ pub struct Choice {
     pub tried: Vec<Tried>,
     /// Kinds that were not, with the reason.
     pub left_out: Vec<(&'static str, String)>,
+    /// Greatest change of each channel by the drift that was taken off the readings held out; nothing where the presses tell none.
+    pub drift: Option<Vec<f64>>,
 }
 
 /// Errors and intervals of an estimator at positions held out.
@@ -477,11 +480,33 @@ pub struct TimeLimit<'a> {
 /// Reason of an estimator that [`TimeLimit`] leaves out.
 const NOT_IN_TIME: &str = "it was not done in time";
 
+/// Brings the readings that splits hold out from the offsets of their time to those that the locators of their folds learn, where the
+/// other presses tell a drift; the greatest change of each channel, or `None` where no split has one.
+///
+/// # Errors
+/// [`InfluenceFitError`] where a split's presses cannot be learnt from, and when the watch stopped it.
+pub fn take_off_drift(
+    setup: &Setup,
+    splits: &mut [Split],
+    watch: Watch,
+) -> Result<Option<Vec<f64>>, InfluenceFitError> {
+    let mut spans: Option<Vec<f64>> = None;
+    for Split { training, judged, offsets } in splits {
+        *offsets = Influence::offset_course(FitTask::new(setup, training).watch(watch), judged)?;
+        for found in offsets.iter().map(OffsetCourse::spans) {
+            let spans = spans.get_or_insert_with(|| vec![0.0; found.len()]);
+            spans.iter_mut().zip(found).for_each(|(most, span)| *most = most.max(span));
+        }
+    }
+    Ok(spans)
+}
+
 /// Folds of the cross-validation that chooses.
 pub const CHOICE_FOLDS: usize = 5;
 
 /// Chooses the estimator for a recording of a setup by cross-validation in [`CHOICE_FOLDS`] folds: the least geometric mean of mean error
-/// and interval score. Estimators are tried from the one that is best on most recordings on.
+/// and interval score. Estimators are tried from the one that is best on most recordings on. In use a drift is tared away, and so it is here:
+/// where the presses tell one, it is taken off the readings held out.
 ///
 /// # Errors
 /// [`FitError::Choice`] when the recording has too few positions, or no estimator suits it: then the last one's reason; and
@@ -490,8 +515,22 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let FitTask { setup, recording, seed, watch } = task;
     let positions = recording.distinct_positions().len();
     let unsuited = |error| FitError::Choice(Box::new(error));
-    let splits =
-        Split::by_folds(recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
+    let recording = recording.clone().in_order();
+    let mut splits =
+        Split::by_folds(&recording, CHOICE_FOLDS.min(positions)).map_err(|error| unsuited(error.into()))?;
+    let whole = FitTask::new(setup, &recording).watch(watch);
+    let course = Influence::offset_course(whole, &recording);
+    let drift = match course
+        .and_then(|course| course.map(|_| take_off_drift(setup, &mut splits, watch)).transpose())
+    {
+        Ok(drift) => drift.flatten(),
+        Err(error) if Cancelled::caused(&error) => return Err(Cancelled.into()),
+        // Presses that tell no influence functions tell no drift; when that estimator is tried, it says why.
+        Err(_) => {
+            splits.iter_mut().for_each(|split| split.offsets = None);
+            None
+        }
+    };
     let start_s = limit.map_or(0.0, |limit| (limit.clock)());
     let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s > limit.seconds);
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
@@ -522,7 +561,7 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let Some(best) = tried.first().map(|(estimator, _)| estimator.clone()) else {
         return Err(last.map_or_else(|| Cancelled.into(), unsuited));
     };
-    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out })
+    Ok(Choice { best, tried: tried.into_iter().map(|(_, outcome)| outcome).collect(), left_out, drift })
 }
 
 impl Locator {
