@@ -5,6 +5,7 @@ use palpate_estimators::estimator::{Locator, Method};
 use palpate_estimators::influence::{
     DriftCourse, ForceLinearLocator, InfluenceLocator, Scatter, Source, Structure,
 };
+use palpate_mechanics::contact::Position;
 use palpate_mechanics::units::{format_count, format_length_mm};
 use palpate_numerics::regression::Kernel;
 use serde::Serialize;
@@ -85,6 +86,14 @@ fn disturbances(linear: &ForceLinearLocator, names: &[String]) -> Vec<String> {
             by_channel(&sd)
         ));
     }
+    if let Some([(least, quiet), (most, noisy)]) = linear.noise_by_place() {
+        let place = |position: Position| linear.extent().place_in_words(position);
+        lines.push(format!(
+            "noise of touches by place, over that of the untouched board: {least:.1} times at {} to {most:.1} times at {}; presses and readings are weighed by it",
+            place(quiet),
+            place(noisy)
+        ));
+    }
     if !linear.set_aside().is_empty() {
         lines.push(format!(
             "set aside, as no function of the position explains them: {}",
@@ -141,6 +150,9 @@ pub fn json(linear: &ForceLinearLocator, names: &[String]) -> impl Serialize + u
         "presses": linear.presses(),
         "channels": channels.collect::<Vec<_>>(),
         "drift_course"?: linear.drift_course(),
+        "noise_by_place"?: linear.noise_by_place().map(|ends| ends.map(|(times, Position { x_m, y_m })| {
+            object! { "times": times, "x_mm": 1e3 * x_m, "y_mm": 1e3 * y_m }
+        })),
         "scatter_force_n"?: scatter.as_ref().map(|scatter| scatter.force_n),
         "rows_set_aside": linear.set_aside().iter().map(|row| row + 1).collect::<Vec<_>>(),
     }

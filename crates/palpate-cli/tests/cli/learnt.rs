@@ -1,7 +1,7 @@
 //! What a recording has told of a surface without a model, said by `fit` and `inspect`.
 
 use crate::support::board::{Board, RIG, Touch};
-use crate::support::command::{folder, run, said};
+use crate::support::command::{complained, folder, run, said};
 use std::fs;
 
 /// A recording of presses at 20 places in which every channel drifts by 3 counts after every sixth press; the forces are recorded with
@@ -56,6 +56,42 @@ fn drift_scatter_and_what_was_set_aside_are_said() {
 
     let rig = json(&["inspect", "rig.toml", "--json"]);
     assert_eq!((&rig["says"][0], rig.get("learnt")), (&serde_json::json!("a rig"), None));
+}
+
+#[test]
+fn noise_by_place_is_said() {
+    let (folder, mut board) = (folder(RIG), Board::new(5));
+    let mut csv = "Position,Force,g1,g2,g3,g4,g5,g6\n".to_owned();
+    for i in 0..120 {
+        let touch = Touch {
+            position_mm: 15.0 + 13.5 * f64::from((8 * i) % 21),
+            force_n: 1.0 + f64::from((3 * i) % 5),
+        };
+        // Four times the noise on one half: the mean of two readings and three times their difference.
+        let [a, b] = [board.reading(touch), board.reading(touch)];
+        let times = if touch.position_mm > 150.0 { 2.8 } else { 0.7 };
+        let reading = a.iter().zip(&b).map(|(a, b)| format!("{:.3}", 0.5 * (a + b) + times * (a - b)));
+        let reading = reading.collect::<Vec<_>>().join(",");
+        csv += &format!("{},{},{reading}\n", touch.position_mm, touch.force_n);
+    }
+    fs::write(folder.path().join("presses.csv"), csv).unwrap();
+    let fitted = said(&run(folder.path(), &["fit", "rig.toml", "--data", "presses.csv", "-o", "board.json"]));
+    let inspected = said(&run(folder.path(), &["inspect", "board.json"]));
+    let line = fitted.lines().find(|line| line.starts_with("  noise of touches")).unwrap().trim();
+    assert!(inspected.contains(line), "{inspected}");
+    insta::assert_snapshot!(line);
+    let json = said(&run(folder.path(), &["inspect", "board.json", "--json"]));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let [least, most] = [0, 1].map(|i| json["learnt"]["noise_by_place"][i]["times"].as_f64().unwrap());
+    assert!((2.5..6.0).contains(&(most / least)), "{json}");
+
+    // What a file may have got wrong.
+    let text = fs::read_to_string(folder.path().join("board.json")).unwrap();
+    let noise = text.find("\"noise_by_place\"").unwrap();
+    let bad = text[..noise].to_owned() + &text[noise..].replacen("\"width\": ", "\"width\": -", 1);
+    fs::write(folder.path().join("bad.json"), bad).unwrap();
+    let refused = complained(&run(folder.path(), &["inspect", "bad.json"]), 2);
+    assert!(refused.contains("width of the noise by place"), "{refused}");
 }
 
 #[test]

@@ -88,7 +88,7 @@ impl Presses {
             self.push(
                 sums.position_m.clone(),
                 force_n,
-                all.count_of(sums.weight / ends.len() as f64, force_n),
+                all.count_of(sums.weight / ends.len() as f64, force_n, &sums.position_m),
                 &reading,
             );
         }
@@ -104,7 +104,8 @@ impl Presses {
             let force_n = all.prior.force_of_relative_response(sums.mean_square.sqrt());
             self.repeated.force_n.push(force_n);
             self.repeated.freedom.push((cell.len() - ends.len()) as f64);
-            let squares = squares * all.prior.relative_noise(force_n);
+            let squares = squares * all.prior.relative_noise(force_n, &sums.position_m);
+            self.repeated.positions_m.push(sums.position_m.clone());
             self.repeated.squares.push_row(squares.view()).expect("as many channels as all presses have");
         }
     }
@@ -130,7 +131,12 @@ impl Presses {
             })
             .collect();
         let force_n = all.prior.force_of_relative_response(response);
-        self.push(sums.position_m.clone(), force_n, all.count_of(sums.weight, force_n), &reading);
+        self.push(
+            sums.position_m.clone(),
+            force_n,
+            all.count_of(sums.weight, force_n, &sums.position_m),
+            &reading,
+        );
         sums.weight * sums.spread().powi(2) / sums.mean_square
     }
 }
@@ -154,12 +160,12 @@ impl All<'_> {
 
     /// Rows of a press over the variance of one, relative to that of an untouched board.
     fn weight(&self, i: usize) -> f64 {
-        self.presses.count[i] / self.prior.relative_noise(self.presses.force_n[i])
+        self.presses.count[i] / self.prior.relative_noise_of(self.presses, i)
     }
 
-    /// Rows of a press under a force that have this weight.
-    fn count_of(&self, weight: f64, force_n: f64) -> f64 {
-        weight * self.prior.relative_noise(force_n)
+    /// Rows of a press under a force at a place that have this weight.
+    fn count_of(&self, weight: f64, force_n: f64, place_m: &[f64]) -> f64 {
+        weight * self.prior.relative_noise(force_n, place_m)
     }
 
     fn is_one_place(&self, cell: &[usize]) -> bool {

@@ -125,8 +125,12 @@ struct RepeatedNoise {
 
 impl RepeatedNoise {
     fn new(presses: &Presses, prior: &Prior) -> Self {
-        let Repeated { force_n, freedom, squares } = &presses.repeated;
-        let relative: Array1<f64> = force_n.iter().map(|force_n| prior.relative_noise(*force_n)).collect();
+        let Repeated { positions_m, force_n, freedom, squares } = &presses.repeated;
+        let relative: Array1<f64> = force_n
+            .iter()
+            .zip(positions_m)
+            .map(|(force_n, position_m)| prior.relative_noise(*force_n, position_m))
+            .collect();
         Self {
             freedom: freedom.iter().sum(),
             squares: squares.t().dot(&relative.mapv(f64::recip)),

@@ -7,14 +7,17 @@
 
 use super::drift::DriftCourse;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
+use super::place_noise::PlaceNoise;
+use super::place_noise_search::PlaceNoiseSearch;
 use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
+use super::residuals::Residuals;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use ndarray::{Array1, Array2};
+use ndarray::Zip;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
@@ -57,16 +60,36 @@ impl Learnt {
         most_presses: usize,
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
+        let learn = |noise: Option<&PlaceNoise>| {
+            Self::without_outliers(setup, recording, structure, most_presses, noise, watch)
+        };
+        let Some(learnt) = learn(None)? else { return Ok(None) };
+        // Rows that nothing explains look like noise of their place, and noise of a place like rows that nothing explains: the noise is told by
+        // rows that are none, and rows are set aside by that noise.
+        match learnt.noise_by_place(watch)? {
+            None => Ok(Some(learnt)),
+            Some(noise) => learn(Some(&noise)),
+        }
+    }
+
+    /// Learns from the presses that some function explains.
+    fn without_outliers(
+        setup: &Setup,
+        recording: &Recording,
+        structure: Structure,
+        most_presses: usize,
+        noise: Option<&PlaceNoise>,
+        watch: Watch,
+    ) -> Result<Option<Self>, MeasuredError> {
         /// Rounds in which presses are set aside, and the share of all rows that may be.
         const ROUNDS: usize = 4;
         const MOST_SET_ASIDE: f64 = 0.1;
+        let learn = |set_aside: &[usize]| {
+            Self::without_rows(setup, recording, structure, most_presses, noise, set_aside, watch)
+        };
         let mut set_aside = Vec::new();
         for _ in 0..ROUNDS {
-            let Some(learnt) =
-                Self::without_rows(setup, recording, structure, most_presses, &set_aside, watch)?
-            else {
-                return Ok(None);
-            };
+            let Some(learnt) = learn(&set_aside)? else { return Ok(None) };
             let outliers = learnt.outliers()?;
             let most = (MOST_SET_ASIDE * recording.rows.len() as f64) as usize;
             if outliers.is_empty() || set_aside.len() + outliers.len() > most {
@@ -75,7 +98,7 @@ impl Learnt {
             set_aside.extend(outliers);
             set_aside.sort_unstable();
         }
-        Self::without_rows(setup, recording, structure, most_presses, &set_aside, watch)
+        learn(&set_aside)
     }
 
     fn without_rows(
@@ -83,6 +106,7 @@ impl Learnt {
         recording: &Recording,
         structure: Structure,
         most_presses: usize,
+        noise: Option<&PlaceNoise>,
         set_aside: &[usize],
         watch: Watch,
     ) -> Result<Option<Self>, MeasuredError> {
@@ -96,7 +120,7 @@ impl Learnt {
         let searched = pressed.thinned(MOST_SEARCHED);
         let extent = setup.surface().extent();
         let decades = (*ALL_DECADES.start(), *ALL_DECADES.end());
-        let mut search = Search { presses: &searched, extent, structure, watch, decades };
+        let mut search = Search { presses: &searched, extent, structure, noise, watch, decades };
         let smooth = search.smooth()?;
         let presses = if pressed.len() <= most_presses {
             pressed.clone()
@@ -157,10 +181,22 @@ impl Learnt {
         Ok(Some(all))
     }
 
+    /// Noise that differs by place; `None` where the presses do not tell it.
+    fn noise_by_place(&self, watch: Watch) -> Result<Option<PlaceNoise>, MeasuredError> {
+        /// The noise is told as well by one of so many places of sensors.
+        const ONE_OF: usize = 5;
+        // Wrong positions and forces scatter more where influences are steep or large; readings in use have no such noise.
+        if self.prior.scatter > 0.0 {
+            return Ok(None);
+        }
+        let searched = self.pressed.thinned(MOST_SEARCHED);
+        let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
+        PlaceNoiseSearch { presses: &searched, prior: &self.prior, sensors_m: &few, watch }.found()
+    }
+
     /// First rows of presses that are further off what all others say of them than noise is in one of a hundred recordings.
     ///
-    /// Each press is predicted from the others (Rasmussen and Williams, eq. 5.12), and its error taken over a deviation that it has no
-    /// part in (externally studentized residuals; Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1).
+    /// The error of each, as the others predict it, is taken over a deviation that it has no part in (externally studentized residuals; Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1).
     ///
     /// Presses that stand for others have averaged what is wrong with a row, and name none.
     fn outliers(&self) -> Result<Vec<usize>, MeasuredError> {
@@ -173,45 +209,18 @@ impl Learnt {
         /// Share of the noise's variance in the error of a press, below which it is not judged.
         const LEAST_TOLD: f64 = 1e-6;
         let n = self.presses.len();
-        let mut squares = Array2::<f64>::zeros((n, self.fits.len()));
-        let mut freedom = f64::INFINITY;
-        for channels in of_equal_ratio(&self.fits) {
-            let evidence = Evidence::new(&self.presses, &self.prior, &[]);
-            let restricted = evidence.restricted(self.fits[channels[0]].ratio)?;
-            freedom = (n - restricted.effects()) as f64 - 3.0;
-            // M·L⁻¹, whose squared columns sum to the diagonal of the projected inverse.
-            let (projection, _) = restricted.residuals(Array2::eye(n));
-            let (white, _) = restricted.residuals(self.presses.means.clone());
-            for c in channels {
-                let mut left = white.column(c).to_owned();
-                let mut diagonal: Array1<f64> =
-                    projection.columns().into_iter().map(|column| column.dot(&column)).collect();
-                if let Some(source) = self.fits[c].sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))
-                {
-                    let place = std::slice::from_ref(&self.sensors_m[source.place]);
-                    let (column, _) = restricted.residuals(self.prior.sources(&self.presses, place));
-                    let column = column.column(0).to_owned();
-                    let share = column.dot(&left) / column.dot(&column);
-                    let seen = projection.t().dot(&column);
-                    diagonal.scaled_add(-1.0 / column.dot(&column), &seen.mapv(|v| v * v));
-                    left.scaled_add(-share, &column);
-                }
-                let errors = projection.t().dot(&left);
-                let signal = self.fits[c].signal;
-                for i in 0..n {
-                    // The others say next to nothing of a press alone at its place.
-                    if diagonal[i] * self.fits[c].ratio < LEAST_TOLD * self.presses.count[i] {
-                        continue;
-                    }
-                    let square = errors[i].powi(2) / (diagonal[i] * signal);
-                    let others = (freedom - square).max(1e-3 * freedom);
-                    squares[[i, c]] = square * (freedom - 1.0) / others;
-                }
-            }
-        }
+        let Residuals { squares, told, freedom } =
+            Residuals::new(&self.presses, &self.prior, &self.fits, &self.sensors_m)?;
+        let freedom = freedom - 3.0;
         if freedom < 5.0 {
             return Ok(Vec::new());
         }
+        let externally = |square: f64, told: f64| {
+            let others = (freedom - square).max(1e-3 * freedom);
+            // The others say next to nothing of a press alone at its place.
+            if told < LEAST_TOLD { 0.0 } else { square * (freedom - 1.0) / others }
+        };
+        let squares = Zip::from(&squares).and(&told).map_collect(|square, told| externally(*square, *told));
         let channels = self.fits.len();
         let bound = |count: usize, tests: usize| {
             let bound = chi_squared_critical_value(TAIL / tests as f64, count);
@@ -234,7 +243,7 @@ impl Learnt {
 /// A wrong position or force makes presses scatter with their force, in all channels alike; half of it is taken to move the position. The variance of every channel multiplied by the factor is that of a position told by one, not by the mean of all.
 fn dependence(prior: &Prior, presses: &Presses) -> f64 {
     const MOVES_POSITION: f64 = 0.5;
-    let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.relative_noise(*force_n)));
+    let scattered = mean(presses.force_n.iter().map(|force_n| 1.0 - 1.0 / prior.scatter_of(*force_n)));
     1.0 + scattered * (MOVES_POSITION * presses.centre.len() as f64 - 1.0).max(0.0)
 }
 
@@ -326,7 +335,7 @@ impl Found {
             for ((c, fit), readings) in asked.into_iter().zip(found) {
                 for (k, (reading, process)) in readings.into_iter().enumerate() {
                     let error = others.means[[k, c]] + others.centre[c] - reading;
-                    let noise = fit.noise_variance() * self.prior.relative_noise(others.force_n[k]);
+                    let noise = fit.noise_variance() * self.prior.relative_noise_of(&others, k);
                     errors.push([error * error, noise / others.count[k], process]);
                 }
             }
@@ -355,6 +364,8 @@ struct Search<'a> {
     presses: &'a Presses,
     extent: Extent,
     structure: Structure,
+    /// Noise that differs by place.
+    noise: Option<&'a PlaceNoise>,
     watch: Watch<'a>,
     /// Powers of ten about those of the noise of the channels, as the last prior told them.
     decades: (i32, i32),
@@ -385,7 +396,8 @@ impl Search<'_> {
     /// The most probable smooth prior: the smoother kernel on sufficient evidence, length scales by ever smaller steps; drift, response and
     /// nonlinearity last.
     fn smooth(&mut self) -> Result<Found, Cancelled> {
-        let rough = Prior::smooth(self.extent, self.presses);
+        let noise_by_place = self.noise.cloned();
+        let rough = Prior { noise_by_place, ..Prior::smooth(self.extent, self.presses) };
         self.total_anew(&rough, &[])?;
         let (mut best, mut prior) = self.climb_lengths(rough)?;
         let (smooth_best, smooth) =

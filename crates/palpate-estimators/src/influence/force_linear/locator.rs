@@ -6,7 +6,7 @@
 //!
 //! p(a | d) ∝ ∫ Π S_k^(−½)·exp(−(d_k − F·f_k)²/(2·S_k)) dF,
 //!
-//! S taken at the force of the least misfit. Where the response to the force is not linear, F stands for φ(F), and the estimate is
+//! where the noise differs by place its multiplier m(a) in the place of the 1, S taken at the force of the least misfit. Where the response to the force is not linear, F stands for φ(F), and the estimate is
 //! turned back. The determinant belongs there: between presses, where v is large, everything would
 //! explain a reading otherwise.
 
@@ -297,6 +297,26 @@ impl ForceLinearLocator {
             .then(|| Scatter { force_n: force_scale_n, sd: self.channels().map(channel).collect() })
     }
 
+    /// Length, and width on a plane, of the surface.
+    pub fn extent(&self) -> Extent {
+        self.stored.prior.extent
+    }
+
+    /// Least and greatest standard deviation of the noise over the grid, over that of an untouched board, and where each is; `None` where it is the
+    /// same everywhere.
+    pub fn noise_by_place(&self) -> Option<[(f64, Position); 2]> {
+        self.stored.prior.noise_by_place.as_ref()?;
+        let [x, y] = self.axes();
+        let at = |place: usize| {
+            let node = self.node(place);
+            let position = Position { x_m: x.value(node[0]), y_m: y.value(node[1]) };
+            (self.noise_at(node).sqrt(), position)
+        };
+        let by_noise = |a: &(f64, Position), b: &(f64, Position)| a.0.total_cmp(&b.0);
+        let places = || (0..self.places()).map(at);
+        Some([places().min_by(by_noise)?, places().max_by(by_noise)?])
+    }
+
     /// The structure that was asked for; what was found is its [`response`](Self::response).
     pub fn asked_structure(&self) -> Structure {
         self.stored.structure
@@ -387,7 +407,8 @@ impl ForceLinearLocator {
         let live = self.stored.live.len();
         Scan::new(self.places(), live, self.expected, self.known_response_n(), |place, c| {
             let Place { values, variances, covariances } = self.place(place);
-            let (noise, open) = (self.noise(), self.stored.functions.offset_variances[c]);
+            let open = self.stored.functions.offset_variances[c];
+            let noise = self.noise() * self.noise_at(self.node(place));
             let (v, beta) = (variances[c], covariances[c]);
             let hardest_n = self.known_response_n().unwrap_or(self.stored.hardest_n);
             let hardest = noise + (open + hardest_n * (2.0 * beta + hardest_n * v)).max(0.0);
@@ -491,6 +512,18 @@ impl ForceLinearLocator {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
+    /// Variance of the noise at a place of the grid over that of an untouched board.
+    fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
+        let at_m = [self.stored.x.value(x), self.stored.y.value(y)];
+        self.stored.prior.noise_at(&at_m[..self.stored.prior.extent.dimensions()])
+    }
+
+    /// Place `place` of the grid along and across.
+    fn node(&self, place: usize) -> [f64; 2] {
+        let across = self.stored.y.count;
+        [(place / across) as f64, (place % across) as f64]
+    }
+
     /// φ of the known force.
     fn known_response_n(&self) -> Option<f64> {
         self.stored.known_force_n.map(|force_n| self.stored.prior.response_n(force_n))
@@ -498,7 +531,13 @@ impl ForceLinearLocator {
 
     /// A reading, less offsets and over the noise, ready to be explained.
     fn seen(&self, relative: &[f64]) -> Seen<'_> {
-        Seen { locator: self, reading: in_lanes(relative), between: Vec::new(), slopes: Vec::new() }
+        Seen {
+            locator: self,
+            reading: in_lanes(relative),
+            noise: 1.0,
+            between: Vec::new(),
+            slopes: Vec::new(),
+        }
     }
 
     /// Source of the force of an estimate.
@@ -523,6 +562,8 @@ impl ForceLinearLocator {
 struct Seen<'a> {
     locator: &'a ForceLinearLocator,
     reading: Vec<Lanes>,
+    /// Variance of the noise at the place that is looked at over that of an untouched board.
+    noise: f64,
     between: Vec<Lanes>,
     slopes: Vec<Slopes>,
 }
@@ -585,8 +626,12 @@ impl Seen<'_> {
         let ForceLinearLocator { open, layers, .. } = self.locator;
         let of = |layer: usize| &self.between[layer * layers.groups()..(layer + 1) * layers.groups()];
         let functions = [of(VALUES), of(VARIANCES), of(COVARIANCES)];
-        let noise = self.locator.noise();
-        simd::run_loops(WeighChannels { reading: &self.reading, functions, open, noise, force_n })
+        let noise = self.locator.noise() * self.noise;
+        let weighed =
+            simd::run_loops(WeighChannels { reading: &self.reading, functions, open, noise, force_n });
+        // Its determinant is relative to the noise of the place.
+        let of_place = self.locator.stored.live.len() as f64 * self.noise.ln();
+        Weighed { log_determinant: weighed.log_determinant + of_place, ..weighed }
     }
 }
 
@@ -618,7 +663,8 @@ impl Explain for Seen<'_> {
         let place = near[0].round() as usize * self.locator.stored.y.count + near[1].round() as usize;
         let [variances, covariances] =
             [VARIANCES, COVARIANCES].map(|layer| layers.groups_of(place, layer..layer + 1));
-        let (noise, near_n) = (self.locator.noise(), near[2]);
+        let noise = self.locator.noise() * self.locator.noise_at([near[0], near[1]]);
+        let near_n = near[2];
         let channels = (0..self.reading.len()).map(|g| {
             let [f, along, across] = &self.slopes[g];
             let weights = std::array::from_fn(|l| {
@@ -643,6 +689,7 @@ impl Explain for Seen<'_> {
         let [x, y] = self.axes();
         let margin = x.margin_cost(place[0]) + y.margin_cost(place[1]);
         self.locator.layers.interpolate(place, 0..LAYERS, &mut self.between);
+        self.noise = self.locator.noise_at(place);
         let Some((least_n, hardest_n)) = self.range() else {
             let Weighed { dd, fd, ff, log_determinant } = self.weighed(latent);
             let misfit = (dd + latent * (latent * ff - 2.0 * fd)).max(0.0);
@@ -685,7 +732,7 @@ impl Explain for Seen<'_> {
     }
 }
 
-/// Reading of a channel less its offset, over its noise, as a function of the contact.
+/// Reading of a channel less its offset, over its noise at the place, as a function of the contact.
 struct LearntResponse<'a> {
     locator: &'a ForceLinearLocator,
     channel: usize,
@@ -695,18 +742,26 @@ impl LearntResponse<'_> {
     fn influence(&self, position: Position) -> f64 {
         self.locator.influences_at(position)[self.channel]
     }
+
+    /// Standard deviation of the noise at a place over that of an untouched board.
+    fn noise(&self, position: Position) -> f64 {
+        let at_m = [position.x_m, position.y_m];
+        let prior = &self.locator.stored.prior;
+        prior.noise_at(&at_m[..prior.extent.dimensions()]).sqrt()
+    }
 }
 
 impl ResponseFunction for LearntResponse<'_> {
     fn at(&self, contact: Contact) -> f64 {
-        self.locator.stored.prior.response_n(contact.force_n) * self.influence(contact.position)
+        let response_n = self.locator.stored.prior.response_n(contact.force_n);
+        response_n * self.influence(contact.position) / self.noise(contact.position)
     }
 
     fn gradient(&self, Contact { position, force_n }: Contact) -> ResponseGradient {
         /// Half a difference, in steps of the grid.
         const REACH: f64 = 0.05;
         let [x, y] = self.locator.axes();
-        let response_n = self.locator.stored.prior.response_n(force_n);
+        let response_n = self.locator.stored.prior.response_n(force_n) / self.noise(position);
         let slope = |axis: Axis, moved: &dyn Fn(f64) -> Position| {
             if axis.count < 2 {
                 return 0.0;

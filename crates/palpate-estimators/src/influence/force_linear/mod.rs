@@ -8,9 +8,12 @@ mod drift;
 mod evidence;
 mod learning;
 mod locator;
+mod place_noise;
+mod place_noise_search;
 mod posterior;
 mod presses;
 mod prior;
+mod residuals;
 mod scan;
 
 pub use drift::DriftCourse;

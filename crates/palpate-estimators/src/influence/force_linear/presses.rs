@@ -37,6 +37,7 @@ pub(super) struct Presses {
 /// Scatter of the presses that were repeated, a row a press.
 #[derive(Clone, Debug)]
 pub(super) struct Repeated {
+    pub positions_m: Vec<Vec<f64>>,
     pub force_n: Vec<f64>,
     /// Number of repeats less one.
     pub freedom: Vec<f64>,
@@ -110,6 +111,7 @@ impl Presses {
             time: groups.iter().map(|group| mean(group.iter().map(|row| row.time))).collect(),
             row: groups.iter().map(|group| group[0].row).collect(),
             repeated: Repeated {
+                positions_m: repeated.iter().map(|i| groups[*i][0].position_m.clone()).collect(),
                 force_n: repeated.iter().map(|i| groups[*i][0].force_n).collect(),
                 freedom: repeated.iter().map(|i| (groups[*i].len() - 1) as f64).collect(),
                 squares: squares.select(Dimension(0), &repeated),

@@ -13,10 +13,11 @@
 //! φ(F) = F̄·(F/F̄)^γ, F̄ being the root mean square force: γ = 1 but where the presses say that all positions share another
 //! response. A gain that changes with position and force, δ²·k·exp(−(F − F′)²/2F̄²), tells how far the presses are from any of that.
 //! Drift is a Gaussian process of the time for each channel ([`DriftCourse`]), of variance κ times the noise's from one end of the
-//! recording to the other. Noise has the variance σ²·(1 + μ·φ²/F̄²): presses scatter with their force where forces or positions were not
-//! quite as recorded.
+//! recording to the other. Noise has the variance σ²·m(a)·(1 + μ·φ²/F̄²): presses scatter with their force where forces or positions were not
+//! quite as recorded, and the noise may differ by place ([`PlaceNoise`]). Without a force it has the variance σ².
 
 use super::drift::DriftCourse;
+use super::place_noise::PlaceNoise;
 use super::presses::Presses;
 use crate::fit::LocatorFault;
 use ndarray::{Array1, Array2};
@@ -92,6 +93,9 @@ pub(super) struct Prior {
     /// μ.
     #[serde(default)]
     pub scatter: f64,
+    /// m; nothing where it is 1 everywhere.
+    #[serde(default)]
+    pub noise_by_place: Option<PlaceNoise>,
 }
 
 impl Prior {
@@ -110,6 +114,7 @@ impl Prior {
             drift: 0.0,
             drift_course: DriftCourse::default(),
             scatter: 0.0,
+            noise_by_place: None,
         }
     }
 
@@ -160,7 +165,8 @@ impl Prior {
         let shares = [self.smooth_part, self.nonlinearity, self.drift, self.scatter];
         numbers("smooth part, nonlinearity, drift or scatter", &shares, |share| share >= 0.0, "at least 0")?;
         numbers("exponent of the response", &[self.response], |exponent| exponent > 0.0, "greater than 0")?;
-        numbers("force", &[self.force_scale_n], |force| force > 0.0, "greater than 0")
+        numbers("force", &[self.force_scale_n], |force| force > 0.0, "greater than 0")?;
+        self.noise_by_place.as_ref().map_or(Ok(()), |noise| noise.check(self.extent.dimensions()))
     }
 
     /// φ/F̄ of every press.
@@ -193,7 +199,7 @@ impl Prior {
     pub fn with_noise(&self, covariance: &Array2<f64>, presses: &Presses, ratio: f64) -> Array2<f64> {
         let mut covariance = covariance.clone();
         for (i, count) in presses.count.iter().enumerate() {
-            covariance[[i, i]] += ratio * self.relative_noise(presses.force_n[i]) / count;
+            covariance[[i, i]] += ratio * self.relative_noise_of(presses, i) / count;
         }
         if self.drift > 0.0 {
             for ((i, j), value) in covariance.indexed_iter_mut() {
@@ -204,8 +210,23 @@ impl Prior {
     }
 
     /// Variance of the noise of a press over that of an untouched row.
-    pub fn relative_noise(&self, force_n: f64) -> f64 {
+    pub fn relative_noise(&self, force_n: f64, place_m: &[f64]) -> f64 {
+        if force_n == 0.0 { 1.0 } else { self.scatter_of(force_n) * self.noise_at(place_m) }
+    }
+
+    /// That of press `i`.
+    pub fn relative_noise_of(&self, presses: &Presses, i: usize) -> f64 {
+        self.relative_noise(presses.force_n[i], &presses.positions_m[i])
+    }
+
+    /// 1 + μ·φ²/F̄².
+    pub fn scatter_of(&self, force_n: f64) -> f64 {
         1.0 + self.scatter * self.response_to(force_n).powi(2)
+    }
+
+    /// m at a place.
+    pub fn noise_at(&self, place_m: &[f64]) -> f64 {
+        self.noise_by_place.as_ref().map_or(1.0, |noise| noise.multiplier(place_m))
     }
 
     /// Covariance of the drift at two times over the noise's variance.

@@ -28,6 +28,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::rc::Rc;
 
 mod drift;
+mod noise;
 mod scatter;
 
 const STRIP_M: f64 = 0.3;

@@ -1,0 +1,192 @@
+//! The search for noise that differs by place, by the scoring of residual variances.
+//!
+//! With t the share of the noise in the error of a press and d its square over the variance, b the slopes of ln m by θ, and both about their
+//! means of each channel, as the channel's noise is learnt as well, the slope of the restricted likelihood is ½·Σ t·b·(d − 1) and its information about
+//! ½·Σ t·b·bᵀ (Smyth, J. R. Statist. Soc. B 51, 1989; Smyth, Huele and Verbyla, Statistical Modelling 1, 2001). Repeats of a press are as many
+//! errors of t = 1 as they have degrees of freedom.
+
+use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
+use super::place_noise::{PlaceNoise, Shape};
+use super::presses::Presses;
+use super::prior::Prior;
+use super::residuals::Residuals;
+use crate::influence::measured::MeasuredError;
+use ndarray::{Array1, Array2};
+use palpate_numerics::Cholesky;
+use palpate_numerics::watch::Watch;
+
+/// Noise that differs by place is believed from this much more evidence on,
+const LEAST_GAIN: f64 = 10.0;
+/// and each of its parameters from this much.
+const LEAST_MORE: f64 = 3.0;
+
+/// What is known of presses but for noise that differs by place.
+pub(super) struct PlaceNoiseSearch<'a> {
+    pub presses: &'a Presses,
+    pub prior: &'a Prior,
+    pub sensors_m: &'a [Vec<f64>],
+    pub watch: Watch<'a>,
+}
+
+/// A prior with the fits and the evidence of all channels.
+struct Fitted {
+    prior: Prior,
+    fits: Vec<ChannelFit>,
+    total: f64,
+}
+
+/// Slope and information of the likelihood by θ.
+struct Score {
+    slope: Array1<f64>,
+    information: Cholesky,
+}
+
+impl Score {
+    /// The way to the most probable θ were the likelihood a parabola.
+    fn way(&self) -> Array1<f64> {
+        self.information.solve(&self.slope)
+    }
+
+    /// What the evidence would gain on it.
+    fn gain(&self) -> f64 {
+        0.5 * self.slope.dot(&self.way())
+    }
+}
+
+impl PlaceNoiseSearch<'_> {
+    /// The noise that is the most probable, less [`LEAST_MORE`] for each parameter; `None` where that is no more than [`LEAST_GAIN`] above noise
+    /// that is the same everywhere.
+    pub fn found(&self) -> Result<Option<PlaceNoise>, MeasuredError> {
+        /// Steps of the scoring, each with the noise of the channels learnt anew.
+        const STEPS: usize = 4;
+        /// Steps along a coordinate that are looked at, and those of them that are learnt.
+        const MOST_STEPS: usize = 16;
+        const BEST_STEPS: usize = 3;
+        let places_m = self.presses.positions_m();
+        let dimensions = self.prior.extent.dimensions();
+        let Some(before) = self.fitted(self.prior.clone(), None) else { return Ok(None) };
+        let residuals = Residuals::new(self.presses, &before.prior, &before.fits, self.sensors_m)?;
+        let with_gain = |shape: Shape| {
+            let score = self.score(&before, &residuals, &PlaceNoise::even(&places_m, shape));
+            score.map(|score| (score.gain(), shape))
+        };
+        let smooth: Vec<Shape> =
+            (1..=PlaceNoise::most_degrees(dimensions)).map(|degree| Shape::Smooth { degree }).collect();
+        let gains = smooth.iter().map(|shape| with_gain(*shape)).collect::<Result<Vec<_>, _>>()?;
+        let steps = PlaceNoise::steps(&places_m, MOST_STEPS).into_iter();
+        let mut steps = steps.map(with_gain).collect::<Result<Vec<_>, _>>()?;
+        steps.sort_by(|a, b| b.0.total_cmp(&a.0));
+        steps.truncate(BEST_STEPS);
+        // Variances that differ much gain more than the parabola says.
+        if gains.iter().chain(&steps).all(|(gain, _)| *gain < 0.5 * LEAST_GAIN) {
+            return Ok(None);
+        }
+        let mut best: Option<(f64, PlaceNoise)> = None;
+        let mut theta: Vec<f64> = Vec::new();
+        for shape in smooth.into_iter().chain(steps.into_iter().map(|(_, shape)| shape)) {
+            let even = PlaceNoise::even(&places_m, shape);
+            let start = match shape {
+                Shape::Smooth { .. } => even.with_coefficients(&places_m, &theta),
+                Shape::Step { .. } => even,
+            };
+            let prior = Prior { noise_by_place: Some(start), ..self.prior.clone() };
+            let Some(mut found) = self.fitted(prior, Some(&before.fits)) else { continue };
+            for _ in 0..STEPS {
+                self.watch.round()?;
+                let Some(next) = self.step(&found, &places_m)? else { break };
+                let gained = next.total - found.total;
+                if gained > 0.0 {
+                    found = next;
+                }
+                if gained < 0.1 {
+                    break;
+                }
+            }
+            let Some(noise) = found.prior.noise_by_place else { continue };
+            if let Shape::Smooth { .. } = shape {
+                theta = noise.coefficients().to_vec();
+            }
+            let gain = found.total - before.total - LEAST_MORE * noise.shape().parameters(dimensions) as f64;
+            if gain > best.as_ref().map_or(LEAST_GAIN, |(most, _)| *most) {
+                best = Some((gain, noise));
+            }
+        }
+        Ok(best.map(|(_, noise)| noise.towards_quiet()))
+    }
+
+    /// The fits under a prior; about those of another one where these are told.
+    fn fitted(&self, prior: Prior, about: Option<&[ChannelFit]>) -> Option<Fitted> {
+        let evidence = Evidence::new(self.presses, &prior, self.sensors_m);
+        let coarse = match about {
+            Some(fits) => fits.to_vec(),
+            None => evidence.best_decades(ALL_DECADES)?,
+        };
+        let fits = evidence.refined(coarse);
+        let total = fits.iter().map(|fit| fit.evidence).sum::<f64>();
+        total.is_finite().then_some(Fitted { prior, fits, total })
+    }
+
+    /// A step of the scoring; `None` where the presses tell nothing.
+    fn step(&self, from: &Fitted, places_m: &[&[f64]]) -> Result<Option<Fitted>, MeasuredError> {
+        /// Longest step of a coefficient.
+        const LONGEST: f64 = 1.5;
+        let Some(noise) = &from.prior.noise_by_place else { return Ok(None) };
+        let residuals = Residuals::new(self.presses, &from.prior, &from.fits, self.sensors_m)?;
+        let way = self.score(from, &residuals, noise)?.way();
+        let longest = way.iter().fold(0.0, |most: f64, step| most.max(step.abs()));
+        let share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
+        let moved: Vec<f64> =
+            noise.coefficients().iter().zip(&way).map(|(theta, step)| theta + share * step).collect();
+        let noise_by_place = Some(noise.with_coefficients(places_m, &moved));
+        let prior = Prior { noise_by_place, ..from.prior.clone() };
+        Ok(self.fitted(prior, Some(&from.fits)))
+    }
+
+    /// The slope and the information by the θ of a noise, from the errors under a prior.
+    fn score(&self, at: &Fitted, residuals: &Residuals, noise: &PlaceNoise) -> Result<Score, MeasuredError> {
+        /// Coefficients are taken to be about 0 with this precision, which errors at few places do not tell.
+        const PRECISION: f64 = 0.05;
+        let Fitted { prior, fits, .. } = at;
+        let (presses, repeated) = (self.presses, &self.presses.repeated);
+        let places_m = presses.positions_m();
+        let slopes_of = |positions_m: &[Vec<f64>], force_n: &[f64]| {
+            let mut slopes = noise.slopes(&places_m, positions_m);
+            let untouched = slopes.outer_iter_mut().zip(force_n).filter(|(_, force_n)| **force_n == 0.0);
+            untouched.for_each(|(mut row, _)| row.fill(0.0));
+            slopes
+        };
+        let of_presses = slopes_of(&presses.positions_m, &presses.force_n);
+        let of_repeats = slopes_of(&repeated.positions_m, &repeated.force_n);
+        let terms = of_presses.ncols();
+        let mut slope = Array1::from_iter(noise.coefficients().iter().map(|theta| -PRECISION * theta));
+        let mut information = PRECISION * Array2::eye(terms);
+        for (c, fit) in fits.iter().enumerate() {
+            let errors = (0..presses.len()).map(|i| {
+                let (told, square) = (residuals.told[[i, c]], residuals.squares[[i, c]]);
+                (of_presses.row(i), if square.is_finite() { told.clamp(0.0, 1.0) } else { 0.0 }, square)
+            });
+            let repeats = (0..repeated.freedom.len()).map(|i| {
+                let noise = fit.noise_variance()
+                    * prior.relative_noise(repeated.force_n[i], &repeated.positions_m[i]);
+                let freedom = repeated.freedom[i];
+                (of_repeats.row(i), freedom, repeated.squares[[i, c]] / (freedom * noise))
+            });
+            let all: Vec<_> = errors.chain(repeats).filter(|(_, told, _)| *told > 0.0).collect();
+            let weight: f64 = all.iter().map(|(_, told, _)| told).sum();
+            let square: f64 = all.iter().map(|(_, told, square)| told * square).sum::<f64>() / weight;
+            if weight.is_nan() || weight <= 0.0 || square.is_nan() || square <= 0.0 {
+                continue;
+            }
+            let mut middle = Array1::<f64>::zeros(terms);
+            all.iter().for_each(|(row, told, _)| middle.scaled_add(told / weight, row));
+            for (row, told, own) in all {
+                let row = &row - &middle;
+                slope.scaled_add(0.5 * told * (own / square - 1.0), &row);
+                for k in 0..terms {
+                    information.row_mut(k).scaled_add(0.5 * told * row[k], &row);
+                }
+            }
+        }
+        Ok(Score { slope, information: Cholesky::factor(information)? })
+    }
+}

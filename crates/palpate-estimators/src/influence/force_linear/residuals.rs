@@ -1,0 +1,66 @@
+//! Errors of presses that are predicted from all others.
+//!
+//! Each press is predicted from the others (Rasmussen and Williams, eq. 5.12). With P = Lᵀ⁻¹·M·L⁻¹ the error of press i is
+//! (P·y)_i/P_ii, and its variance s²/P_ii.
+
+use super::evidence::{ChannelFit, Evidence};
+use super::posterior::of_equal_ratio;
+use super::presses::Presses;
+use super::prior::Prior;
+use ndarray::{Array1, Array2};
+use palpate_numerics::NotPositiveDefinite;
+
+/// Errors of presses that are predicted from all others, a row a press and a column a channel.
+pub(super) struct Residuals {
+    /// Squared errors over what the prior says of their variance.
+    pub squares: Array2<f64>,
+    /// Shares of the noise of the press itself in that variance.
+    pub told: Array2<f64>,
+    /// Degrees of freedom of a channel.
+    pub freedom: f64,
+}
+
+impl Residuals {
+    pub fn new(
+        presses: &Presses,
+        prior: &Prior,
+        fits: &[ChannelFit],
+        sensors_m: &[Vec<f64>],
+    ) -> Result<Self, NotPositiveDefinite> {
+        let n = presses.len();
+        let mut squares = Array2::<f64>::zeros((n, fits.len()));
+        let mut told = squares.clone();
+        let mut freedom = f64::INFINITY;
+        let noise: Vec<f64> =
+            (0..n).map(|i| prior.relative_noise_of(presses, i) / presses.count[i]).collect();
+        let evidence = Evidence::new(presses, prior, &[]);
+        for channels in of_equal_ratio(fits) {
+            let ratio = fits[channels[0]].ratio;
+            let restricted = evidence.restricted(ratio)?;
+            freedom = (n - restricted.effects()) as f64;
+            // M·L⁻¹, whose squared columns sum to the diagonal of the projected inverse.
+            let (projection, _) = restricted.residuals(Array2::eye(n));
+            let (white, _) = restricted.residuals(presses.means.clone());
+            for c in channels {
+                let mut left = white.column(c).to_owned();
+                let mut diagonal: Array1<f64> =
+                    projection.columns().into_iter().map(|column| column.dot(&column)).collect();
+                if let Some(source) = fits[c].sources.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)) {
+                    let place = std::slice::from_ref(&sensors_m[source.place]);
+                    let (column, _) = restricted.residuals(prior.sources(presses, place));
+                    let column = column.column(0).to_owned();
+                    let share = column.dot(&left) / column.dot(&column);
+                    let seen = projection.t().dot(&column);
+                    diagonal.scaled_add(-1.0 / column.dot(&column), &seen.mapv(|v| v * v));
+                    left.scaled_add(-share, &column);
+                }
+                let errors = projection.t().dot(&left);
+                for i in 0..n {
+                    told[[i, c]] = diagonal[i] * ratio * noise[i];
+                    squares[[i, c]] = errors[i].powi(2) / (diagonal[i] * fits[c].signal);
+                }
+            }
+        }
+        Ok(Self { squares, told, freedom })
+    }
+}

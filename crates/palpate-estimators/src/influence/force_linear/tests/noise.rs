@@ -1,0 +1,120 @@
+//! Surfaces whose noise differs by place.
+
+use super::*;
+
+/// Noise of touches over that of an untouched board, as a function of the place.
+type NoiseAt = fn(Position) -> f64;
+
+/// Multiplies the noise of some rows by what it is at their places.
+fn make_noisy(bench: &mut Bench, rows: &mut [Row], noise: NoiseAt) {
+    for row in rows {
+        let force_n = row.force_n.unwrap();
+        let clean: Vec<f64> = (bench.influences)(row.position);
+        for ((value, f), offset) in row.reading.iter_mut().zip(clean).zip(&bench.offsets) {
+            let clean = offset + force_n * f;
+            *value = clean + noise(row.position) * (*value - clean);
+        }
+    }
+}
+
+/// A step in the middle.
+fn half(at: Position) -> f64 {
+    if at.x_m > 0.5 * STRIP_M { 4.0 } else { 1.0 }
+}
+
+/// A steady rise from one end to the other.
+fn rising(at: Position) -> f64 {
+    (4f64.ln() * at.x_m / STRIP_M).exp()
+}
+
+/// Errors and coverage of touches on the quiet and the noisy half.
+#[derive(Default)]
+struct Halves {
+    errors_mm: [Vec<f64>; 2],
+    covered: [Vec<f64>; 2],
+    found: usize,
+    /// Greatest over least standard deviation of the noise, where it was found to differ.
+    ratios: Vec<f64>,
+}
+
+impl Halves {
+    fn add(&mut self, locator: &ForceLinearLocator, touches: &[Row], middle_m: f64) {
+        self.found += usize::from(locator.noise_by_place().is_some());
+        self.ratios.extend(locator.noise_by_place().map(|[(least, _), (most, _)]| most / least));
+        for side in [0, 1] {
+            let own: Vec<Row> =
+                touches.iter().filter(|row| (row.position.x_m > middle_m) == (side == 1)).cloned().collect();
+            let (errors, covered) = errors_mm(locator, &own);
+            self.errors_mm[side].extend(errors);
+            self.covered[side].push(covered * own.len() as f64);
+            self.covered[side].push(0.0);
+        }
+    }
+
+    fn summary(&self) -> [(f64, f64); 2] {
+        [0, 1].map(|side| {
+            let errors = &self.errors_mm[side];
+            (
+                mean(errors.iter().copied()),
+                100.0 * self.covered[side].iter().sum::<f64>() / errors.len() as f64,
+            )
+        })
+    }
+}
+
+#[test]
+fn noise_by_place_is_found_and_intervals_follow_it() {
+    let cases: [(&str, NoiseAt, bool); 3] =
+        [("even", |_| 1.0, false), ("half", half, true), ("rising", rising, true)];
+    let sizes: &[(usize, usize)] =
+        if benches(0) == 0 { &[(120, 30)] } else { &[(25, 9), (60, 15), (120, 30)] };
+    for (presses, places) in sizes.iter().copied() {
+        for (name, noise, differs) in cases {
+            let (mut with, mut without) = (Halves::default(), Halves::default());
+            let count = benches(3);
+            for seed in 0..count {
+                let mut bench = Bench::strip(seed, presses, places);
+                let mut pressed = bench.presses.clone();
+                let mut touches = bench.touches(200);
+                make_noisy(&mut bench, &mut pressed, noise);
+                make_noisy(&mut bench, &mut touches, noise);
+                bench.presses = pressed;
+                let locator = bench.fit(Structure::Auto).unwrap();
+                with.add(&locator, &touches, 0.5 * STRIP_M);
+                let mut stored = Stored::from(locator);
+                stored.prior.noise_by_place = None;
+                without.add(&stored.into_locator(), &touches, 0.5 * STRIP_M);
+            }
+            let (halves, ratio) = (with.summary(), mean(with.ratios.iter().copied()));
+            eprintln!(
+                "{presses} presses at {places} places, {name}: found on {} of {count}, ratio {ratio:.1}; quiet {:.2?}, noisy {:.2?}; without {:.2?}",
+                with.found,
+                halves[0],
+                halves[1],
+                without.summary(),
+            );
+            if presses == 120 {
+                assert_eq!(with.found as u64, if differs { count } else { 0 });
+                assert!(halves.iter().all(|(_, covered)| (91.0..98.0).contains(covered)), "{halves:?}");
+                assert!(!differs || (2.0..6.0).contains(&ratio), "{ratio}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_untouched_board_is_no_contact_where_touches_are_noisy() {
+    let mut bench = Bench::strip(1, 120, 30);
+    let mut pressed = bench.presses.clone();
+    make_noisy(&mut bench, &mut pressed, half);
+    bench.presses = pressed;
+    let locator = bench.fit(Structure::Auto).unwrap();
+    assert!(locator.noise_by_place().is_some());
+    let file: ForceLinearLocator = serde_json::from_str(&serde_json::to_string(&locator).unwrap()).unwrap();
+    assert_eq!(file, locator);
+    const COUNT: usize = 2000;
+    let untouched = (0..COUNT)
+        .filter(|_| locator.locate(&bench.counts(Position::along(0.15), 0.0)).status == Status::NoContact);
+    let untouched = untouched.count();
+    assert!(untouched >= COUNT * 997 / 1000, "{untouched} of {COUNT}");
+}
