@@ -1,6 +1,7 @@
 //! Levenberg's steps down the misfit of a contact (K. Levenberg, Quart. Appl. Math. 2, 1944, with Marquardt's scaling by the diagonal).
 
-use super::lanes::{LANES, Lanes};
+use super::lanes::{Lanes, sum_of};
+use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use palpate_numerics::small::{Ldl, Matrix};
 
 /// Position along and across, and the force or whatever else a reading depends on.
@@ -17,31 +18,8 @@ pub(super) struct Equations {
 
 impl Equations {
     /// From the weights V⁻¹, the residual and the derivatives of groups of channels.
-    #[inline(always)]
     pub fn new(channels: impl Iterator<Item = (Lanes, Lanes, [Lanes; 3])>) -> Self {
-        let mut sums = [[0.0; LANES]; 10];
-        for (weights, e, [x, y, t]) in channels {
-            for l in 0..LANES {
-                let (we, wx, wy) = (weights[l] * e[l], weights[l] * x[l], weights[l] * y[l]);
-                let terms = [
-                    we * e[l],
-                    we * x[l],
-                    we * y[l],
-                    we * t[l],
-                    wx * x[l],
-                    wx * y[l],
-                    wx * t[l],
-                    wy * y[l],
-                    wy * t[l],
-                    weights[l] * t[l] * t[l],
-                ];
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    sum[l] += term;
-                }
-            }
-        }
-        let [misfit, ex, ey, et, xx, xy, xt, yy, yt, tt] = sums.map(|lanes| lanes.iter().sum::<f64>());
-        Self { misfit, right: [ex, ey, et], information: [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]] }
+        InstructionSet::best().run(SumGroups { channels })
     }
 
     /// With what is expected of the last unknown: a normal density of this mean and precision.
@@ -51,6 +29,39 @@ impl Equations {
         self.right[2] -= off * precision;
         self.information[2][2] += precision;
         self
+    }
+}
+
+struct SumGroups<I> {
+    channels: I,
+}
+
+impl<I: Iterator<Item = (Lanes, Lanes, [Lanes; 3])>> Kernel for SumGroups<I> {
+    type Output = Equations;
+    const FUSED: bool = true;
+
+    #[inline(always)] // Compiled for the instructions of its caller.
+    fn run<S: Simd>(self) -> Equations {
+        let mut sums = [S::F64::splat(0.0); 10];
+        for (weights, e, [x, y, t]) in self.channels {
+            let [weights, e, x, y, t] = [&weights, &e, &x, &y, &t].map(S::F64::load);
+            let [we, wx, wy] = [weights * e, weights * x, weights * y];
+            let terms = [
+                (we, e),
+                (we, x),
+                (we, y),
+                (we, t),
+                (wx, x),
+                (wx, y),
+                (wx, t),
+                (wy, y),
+                (wy, t),
+                (weights * t, t),
+            ];
+            sums.iter_mut().zip(terms).for_each(|(sum, (a, b))| *sum = a.mul_add(b, *sum));
+        }
+        let [misfit, ex, ey, et, xx, xy, xt, yy, yt, tt] = sums.map(sum_of);
+        Equations { misfit, right: [ex, ey, et], information: [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]] }
     }
 }
 

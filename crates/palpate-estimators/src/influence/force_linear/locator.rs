@@ -537,6 +537,7 @@ impl ForceLinearLocator {
             noise: 1.0,
             between: Vec::new(),
             slopes: Vec::new(),
+            weights: Vec::new(),
         }
     }
 
@@ -566,6 +567,7 @@ struct Seen<'a> {
     noise: f64,
     between: Vec<Lanes>,
     slopes: Vec<Slopes>,
+    weights: Vec<Lanes>,
 }
 
 /// Sums over the channels of a place, by the variances S of one force.
@@ -657,28 +659,31 @@ impl Explain for Seen<'_> {
         self.locator.known_response_n().is_none().then_some((0.0, self.locator.stored.hardest_n))
     }
 
-    fn equations(&mut self, [x, y, response_n]: Unknowns, near: Unknowns) -> Equations {
-        let ForceLinearLocator { layers, open, expected, .. } = self.locator;
-        layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
-        let place = near[0].round() as usize * self.locator.stored.y.count + near[1].round() as usize;
-        let [variances, covariances] =
-            [VARIANCES, COVARIANCES].map(|layer| layers.groups_of(place, layer..layer + 1));
-        let noise = self.locator.noise() * self.locator.noise_at([near[0], near[1]]);
-        let near_n = near[2];
-        let channels = (0..self.reading.len()).map(|g| {
-            let [f, along, across] = &self.slopes[g];
-            let weights = std::array::from_fn(|l| {
-                let spread = open[g][l] + near_n * (2.0 * covariances[g][l] + near_n * variances[g][l]);
+    fn weigh(&mut self, [x, y, response_n]: Unknowns) {
+        let ForceLinearLocator { layers, open, .. } = self.locator;
+        layers.interpolate([x, y], VARIANCES..LAYERS, &mut self.between);
+        let noise = self.locator.noise() * self.locator.noise_at([x, y]);
+        let groups = self.reading.len();
+        let (variances, covariances) = self.between.split_at(groups);
+        self.weights.clear();
+        self.weights.extend((0..groups).map(|g| {
+            std::array::from_fn(|l| {
+                let v = variances[g][l].max(0.0);
+                let spread = open[g][l] + response_n * (2.0 * covariances[g][l] + response_n * v);
                 1.0 / (noise + spread.max(0.0))
-            });
+            })
+        }));
+    }
+
+    fn equations(&mut self, [x, y, response_n]: Unknowns) -> Equations {
+        let ForceLinearLocator { layers, expected, .. } = self.locator;
+        layers.interpolate_slopes([x, y], VALUES..VALUES + 1, &mut self.slopes);
+        let equations = Equations::new((0..self.reading.len()).map(|g| {
+            let [f, along, across] = &self.slopes[g];
             let residual = std::array::from_fn(|l| self.reading[g][l] - response_n * f[l]);
-            (
-                weights,
-                residual,
-                [along.map(|slope| response_n * slope), across.map(|slope| response_n * slope), *f],
-            )
-        });
-        let equations = Equations::new(channels);
+            let times = |slopes: &Lanes| slopes.map(|slope| response_n * slope);
+            (self.weights[g], residual, [times(along), times(across), *f])
+        }));
         if self.range().is_some() { equations.with_expected(response_n, *expected) } else { equations }
     }
 

@@ -67,13 +67,19 @@ impl Cells {
         let is_valley = |cell: &usize| {
             let [i, j] = self.indices(*cell);
             let cost = looks[*cell].cost;
-            let mut others = around(i, counts[0])
-                .flat_map(|i| around(j, counts[1]).map(move |j| i * counts[1] + j))
-                .filter(|other| other != cell);
-            cost.is_finite()
-                && others.all(|other| {
-                    if other < *cell { looks[other].cost > cost } else { looks[other].cost >= cost }
-                })
+            if !cost.is_finite() {
+                return false;
+            }
+            for i in around(i, counts[0]) {
+                for j in around(j, counts[1]) {
+                    let other = i * counts[1] + j;
+                    let (from, is_before) = (looks[other].cost, other < *cell);
+                    if from < cost || is_before && from == cost {
+                        return false;
+                    }
+                }
+            }
+            true
         };
         let mut valleys: Vec<usize> = (0..looks.len()).filter(is_valley).collect();
         valleys.sort_by(|a, b| looks[*a].cost.total_cmp(&looks[*b].cost));

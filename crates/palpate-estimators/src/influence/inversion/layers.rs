@@ -2,7 +2,7 @@
 
 use crate::influence::grid::Axis;
 use crate::influence::lanes::{LANES, Lanes};
-use palpate_numerics::simd::{Kernel, Simd, run_loops};
+use palpate_numerics::simd::{Arithmetic, InstructionSet, Kernel, Simd, Vector};
 use std::ops::Range;
 
 /// Layers of numbers, one a channel, over the places of a grid.
@@ -77,21 +77,22 @@ impl Layers {
         weights: impl Fn(&[Stencil; 2], usize, usize) -> [f64; K],
     ) {
         let stencils = [Stencil::new(x, self.counts[0]), Stencil::new(y, self.counts[1])];
-        run_loops(Interpolate { table: self, stencils, layers, weights, out });
+        InstructionSet::best().run(Interpolate { table: self, stencils, layers, weights, out });
     }
 }
 
 /// Lagrange's weights of up to four nodes around a place, and their change by a node.
 #[derive(Clone, Copy, Debug)]
-struct Stencil {
-    first: usize,
-    used: usize,
-    weights: [f64; 4],
-    slopes: [f64; 4],
+pub(in crate::influence) struct Stencil {
+    pub first: usize,
+    pub used: usize,
+    pub weights: [f64; 4],
+    pub slopes: [f64; 4],
 }
 
 impl Stencil {
-    fn new(place: f64, count: usize) -> Self {
+    /// Around a place of a row of `count` nodes.
+    pub fn new(place: f64, count: usize) -> Self {
         let used = count.min(4);
         let first = ((place.floor() - 1.0).max(0.0) as usize).min(count - used);
         let t = place - first as f64;
@@ -129,24 +130,31 @@ struct Interpolate<'a, W, const K: usize> {
 
 impl<W: Fn(&[Stencil; 2], usize, usize) -> [f64; K], const K: usize> Kernel for Interpolate<'_, W, K> {
     type Output = ();
-    const FUSED: bool = false;
+    const FUSED: bool = true;
 
     #[inline(always)] // Compiled for the instructions of its caller.
     fn run<S: Simd>(self) {
         let Self { table, stencils, layers, weights, out } = self;
         let [along, across] = &stencils;
+        // Weights of the nodes, and where in the table their first group is.
+        let mut nodes = [([0.0; K], 0); 16];
         for i in 0..along.used {
             for j in 0..across.used {
                 let place = (along.first + i) * table.counts[1] + across.first + j;
-                let weights = weights(&stencils, i, j);
-                for (sums, lanes) in out.iter_mut().zip(table.groups_of(place, layers.clone())) {
-                    for k in 0..K {
-                        for l in 0..LANES {
-                            sums[k][l] += weights[k] * lanes[l];
-                        }
-                    }
+                let first = (place * table.layers + layers.start) * table.groups;
+                nodes[i * across.used + j] = (weights(&stencils, i, j), first);
+            }
+        }
+        let nodes = &nodes[..along.used * across.used];
+        for (o, out) in out.iter_mut().enumerate() {
+            let mut sums = [S::F64::splat(0.0); K];
+            for (weights, first) in nodes {
+                let value = S::F64::load(&table.values[first + o]);
+                for k in 0..K {
+                    sums[k] = value.mul_add(S::F64::splat(weights[k]), sums[k]);
                 }
             }
+            *out = sums.map(S::F64::to_array);
         }
     }
 }

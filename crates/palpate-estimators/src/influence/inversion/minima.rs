@@ -1,7 +1,7 @@
 //! Minima of a reading's misfit, and the modes that they belong to.
 
-use super::Explain;
 use super::cells::Look;
+use super::{Explain, Explained};
 use crate::influence::levenberg::{Unknowns, descend};
 use palpate_numerics::small::Matrix;
 
@@ -9,9 +9,7 @@ use palpate_numerics::small::Matrix;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
     pub at: Unknowns,
-    /// −2·ln of the posterior density of its place, less a constant, and χ² there.
-    pub cost: f64,
-    pub misfit: f64,
+    pub found: Explained,
     pub information: Matrix<3>,
 }
 
@@ -28,34 +26,35 @@ pub(super) fn minima<E: Explain>(reading: &mut E, looks: &[Look]) -> Vec<Minimum
     let mut found: Vec<Minimum> = Vec::with_capacity(MOST_VALLEYS);
     let mut best = f64::INFINITY;
     for cell in cells.valleys(looks, MOST_VALLEYS) {
-        let Look { misfit, cost, latent } = looks[cell];
-        let [along, across] = reading.lengths(cells.middle(cell), latent);
-        let [(x0, x1), (y0, y1)] = cells.span(cell);
-        let reach = 0.5 * (along * (x1 - x0)).hypot(across * (y1 - y0));
-        if floor(misfit, reach) + (cost - misfit) > best + NEGLIGIBLE {
+        let Look { latent, .. } = looks[cell];
+        if least_cost(reading, cell, &looks[cell]) > best + NEGLIGIBLE {
             continue;
         }
         let [x, y] = cells.middle(cell).map(|node| node as f64);
         let minimum = refined(reading, [x, y, latent]);
-        if !minimum.cost.is_finite() {
+        if !minimum.found.cost.is_finite() {
             continue;
         }
-        best = best.min(minimum.cost);
+        best = best.min(minimum.found.cost);
         match (0..found.len()).find(|i| same(reading, &found[*i], &minimum)) {
-            Some(i) if minimum.cost < found[i].cost => found[i] = minimum,
+            Some(i) if minimum.found.cost < found[i].found.cost => found[i] = minimum,
             Some(_) => {}
             None => found.push(minimum),
         }
     }
-    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    found.retain(|minimum| minimum.cost <= best + NEGLIGIBLE);
+    found.sort_by(|a, b| a.found.cost.total_cmp(&b.found.cost));
+    found.retain(|minimum| minimum.found.cost <= best + NEGLIGIBLE);
     found
 }
 
-/// Lower bound of the misfit within `reach` of a place, over the noise, about.
-pub(super) fn floor(misfit: f64, reach: f64) -> f64 {
-    let closest = (misfit.max(0.0).sqrt() - reach).max(0.0);
-    closest * closest
+/// Lower bound of what places of a cell cost, about: its corners are half the way to the next cells from its middle.
+pub(super) fn least_cost<E: Explain>(reading: &E, cell: usize, look: &Look) -> f64 {
+    let cells = reading.cells();
+    let [along, across] = reading.lengths(cells.middle(cell), look.latent);
+    let [(x0, x1), (y0, y1)] = cells.span(cell);
+    let reach = 0.5 * (along * (x1 - x0)).hypot(across * (y1 - y0));
+    let closest = (look.misfit.max(0.0).sqrt() - reach).max(0.0);
+    closest * closest + (look.cost - look.misfit)
 }
 
 /// True of minima in one valley: on the straight way between them the cost hardly rises.
@@ -63,7 +62,7 @@ fn same<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> bool {
     const RISE: f64 = 1.0;
     const CLOSE: f64 = 0.05;
     let close = (0..2).all(|k| (a.at[k] - b.at[k]).abs() < CLOSE);
-    close || highest_between(reading, a, b) <= a.cost.max(b.cost) + RISE
+    close || highest_between(reading, a, b) <= a.found.cost.max(b.found.cost) + RISE
 }
 
 /// Number of the mode of each minimum, from 0: minima between which the density does not fall to a hundredth of the best one's are one mode.
@@ -73,7 +72,7 @@ pub(super) fn modes<E: Explain>(reading: &mut E, minima: &[Minimum]) -> Vec<usiz
     let mut modes: Vec<usize> = Vec::with_capacity(minima.len());
     let mut count = 0;
     for (i, minimum) in minima.iter().enumerate() {
-        let most = minima[0].cost + rise;
+        let most = minima[0].found.cost + rise;
         let of = (0..i).find(|other| highest_between(reading, &minima[*other], minimum) <= most);
         modes.push(of.map_or(count, |other| modes[other]));
         count += usize::from(of.is_none());
@@ -96,12 +95,14 @@ fn highest_between<E: Explain>(reading: &mut E, a: &Minimum, b: &Minimum) -> f64
 fn refined<E: Explain>(reading: &mut E, start: Unknowns) -> Minimum {
     let [x, y] = reading.axes().map(|axis| (0.0, (axis.count - 1) as f64));
     let ends = [x, y, reading.range().unwrap_or((start[2], start[2]))];
-    let descend_from =
-        |reading: &mut E, start| descend(start, ends, SMALL, |at| reading.equations(at, start));
+    let descend_from = |reading: &mut E, start| {
+        reading.weigh(start);
+        descend(start, ends, SMALL, |at| reading.equations(at))
+    };
     // Within one descent the variances stay, so that misfits can be compared.
     let start = [start[0], start[1], start[2].clamp(ends[2].0, ends[2].1)];
     let (near, _) = descend_from(reading, start);
     let (at, equations) = descend_from(reading, near);
-    let explained = reading.explain([at[0], at[1]], at[2]);
-    Minimum { at, cost: explained.cost, misfit: explained.misfit, information: equations.information }
+    let found = reading.explain([at[0], at[1]], at[2]);
+    Minimum { at, found, information: equations.information }
 }

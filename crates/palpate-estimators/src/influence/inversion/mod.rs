@@ -8,10 +8,13 @@ mod cells;
 mod layers;
 mod minima;
 mod posterior;
+mod quadrature;
+mod tiles;
 
 pub(super) use cells::{CellBlocks, Cells, Look, look_at_cells};
-pub(super) use layers::{Layers, Slopes};
+pub(super) use layers::{Layers, Slopes, Stencil};
 pub(super) use posterior::{Inversion, ToldForce};
+pub(super) use quadrature::FIVE_POINTS;
 
 use super::grid::Axis;
 use super::levenberg::{Equations, Unknowns};
@@ -45,8 +48,11 @@ pub(super) trait Explain {
     /// The latent number's least and greatest value; `None` where there is nothing to look for.
     fn range(&self) -> Option<(f64, f64)>;
 
-    /// The normal equations of a contact, with the variances that readings have `near` another.
-    fn equations(&mut self, at: Unknowns, near: Unknowns) -> Equations;
+    /// Takes the variances that readings have near a contact for the equations that follow.
+    fn weigh(&mut self, near: Unknowns);
+
+    /// The normal equations of a contact, with the variances of the contact weighed last.
+    fn equations(&mut self, at: Unknowns) -> Equations;
 
     /// A place, the latent number integrated out; that is about `latent`.
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained;

@@ -6,7 +6,7 @@ use super::presses::{Presses, nuisance_coordinate};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
 use crate::influence::grid::Axis;
-use crate::influence::inversion::Layers;
+use crate::influence::inversion::{Layers, Stencil};
 use crate::influence::noise::{Noise, Whitening};
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -167,25 +167,25 @@ impl Presses {
         for node in (0..nodes).step_by(every) {
             let (place, k) = (node / nuisance.count, node % nuisance.count);
             let (i, j) = (place / y.count, place % y.count);
-            let next = (k + 1).min(nuisance.count - 1);
             let middles = [[half(x, i), half(y, j), k as f64], [i as f64, j as f64, half(nuisance, k)]];
             for (square, at) in squares.iter_mut().zip(middles) {
                 process.mean_into(&self.coordinates_at([*x, *y, *nuisance], at), &mut raw, &mut scratch);
                 whitening.apply(&raw, &mut white);
-                layers.interpolate([at[0], at[1]], k..next + 1, &mut between);
-                let part = at[2] - k as f64;
-                let (from, to) = (&between[..layers.groups()], &between[(next - k) * layers.groups()..]);
-                let pairs = from.as_flattened().iter().zip(to.as_flattened());
-                *square +=
-                    white.iter().zip(pairs).map(|(w, (a, b))| (w - a - part * (b - a)).powi(2)).sum::<f64>();
+                let Stencil { first, used, weights, .. } = Stencil::new(at[2], nuisance.count);
+                layers.interpolate([at[0], at[1]], first..first + used, &mut between);
+                let of_nodes = between.as_flattened().chunks(between.as_flattened().len() / used);
+                for (weight, mean) in weights.iter().zip(of_nodes) {
+                    white.iter_mut().zip(mean).for_each(|(w, mean)| *w -= weight * mean);
+                }
+                *square += white.iter().map(|w| w * w).sum::<f64>();
             }
         }
         let count = (nodes.div_ceil(every) * channels) as f64;
         squares.map(|square| (square / count).sqrt())
     }
 
-    /// Axes with so many more nodes that a table misses less, as far as there may be so many: cubic interpolation between places errs as the
-    /// fourth power of their distance, straight lines along the nuisance coordinate as the second.
+    /// Axes with so many more nodes that a table misses less, as far as there may be so many: cubic interpolation errs as the fourth power of
+    /// the distance between nodes.
     fn finer(&self, [x, y, nuisance]: [Axis; 3], missed: [f64; 2]) -> [Axis; 3] {
         let is_plane = y.count > 1;
         let (most, most_nuisance) = if is_plane {
@@ -193,9 +193,8 @@ impl Presses {
         } else {
             (MOST_ALONG, MOST_OF_NUISANCE)
         };
-        let [places, nodes] = missed.map(|missed| missed / MOST_MISSED);
-        let places = places.sqrt().sqrt();
-        [x.finer(places, most), y.finer(places, most), nuisance.finer(nodes.sqrt(), most_nuisance)]
+        let [places, nodes] = missed.map(|missed| (missed / MOST_MISSED).sqrt().sqrt());
+        [x.finer(places, most), y.finer(places, most), nuisance.finer(nodes, most_nuisance)]
     }
 
     fn axes(&self, process: &GaussianProcess, setup: &Setup) -> [Axis; 3] {

@@ -1,12 +1,14 @@
 //! The locator of a measured surface: its table, and what the places and nuisance coordinates of the table explain of a reading.
 
 use super::config::Scale;
+use super::curve::{Curve, Window};
+use super::line::{Line, Marginal, Stretch, WhiteNoise};
 use super::scan::Scan;
-use super::table::{Line, Marginal, Stretch, Table, WhiteNoise};
+use super::table::Table;
 use crate::fit::{Locate, LocatorFault};
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
-    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, ToldForce, look_at_cells,
+    Cells, Explain, Explained, Inversion, Layers, Look, Slopes, Stencil, ToldForce, look_at_cells,
 };
 use crate::influence::lanes::{LANES, Lanes, in_lanes};
 use crate::influence::levenberg::{Equations, Unknowns};
@@ -64,16 +66,16 @@ struct Search {
     noise: WhiteNoise,
     cells: Cells,
     scan: Scan,
-    /// Greatest way of the reading from a place to the next along and across, for each node of the nuisance coordinate.
+    /// Greatest way of the reading from a place to the next along and across, over the deviations there, for each node of the nuisance coordinate.
     lengths: Vec<[f64; 2]>,
 }
 
 /// Nodes of a cell along either axis of a plane, where every place has a line of nodes; elsewhere 1.
 const STRIDE: usize = 3;
-/// Nodes of the nuisance coordinate that are looked at first, to either side of where it is thought to be.
-const NEAR: usize = 1;
-/// Beyond a node whose squared residual is this much above the least, the nuisance coordinate has no probability worth adding up: e⁻¹⁰.
-const NEGLIGIBLE: f64 = 20.0;
+/// Straight parts of a line from a node to the next.
+const PARTS: usize = 4;
+/// Curves of a line that are tried, each around where the one before says that the nuisance coordinate is.
+const MOST_WINDOWS: usize = 3;
 /// A gain beyond this many standard deviations is not looked for.
 const MOST_GAIN: f64 = 6.0;
 
@@ -109,14 +111,14 @@ impl Search {
 
     /// From each node of a place to the lines of its neighbours.
     fn find_lengths(&mut self, axes: [Axis; 2], nodes: usize) {
-        let unit = self.noise.unit();
+        let noise = self.noise.without_gain();
         let mut stretches = Vec::new();
         self.lengths = (0..axes[0].count * axes[1].count * nodes)
             .map(|i| {
                 let (place, node) = (i / nodes, i % nodes);
                 let mean = self.means.groups_of(place, node..node + 1);
                 greatest_distances(axes, place, |other| {
-                    self.line(other, nodes).residual(mean, &unit, &mut stretches).sqrt()
+                    self.line(other, nodes).residual(mean, &noise, &mut stretches).sqrt()
                 })
             })
             .collect();
@@ -192,6 +194,9 @@ impl MeasuredLocator {
             means: Vec::new(),
             variances: Vec::new(),
             slopes: Vec::new(),
+            weights: Vec::new(),
+            parts: Vec::new(),
+            parts_variances: Vec::new(),
             stretches: Vec::new(),
         })
     }
@@ -261,23 +266,73 @@ struct Seen<'a> {
     means: Vec<Lanes>,
     variances: Vec<Lanes>,
     slopes: Vec<Slopes>,
+    weights: Vec<Lanes>,
+    parts: Vec<Lanes>,
+    parts_variances: Vec<f64>,
     stretches: Vec<Stretch>,
 }
 
 impl Seen<'_> {
-    /// The least squared residual of a place and the integral over some nodes of its line; `None` where others may matter.
-    fn explain_by(&mut self, place: [f64; 2], nodes: std::ops::Range<usize>) -> Option<(f64, Marginal)> {
+    /// The least squared residual of a place and the integral over its line near a node; `None` where the line's ends or another part of it may
+    /// matter.
+    fn explain_near(&mut self, place: [f64; 2], mut near: f64) -> Option<(f64, Marginal)> {
+        let nodes = self.nodes();
+        for _ in 0..MOST_WINDOWS {
+            let window = Window::around(near, nodes);
+            let Search { means, noise, .. } = &self.locator.search;
+            means.interpolate(place, window.first..window.first + window.nodes, &mut self.means);
+            let v = self.variance(near);
+            let weights = |g: usize| noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
+            match Curve::new(&self.reading, &self.means, weights, window).integral(near) {
+                Ok(found) => return Some(found),
+                Err(node) => near = node.filter(|node| Window::around(*node, nodes) != window)?,
+            }
+        }
+        None
+    }
+
+    /// The same of the whole line, in straight parts.
+    fn explain_line(&mut self, place: [f64; 2]) -> (f64, Marginal) {
+        let nodes = self.nodes();
         let Search { means, noise, .. } = &self.locator.search;
-        means.interpolate(place, nodes.clone(), &mut self.means);
-        let variances = &self.variances.as_flattened()[nodes.clone()];
-        let line = Line { means: &self.means, variances };
-        let (misfit, mut marginal) = line.explain(&self.reading, noise, &mut self.stretches);
-        let negligible = misfit + NEGLIGIBLE;
-        let (Some(below), Some(above)) = (self.stretches.first(), self.stretches.last()) else { return None };
-        let is_open = nodes.start > 0 && below.residual_at(0.0) < negligible
-            || nodes.end < self.nodes() && above.residual_at(1.0) < negligible;
-        marginal.shift(nodes.start as f64);
-        (!is_open).then_some((misfit, marginal))
+        means.interpolate(place, 0..nodes, &mut self.means);
+        let groups = means.groups();
+        let parts = if nodes > 1 { PARTS } else { 1 };
+        self.parts.clear();
+        self.parts_variances.clear();
+        for part in 0..=(nodes - 1) * parts {
+            let node = part as f64 / parts as f64;
+            let Stencil { first, used, weights, .. } = Stencil::new(node, nodes);
+            for g in 0..groups {
+                let mut sum = [0.0; LANES];
+                for (k, weight) in weights[..used].iter().enumerate() {
+                    let mean = &self.means[(first + k) * groups + g];
+                    (0..LANES).for_each(|l| sum[l] += weight * mean[l]);
+                }
+                self.parts.push(sum);
+            }
+            let v = self.variance(node);
+            self.parts_variances.push(v);
+        }
+        let line = Line { means: &self.parts, variances: &self.parts_variances };
+        let (misfit, Marginal { weight, mean, variance }) =
+            line.explain(&self.reading, noise, &mut self.stretches);
+        let scale = 1.0 / parts as f64;
+        (misfit, Marginal { weight: weight * scale, mean: mean * scale, variance: variance * scale * scale })
+    }
+
+    /// The variances of a line between those of the grid.
+    fn interpolate_variances(&mut self, place: [f64; 2]) {
+        self.locator.search.variances.interpolate(place, 0..1, &mut self.variances);
+        self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
+    }
+
+    /// The variance of the place that was interpolated last, at a node of its line.
+    fn variance(&self, node: f64) -> f64 {
+        let variances = self.variances.as_flattened();
+        let (first, share) = self.stretch(node);
+        let next = (first + 1).min(self.nodes() - 1);
+        variances[first] + share * (variances[next] - variances[first])
     }
 
     /// The stretch of a line that a node of the nuisance coordinate is in, and where in it.
@@ -286,44 +341,39 @@ impl Seen<'_> {
         (first, node - first as f64)
     }
 
-    /// The equations where the latent number is the nuisance coordinate, straight between two nodes; `variances` are those of a line, and
-    /// taken at the node `near`.
-    fn equations_of_line(&mut self, [x, y, latent]: Unknowns, variances: &[f64], near: f64) -> Equations {
-        let Search { means, noise, .. } = &self.locator.search;
-        let (first, t) = self.stretch(latent);
-        means.interpolate_slopes([x, y], first..first + 2, &mut self.slopes);
-        let (of_near, share) = self.stretch(near);
-        let v = variances[of_near] + share * (variances[of_near + 1] - variances[of_near]);
-        let (from, to) = self.slopes.split_at(self.reading.len());
-        let channels = (0..self.reading.len()).map(|g| {
-            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
-            let mut between = from[g];
-            for k in 0..3 {
+    /// The equations where the latent number is the nuisance coordinate.
+    fn equations_of_line(&mut self, [x, y, latent]: Unknowns) -> Equations {
+        let Search { means, .. } = &self.locator.search;
+        let Stencil { first, used, weights: shares, slopes } = Stencil::new(latent, self.nodes());
+        means.interpolate_slopes([x, y], first..first + used, &mut self.slopes);
+        let groups = self.reading.len();
+        Equations::new((0..groups).map(|g| {
+            let [mut mean, mut along, mut across, mut by_node] = [[0.0; LANES]; 4];
+            for (k, of_node) in self.slopes[g..].iter().step_by(groups).enumerate() {
                 for l in 0..LANES {
-                    between[k][l] += t * (to[g][k][l] - from[g][k][l]);
+                    mean[l] += shares[k] * of_node[0][l];
+                    along[l] += shares[k] * of_node[1][l];
+                    across[l] += shares[k] * of_node[2][l];
+                    by_node[l] += slopes[k] * of_node[0][l];
                 }
             }
-            let [mean, along, across] = between;
             let residual = std::array::from_fn(|l| self.reading[g][l] - mean[l]);
-            let by_node = std::array::from_fn(|l| to[g][0][l] - from[g][0][l]);
-            (weights, residual, [along, across, by_node])
-        });
-        Equations::new(channels)
+            (self.weights[g], residual, [along, across, by_node])
+        }))
     }
 
     /// The equations where the latent number is a gain, in standard deviations.
-    fn equations_of_gain(&mut self, [x, y, latent]: Unknowns, v: f64) -> Equations {
+    fn equations_of_gain(&mut self, [x, y, latent]: Unknowns) -> Equations {
         let Search { means, noise, .. } = &self.locator.search;
         means.interpolate_slopes([x, y], 0..1, &mut self.slopes);
         let scale = 1.0 + noise.gain * latent;
-        let channels = (0..self.reading.len()).map(|g| {
+        let equations = Equations::new((0..self.reading.len()).map(|g| {
             let [mean, along, across] = &self.slopes[g];
-            let weights = noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
             let residual = std::array::from_fn(|l| self.reading[g][l] - scale * mean[l]);
             let times = |slopes: &Lanes, factor: f64| slopes.map(|slope| factor * slope);
-            (weights, residual, [times(along, scale), times(across, scale), times(mean, noise.gain)])
-        });
-        Equations::new(channels).with_expected(latent, [0.0, 1.0])
+            (self.weights[g], residual, [times(along, scale), times(across, scale), times(mean, noise.gain)])
+        }));
+        equations.with_expected(latent, [0.0, 1.0])
     }
 
     /// Nodes of the nuisance coordinate.
@@ -367,32 +417,29 @@ impl Explain for Seen<'_> {
         if nodes > 1 { Some((0.0, (nodes - 1) as f64)) } else { gain.then_some((-MOST_GAIN, MOST_GAIN)) }
     }
 
-    fn equations(&mut self, at: Unknowns, near: Unknowns) -> Equations {
-        let place = near[0].round() as usize * self.axes()[1].count + near[1].round() as usize;
-        let variances = self.locator.search.variances.groups_of(place, 0..1).as_flattened();
-        if self.nodes() > 1 {
-            self.equations_of_line(at, variances, near[2])
-        } else {
-            self.equations_of_gain(at, variances[0])
-        }
+    fn weigh(&mut self, [x, y, latent]: Unknowns) {
+        self.interpolate_variances([x, y]);
+        let v = if self.nodes() > 1 { self.variance(latent) } else { self.variance(0.0) };
+        let signal = &self.locator.search.noise.signal;
+        self.weights.clear();
+        self.weights.extend(signal.iter().map(|signal| signal.map(|signal| 1.0 / (1.0 + v * signal))));
+    }
+
+    fn equations(&mut self, at: Unknowns) -> Equations {
+        if self.nodes() > 1 { self.equations_of_line(at) } else { self.equations_of_gain(at) }
     }
 
     fn explain(&mut self, place: [f64; 2], latent: f64) -> Explained {
         let nodes = self.nodes();
-        self.locator.search.variances.interpolate(place, 0..1, &mut self.variances);
-        self.variances.as_flattened_mut().iter_mut().for_each(|v| *v = v.max(0.0));
-        let (first, _) = self.stretch(latent);
-        let near = first.saturating_sub(NEAR)..(first + NEAR + 2).min(nodes);
-        let (misfit, marginal) =
-            self.explain_by(place, near).or_else(|| self.explain_by(place, 0..nodes)).unwrap_or_default();
-        let Marginal { weight, nuisance, nuisance_square } = marginal;
-        let latent = nuisance / weight;
+        self.interpolate_variances(place);
+        let near = if nodes > 1 { self.explain_near(place, latent) } else { None };
+        let (misfit, Marginal { weight, mean, variance }) = near.unwrap_or_else(|| self.explain_line(place));
         let [x, y] = self.axes();
         Explained {
             misfit,
             cost: misfit - 2.0 * weight.ln() + x.margin_cost(place[0]) + y.margin_cost(place[1]),
-            latent: if nodes > 1 { latent } else { 0.0 },
-            latent_variance: (nuisance_square / weight - latent * latent).max(0.0),
+            latent: if nodes > 1 { mean } else { 0.0 },
+            latent_variance: variance,
         }
     }
 

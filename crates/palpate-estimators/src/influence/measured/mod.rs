@@ -17,7 +17,9 @@
 //! out of the recording show it to miss.
 
 mod config;
+mod curve;
 mod fitting;
+mod line;
 mod locator;
 mod presses;
 mod scan;
