@@ -35,7 +35,8 @@ pub(super) struct Weighed {
 /// Places around a minimum that stand for its posterior; `None` where that is cut off or not nearly normal.
 ///
 /// The first normal density is Laplace's, at the minimum. Between presses, where the process knows less, variances change with the place and so
-/// bend the cost: further densities are fitted to the points of the one before.
+/// bend the cost: further densities are fitted to the points of the one before. Where none fits, 25 points on a plane have to tell the mean and
+/// the variances that 9 do.
 pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<Vec<Weighed>> {
     let axes = reading.axes();
     let varies = axes.map(|axis| axis.count > 1);
@@ -43,24 +44,21 @@ pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<V
     let free = [varies[0], varies[1], reading.range().is_some()];
     let [[xx, xy, _], [_, yy, _], _] = Ldl::of_free(&minimum.information, free)?.inverse();
     let mut normal = Normal::new([x, y], [xx, xy, yy]);
-    let (mut middle, mut points) = (minimum.found, Vec::with_capacity(9));
-    for _ in 0..MOST_FITS {
+    let mut middle = minimum.found;
+    for fits in 1.. {
         if !normal.is_clear(axes) {
             return None;
         }
-        points.clear();
-        points.extend(rule(varies).map(|(at, weight)| Point {
-            at,
-            weight,
-            found: if at == [0.0; 2] { middle } else { reading.explain(normal.place(at), latent) },
-        }));
-        if points.iter().all(|point| point.bend(&middle).abs() <= MOST_BENT * point.rise().max(1.0)) {
-            let weighed = |point: &Point| Weighed {
-                place: normal.place(point.at),
-                weight: point.weight * (-0.5 * point.bend(&middle)).exp(),
-                found: point.found,
-            };
-            return Some(points.iter().map(weighed).collect());
+        let points = normal.points(reading, latent, middle, rule(varies));
+        if points.iter().all(|point| point.bend.abs() <= MOST_BENT * point.rise().max(1.0)) {
+            return Some(points.iter().map(Point::weighed).collect());
+        }
+        if fits == MOST_FITS {
+            if varies != [true; 2] {
+                return None;
+            }
+            let finer = normal.points(reading, latent, middle, product([&FIVE_POINTS; 2]));
+            return agree(&points, &finer).then(|| finer.iter().map(Point::weighed).collect());
         }
         normal = normal.fitted(&points, varies)?;
         middle = reading.explain(normal.mean, latent);
@@ -82,31 +80,62 @@ struct Normal {
 #[derive(Clone, Copy, Debug)]
 struct Point {
     at: [f64; 2],
+    place: [f64; 2],
     weight: f64,
     found: Explained,
+    /// What the cost rises more from the middle than that of the normal density.
+    bend: f64,
 }
 
 impl Point {
-    /// Rise of a normal density's cost from its middle.
+    /// Rise of the normal density's cost from its middle.
     fn rise(&self) -> f64 {
-        self.at[0] * self.at[0] + self.at[1] * self.at[1]
+        square(self.at)
     }
 
-    /// What the cost rises more from the middle than that of a normal density.
-    fn bend(&self, middle: &Explained) -> f64 {
-        self.found.cost - middle.cost - self.rise()
+    fn weighed(&self) -> Weighed {
+        Weighed { place: self.place, weight: self.weight * (-0.5 * self.bend).exp(), found: self.found }
     }
 }
 
-/// Points and weights of the rule over those axes that vary, the middle first.
+/// Squared distance from the middle.
+fn square([u, v]: [f64; 2]) -> f64 {
+    u * u + v * v
+}
+
+/// Whether two rules tell the same mean, to a tenth of a standard deviation, and the same variances, to a fifth.
+fn agree(points: &[Point], finer: &[Point]) -> bool {
+    let moments = |points: &[Point]| {
+        let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
+        for point in points {
+            let weight = point.weighed().weight;
+            sum += weight;
+            for k in 0..2 {
+                first[k] += weight * point.at[k];
+                second[k] += weight * point.at[k] * point.at[k];
+            }
+        }
+        [0, 1].map(|k| (first[k] / sum, second[k] / sum - (first[k] / sum).powi(2)))
+    };
+    moments(points).iter().zip(moments(finer)).all(|((mean, variance), (finer_mean, finer_variance))| {
+        (mean - finer_mean).abs() <= 0.1 * finer_variance.sqrt()
+            && (variance / finer_variance - 1.0).abs() <= 0.2
+    })
+}
+
+/// Points and weights of the rule over those axes that vary.
 fn rule(varies: [bool; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
     const NONE: &[(f64, f64)] = &[(0.0, 1.0)];
-    let [of_u, of_v]: [&[(f64, f64)]; 2] = match varies {
+    product(match varies {
         [true, true] => [&THREE_POINTS, &THREE_POINTS],
         [true, false] => [&FIVE_POINTS, NONE],
         [false, true] => [NONE, &FIVE_POINTS],
         [false, false] => [NONE, NONE],
-    };
+    })
+}
+
+/// Points and weights of two rules, the middle first.
+fn product([of_u, of_v]: [&'static [(f64, f64)]; 2]) -> impl Iterator<Item = ([f64; 2], f64)> {
     of_u.iter().flat_map(move |(u, of_u)| of_v.iter().map(move |(v, of_v)| ([*u, *v], of_u * of_v)))
 }
 
@@ -120,6 +149,22 @@ impl Normal {
 
     fn place(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         [self.mean[0] + self.along * u, self.mean[1] + self.both * u + self.across * v]
+    }
+
+    /// What a reading has at the points of a rule; that of the `middle` is known.
+    fn points<E: Explain>(
+        &self,
+        reading: &mut E,
+        latent: f64,
+        middle: Explained,
+        rule: impl Iterator<Item = ([f64; 2], f64)>,
+    ) -> Vec<Point> {
+        let point = |(at, weight): ([f64; 2], f64)| {
+            let place = self.place(at);
+            let found = if at == [0.0; 2] { middle } else { reading.explain(place, latent) };
+            Point { at, place, weight, found, bend: found.cost - middle.cost - square(at) }
+        };
+        rule.map(point).collect()
     }
 
     /// True where no edge of the grid, and none of its margins, matters.
@@ -139,7 +184,7 @@ impl Normal {
         /// Greatest change of a variance.
         const MOST_CHANGE: f64 = 4.0;
         let ([mut bu, mut bv], [mut uu, mut uv, mut vv]) = ([0.0; 2], [0.0; 3]);
-        for Point { at: [u, v], weight, found } in points {
+        for Point { at: [u, v], weight, found, .. } in points {
             let c = weight * (found.cost - points[0].found.cost);
             bu += c * u;
             bv += c * v;

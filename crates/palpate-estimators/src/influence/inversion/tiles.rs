@@ -7,8 +7,9 @@ use super::{Explain, Explained};
 
 /// A cost this much above the least has no probability worth adding up: e⁻⁸.
 pub(super) const CUT: f64 = 16.0;
-/// A tile stands for its middle when readings move no further within it, over the noise.
-const FINE: f64 = 0.5;
+/// A tile stands for its middle when readings move no further within it, over the noise: on a line, and on a plane, where every halving takes
+/// four times as long.
+const FINE: [f64; 2] = [0.5, 1.0];
 /// Least and longest side of a tile, in nodes, of which a length scale has eight.
 const LEAST_STEP: f64 = 1e-6;
 const MOST_STEP: f64 = 2.0;
@@ -64,14 +65,16 @@ impl Lattice {
         Self { counts, steps: [0, 1].map(|k| (nodes[k] - 1) as f64 / counts[k] as f64) }
     }
 
-    /// Steps within which readings move by [`FINE`] near a minimum, whatever the latent number.
+    /// Steps within which readings hardly move near a minimum, whatever the latent number.
     fn fine_steps<E: Explain>(reading: &E, minimum: &Minimum) -> [f64; 2] {
         let [x, y, latent] = minimum.at;
         let lengths = reading.lengths([x, y].map(|at| at.round() as usize), latent);
         let [[xx, _, xt], [_, yy, yt], [_, _, tt]] = minimum.information;
+        let is_plane = reading.axes().iter().all(|axis| axis.count > 1);
+        let fine = FINE[usize::from(is_plane)];
         let step = |own: f64, with_latent: f64, length: f64| {
             let told = if tt > 0.0 { own - with_latent * with_latent / tt } else { own };
-            (FINE / told.max(0.0).sqrt().max(length)).clamp(LEAST_STEP, MOST_STEP)
+            (fine / told.max(0.0).sqrt().max(length)).clamp(LEAST_STEP, MOST_STEP)
         };
         [step(xx, xt, lengths[0]), step(yy, yt, lengths[1])]
     }
