@@ -96,7 +96,7 @@ impl Influence {
     }
 
     /// Offsets of the channels at the rows of `asked`, told by the task's presses where these drift; `None` of a surface with a model,
-    /// of rows without times or forces, and where the presses tell no drift.
+    /// of rows without times or forces or with a nuisance coordinate, and where the presses tell no drift or read no multiple of the force.
     ///
     /// # Errors
     /// [`InfluenceFitError`] where influence functions cannot be learnt, or the watch stopped it.
@@ -104,7 +104,7 @@ impl Influence {
         task: FitTask,
         asked: &Recording,
     ) -> Result<Option<OffsetCourse>, InfluenceFitError> {
-        if task.setup.surface().model().is_some() {
+        if task.setup.surface().model().is_some() || has_nuisance(task.recording) {
             return Ok(None);
         }
         Ok(force_linear::offset_course(task, asked)?)
@@ -126,8 +126,9 @@ impl Influence {
     /// Fits offsets and influence functions of a surface without a model; `None` where the setting, the recording or a named
     /// nuisance coordinate says that readings are no multiple of the force.
     fn fit_force_linear(&self, task: FitTask) -> Result<Option<ForceLinearLocator>, InfluenceFitError> {
-        let has_nuisance = || task.recording.rows.iter().any(|row| row.nuisance.is_some());
-        if self.structure == Structure::Free || self.structure == Structure::Auto && has_nuisance() {
+        if self.structure == Structure::Free
+            || self.structure == Structure::Auto && has_nuisance(task.recording)
+        {
             return Ok(None);
         }
         let fitted = force_linear::fit(task, self.structure)?;
@@ -153,6 +154,11 @@ impl Influence {
     pub fn fit_beam(&self, task: FitTask) -> Result<BeamLocator, InfluenceFitError> {
         beam::fit(*self, task)
     }
+}
+
+/// Whether a coordinate beside position and force shapes the readings.
+fn has_nuisance(recording: &Recording) -> bool {
+    recording.rows.iter().any(|row| row.nuisance.is_some())
 }
 
 impl InfluenceLocator {

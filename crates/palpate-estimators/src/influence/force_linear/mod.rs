@@ -107,13 +107,18 @@ fn fit_condensed(
     Ok(Some(locator))
 }
 
-/// Offsets at the rows of `asked`, told by the presses of a recording; `None` where its rows have no times, or tell no drift.
+/// Offsets at the rows of `asked`, told by the presses of a recording; `None` where its rows have no times, tell no drift, or read no
+/// multiple of the force.
 pub(super) fn offset_course(task: FitTask, asked: &Recording) -> Result<Option<OffsetCourse>, MeasuredError> {
     let FitTask { setup, recording, watch, .. } = task;
     let Some((own_s, asked_s)) = recording.times_s().zip(asked.times_s()) else { return Ok(None) };
     let Some(learnt) = Learnt::new(setup, recording, Structure::Auto, MOST_PRESSES, watch)? else {
         return Ok(None);
     };
+    // Elsewhere the order of the presses, of their places or of a nuisance coordinate, would pass for a drift.
+    if !learnt.prior.is_separable() {
+        return Ok(None);
+    }
     let Some(at_rows) = learnt.offsets_at(&shares(&asked_s, &own_s))? else { return Ok(None) };
     let Some(own) = learnt.offsets_at(&shares(&own_s, &own_s))? else { return Ok(None) };
     let channels = recording.channels.len();

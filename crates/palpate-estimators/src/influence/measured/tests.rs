@@ -284,6 +284,22 @@ fn it_comes_back_from_a_file() {
     assert!(fault.to_string().contains("table means"), "{fault}");
 }
 
+/// Presses one after the other along the strip, whose order is that of their positions.
+#[test]
+fn presses_that_are_no_multiple_of_the_force_tell_no_drift() {
+    let setup = raw_setup(*STRIP, 2, None);
+    let named = |mut row: Row| {
+        row.nuisance = row.force_n.map(|force_n| force_n.powf(0.7));
+        row
+    };
+    let recording = squeezes(21).in_order();
+    let with_depth = raw_recording(squeezes(21).rows.into_iter().map(named).collect()).in_order();
+    for recording in [recording, with_depth] {
+        let course = Influence::offset_course(FitTask::new(&setup, &recording), &recording).unwrap();
+        assert_eq!(course, None);
+    }
+}
+
 /// Fails unless the pooled errors of five folds by position undercut scikit-learn's best, `median_mm` and `mean_mm`, by the share `less`,
 /// and the 95 % regions hold about as many contacts as they say.
 fn check(name: &str, recorded: Option<(Setup, Recording)>, (median_mm, mean_mm): (f64, f64), less: f64) {
