@@ -107,7 +107,7 @@ pub fn simulate_at(
         let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
             let reading = measure(setup.layout(), &clean, &errors, &mut rng);
-            rows.push(Row { position, force_n: Some(force_n), nuisance: None, time_s: None, reading });
+            rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         }
     }
     Ok(Recording::new(setup.layout(), "simulation", rows).seeded(seed))

@@ -12,7 +12,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::{Dimension, Unit, UnitError};
 
 use crate::document::At;
-use crate::error::{RigError, RigProblem};
+use crate::error::{Place, RigError, RigProblem};
 use crate::values::{Count, Length, Positive, Quantity};
 
 /// Columns of a CSV file by their roles; what is not said is as in the recordings that palpate itself writes.
@@ -42,10 +42,11 @@ pub(crate) struct RecordingKeys {
     pub force: Option<At<ColumnKey>>,
     /// The unit of forces; N unless said otherwise.
     pub force_unit: Option<At<String>>,
-    /// Column of a coordinate that readings depend on, is known here, and is unknown in use.
-    pub nuisance: Option<At<ColumnKey>>,
-    /// The unit of the nuisance coordinate; none unless said otherwise.
-    pub nuisance_unit: Option<At<String>>,
+    /// Column of a coordinate that readings depend on, is known here, and is unknown in use, or a list of several; the first is looked for
+    /// with the position.
+    pub nuisance: Option<At<NuisanceKeys>>,
+    /// The unit of the nuisance coordinate, or a list of as many; none unless said otherwise.
+    pub nuisance_unit: Option<At<ChannelUnitKeys>>,
     /// Column of the time of each row, as numbers or timestamps; `time_s`, where the file has it, unless said otherwise.
     pub time: Option<At<ColumnKey>>,
     /// The unit of times that are numbers; s unless said otherwise.
@@ -73,6 +74,23 @@ pub(crate) enum ColumnKey {
     Number(Count<1, { i64::MAX }>),
 }
 
+/// One column, or a list of them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename = "by shape", expecting = "a column's name or number, or a list of them")]
+pub(crate) enum NuisanceKeys {
+    Scalar(At<ColumnKey>),
+    List(Vec<At<ColumnKey>>),
+}
+
+impl NuisanceKeys {
+    fn columns(&self) -> &[At<ColumnKey>] {
+        match self {
+            Self::Scalar(column) => std::slice::from_ref(column),
+            Self::List(columns) => columns,
+        }
+    }
+}
+
 /// A span of time, as in "0 s..10 s", "95 s.." or "..2 min".
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span(TimeSpan);
@@ -84,7 +102,7 @@ impl<'de> Deserialize<'de> for Span {
     }
 }
 
-/// One unit for all channels, or one for each.
+/// One unit, or a list of them.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename = "by shape", expecting = "a unit such as \"mm\", or a list of them")]
 pub(crate) enum ChannelUnitKeys {
@@ -97,11 +115,7 @@ impl At<RecordingKeys> {
         self.check_numbered(extent)?;
         let own = Columns::own(&layout.names(), &layout.kinds(), extent);
         let force_unit = unit(&self.force_unit, Dimension::Force, SensorKind::Reaction.unit())?;
-        let nuisance_unit = match &self.nuisance_unit {
-            None => Unit::NONE,
-            Some(symbol) => Unit::from_symbol(symbol)
-                .ok_or_else(|| symbol.place.invalid(UnitError::UnknownUnit { unit: symbol.to_string() }))?,
-        };
+        let mut nuisances = self.nuisances()?.into_iter();
         let second = Unit::from_symbol("s").unwrap_or(Unit::NONE);
         let time_unit = unit(&self.time_unit, Dimension::Time, second)?;
         let force = self.value("force", &self.force, &self.force_unit, force_unit)?;
@@ -112,7 +126,8 @@ impl At<RecordingKeys> {
             frame: self.frame(extent)?,
             channels: self.channels(&layout.kinds(), own.channels)?,
             force: force.map(|values| ForceColumn { values, need: Need::Required }).or(own.force),
-            nuisance: self.value("nuisance", &self.nuisance, &self.nuisance_unit, nuisance_unit)?,
+            nuisance: nuisances.next(),
+            further_nuisances: nuisances.collect(),
             separator: self.separator,
             decimal: self.decimal,
             time: self.value("time", &self.time, &self.time_unit, time_unit)?,
@@ -124,7 +139,8 @@ impl At<RecordingKeys> {
     /// Checks that without a header columns are numbers; the force can be missing.
     fn check_numbered(&self, extent: Extent) -> Result<(), RigError> {
         let positions = [&self.position, &self.x, &self.y].into_iter().flatten();
-        let values = [&self.force, &self.nuisance, &self.time, &self.untouched].into_iter().flatten();
+        let nuisances = self.nuisance.iter().flat_map(|nuisances| nuisances.columns());
+        let values = [&self.force, &self.time, &self.untouched].into_iter().flatten().chain(nuisances);
         let channels = self.channels.iter().flat_map(|channels| channels.iter());
         let named = |key: &&At<ColumnKey>| matches!(***key, ColumnKey::Text(_));
         match positions.clone().chain(values).chain(channels).find(named) {
@@ -189,16 +205,47 @@ impl At<RecordingKeys> {
         let columns: Vec<Column> = match &self.channels {
             None => own.into_iter().map(|channel| channel.column).collect(),
             Some(listed) if listed.len() != kinds.len() => return Err(listed.place.refuse(one_each())),
-            Some(listed) => {
-                let columns: Vec<_> = listed.iter().map(|channel| channel.column()).collect();
-                if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
-                    let place = &listed[again].place;
-                    return Err(place.refuse_as(format!("{} again", place.written), "a column of its own"));
-                }
-                columns
-            }
+            Some(listed) => distinct(listed)?,
         };
         Ok(columns.into_iter().zip(units).map(|(column, unit)| ValueColumn { column, unit }).collect())
+    }
+
+    /// Columns of the nuisance coordinates with their units, of which none can be said alone.
+    fn nuisances(&self) -> Result<Vec<ValueColumn>, RigError> {
+        let Some(listed) = &self.nuisance else {
+            return match &self.nuisance_unit {
+                Some(symbols) => Err(self.alone("nuisance", &symbols.place)),
+                None => Ok(Vec::new()),
+            };
+        };
+        let columns = distinct(listed.columns())?;
+        if columns.is_empty() {
+            return Err(listed.place.refuse("a column, or a list of at least 1"));
+        }
+        let symbols: &[At<String>] = match self.nuisance_unit.as_deref() {
+            None => &[],
+            Some(ChannelUnitKeys::Text(symbol)) => std::slice::from_ref(symbol),
+            Some(ChannelUnitKeys::List(symbols)) => symbols,
+        };
+        if let Some(said) = self.nuisance_unit.as_ref().filter(|_| symbols.len() != columns.len()) {
+            let count = columns.len();
+            return Err(said.place.refuse(format!("a list of {count}, one for each nuisance coordinate")));
+        }
+        let unit_of = |symbol: &At<String>| {
+            let unknown = || symbol.place.invalid(UnitError::UnknownUnit { unit: symbol.to_string() });
+            Unit::from_symbol(symbol).ok_or_else(unknown)
+        };
+        let each = columns.into_iter().enumerate().map(|(i, column)| {
+            let unit = symbols.get(i).map_or(Ok(Unit::NONE), unit_of)?;
+            Ok(ValueColumn { column, unit })
+        });
+        each.collect()
+    }
+
+    /// The error of a unit at `place` without the `key` that it is of.
+    fn alone(&self, key: &str, place: &Place) -> RigError {
+        let (section, key) = (self.place.path.clone(), key.to_owned());
+        RigProblem::MissingKey { section, key }.at_place(place)
     }
 
     /// The column that is said at `key`, of which the unit cannot be said alone.
@@ -210,13 +257,20 @@ impl At<RecordingKeys> {
         unit: Unit,
     ) -> Result<Option<ValueColumn>, RigError> {
         match (column, symbol) {
-            (None, Some(symbol)) => {
-                let (section, key) = (self.place.path.clone(), key.to_owned());
-                Err(RigProblem::MissingKey { section, key }.at_place(&symbol.place))
-            }
+            (None, Some(symbol)) => Err(self.alone(key, &symbol.place)),
             (column, _) => Ok(column.as_ref().map(|column| ValueColumn { column: column.column(), unit })),
         }
     }
+}
+
+/// The columns of a list, none of them twice.
+fn distinct(listed: &[At<ColumnKey>]) -> Result<Vec<Column>, RigError> {
+    let columns: Vec<_> = listed.iter().map(|column| column.column()).collect();
+    if let Some(again) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
+        let place = &listed[again].place;
+        return Err(place.refuse_as(format!("{} again", place.written), "a column of its own"));
+    }
+    Ok(columns)
 }
 
 impl ColumnKey {

@@ -72,6 +72,32 @@ fn the_time_of_rows_and_the_dialect_are_mapped() {
 }
 
 #[test]
+fn several_nuisance_columns_are_mapped_in_their_order() {
+    let said = r#"nuisance = "depth"
+nuisance_unit = "mm""#;
+    assert!(FSI_WATER.contains("nuisance = "), "the example has a nuisance coordinate");
+    let lines = FSI_WATER.lines().filter(|line| !line.starts_with("nuisance"));
+    let rest = lines.collect::<Vec<_>>().join("\n");
+    let with = |keys: &str| Rig::from_toml(&rest.replace("[recording]", &format!("[recording]\n{keys}")));
+    let columns = |keys: &str| -> Vec<(String, String)> {
+        let rig = with(keys).unwrap();
+        let columns = rig.setup.columns().unwrap();
+        columns
+            .nuisances()
+            .map(|values| (values.column.to_string(), values.unit.symbol().to_owned()))
+            .collect()
+    };
+    let pair = |name: &str, unit: &str| (format!("`{name}`"), unit.to_owned());
+    assert_eq!(columns(""), []);
+    assert_eq!(columns(said), [pair("depth", "mm")]);
+    assert_eq!(columns("nuisance = [\"depth\"]\nnuisance_unit = [\"mm\"]"), [pair("depth", "mm")]);
+    let two = "nuisance = [\"depth\", \"temperature\"]";
+    assert_eq!(columns(two), [pair("depth", ""), pair("temperature", "")]);
+    let units = columns(&format!("{two}\nnuisance_unit = [\"mm\", \"\"]"));
+    assert_eq!(units, [pair("depth", "mm"), pair("temperature", "")]);
+}
+
+#[test]
 fn the_water_strips_recording_is_read() {
     let Some(path) = recording("tactile-fsi/1d-water-1.5mm.csv") else { return };
     let rig = Rig::from_toml(FSI_WATER).unwrap();

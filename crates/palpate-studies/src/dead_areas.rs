@@ -263,7 +263,7 @@ impl ArraySensor {
             Row {
                 position: *position,
                 force_n: self.rig.setup.force_n(),
-                nuisance: None,
+                nuisances: Vec::new(),
                 time_s: None,
                 reading: reading.collect(),
             }

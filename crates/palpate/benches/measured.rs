@@ -137,7 +137,7 @@ impl Bench {
         Row {
             position,
             force_n: matches!(self.second, Second::ForceN).then_some(depth_mm),
-            nuisance: matches!(self.second, Second::DepthMm).then_some(depth_mm),
+            nuisances: matches!(self.second, Second::DepthMm).then_some(depth_mm).into_iter().collect(),
             time_s: None,
             reading: (0..self.channels).map(noisy).collect(),
         }

@@ -9,6 +9,7 @@ mod digit;
 mod init;
 mod learnt;
 mod limit;
+mod nuisances;
 mod plane;
 mod positions;
 mod profile;

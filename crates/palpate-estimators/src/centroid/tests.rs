@@ -45,7 +45,7 @@ fn lever(x_m: f64, force_n: f64) -> Row {
     Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: vec![force_n - right, right],
     }
@@ -74,7 +74,7 @@ fn raw_channels_find_their_positions() {
         Row {
             position,
             force_n: None,
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading: weights.iter().map(|w| -3.0 * w).collect(),
         }

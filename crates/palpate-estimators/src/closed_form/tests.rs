@@ -36,7 +36,7 @@ fn fit(setup: &Setup) -> Result<ClosedFormLocator, ClosedFormFitError> {
     let row = Row {
         position: Position::along(0.1),
         force_n: None,
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: vec![0.0; setup.layout().len()],
     };

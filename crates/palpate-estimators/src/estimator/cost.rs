@@ -39,9 +39,9 @@ const LOOPS: f64 = 1e9;
 struct Sizes {
     rows: f64,
     channels: f64,
-    /// Distinct contacts, each with its force and its nuisance coordinate.
+    /// Distinct contacts, each with its force and its nuisance coordinates.
     presses: f64,
-    has_nuisance: bool,
+    nuisances: usize,
 }
 
 impl Estimator {
@@ -97,19 +97,20 @@ impl Estimator {
 
 impl Sizes {
     fn new(setup: &Setup, recording: &Recording) -> Self {
-        let presses: HashSet<[u64; 4]> = recording
+        let presses: HashSet<Vec<u64>> = recording
             .rows
             .iter()
             .map(|row| {
-                let own = row.nuisance.or(row.force_n).unwrap_or_default();
-                [row.position.x_m, row.position.y_m, own, 0.0].map(f64::to_bits)
+                let position = [row.position.x_m, row.position.y_m];
+                let force_n = row.force_n.filter(|_| row.nuisances.is_empty());
+                position.iter().chain(&row.nuisances).chain(&force_n).map(|value| value.to_bits()).collect()
             })
             .collect();
         Self {
             rows: recording.rows.len() as f64,
             channels: setup.layout().len() as f64,
             presses: presses.len() as f64,
-            has_nuisance: recording.rows.iter().any(|row| row.nuisance.is_some()),
+            nuisances: recording.rows.iter().map(|row| row.nuisances.len()).max().unwrap_or_default(),
         }
     }
 
@@ -135,7 +136,7 @@ impl Sizes {
     fn influence(&self, influence: &Influence, setup: &Setup, recording: &Recording) -> FitCost {
         let extent = setup.surface().extent();
         let is_free = influence.structure == Structure::Free
-            || self.has_nuisance
+            || self.nuisances > 0
             || recording.rows.iter().any(|row| row.force_n.is_none());
         if setup.surface().model().is_some() {
             return self.over_a_model(extent);
@@ -144,9 +145,9 @@ impl Sizes {
             return self.force_linear(extent);
         }
         let nodes = most_nodes(extent) as f64;
-        let has_depth = self.has_nuisance || recording.rows.iter().any(|row| row.force_n.is_some());
+        let has_depth = self.nuisances > 0 || recording.rows.iter().any(|row| row.force_n.is_some());
         let depth = if has_depth { most_nuisance_nodes(extent) as f64 } else { 1.0 };
-        let coordinates = (extent.dimensions() + usize::from(has_depth)) as f64;
+        let coordinates = (extent.dimensions() + self.nuisances.max(usize::from(has_depth))) as f64;
         let process = self.process(
             self.presses,
             coordinates,

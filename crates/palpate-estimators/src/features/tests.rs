@@ -11,7 +11,7 @@ fn recording() -> Recording {
 
 fn row(at: f64, force_n: f64) -> Row {
     let reading = vec![force_n * (1.0 - at), force_n * at, 7.0, -1e-3 * force_n * at * (1.0 - at)];
-    Row { position: Position::along(at), force_n: None, nuisance: None, time_s: None, reading }
+    Row { position: Position::along(at), force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
 fn recording_of(rows: Vec<Row>) -> Recording {

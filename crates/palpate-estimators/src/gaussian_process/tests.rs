@@ -33,7 +33,7 @@ fn bells(x_m: f64, force_n: f64, noise: f64, rng: &mut Xoshiro256PlusPlus) -> Ro
         force_n * (-off * off).exp() + noise * error
     };
     let reading = (0..4).map(&mut channel).collect();
-    Row { position: Position::along(x_m), force_n: None, nuisance: None, time_s: None, reading }
+    Row { position: Position::along(x_m), force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn a_pad_is_two_dimensional() {
         let (u, v) = (x_m / 0.2, y_m / 0.1);
         let mut reading = vec![(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v, 5.0];
         reading[..4].iter_mut().for_each(|value| *value *= 0.4 + 0.2 * f64::from(i % 4));
-        Row { position: Position { x_m, y_m }, force_n: None, nuisance: None, time_s: None, reading }
+        Row { position: Position { x_m, y_m }, force_n: None, nuisances: Vec::new(), time_s: None, reading }
     });
     let setup = raw_setup(extent, 5, None);
     let locator = fit(&setup, &raw_recording(rows.collect())).unwrap();
@@ -93,7 +93,7 @@ fn a_position_beyond_the_edge_is_said_to_be_one() {
         Row {
             position: Position::along(x_m),
             force_n: None,
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading: vec![x_m, 1.0 - x_m],
         }
@@ -198,7 +198,7 @@ fn channels_that_follow_different_powers_of_the_force_are_taken_by_their_logarit
         Row {
             position: Position::along(x_m),
             force_n: None,
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading: reading.to_vec(),
         }

@@ -458,7 +458,7 @@ mod tests {
         let rows = rows.iter().map(|(x_m, force_n, value)| Row {
             position: Position::along(*x_m),
             force_n: (*force_n > 0.0).then_some(*force_n),
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading: vec![*value],
         });

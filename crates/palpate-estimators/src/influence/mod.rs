@@ -158,7 +158,7 @@ impl Influence {
 
 /// Whether a coordinate beside position and force shapes the readings.
 fn has_nuisance(recording: &Recording) -> bool {
-    recording.rows.iter().any(|row| row.nuisance.is_some())
+    recording.rows.iter().any(|row| !row.nuisances.is_empty())
 }
 
 impl InfluenceLocator {

@@ -97,7 +97,7 @@ fn on_a_surface_without_a_model_it_is_true_within_a_tenth() {
         recording.rows.push(Row {
             position: Position::default(),
             force_n: Some(0.0),
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading,
         });

@@ -20,7 +20,7 @@ fn row(x_m: f64, y_m: f64, force_n: f64) -> Row {
     Row {
         position: Position { x_m, y_m },
         force_n: Some(force_n),
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: vec![size * angle.cos(), size * angle.sin()],
     }

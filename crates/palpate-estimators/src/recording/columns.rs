@@ -28,9 +28,12 @@ pub struct Columns {
     pub channels: Vec<ValueColumn>,
     /// Column of the contact force, if there is one.
     pub force: Option<ForceColumn>,
-    /// Column of the nuisance coordinate, if there is one; see [`Row::nuisance`](super::Row::nuisance).
+    /// Column of the nuisance coordinate, or of the first of several, if there is one; see [`Row::nuisances`](super::Row::nuisances).
     #[serde(default)]
     pub nuisance: Option<ValueColumn>,
+    /// Columns of the further nuisance coordinates.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further_nuisances: Vec<ValueColumn>,
     /// Column of the time, of numbers in this unit or of timestamps; `None` for `time_s`, where the header has that. See
     /// [`Row::time_s`](super::Row::time_s).
     #[serde(default)]
@@ -197,6 +200,7 @@ impl Columns {
             channels,
             force: None,
             nuisance: None,
+            further_nuisances: Vec::new(),
             time: None,
             untouched: None,
             untouched_times: Vec::new(),
@@ -212,10 +216,21 @@ impl Columns {
         Self { force: Some(ForceColumn { values, need: Need::Required }), ..self }
     }
 
-    /// The same with a nuisance coordinate in this column and unit; see [`Row::nuisance`](super::Row::nuisance).
+    /// The same with a nuisance coordinate in this column and unit, after those that it has; see
+    /// [`Row::nuisances`](super::Row::nuisances).
     #[must_use]
-    pub fn nuisance(self, column: impl Into<Column>, unit: Unit) -> Self {
-        Self { nuisance: Some(ValueColumn { column: column.into(), unit }), ..self }
+    pub fn nuisance(mut self, column: impl Into<Column>, unit: Unit) -> Self {
+        let values = ValueColumn { column: column.into(), unit };
+        match self.nuisance {
+            None => self.nuisance = Some(values),
+            Some(_) => self.further_nuisances.push(values),
+        }
+        self
+    }
+
+    /// Columns of all nuisance coordinates, the first one first.
+    pub fn nuisances(&self) -> impl Iterator<Item = &ValueColumn> {
+        self.nuisance.iter().chain(&self.further_nuisances)
     }
 
     /// The same with the time of each row in this column, in seconds or as timestamps.
@@ -257,6 +272,7 @@ impl Columns {
             channels: channels.collect(),
             force: Some(ForceColumn { values: force, need: Need::Optional }),
             nuisance: None,
+            further_nuisances: Vec::new(),
             time: None,
             untouched: None,
             untouched_times: Vec::new(),

@@ -169,7 +169,7 @@ impl<'s> File<'s> {
     }
 }
 
-/// Fields of a row for the position, force and nuisance coordinate of the contact.
+/// Fields of a row for the position, force and nuisance coordinates of the contact.
 #[derive(Clone, Debug)]
 struct ContactFields {
     x: usize,
@@ -177,7 +177,7 @@ struct ContactFields {
     position_unit: Unit,
     frame: Frame,
     force: Option<(usize, Unit)>,
-    nuisance: Option<(usize, Unit)>,
+    nuisances: Vec<(usize, Unit)>,
     untouched: Option<usize>,
 }
 
@@ -198,12 +198,12 @@ impl ContactFields {
             }
             _ => None,
         };
-        let mut find = |values: &ValueColumn| -> Result<_, CsvError> {
+        let find = |values: &ValueColumn| -> Result<_, CsvError> {
             Ok((head.find_values(values, "nuisance_unit", header)?, values.unit))
         };
-        let nuisance = columns.nuisance.as_ref().map(&mut find).transpose()?;
+        let nuisances = columns.nuisances().map(find).collect::<Result<_, _>>()?;
         let untouched = columns.untouched.as_ref().map(|column| head.find(column, header)).transpose()?;
-        Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisance, untouched })
+        Ok(Self { x, y, position_unit, frame: columns.frame, force, nuisances, untouched })
     }
 
     /// The row of a contact at a time, its reading still empty.
@@ -230,9 +230,9 @@ impl ContactFields {
             let across = self.y.filter(|_| extent.contains(Position::along(position.x_m)));
             return Err(cells.error(across.unwrap_or(self.x), CsvProblem::OffSurface { position, extent }));
         }
-        let nuisance = self.nuisance.map(|(field, unit)| cells.number(field, unit)).transpose()?;
+        let nuisances = self.nuisances(cells)?;
         let force_n = force_n.or(schema.known_force_n);
-        Ok(Row { position, force_n, nuisance, time_s, reading: Vec::new() })
+        Ok(Row { position, force_n, nuisances, time_s, reading: Vec::new() })
     }
 
     /// The position; `None` where its fields are empty.
@@ -245,6 +245,10 @@ impl ContactFields {
         let x_m = cells.number(self.x, self.position_unit)?;
         let y_m = self.y.map_or(Ok(0.0), |y| cells.number(y, self.position_unit))?;
         Ok(self.frame.position(x_m, y_m))
+    }
+
+    fn nuisances(&self, cells: &mut Cells) -> Result<Vec<f64>, CsvError> {
+        self.nuisances.iter().map(|(field, unit)| cells.number(*field, *unit)).collect()
     }
 
     /// Whether the row is marked as untouched, or its time is among those in which nothing touched.
@@ -263,11 +267,9 @@ impl ContactFields {
         position: Option<Position>,
     ) -> Result<Row, CsvError> {
         let position = position.filter(|position| schema.extent.contains(*position)).unwrap_or_default();
-        let nuisance = match self.nuisance {
-            Some((field, unit)) if !cells.is_empty(field) => Some(cells.number(field, unit)?),
-            _ => None,
-        };
-        Ok(Row { position, force_n: Some(0.0), nuisance, time_s, reading: Vec::new() })
+        let is_known = self.nuisances.iter().all(|(field, _)| !cells.is_empty(*field));
+        let nuisances = if is_known { self.nuisances(cells)? } else { Vec::new() };
+        Ok(Row { position, force_n: Some(0.0), nuisances, time_s, reading: Vec::new() })
     }
 }
 

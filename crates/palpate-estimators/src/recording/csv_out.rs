@@ -9,7 +9,7 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 /// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the time
-/// and the force are written where every row has one, a nuisance coordinate never. `extent` says whether positions have one coordinate or
+/// and the force are written where every row has one, nuisance coordinates never. `extent` says whether positions have one coordinate or
 /// two. `comment` says where the recording comes from, in a first line that begins with `#`.
 ///
 /// ```

@@ -30,6 +30,7 @@ fn foreign() -> Columns {
         }),
         frame: Frame::default(),
         nuisance: None,
+        further_nuisances: Vec::new(),
         time: None,
         untouched: None,
         untouched_times: Vec::new(),
@@ -61,7 +62,7 @@ fn columns_are_mapped_and_others_ignored() {
     let row = |x_m, force_n, reading: [f64; 2]| Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: reading.to_vec(),
     };
@@ -335,7 +336,7 @@ fn sweeps(reading: impl Fn(usize, usize) -> f64) -> Recording {
     let rows = (0..50).map(|row| Row {
         position: Position::along(0.01 * (row % 10) as f64),
         force_n: None,
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: vec![(row % 10) as f64 + 0.001 * ((row * 7919) % 13) as f64, reading(row % 10, row / 10)],
     });
@@ -385,7 +386,7 @@ proptest! {
         let rows = rows.into_iter().enumerate().map(|(i, (x_m, force_n, reading))| Row {
             position: Position::along(x_m),
             force_n: Some(force_n),
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: start_s.map(|start_s| start_s + 0.1 * i as f64),
             reading: reading.to_vec(),
         });

@@ -96,7 +96,7 @@ pub fn simulate_moving(
         let clean = under.reading(layout, &contacts, since_s);
         let reading = measure(layout, &clean, &errors, &mut rng);
         let Contact { position, force_n } = contacts[0];
-        rows.push(Row { position, force_n: Some(force_n), nuisance: None, time_s: None, reading });
+        rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
         second.extend(contacts.get(1));
     }
     let recording = Recording::new(layout, "simulation", rows).seeded(seed);

@@ -134,7 +134,7 @@ impl Bench {
     fn touch(&mut self, position: Position) -> Row {
         let force_n = self.rng.random_range(FORCES_N);
         let reading = self.counts(position, force_n);
-        Row { position, force_n: Some(force_n), nuisance: None, time_s: None, reading }
+        Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading }
     }
 
     fn counts(&mut self, position: Position, force_n: f64) -> Vec<f64> {
@@ -479,7 +479,7 @@ fn rows_without_force_teach_offset_and_noise() {
         bench.presses.push(Row {
             position: Position::along(0.1),
             force_n: Some(0.0),
-            nuisance: None,
+            nuisances: Vec::new(),
             time_s: None,
             reading,
         });

@@ -2,7 +2,7 @@
 
 use super::config::{MeasuredError, MeasuredInfluence, Scale};
 use super::locator::{MeasuredLocator, NuisanceRole, Stored};
-use super::presses::{Presses, nuisance_coordinate};
+use super::presses::{Presses, nuisance_coordinates};
 use super::table::Table;
 use crate::fit::{Fit, FitTask};
 use crate::influence::grid::Axis;
@@ -53,8 +53,8 @@ impl Fit for MeasuredInfluence {
     fn fit_method(&self, task: FitTask) -> Result<MeasuredLocator, MeasuredError> {
         let FitTask { setup, recording, seed, watch } = task;
         recording.check_distinct_positions(LEAST_POSITIONS)?;
-        let (role, nuisance) = nuisance_coordinate(setup, recording)?;
-        let presses = Presses::average(self, setup, recording, nuisance.as_deref())?;
+        let (role, nuisances) = nuisance_coordinates(setup, recording)?;
+        let presses = Presses::average(self, setup, recording, &nuisances)?;
         let samples = Samples {
             coordinates: presses.coordinates.view(),
             outputs: presses.means.view(),
@@ -63,12 +63,7 @@ impl Fit for MeasuredInfluence {
         let regression =
             Regression { kernel: self.kernel, trend: self.trend, search_points: self.search_points, seed };
         let process = regression.fit(samples, watch)?;
-        let whitening = presses.whitening(&process, role)?;
-        // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
-        let whitening = match misfit(&presses, &regression, &process, &whitening)? {
-            Some(factor) => whitening.widened(factor),
-            None => whitening,
-        };
+        let whitening = presses.whitening(&regression, &process, role)?;
         let axes = presses.axes(&process, setup);
         let mut table = presses.table(axes, &process, &whitening, watch)?;
         let mut missed = presses.missed(&table, &process, &whitening);
@@ -95,8 +90,54 @@ impl Fit for MeasuredInfluence {
 }
 
 impl Presses {
-    /// The noise from repeats, or what the process calls noise where there are too few; the signal from the process.
-    fn whitening(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Whitening, MeasuredError> {
+    /// The whitening by the noise of readings in use, and by the signal of the process.
+    fn whitening(
+        &self,
+        regression: &Regression,
+        process: &GaussianProcess,
+        role: NuisanceRole,
+    ) -> Result<Whitening, MeasuredError> {
+        let signal =
+            Array2::from_diag(&Array1::from_shape_fn(self.means.ncols(), |j| process.signal_variance(j)));
+        let noise = self.noise(process, role)?;
+        let known = Whitening::from_covariances(noise.clone(), &signal)?;
+        // What repeats itself at a place, but not at its neighbours, is noise to a contact between them.
+        let factor = misfit(self, regression, process, &known)?.unwrap_or(1.0);
+        if self.further.is_empty() {
+            return Ok(known.widened(factor));
+        }
+        let square = factor * factor;
+        let covariance = noise.covariance * square + self.of_further(process);
+        let noise = Noise { covariance, gain: noise.gain * factor };
+        Ok(Whitening::from_covariances(noise, &(signal * square))?)
+    }
+
+    /// What nuisance coordinates beyond the first do to readings in use, where nobody knows them: Σ s²·J·Jᵀ to first order, s² a
+    /// coordinate's variance and J the slopes by it, on average over the presses.
+    fn of_further(&self, process: &GaussianProcess) -> Array2<f64> {
+        /// Presses that are averaged over.
+        const TRIED: usize = 1000;
+        let (channels, d) = (process.outputs(), process.coordinates());
+        let (mut means, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
+        let mut scratch = process.scratch();
+        let mut sum = Array2::<f64>::zeros((channels, channels));
+        let every = self.coordinates.nrows().div_ceil(TRIED).max(1);
+        let mut count = 0.0;
+        for at in self.coordinates.outer_iter().step_by(every) {
+            process.mean_and_gradient_into(&at.to_vec(), &mut means, &mut gradients, &mut scratch);
+            count += 1.0;
+            for (k, further) in (self.searched()..d).zip(&self.further) {
+                let slope = |channel: usize| gradients[channel * d + k];
+                for ((i, j), sum) in sum.indexed_iter_mut() {
+                    *sum += further.variance * slope(i) * slope(j);
+                }
+            }
+        }
+        sum / count
+    }
+
+    /// The noise from repeats, or what the process calls noise where there are too few.
+    fn noise(&self, process: &GaussianProcess, role: NuisanceRole) -> Result<Noise, MeasuredError> {
         let channels = self.means.ncols();
         let with_gain = role == NuisanceRole::None && self.readings == Scale::Linear;
         let signal: Array1<f64> = (0..channels).map(|j| process.signal_variance(j)).collect();
@@ -111,7 +152,7 @@ impl Presses {
             let variances = (0..channels).map(|j| process.noise_variance(j).unwrap_or_default() + floor[j]);
             Noise { covariance: Array2::from_diag(&Array1::from_iter(variances)), gain: 0.0 }
         };
-        Ok(Whitening::from_covariances(repeats.unwrap_or_else(fitted), &Array2::from_diag(&signal))?)
+        Ok(repeats.unwrap_or_else(fitted))
     }
 
     /// The process at every node.
@@ -141,12 +182,12 @@ impl Presses {
         Ok(Table { x, y, nuisance, means, variances })
     }
 
-    /// Coordinates of the process at (x, y, nuisance), in nodes.
+    /// Coordinates of the process at (x, y, nuisance), in nodes, and at the means of the further nuisance coordinates.
     fn coordinates_at(&self, [x, y, nuisance]: [Axis; 3], at: [f64; 3]) -> Vec<f64> {
-        let positions = self.coordinates.ncols() - usize::from(self.has_nuisance);
         let mut coordinates = vec![x.value(at[0])];
-        coordinates.extend((positions == 2).then(|| y.value(at[1])));
+        coordinates.extend((self.dimensions() == 2).then(|| y.value(at[1])));
         coordinates.extend(self.has_nuisance.then(|| nuisance.value(at[2])));
+        coordinates.extend(self.further.iter().map(|further| further.mean));
         coordinates
     }
 
@@ -208,9 +249,9 @@ impl Presses {
         };
         let along = positions(0, extent.length_m(), most);
         let across = extent.width_m().map(|width_m| positions(1, width_m, MOST_OF_PLANE));
-        let last = self.coordinates.ncols() - 1;
+        let first = self.dimensions();
         let nuisance =
-            self.has_nuisance.then(|| Axis::over(values(last), lengths[last], most_nuisance_nodes(extent)));
+            self.has_nuisance.then(|| Axis::over(values(first), lengths[first], most_nuisance_nodes(extent)));
         [along, across.unwrap_or(Axis::NONE), nuisance.unwrap_or(Axis::NONE)]
     }
 }
@@ -241,7 +282,7 @@ pub(super) fn misfit(
     process: &GaussianProcess,
     whitening: &Whitening,
 ) -> Result<Option<f64>, MeasuredError> {
-    let dimensions = presses.coordinates.ncols() - usize::from(presses.has_nuisance);
+    let (dimensions, searched) = (presses.dimensions(), presses.searched());
     let Some(held) = held_out(presses, dimensions) else { return Ok(None) };
     let kept: Vec<usize> = (0..held.len()).filter(|i| !held[*i]).collect();
     let coordinates = presses.coordinates.select(ndarray::Axis(0), &kept);
@@ -256,7 +297,8 @@ pub(super) fn misfit(
             continue;
         }
         let at = presses.coordinates.row(*place).to_vec();
-        let prediction = known[*place].get_or_insert_with(|| Prediction::new(&other, &at, whitening));
+        let prediction =
+            known[*place].get_or_insert_with(|| Prediction::new(&other, &at, searched, whitening));
         if let Some(score) = prediction.score(&output.to_vec(), whitening, dimensions) {
             square += score;
             count += dimensions;
@@ -294,7 +336,8 @@ struct Prediction {
 }
 
 impl Prediction {
-    fn new(process: &GaussianProcess, at: &[f64], whitening: &Whitening) -> Self {
+    /// The slopes are by the first `searched` coordinates, the others being known.
+    fn new(process: &GaussianProcess, at: &[f64], searched: usize, whitening: &Whitening) -> Self {
         let (channels, d) = (process.outputs(), process.coordinates());
         let (raw, variances) = process.predict(at);
         let (mut unused, mut gradients) = (vec![0.0; channels], vec![0.0; channels * d]);
@@ -307,7 +350,7 @@ impl Prediction {
         let slope = |k: usize| white(&gradients.iter().skip(k).step_by(d).copied().collect::<Vec<f64>>());
         let signal = process.signal_variance(0);
         let variance = if signal > 0.0 { variances[0] / signal } else { 0.0 };
-        Self { mean: white(&raw), slopes: (0..d).map(slope).collect(), variance }
+        Self { mean: white(&raw), slopes: (0..searched).map(slope).collect(), variance }
     }
 
     /// The squared standardized position error of a reading; `None` where the slopes tell no position.

@@ -5,43 +5,69 @@ use super::locator::NuisanceRole;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use ndarray::Array2;
+use palpate_numerics::mean;
 use std::collections::HashMap;
 
-/// Coordinate that shapes the readings besides the position, row by row: the named column, or a force that is not always the same.
-pub(super) fn nuisance_coordinate(
+/// Coordinates that shape the readings besides the position, row by row: the named columns, or a force that is not always the same.
+pub(super) fn nuisance_coordinates(
     setup: &Setup,
     recording: &Recording,
-) -> Result<(NuisanceRole, Option<Vec<f64>>), MeasuredError> {
-    let all = |what, values: Vec<Option<f64>>| {
-        if values.iter().all(Option::is_none) {
-            return Ok(None);
+) -> Result<(NuisanceRole, Vec<Vec<f64>>), MeasuredError> {
+    // As many in every row as in the row that has most.
+    let all = |what, values: Vec<Vec<f64>>| {
+        let most = values.iter().map(Vec::len).max().unwrap_or_default();
+        match values.iter().position(|values| values.len() < most) {
+            Some(i) => Err(MeasuredError::NuisanceMissing { what, row: i + 1 }),
+            None => Ok(values),
         }
-        let known = values
-            .iter()
-            .enumerate()
-            .map(|(i, value)| value.ok_or(MeasuredError::NuisanceMissing { what, row: i + 1 }));
-        known.collect::<Result<Vec<f64>, _>>().map(Some)
     };
-    let named = all("nuisance coordinate", recording.rows.iter().map(|row| row.nuisance).collect())?;
-    if named.is_some() {
+    let rows = &recording.rows;
+    if rows.iter().any(|row| !row.nuisances.is_empty()) {
+        let named = all("nuisance coordinate", rows.iter().map(|row| row.nuisances.clone()).collect())?;
         return Ok((NuisanceRole::Other, named));
     }
     // A force that is known, or always the same, shapes nothing.
-    if setup.force_n().is_some() {
-        return Ok((NuisanceRole::None, None));
+    if setup.force_n().is_some() || rows.iter().all(|row| row.force_n.is_none()) {
+        return Ok((NuisanceRole::None, vec![Vec::new(); rows.len()]));
     }
-    let force = all("force", recording.rows.iter().map(|row| row.force_n).collect())?;
-    Ok((if force.is_some() { NuisanceRole::Force } else { NuisanceRole::None }, force))
+    let force = all("force", rows.iter().map(|row| row.force_n.into_iter().collect()).collect())?;
+    Ok((NuisanceRole::Force, force))
 }
 
-/// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinate, are one.
+/// A nuisance coordinate beyond the first, whose value is not looked for in use: what the recording has of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Further {
+    /// Which of a row's nuisance coordinates it is.
+    index: usize,
+    /// Mean of its recorded values.
+    pub mean: f64,
+    /// Variance of its recorded values, greater than 0.
+    pub variance: f64,
+}
+
+impl Further {
+    /// All of the rows' nuisance coordinates beyond the first that vary; what is always the same shapes nothing.
+    fn of_rows(nuisances: &[Vec<f64>]) -> Vec<Self> {
+        let count = nuisances.first().map_or(0, Vec::len);
+        let of = |index: usize| {
+            let values = || nuisances.iter().map(|row| row[index]);
+            let center = mean(values());
+            let variance = mean(values().map(|value| (value - center).powi(2)));
+            let is_one = values().all(|value| value == nuisances[0][index]);
+            (!is_one && variance > 0.0).then_some(Self { index, mean: center, variance })
+        };
+        (1..count).filter_map(of).collect()
+    }
+}
+
+/// The recording as the process sees it: repeats of a press, at the same position and nuisance coordinates, are one.
 ///
 /// Texture of the surface that repeats itself at a place but is not smooth, as a press a little off, is noise to
 /// interpolation, and its process finds it; how repeats scatter about their mean is the noise of a reading.
 pub(super) struct Presses {
     pub readings: Scale,
     pub nuisance: Scale,
-    /// Position along, across where the surface has a width, and the nuisance coordinate where there is one: n×d.
+    /// Position along, across where the surface has a width, the nuisance coordinate where there is one, and the further ones: n×d.
     pub coordinates: Array2<f64>,
     /// Mean scaled readings, n×m.
     pub means: Array2<f64>,
@@ -50,6 +76,7 @@ pub(super) struct Presses {
     /// Scaled readings, row by row.
     pub outputs: Array2<f64>,
     pub has_nuisance: bool,
+    pub further: Vec<Further>,
 }
 
 impl Presses {
@@ -57,12 +84,12 @@ impl Presses {
         config: &MeasuredInfluence,
         setup: &Setup,
         recording: &Recording,
-        nuisance: Option<&[f64]>,
+        nuisances: &[Vec<f64>],
     ) -> Result<Self, MeasuredError> {
         let rows = &recording.rows;
         let values = || rows.iter().flat_map(|row| row.reading.iter().copied());
         let readings = config.readings.unwrap_or_else(|| Scale::for_values(values()));
-        let nuisance_values = || nuisance.unwrap_or_default().iter().copied();
+        let nuisance_values = || nuisances.iter().filter_map(|row| row.first().copied());
         let nuisance_scale = config.nuisance.unwrap_or_else(|| Scale::for_values(nuisance_values()));
 
         let channels = rows.first().map_or(0, |row| row.reading.len());
@@ -71,14 +98,16 @@ impl Presses {
             *output = scaled(readings, "a reading", i, rows[i].reading[j])?;
         }
         let extent = setup.surface().extent();
+        let further = Further::of_rows(nuisances);
         let mut distinct: Vec<Vec<f64>> = Vec::new();
         let mut known: HashMap<Vec<u64>, usize> = HashMap::new();
         let mut places = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
             let mut at: Vec<f64> = extent.coordinates_m(row.position).collect();
-            if let Some(nuisance) = nuisance {
-                at.push(scaled(nuisance_scale, "the nuisance coordinate", i, nuisance[i])?);
+            if let Some(first) = nuisances[i].first() {
+                at.push(scaled(nuisance_scale, "the nuisance coordinate", i, *first)?);
             }
+            at.extend(further.iter().map(|further| nuisances[i][further.index]));
             let bits = at.iter().map(|value| (value + 0.0).to_bits()).collect();
             places.push(*known.entry(bits).or_insert_with(|| {
                 distinct.push(at);
@@ -98,8 +127,27 @@ impl Presses {
         for (mut mean, count) in means.outer_iter_mut().zip(counts) {
             mean /= count;
         }
-        let has_nuisance = nuisance.is_some();
-        Ok(Self { readings, nuisance: nuisance_scale, coordinates, means, places, outputs, has_nuisance })
+        let has_nuisance = nuisances.first().is_some_and(|row| !row.is_empty());
+        Ok(Self {
+            readings,
+            nuisance: nuisance_scale,
+            coordinates,
+            means,
+            places,
+            outputs,
+            has_nuisance,
+            further,
+        })
+    }
+
+    /// Coordinates of a table: those of the position, and the first nuisance coordinate.
+    pub fn searched(&self) -> usize {
+        self.coordinates.ncols() - self.further.len()
+    }
+
+    /// Coordinates of the position.
+    pub fn dimensions(&self) -> usize {
+        self.searched() - usize::from(self.has_nuisance)
     }
 }
 

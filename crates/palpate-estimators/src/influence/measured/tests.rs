@@ -44,7 +44,13 @@ fn squeeze(x_m: f64, force_n: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let u = x_m / 0.1;
     let clean = [force_n.powf(1.2) * (1.6 - u), force_n.powf(1.1) * (0.4 + u * u)];
     let reading = clean.map(|r| r * (1.0 + 0.01 * noise(rng))).to_vec();
-    Row { position: Position::along(x_m), force_n: Some(force_n), nuisance: None, time_s: None, reading }
+    Row {
+        position: Position::along(x_m),
+        force_n: Some(force_n),
+        nuisances: Vec::new(),
+        time_s: None,
+        reading,
+    }
 }
 
 fn squeezes(seed: u64) -> Recording {
@@ -153,14 +159,17 @@ fn estimates_are_those_of_a_plain_sum_over_the_grid() {
 #[test]
 fn a_named_nuisance_coordinate_comes_before_the_force_and_is_not_told() {
     let mut recording = squeezes(3);
-    recording.rows.iter_mut().for_each(|row| row.nuisance = row.force_n.map(|force| force - 2.0));
+    recording
+        .rows
+        .iter_mut()
+        .for_each(|row| row.nuisances = row.force_n.map(|force| force - 2.0).into_iter().collect());
     let locator = fit(&raw_setup(*STRIP, 2, None), &recording);
     assert_eq!((locator.role(), locator.nuisance()), (NuisanceRole::Other, Scale::Linear));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
     let estimate = locator.locate(&squeeze(0.033, 2.7, &mut rng).reading);
     assert!((estimate.contact.position.x_m - 0.033).abs() < 3e-3, "{estimate:?}");
     assert_eq!(estimate.contact.force_n, None);
-    recording.rows[7].nuisance = None;
+    recording.rows[7].nuisances.clear();
     let error = try_fit(&raw_setup(*STRIP, 2, None), &recording).unwrap_err();
     assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 8 });
 }
@@ -172,7 +181,7 @@ fn corner(position: Position, gain: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
     let channel = |(a, b): (f64, f64)| (-(u - a).powi(2) - (v - b).powi(2)).exp() - 0.5;
     let gain = 1.0 + gain * noise(rng);
     let reading = corners.map(|at| gain * channel(at)).map(|clean| clean + 0.002 * noise(rng)).to_vec();
-    Row { position, force_n: None, nuisance: None, time_s: None, reading }
+    Row { position, force_n: None, nuisances: Vec::new(), time_s: None, reading }
 }
 
 /// The same sensors over a soft pad that is dented by so many millimetres.
@@ -181,7 +190,7 @@ fn dent(position: Position, depth_mm: f64, rng: &mut Xoshiro256PlusPlus) -> Row 
     row.reading
         .iter_mut()
         .for_each(|reading| *reading = (*reading + 0.5) * depth_mm.powf(1.3) + 0.03 * noise(rng));
-    row.nuisance = Some(depth_mm);
+    row.nuisances = vec![depth_mm];
     row
 }
 
@@ -219,7 +228,7 @@ fn two_places_that_read_alike_are_both_told() {
     let rows = (0..123).map(|i| {
         let x_m = 0.0025 * f64::from(i % 41);
         let reading = read(x_m).iter().map(|r| r + 0.01 * noise(&mut rng)).collect();
-        Row { position: Position::along(x_m), force_n: None, nuisance: None, time_s: None, reading }
+        Row { position: Position::along(x_m), force_n: None, nuisances: Vec::new(), time_s: None, reading }
     });
     let locator = fit(&raw_setup(*STRIP, 2, Some(1.0)), &raw_recording(rows.collect()));
     let estimate = locator.locate(&read(0.08));
@@ -246,7 +255,7 @@ fn awkward_recordings_give_a_locator_or_clear_words() {
     let row = |x_m: f64, reading: [f64; 2]| Row {
         position: Position::along(x_m),
         force_n: None,
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: reading.to_vec(),
     };
@@ -289,7 +298,7 @@ fn it_comes_back_from_a_file() {
 fn presses_that_are_no_multiple_of_the_force_tell_no_drift() {
     let setup = raw_setup(*STRIP, 2, None);
     let named = |mut row: Row| {
-        row.nuisance = row.force_n.map(|force_n| force_n.powf(0.7));
+        row.nuisances = row.force_n.map(|force_n| force_n.powf(0.7)).into_iter().collect();
         row
     };
     let recording = squeezes(21).in_order();
@@ -350,4 +359,84 @@ fn settings_that_need_mechanics_are_refused() {
     assert!(refused(Influence { contacts: 2, ..good }).contains("several contacts"));
     assert!(refused(Influence { force_sd_n: Some(0.1), ..good }).contains("`force_sd`"));
     assert!(refused(good).contains("0 distinct positions"));
+}
+
+/// Four channels of a strip that is pressed to a depth, whose offsets move with the temperature by 3 to 8 times their noise of 0.05.
+fn warm(x_m: f64, depth_mm: f64, temperature: f64, rng: &mut Xoshiro256PlusPlus) -> Row {
+    let u = x_m / 0.1;
+    let shifts = [0.3, -0.15, 0.2, -0.4];
+    let reading = (0..4).zip(shifts).map(|(c, shift)| {
+        let bump = (-((u - f64::from(c) / 3.0) / 0.35).powi(2)).exp();
+        3.0 * depth_mm.powf(1.3) * bump + shift * temperature + 0.05 * noise(rng)
+    });
+    Row {
+        position: Position::along(x_m),
+        force_n: None,
+        nuisances: vec![depth_mm, temperature],
+        time_s: None,
+        reading: reading.collect(),
+    }
+}
+
+/// Presses at 31 places to 6 depths, each at a temperature of its own.
+fn warm_presses(rng: &mut Xoshiro256PlusPlus) -> Recording {
+    let presses =
+        (0..31).flat_map(|i| (0..6).map(move |k| (0.1 / 30.0 * f64::from(i), 0.5 + 0.3 * f64::from(k))));
+    let rows = presses.map(|(x_m, depth_mm)| {
+        let temperature = noise(rng);
+        warm(x_m, depth_mm, temperature, rng)
+    });
+    raw_recording(rows.collect())
+}
+
+/// Mean error in millimetres of 1500 touches at random depths and temperatures, and the share that 95 % intervals hold.
+fn judge_warm(locator: &MeasuredLocator, rng: &mut Xoshiro256PlusPlus) -> (f64, f64) {
+    const TOUCHES: u32 = 1500;
+    let (mut error_m, mut held) = (0.0, 0);
+    for _ in 0..TOUCHES {
+        let (x_m, depth_mm) = (rng.random_range(0.005..0.095), rng.random_range(0.5..2.0));
+        let temperature = noise(rng);
+        let contact = locator.locate(&warm(x_m, depth_mm, temperature, rng).reading).contact;
+        error_m += (contact.position.x_m - x_m).abs();
+        let (low_m, high_m) = contact.uncertainty.unwrap().x_95_m;
+        held += u32::from((low_m..=high_m).contains(&x_m));
+    }
+    (1e3 * error_m / f64::from(TOUCHES), 100.0 * f64::from(held) / f64::from(TOUCHES))
+}
+
+#[test]
+fn a_further_nuisance_coordinate_that_moves_offsets_is_taken_for_noise_that_channels_share() {
+    const RECORDINGS: u64 = 8;
+    let setup = raw_setup(*STRIP, 4, None);
+    let (mut known, mut ignored) = ((0.0, 0.0), (0.0, 0.0));
+    for seed in 0..RECORDINGS {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(100 + seed);
+        let mut recording = warm_presses(&mut rng);
+        let with = judge_warm(&fit(&setup, &recording), &mut rng.clone());
+        recording.rows.iter_mut().for_each(|row| row.nuisances.truncate(1));
+        let without = judge_warm(&fit(&setup, &recording), &mut rng);
+        println!("with the temperature {with:.3?}, without {without:.3?} (mean error in mm, % held)");
+        for (sum, of) in [(&mut known, with), (&mut ignored, without)] {
+            sum.0 += of.0 / RECORDINGS as f64;
+            sum.1 += of.1 / RECORDINGS as f64;
+        }
+    }
+    println!("means: {known:.3?}, {ignored:.3?}");
+    assert!(known.0 < 0.6 * ignored.0, "{known:?} {ignored:?}");
+    assert!((93.0..=97.0).contains(&known.1), "{known:?}");
+}
+
+#[test]
+fn a_further_nuisance_coordinate_that_never_changes_does_nothing_and_a_missing_one_is_named() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(22);
+    let rows =
+        (0..60).map(|i| warm(0.1 / 9.0 * f64::from(i % 10), 0.5 + 0.3 * f64::from(i / 10), 1.5, &mut rng));
+    let mut recording = raw_recording(rows.collect());
+    let setup = raw_setup(*STRIP, 4, None);
+    let with = fit(&setup, &recording);
+    recording.rows[4].nuisances.truncate(1);
+    let error = try_fit(&setup, &recording).unwrap_err();
+    assert_eq!(error, MeasuredError::NuisanceMissing { what: "nuisance coordinate", row: 5 });
+    recording.rows.iter_mut().for_each(|row| row.nuisances.truncate(1));
+    assert_eq!(with, fit(&setup, &recording));
 }

@@ -86,7 +86,7 @@ fn recording(setup: &Setup, contacts: impl Iterator<Item = (f64, f64)>, seed: u6
     let row = |(x_m, force_n)| Row {
         position: Position::along(x_m),
         force_n: Some(force_n),
-        nuisance: None,
+        nuisances: Vec::new(),
         time_s: None,
         reading: reading(setup, x_m, force_n, &mut rng),
     };
