@@ -68,7 +68,7 @@ fn in_words(cost: FitCost) -> String {
 }
 
 /// A size of memory with its unit.
-fn size(bytes: f64) -> String {
+pub fn size(bytes: f64) -> String {
     match bytes {
         b if b >= 1e9 => format!("{:.1} GB", b / 1e9),
         b if b >= 1e6 => format!("{:.0} MB", b / 1e6),

@@ -127,8 +127,32 @@ pub fn chi_squared_survival(value: f64, freedom: usize) -> f64 {
     if x <= 0.0 {
         return if freedom == 0 { 0.0 } else { 1.0 };
     }
-    let terms = (0..freedom / 2).map(|j| if odd { j as f64 + 0.5 } else { j as f64 });
-    start + terms.map(|j| (j * x.ln() - x - libm::lgamma(j + 1.0)).exp()).sum::<f64>()
+    let count = freedom / 2;
+    if count == 0 {
+        return start;
+    }
+    // From the largest term, at j near x, its neighbours follow by their ratios j/x and x/(j + 1); few of many are not negligible.
+    let least = if odd { 0.5 } else { 0.0 };
+    let largest = (x - least).clamp(0.0, (count - 1) as f64).floor();
+    let at = least + largest;
+    let term = (at * x.ln() - x - libm::lgamma(at + 1.0)).exp();
+    let below = (0..largest as usize).map(|i| (at - i as f64) / x);
+    let above = (largest as usize + 1..count).map(|j| x / (least + j as f64));
+    start + term + sum_of_products(term, below) + sum_of_products(term, above)
+}
+
+/// The sum of a first term times a ratio, times the next ratio too, and so on, until what is left is negligible. Ratios do not grow.
+fn sum_of_products(first: f64, ratios: impl Iterator<Item = f64>) -> f64 {
+    let mut sum = 0.0;
+    let mut term = first;
+    for ratio in ratios {
+        term *= ratio;
+        sum += term;
+        if term < 1e-18 * (first + sum) {
+            break;
+        }
+    }
+    sum
 }
 
 /// The value that a χ² variable of `freedom` ≥ 1 degrees of freedom exceeds with probability `tail`, between 0 and 1, by
@@ -144,6 +168,20 @@ pub fn chi_squared_critical_value(tail: f64, freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_survival_of_many_degrees_of_freedom_is_the_whole_sum() {
+        for (freedom, value) in
+            [(1, 2.0_f64), (2, 0.1), (9, 30.0), (1000, 1100.0), (10_001, 9_800.0), (64, 2000.0)]
+        {
+            let (x, odd) = (0.5 * value, freedom % 2 == 1);
+            let terms = (0..freedom / 2).map(|j| j as f64 + if odd { 0.5 } else { 0.0 });
+            let sum: f64 = terms.map(|j| (j * x.ln() - x - libm::lgamma(j + 1.0)).exp()).sum();
+            let whole = sum + if odd { libm::erfc(x.sqrt()) } else { 0.0 };
+            let found = chi_squared_survival(value, freedom);
+            assert!((found - whole).abs() <= 1e-10 * whole, "{freedom} {value}: {found} {whole}");
+        }
+    }
 
     /// ln of the share, mean and variance by a plain sum over the part.
     fn summed(from: f64, to: f64) -> [f64; 3] {

@@ -1,9 +1,11 @@
 //! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
 
+use crate::cost::size;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::json::object;
 use crate::output::{self, Table, figure};
+use crate::progress::{Observer, duration};
 use crate::tables::{self, CsvTable};
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::{ForceLinearLocator, Influence, InfluenceLocator};
@@ -12,11 +14,13 @@ use palpate_estimators::setup::Setup;
 use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
-    Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
+    Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, Preparation,
+    limit_warnings, positions_with_spacing,
 };
 use palpate_mechanics::sensing::{NoiseError, Sensor};
 use palpate_mechanics::surface::Extent;
-use palpate_mechanics::units::{Quantity, format_length_mm};
+use palpate_mechanics::units::{Quantity, format_count, format_length_mm};
+use palpate_numerics::watch::Watch;
 use palpate_report::{LimitReport, limit_report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -80,7 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 .lightest_touch(&limit);
         }
     }
-    let limits = limits(&limit, &touch, &setup, arguments).map_err(complain)?;
+    let limits = Observer::of_stages()
+        .watch(|watch| limits(&limit, &touch, &setup, arguments, watch))
+        .map_err(complain)?;
     if let Some(out) = &arguments.out {
         write_report(&limits, &setup, arguments, out)?;
     }
@@ -145,6 +151,9 @@ fn setup(bench: &RigOrLocator, arguments: &Arguments) -> Result<Setup, Failure> 
 }
 
 fn complaint(error: LimitError, rig: &Path) -> Failure {
+    if let LimitError::Cancelled(cancelled) = error {
+        return Failure::from_error(&cancelled);
+    }
     let complaint = Complaint::about(rig, error);
     let help = match error {
         LimitError::NoModel => {
@@ -157,6 +166,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
         LimitError::NoForce => "--force \"3 N\" gives one, or `force = \"3 N\"` in [contact]",
         LimitError::Force { .. } => "--force takes a force such as \"3 N\"",
         LimitError::Positions { .. } => "--every takes a length between two positions, such as \"10 mm\"",
+        LimitError::Cancelled(_) => "start it again",
     };
     complaint.help(help).into()
 }
@@ -166,18 +176,20 @@ fn limits<'a>(
     touch: &'a LightestTouch<'a>,
     setup: &Setup,
     arguments: &Arguments,
+    watch: Watch,
 ) -> Result<Limits<'a>, LimitError> {
     let force_n = arguments.force.or(setup.force_n()).ok_or(LimitError::NoForce)?;
     let unknown = arguments.unknown_force || setup.force_n().is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };
     let extent = setup.surface().extent();
     let listed = match arguments.every {
-        Some(every_m) => {
-            let curve = LimitCurve::with_spacing(limit, force_n, force, every_m)?;
-            curve.points.iter().map(|point| point.position).collect()
-        }
+        Some(every_m) => positions_with_spacing(extent, every_m)?,
         None => a_few(extent),
     };
+    if let Some(words) = limit.preparation(listed.len()).and_then(noticeable) {
+        eprintln!("limit of {} sensors: {words}", format_count(limit.alive() as u64));
+    }
+    limit.prepare(&listed, watch)?;
     let known = LimitCurve::over_surface(limit, force_n, Force::Known)?;
     let positions: Vec<Position> = known.points.iter().map(|point| point.position).collect();
     Ok(Limits {
@@ -189,8 +201,22 @@ fn limits<'a>(
         known,
         unknown: LimitCurve::over_surface(limit, force_n, Force::Unknown)?,
         listed,
-        warnings: limit_warnings(limit, force_n, force)?,
+        warnings: limit_warnings(limit, force_n, force, watch)?,
     })
+}
+
+/// What the limit of many sensors will take, in words, where it is noticeable.
+fn noticeable(preparation: Preparation) -> Option<String> {
+    /// Multiply-adds of a core in a second, and how many times as many a search for contacts that read alike may need.
+    const PRODUCTS: f64 = 7e9;
+    const SEARCH: f64 = 12.0;
+    const SECONDS: f64 = 10.0;
+    let seconds = preparation.multiply_adds / PRODUCTS;
+    let words = || {
+        let [least, most] = [seconds, SEARCH * seconds].map(duration);
+        format!("it will take some {least} to {most} and {} of memory", size(preparation.memory_bytes))
+    };
+    (SEARCH * seconds > SECONDS).then(words)
 }
 
 /// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one

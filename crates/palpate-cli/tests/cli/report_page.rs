@@ -38,7 +38,7 @@ fn limit_page() -> Vec<ReportFile> {
         known: &known,
         unknown: &unknown,
         force: Force::Unknown,
-        warnings: &limit_warnings(&limit, 3.0, Force::Unknown).unwrap(),
+        warnings: &limit_warnings(&limit, 3.0, Force::Unknown, Watch::NONE).unwrap(),
         listed: &known.points.iter().step_by(50).map(|point| point.position).collect::<Vec<_>>(),
         touch: &Influence::default().lightest_touch(&limit),
     };

@@ -21,6 +21,7 @@ pub struct LimitPoint {
 /// use palpate_mechanics::limit::{CramerRaoBound, Force, LimitCurve, limit_warnings};
 /// use palpate_mechanics::sensing::{Layout, SensorKind};
 /// use palpate_mechanics::surface::Beam;
+/// use palpate_numerics::watch::Watch;
 ///
 /// let beam = Beam::new(0.4, 0.04, 1.2e-3, 200e9)?;
 /// let mut layout = Layout::even(SensorKind::Deflection, 8, 0.4);
@@ -30,7 +31,7 @@ pub struct LimitPoint {
 /// assert_eq!(curve.points.len(), 399);
 /// let summary = curve.summary().unwrap();
 /// assert!(summary.best.1 < summary.median_m && summary.median_m < summary.worst.1);
-/// let warnings = limit_warnings(&bound, 3.0, Force::Known)?;
+/// let warnings = limit_warnings(&bound, 3.0, Force::Known, Watch::NONE)?;
 /// assert!(warnings[0].to_string().starts_with("ambiguous at 0–1.6 mm with known force"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -63,6 +64,14 @@ pub struct LimitSummary {
     pub without: usize,
 }
 
+/// Positions of a surface `every_m` (metres) apart, the first of them `every_m` from the edge.
+///
+/// # Errors
+/// [`LimitError::Positions`] where those are none or more than 100,000.
+pub fn positions_with_spacing(extent: Extent, every_m: f64) -> Result<Vec<Position>, LimitError> {
+    Ok(Grid::with_spacing(extent, every_m)?.positions)
+}
+
 impl LimitCurve {
     /// The limit all over the surface: on a line at 399 positions, 1/400 of the length apart.
     ///
@@ -70,19 +79,6 @@ impl LimitCurve {
     /// [`LimitError::Force`] for a force that is not positive and finite.
     pub fn over_surface(limit: &CramerRaoBound, force_n: f64, force: Force) -> Result<Self, LimitError> {
         Self::at_positions(limit, force_n, force, &Grid::over_surface(limit.extent).positions)
-    }
-
-    /// The limit at positions `every_m` (metres) apart, the first of them `every_m` from the edge.
-    ///
-    /// # Errors
-    /// [`LimitError::Positions`] where those are none or more than 100,000, and [`LimitError::Force`].
-    pub fn with_spacing(
-        limit: &CramerRaoBound,
-        force_n: f64,
-        force: Force,
-        every_m: f64,
-    ) -> Result<Self, LimitError> {
-        Self::at_positions(limit, force_n, force, &Grid::with_spacing(limit.extent, every_m)?.positions)
     }
 
     /// The limit at the given positions, which must be on the surface.

@@ -12,20 +12,26 @@
 
 mod bound;
 mod curve;
+mod responses;
+mod twins;
 mod warning;
 mod zone;
 
 pub use bound::Bound;
-pub use curve::{LimitCurve, LimitPoint, LimitSummary};
+pub use curve::{LimitCurve, LimitPoint, LimitSummary, positions_with_spacing};
+pub use responses::Preparation;
 pub use warning::{LimitWarning, limit_warnings};
 pub use zone::Zone;
 
 use std::sync::Arc;
 
-use crate::contact::Contact;
+use crate::contact::{Contact, Position};
 use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
 use crate::surface::{Extent, ResponseFunction, ResponseGradient, Surface};
 use bound::{inverse_information, norm};
+use palpate_numerics::watch::{Cancelled, Watch};
+use responses::Responses;
+use zone::Grid;
 
 /// Knowledge of the contact force: given, or estimated along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
@@ -53,14 +59,14 @@ pub struct CramerRaoBound<'a> {
     extent: Extent,
     /// The mechanics, where there are some.
     model: Option<&'a dyn Surface>,
-    channels: Vec<Channel<'a>>,
+    channels: Vec<Channel>,
+    responses: Responses<'a>,
 }
 
 /// A live sensor.
 #[derive(Clone)]
-struct Channel<'a> {
+struct Channel {
     kind: SensorKind,
-    response: Arc<dyn ResponseFunction + 'a>,
     /// √(σ² + q²/12).
     sd: f64,
     range: Option<(f64, f64)>,
@@ -69,16 +75,18 @@ struct Channel<'a> {
 impl<'a> CramerRaoBound<'a> {
     /// The limit of a surface read by `layout`; dead channels are left out.
     ///
+    /// Of more than 1,500 sensors on a plate no influence functions are kept: each contact is solved for, as [`CramerRaoBound::prepare`]
+    /// does for those all over the surface.
+    ///
     /// # Errors
     /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
         let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
-            let sd = sd?;
-            let response = surface.response_function(sensor.kind, sensor.position);
-            Some(Channel { kind: sensor.kind, response, sd, range: sensor.channel.range })
+            Some(Channel { kind: sensor.kind, sd: sd?, range: sensor.channel.range })
         };
         let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
-        Ok(Self { extent: surface.extent(), model: Some(surface), channels })
+        let responses = Responses::new(surface, layout);
+        Ok(Self { extent: surface.extent(), model: Some(surface), channels, responses })
     }
 
     /// The limit of a surface without a model, from what each of its channels reads over the standard deviation of its noise, as a
@@ -114,8 +122,25 @@ impl<'a> CramerRaoBound<'a> {
         extent: Extent,
         whitened: impl IntoIterator<Item = Arc<dyn ResponseFunction + 'a>>,
     ) -> Self {
-        let channel = |response| Channel { kind: SensorKind::Raw, response, sd: 1.0, range: None };
-        Self { extent, model: None, channels: whitened.into_iter().map(channel).collect() }
+        let responses: Vec<_> = whitened.into_iter().collect();
+        let channel = Channel { kind: SensorKind::Raw, sd: 1.0, range: None };
+        let channels = vec![channel; responses.len()];
+        Self { extent, model: None, channels, responses: Responses::BySensor(responses) }
+    }
+
+    /// What [`CramerRaoBound::prepare`] takes with so many other contacts; `None` where nothing is to be prepared.
+    pub fn preparation(&self, others: usize) -> Option<Preparation> {
+        self.responses.preparation(Grid::over_surface(self.extent).positions.len() + others)
+    }
+
+    /// Solves for contacts all over the surface, which curves and warnings ask of, and for others, so that they need not be solved for
+    /// one by one. Only of many sensors there is anything to do.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the work is to stop.
+    pub fn prepare(&self, others: &[Position], watch: Watch) -> Result<(), Cancelled> {
+        let positions = [&Grid::over_surface(self.extent).positions[..], others].concat();
+        self.responses.prepare(&positions, watch)
     }
 
     /// The surface that is touched.
@@ -152,7 +177,18 @@ impl<'a> CramerRaoBound<'a> {
 
     /// Each live sensor's reading at a contact, without noise, over the standard deviation of its noise.
     pub fn whitened_reading(&self, contact: Contact) -> Vec<f64> {
-        self.channels.iter().map(|channel| Self::clean(channel, contact) / channel.sd).collect()
+        self.whitened_readings(&[contact.position], contact.force_n).pop().unwrap_or_default()
+    }
+
+    /// The same at several contacts of one force, which are solved for together.
+    fn whitened_readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
+        let mut each = self.responses.readings(positions, force_n);
+        for readings in &mut each {
+            for (reading, channel) in readings.iter_mut().zip(&self.channels) {
+                *reading = channel.held(*reading) / channel.sd;
+            }
+        }
+        each
     }
 
     /// Length of the whitened reading: how many standard deviations a touch stands out of the noise.
@@ -160,19 +196,14 @@ impl<'a> CramerRaoBound<'a> {
         norm(&self.whitened_reading(contact))
     }
 
-    /// Reading of a sensor without noise, held at the ends of its range.
-    fn clean(channel: &Channel, contact: Contact) -> f64 {
-        let value = channel.response.at(contact);
-        channel.range.map_or(value, |(low, high)| value.max(low).min(high))
-    }
-
     /// Derivatives of the whitened readings; those of saturated channels are 0.
     fn derivatives(&self, contact: Contact) -> Columns {
         let mut columns = Columns::default();
         let mut across = Vec::new();
-        for Channel { response, sd, range, .. } in &self.channels {
-            let reading = response.at(contact);
-            let ResponseGradient { position: [along_x, along_y], force } = response.gradient(contact);
+        for (Channel { sd, range, .. }, (reading, gradient)) in
+            self.channels.iter().zip(self.responses.gradients(contact))
+        {
+            let ResponseGradient { position: [along_x, along_y], force } = gradient;
             let free = range.is_none_or(|(low, high)| low < reading && reading < high);
             let weight = if free { 1.0 / sd } else { 0.0 };
             columns.force.push(weight * force);
@@ -181,6 +212,13 @@ impl<'a> CramerRaoBound<'a> {
         }
         columns.across = self.extent.if_plane(across);
         columns
+    }
+}
+
+impl Channel {
+    /// A reading, held at the ends of the range.
+    fn held(&self, reading: f64) -> f64 {
+        self.range.map_or(reading, |(low, high)| reading.max(low).min(high))
     }
 }
 
@@ -218,6 +256,9 @@ pub enum LimitError {
         /// The most.
         most: usize,
     },
+    /// Whoever watched the work stopped it.
+    #[error("{0}")]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Refuses a force for which there is no limit.

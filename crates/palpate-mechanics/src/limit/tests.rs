@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
 use crate::contact::Position;
-use crate::surface::{Beam, Extent, InfluenceFunction};
+use crate::surface::{Beam, Extent, InfluenceFunction, Plate};
 use palpate_numerics::small::dot;
 
 /// The founding paper's beam.
@@ -34,7 +34,7 @@ fn bound(layout: &Layout) -> CramerRaoBound<'static> {
 }
 
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
-    limit_warnings(&bound(layout), 3.0, force).unwrap()
+    limit_warnings(&bound(layout), 3.0, force, Watch::NONE).unwrap()
 }
 
 /// The words of some warnings.
@@ -154,10 +154,11 @@ fn a_plane_has_a_bound_in_both_directions() {
     let limit = CramerRaoBound::new(&Pad, &line).unwrap();
     let contact = Contact { position: Position { x_m: 0.03, y_m: 0.02 }, force_n: 2.0 };
     assert_eq!(limit.bound_at(contact, Force::Known), None);
-    let found = limit_warnings(&limit, 2.0, Force::Known).unwrap();
+    let found = limit_warnings(&limit, 2.0, Force::Known, Watch::NONE).unwrap();
     // They cannot tell one side of the line from the other either.
     assert_eq!(found.iter().map(LimitWarning::kind).collect::<Vec<_>>(), ["mirror"], "{}", words(&found));
-    let curve = LimitCurve::with_spacing(&limit, 2.0, Force::Known, 5e-3).unwrap();
+    let positions = positions_with_spacing(Pad.extent(), 5e-3).unwrap();
+    let curve = LimitCurve::at_positions(&limit, 2.0, Force::Known, &positions).unwrap();
     assert_eq!(curve.points.len(), 11 * 7);
     assert_eq!(curve.summary().unwrap().without, 11);
     // A figure by x is its mean across; every column has a contact on the line, where there is no bound.
@@ -302,8 +303,7 @@ fn what_has_no_limit_says_why() {
     let no_model = LimitError::NoModel.to_string();
     let limit = bound(&deflections(8));
     let force = |force_n| LimitCurve::over_surface(&limit, force_n, Force::Known).unwrap_err().to_string();
-    let every =
-        |every_m| LimitCurve::with_spacing(&limit, 3.0, Force::Known, every_m).unwrap_err().to_string();
+    let every = |every_m| positions_with_spacing(BEAM.extent(), every_m).unwrap_err().to_string();
     insta::assert_snapshot!(
         [
             said(&clean),
@@ -366,4 +366,55 @@ fn reactions_see_what_deflections_do_not() {
     layout.edit(|sensors| sensors.extend(supports.into_sensors())).unwrap();
     assert_eq!(warnings(&layout, Force::Unknown), vec![]);
     assert_eq!(warnings(&layout, Force::Known), vec![]);
+}
+
+#[test]
+fn many_sensors_solved_for_by_contact_have_the_limit_of_their_functions() {
+    let plate = Plate::simply_supported((0.3, 0.2), 8e-4, 200e9, 0.3).unwrap().with_elements(24).unwrap();
+    let mut layout = with_noise(Layout::even(SensorKind::Deflection, 30, 0.3), 5e-6);
+    let spread = |sensors: &mut Vec<Sensor>| {
+        for (i, sensor) in sensors.iter_mut().enumerate() {
+            let [x_m, y_m] = [0.05 * (i % 6 + 1) as f64 - 0.025, 0.04 * (i / 6 + 1) as f64 - 0.02];
+            sensor.position = Position { x_m, y_m };
+        }
+        sensors[7].channel.dead = true;
+        sensors[8].channel.range = Some((-1e-4, 1e-4));
+    };
+    layout.edit(spread).unwrap();
+    let functions = CramerRaoBound::new(&plate, &layout).unwrap();
+    let responses = Responses::with_most_functions(&plate, &layout, 3);
+    let by_contact = CramerRaoBound { responses, ..functions.clone() };
+    let off_grid = Position { x_m: 0.123, y_m: 0.045 };
+    assert_eq!(functions.preparation(1), None);
+    assert!(by_contact.preparation(1).unwrap().multiply_adds > 1e6);
+    by_contact.prepare(&[off_grid], Watch::NONE).unwrap();
+    for force in [Force::Known, Force::Unknown] {
+        let [one, other] = [&functions, &by_contact].map(|limit| {
+            let summary = LimitCurve::over_surface(limit, 2.0, force).unwrap().summary().unwrap();
+            let contact = Contact { position: Position { x_m: 0.0777, y_m: 0.1 }, force_n: 2.0 };
+            let alone = limit.bound_at(contact, force).unwrap().sd_position_m;
+            let signal = limit.signal_to_noise(Contact { position: off_grid, force_n: 2.0 });
+            let warnings = limit_warnings(limit, 2.0, force, Watch::NONE).unwrap();
+            let (mirrors, others): (Vec<_>, Vec<_>) =
+                warnings.into_iter().partition(|warning| warning.kind() == "mirror");
+            ([summary.mean_m, summary.median_m, summary.worst.1, alone, signal], mirrors, words(&others))
+        });
+        assert!(one.0.iter().zip(&other.0).all(|(a, b)| (a / b - 1.0).abs() < 1e-7), "{one:?} {other:?}");
+        assert_eq!(one.2, other.2);
+        // Of many sensors twins are sought nearby; their readings differ as the functions say.
+        assert!(force == Force::Unknown || !other.1.is_empty());
+        for warning in &other.1 {
+            let LimitWarning::Mirror { at, twin, distance, .. } = *warning else { panic!("{warning}") };
+            let [a, b] = [at, twin].map(|at| functions.whitened_readings(&[at], 2.0).remove(0));
+            let found = match force {
+                Force::Known => a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt(),
+                Force::Unknown => (dot(&a, &a) - dot(&a, &b).powi(2) / dot(&b, &b)).sqrt(),
+            };
+            assert!((found - distance).abs() < 1e-5, "{warning}: {found}");
+        }
+    }
+    let stop = |_| false;
+    assert_eq!(by_contact.prepare(&[], Watch::new(&stop)), Err(Cancelled));
+    let stopped = limit_warnings(&by_contact, 2.0, Force::Known, Watch::new(&stop));
+    assert_eq!(stopped, Err(LimitError::Cancelled(Cancelled)));
 }

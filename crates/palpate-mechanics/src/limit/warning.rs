@@ -1,21 +1,20 @@
 //! Warnings of a limit, in words: the zone, how bad it is, and what would help.
 
+use std::collections::HashMap;
 use std::fmt;
 
-use super::bound::norm;
+use super::responses::key;
+use super::twins::{AMBIGUOUS_DISTANCE, Twin, TwinSearch};
 use super::zone::{Grid, Zone, zones};
 use super::{CramerRaoBound, Force, LimitError, check_force};
 use crate::contact::{Contact, Position};
 use crate::sensing::SensorKind;
 use crate::surface::Surface;
 use palpate_numerics::normal_cdf;
-use palpate_numerics::small::dot;
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// A limit above this share of the length is called blind.
 const BLIND_SHARE: f64 = 0.1;
-/// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
-/// for the other contact's more than once in a hundred times (2·2.326).
-const AMBIGUOUS_DISTANCE: f64 = 4.653;
 /// A touch that stands out of the noise by fewer standard deviations than this is called faint.
 const FAINT_SIGNAL: f64 = 5.0;
 /// Readings that differ by fewer standard deviations than this are the same.
@@ -79,18 +78,19 @@ pub enum LimitWarning {
 /// contacts, each from left to right.
 ///
 /// # Errors
-/// [`LimitError::Force`] for a force that is not positive and finite.
+/// [`LimitError::Force`] for a force that is not positive and finite; [`LimitError::Cancelled`].
 pub fn limit_warnings(
     limit: &CramerRaoBound,
     force_n: f64,
     force: Force,
+    watch: Watch,
 ) -> Result<Vec<LimitWarning>, LimitError> {
     check_force(force_n)?;
     // A support that stands between the positions of the grid could be missed: next to it little may be told.
     let grid = Grid::over_surface(limit.extent).including(&force_supports(limit));
     let survey = Survey { limit, force_n, force, grid };
     let mut warnings = survey.blind();
-    warnings.extend(survey.mirrors());
+    warnings.extend(survey.mirrors(watch)?);
     warnings.extend(survey.faint());
     Ok(warnings)
 }
@@ -162,17 +162,26 @@ impl Survey<'_> {
     }
 
     /// Each pair of zones once, however it was found.
-    fn mirrors(&self) -> Vec<LimitWarning> {
+    fn mirrors(&self, watch: Watch) -> Result<Vec<LimitWarning>, Cancelled> {
         let search = TwinSearch::new(self.limit, self.force_n, self.force);
         // Where a contact is faint or blind anyway, everything around it reads alike.
         let clear = |position: Position| {
             self.signal(position) >= FAINT_SIGNAL
                 && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
         };
-        let twin = |position: Position| clear(position).then(|| search.twin_of(position)).flatten();
-        let found = zones(self.limit.extent, &self.grid, |position| twin(position).is_some());
+        let mut found = HashMap::new();
+        let count = self.grid.positions.len() as f64;
+        for (done, &position) in self.grid.positions.iter().enumerate() {
+            watch.stage("contacts that read alike", done as f64 / count)?;
+            found.insert(key(position), clear(position).then(|| search.twin_of(position)).flatten());
+        }
+        let twin = |position: Position| match found.get(&key(position)) {
+            Some(twin) => *twin,
+            None => clear(position).then(|| search.twin_of(position)).flatten(),
+        };
+        let zones = zones(self.limit.extent, &self.grid, |position| twin(position).is_some());
         let mut warnings: Vec<LimitWarning> = Vec::new();
-        for (zone, inside) in found {
+        for (zone, inside) in zones {
             let pairs: Vec<(Position, Twin)> =
                 inside.into_iter().filter_map(|at| Some((at, twin(at)?))).collect();
             let nearest = pairs.iter().min_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
@@ -193,7 +202,7 @@ impl Survey<'_> {
                 warnings.push(LimitWarning::Mirror { zone, twins, force: self.force, at, twin, distance });
             }
         }
-        warnings
+        Ok(warnings)
     }
 
     fn faint(&self) -> Vec<LimitWarning> {
@@ -349,121 +358,4 @@ fn figure(value: f64) -> String {
     let unit = 10f64.powi(-digits);
     let decimals = digits.max(0) as usize;
     format!("{:.decimals$}", (value / unit).round() * unit)
-}
-
-/// Points of the straight way between two contacts at which their difference is looked at.
-const WAY_POINTS: u32 = 48;
-/// The search for the nearest reading ends at this share of the grid's pitch.
-const FINEST: f64 = 1e-3;
-
-/// The contact whose readings are nearest, somewhere else on the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Twin {
-    pub position: Position,
-    /// Distance of the readings, in standard deviations of their noise.
-    pub distance: f64,
-}
-
-/// The whitened readings of a whole surface, to be compared with.
-///
-/// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second one may have any force, and
-/// what is left is the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
-struct TwinSearch<'a> {
-    limit: &'a CramerRaoBound<'a>,
-    force_n: f64,
-    force: Force,
-    grid: Grid,
-    /// The shape of the reading at each position of the grid.
-    shapes: Vec<Vec<f64>>,
-    /// The largest difference of its shape from a neighbour's.
-    spreads: Vec<f64>,
-}
-
-impl<'a> TwinSearch<'a> {
-    pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force) -> Self {
-        let grid = Grid::over_surface(limit.extent);
-        let mut search = Self { limit, force_n, force, grid, shapes: Vec::new(), spreads: Vec::new() };
-        search.shapes = search.grid.positions.iter().map(|&position| search.shape(position).0).collect();
-        let spread = |i: usize| {
-            let differences =
-                search.grid.neighbours(i).map(|j| difference(&search.shapes[i], &search.shapes[j]));
-            differences.fold(0.0, f64::max)
-        };
-        search.spreads = (0..search.shapes.len()).map(spread).collect();
-        search
-    }
-
-    /// The nearest twin within the bound that is not just a neighbour: on the way to it the readings differ by more.
-    pub fn twin_of(&self, position: Position) -> Option<Twin> {
-        let target = self.shape(position);
-        let distances: Vec<f64> = self.shapes.iter().map(|shape| self.distance(&target, shape)).collect();
-        let scale = if self.force == Force::Known { 1.0 } else { target.1 };
-        let reachable = |i: &usize| distances[*i] - scale * self.spreads[*i] <= AMBIGUOUS_DISTANCE;
-        let lowest = |i: &usize| self.grid.neighbours(*i).all(|j| distances[*i] <= distances[j]);
-        let starts = (0..distances.len()).filter(reachable).filter(lowest);
-        let twins = starts.map(|i| self.descend(&target, self.grid.positions[i], distances[i]));
-        twins
-            .filter(|twin| {
-                twin.distance <= AMBIGUOUS_DISTANCE && self.apart(&target, position, twin.position)
-            })
-            .min_by(|a, b| a.distance.total_cmp(&b.distance))
-    }
-
-    /// Part of the reading that is compared, and the length of the whitened reading: the reading itself for a
-    /// known force, its direction for an unknown one.
-    fn shape(&self, position: Position) -> (Vec<f64>, f64) {
-        let mut reading = self.limit.whitened_reading(Contact { position, force_n: self.force_n });
-        let length = norm(&reading);
-        if self.force == Force::Unknown && length > 0.0 {
-            reading.iter_mut().for_each(|value| *value /= length);
-        }
-        (reading, length)
-    }
-
-    fn distance(&self, (shape, length): &(Vec<f64>, f64), other: &[f64]) -> f64 {
-        match self.force {
-            Force::Known => difference(shape, other),
-            Force::Unknown => {
-                // A force pushes, so a direction that points the other way is no nearer than no contact at all.
-                let along = dot(shape, other).max(0.0);
-                let off = shape.iter().zip(other).map(|(a, b)| (a - along * b).powi(2)).sum::<f64>();
-                length * off.sqrt()
-            }
-        }
-    }
-
-    /// From a position of the grid down to the nearest reading around it, by ever smaller steps along x and y.
-    fn descend(&self, target: &(Vec<f64>, f64), start: Position, distance: f64) -> Twin {
-        let mut twin = Twin { position: start, distance };
-        let finest_m = FINEST * self.grid.pitch_m();
-        let mut step_m = 0.5 * self.grid.pitch_m();
-        while step_m > finest_m {
-            let Position { x_m, y_m } = twin.position;
-            let around = [(step_m, 0.0), (-step_m, 0.0), (0.0, step_m), (0.0, -step_m)];
-            let better = around
-                .map(|(dx, dy)| Position { x_m: x_m + dx, y_m: y_m + dy })
-                .into_iter()
-                .filter(|&position| self.limit.extent.contains(position))
-                .map(|position| Twin { position, distance: self.distance(target, &self.shape(position).0) })
-                .find(|near| near.distance < twin.distance);
-            match better {
-                Some(near) => twin = near,
-                None => step_m *= 0.5,
-            }
-        }
-        twin
-    }
-
-    fn apart(&self, target: &(Vec<f64>, f64), from: Position, to: Position) -> bool {
-        (1..WAY_POINTS).any(|i| {
-            let share = f64::from(i) / f64::from(WAY_POINTS);
-            let between = |a: f64, b: f64| a + share * (b - a);
-            let at = Position { x_m: between(from.x_m, to.x_m), y_m: between(from.y_m, to.y_m) };
-            self.distance(target, &self.shape(at).0) > AMBIGUOUS_DISTANCE
-        })
-    }
-}
-
-fn difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }

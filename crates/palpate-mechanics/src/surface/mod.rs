@@ -51,6 +51,24 @@ pub trait Surface: Send + Sync {
         Arc::new(Proportional(self.influence_function(kind, sensor)))
     }
 
+    /// The response functions of several sensors of one kind, as [`Surface::influence_functions`] has their influence functions.
+    fn response_functions(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+    ) -> Vec<Arc<dyn ResponseFunction + '_>> {
+        sensors.iter().map(|sensor| self.response_function(kind, *sensor)).collect()
+    }
+
+    /// What many sensors read, contact by contact; `None` where a surface has nothing that is sooner than their influence
+    /// functions.
+    fn readings_by_contact(
+        &self,
+        _sensors: &[(SensorKind, Position)],
+    ) -> Option<Arc<dyn ReadingsByContact + '_>> {
+        None
+    }
+
     /// One value of an influence function, where no other of the same sensor is wanted.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
         self.influence_function(kind, sensor).at(contact)
@@ -95,6 +113,42 @@ pub trait InfluenceFunction: Send + Sync {
     /// Its derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
+}
+
+/// Readings of many sensors on a surface that bends in proportion to the force, by contact: by reciprocity one solution for a
+/// contact tells all of them, where influence functions are one solution for each sensor.
+pub trait ReadingsByContact: Send + Sync {
+    /// What the sensors read, in their order, under each of `loads`.
+    fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
+
+    /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor: contacts near each other share them.
+    fn degrees(&self, contact: Position) -> Vec<(usize, f64)>;
+
+    /// Loads that are sooner solved for together than one by one; more at a time cost memory and save nothing.
+    fn together(&self) -> usize;
+
+    /// Multiply-adds that one load costs.
+    fn multiply_adds(&self) -> f64;
+}
+
+/// A unit load on a surface at a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactLoad {
+    /// A downward unit force: sensors read their influence.
+    Force(Position),
+    /// Its derivative by x: sensors read the derivative of their influence along the length, per metre.
+    ByX(Position),
+    /// Its derivative by y, across the width.
+    ByY(Position),
+    /// One on a degree of freedom of [`ReadingsByContact::degrees`].
+    Degree(usize),
+}
+
+impl ContactLoad {
+    /// The force at a contact and its derivatives.
+    pub const fn all(contact: Position) -> [Self; 3] {
+        [Self::Force(contact), Self::ByX(contact), Self::ByY(contact)]
+    }
 }
 
 /// Response function of one sensor: its reading as a function of the contact's position and force.

@@ -276,7 +276,7 @@ fn limits(sensors: SensorGroup, force: Force) -> Vec<ReportFile> {
         known: &curve(Force::Known),
         unknown: &curve(Force::Unknown),
         force,
-        warnings: &limit_warnings(&limit, 3.0, force).unwrap(),
+        warnings: &limit_warnings(&limit, 3.0, force, Watch::NONE).unwrap(),
         listed: &[0.0, 0.05, 0.2].map(Position::along),
         touch: &Influence::default().lightest_touch(&limit),
     })

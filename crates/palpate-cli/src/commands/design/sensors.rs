@@ -222,7 +222,7 @@ pub fn help(error: &DesignError) -> &'static str {
             "the limit depends on the contact force: `force = \"3 N\"` in [contact], or --force \"3 N\""
         }
         DesignError::Limit(LimitError::Noise(error)) => error.help(),
-        DesignError::Cancelled(_) => "start it again",
+        DesignError::Cancelled(_) | DesignError::Limit(LimitError::Cancelled(_)) => "start it again",
         DesignError::Limit(LimitError::Positions { .. }) => "set the contacts' `every` wider apart",
         DesignError::OutOfRange(_) | DesignError::Layout(_) => "check it in [design]",
         DesignError::SingularNoise { .. } => {

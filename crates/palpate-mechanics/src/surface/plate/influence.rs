@@ -1,11 +1,11 @@
 //! The influence function of one sensor on a plate, and how large influences are.
 
 use super::mesh::{Derivative, Mesh, NODE_DEGREES};
-use super::solved::{Functional, Solved};
+use super::solved::{Functional, Solved, TOGETHER};
 use super::spec::{self, PlateSpec, PointSupport, PointSupportKind};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use crate::surface::InfluenceFunction;
+use crate::surface::{ContactLoad, InfluenceFunction, ReadingsByContact};
 
 /// Bicubic patches over the plate, with their own degrees of freedom.
 ///
@@ -20,21 +20,20 @@ impl PlateInfluence {
     /// The influence functions of sensors of this `kind` at `sensors`; 0 everywhere for a raw channel, or a reaction where
     /// there is no support.
     pub fn of_all(spec: &PlateSpec, solved: &Solved, kind: SensorKind, sensors: &[Position]) -> Vec<Self> {
-        let mesh = solved.mesh;
-        let by_load = |load: &dyn Fn(Position) -> Functional, factor: f64| {
-            let loads: Vec<_> = sensors.iter().map(|sensor| (load(*sensor), factor)).collect();
-            solved.solutions(&loads)
+        let reads: Vec<Reads> =
+            sensors.iter().map(|sensor| Reads::new(spec, solved, kind, *sensor)).collect();
+        let load = |reads: &Reads| match reads {
+            Reads::Shape(functional, factor) => Some((functional.clone(), *factor)),
+            Reads::Contact(_) | Reads::Nothing => None,
         };
-        let degrees = match kind {
-            SensorKind::Deflection => by_load(&|sensor| weights(&mesh, sensor, Derivative::None), -1.0),
-            SensorKind::Slope => by_load(&|sensor| weights(&mesh, sensor, Derivative::X), -1.0),
-            // Strain on the lower face, t/2 below the middle, is (t/2)·∂²w/∂x²: a plate that is hollow above is stretched
-            // below.
-            SensorKind::Strain => by_load(&|sensor| curvature(&mesh, sensor), -0.5 * spec.thickness_m),
-            SensorKind::Reaction => sensors.iter().map(|sensor| reaction(spec, solved, *sensor)).collect(),
-            SensorKind::Raw => vec![vec![0.0; mesh.degrees()]; sensors.len()],
-        };
-        degrees.into_iter().map(|degrees| Self { mesh, degrees }).collect()
+        let loads: Vec<_> = reads.iter().filter_map(load).collect();
+        let mut solutions = solved.solutions(&loads).into_iter();
+        let degrees = reads.into_iter().filter_map(|reads| match reads {
+            Reads::Shape(..) => solutions.next(),
+            Reads::Contact(degrees) => Some(degrees),
+            Reads::Nothing => Some(vec![0.0; solved.mesh.degrees()]),
+        });
+        degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect()
     }
 
     /// The largest magnitude at the nodes.
@@ -85,17 +84,99 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
     }
 }
 
-/// The force of the support at `at` on the plate, positive upward: of an elastic one −k·w.
-fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Vec<f64> {
-    let none = || vec![0.0; solved.mesh.degrees()];
-    let Some(i) = spec::support_at(spec, at) else { return none() };
-    let PointSupport { position, kind } = spec.supports[i];
-    match kind {
-        PointSupportKind::Simple => solved.reaction(i).unwrap_or_else(none),
-        PointSupportKind::Elastic { stiffness_n_per_m } => {
-            let load = weights(&solved.mesh, position, Derivative::None);
-            solved.solutions(&[(load, stiffness_n_per_m)]).pop().unwrap_or_else(none)
+/// What a sensor reads.
+enum Reads {
+    /// A functional of the plate's shape under the load, upward as the shape functions are, times a factor.
+    Shape(Functional, f64),
+    /// A function of where the force acts, as degrees of freedom; no matter how the plate bends.
+    Contact(Vec<f64>),
+    /// 0, whatever the load.
+    Nothing,
+}
+
+impl Reads {
+    fn new(spec: &PlateSpec, solved: &Solved, kind: SensorKind, at: Position) -> Self {
+        let mesh = &solved.mesh;
+        match kind {
+            SensorKind::Deflection => Self::Shape(weights(mesh, at, Derivative::None), -1.0),
+            SensorKind::Slope => Self::Shape(weights(mesh, at, Derivative::X), -1.0),
+            // Strain on the lower face, t/2 below the middle, is (t/2)·∂²w/∂x²: a plate that is hollow above is stretched
+            // below.
+            SensorKind::Strain => Self::Shape(curvature(mesh, at), -0.5 * spec.thickness_m),
+            SensorKind::Reaction => Self::reaction(spec, solved, at),
+            SensorKind::Raw => Self::Nothing,
         }
+    }
+
+    /// The force of the support at `at` on the plate, positive upward: of an elastic one −k·w.
+    fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Self {
+        let Some(i) = spec::support_at(spec, at) else { return Self::Nothing };
+        let PointSupport { position, kind } = spec.supports[i];
+        match kind {
+            PointSupportKind::Simple => solved.reaction(i).map_or(Self::Nothing, Self::Contact),
+            PointSupportKind::Elastic { stiffness_n_per_m } => {
+                Self::Shape(weights(&solved.mesh, position, Derivative::None), stiffness_n_per_m)
+            }
+        }
+    }
+}
+
+/// Readings of many sensors under loads at contacts: by Maxwell's and Betti's reciprocity s'·K⁻¹·f is as well what the sensors s make
+/// of the shape K⁻¹·f.
+pub(super) struct PlateReadings<'a> {
+    solved: &'a Solved,
+    sensors: Vec<Reads>,
+}
+
+impl<'a> PlateReadings<'a> {
+    pub fn new(spec: &PlateSpec, solved: &'a Solved, sensors: &[(SensorKind, Position)]) -> Self {
+        let sensors = sensors.iter().map(|(kind, at)| Reads::new(spec, solved, *kind, *at)).collect();
+        Self { solved, sensors }
+    }
+}
+
+impl ReadingsByContact for PlateReadings<'_> {
+    fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>> {
+        let mesh = &self.solved.mesh;
+        let load = |load: &ContactLoad| match *load {
+            ContactLoad::Force(at) => weights(mesh, at, Derivative::None),
+            ContactLoad::ByX(at) => weights(mesh, at, Derivative::X),
+            ContactLoad::ByY(at) => weights(mesh, at, Derivative::Y),
+            ContactLoad::Degree(degree) => vec![(degree, 1.0)],
+        };
+        let value = |functional: &Functional, degrees: &[f64]| -> f64 {
+            functional.iter().map(|(degree, weight)| weight * degrees[*degree]).sum()
+        };
+        let loads: Vec<(Functional, f64)> = loads.iter().map(|of| (load(of), 1.0)).collect();
+        let readings = |(shape, (load, _)): (Vec<f64>, &(Functional, f64))| {
+            let reading = |reads: &Reads| match reads {
+                Reads::Shape(functional, factor) => factor * value(functional, &shape),
+                Reads::Contact(degrees) => value(load, degrees),
+                Reads::Nothing => 0.0,
+            };
+            self.sensors.iter().map(reading).collect()
+        };
+        let each = loads.chunks(TOGETHER).flat_map(|loads| {
+            self.solved.solutions(loads).into_iter().zip(loads).map(readings).collect::<Vec<_>>()
+        });
+        each.collect()
+    }
+
+    fn degrees(&self, contact: Position) -> Vec<(usize, f64)> {
+        weights(&self.solved.mesh, contact, Derivative::None)
+    }
+
+    fn together(&self) -> usize {
+        TOGETHER
+    }
+
+    fn multiply_adds(&self) -> f64 {
+        let weights = |reads: &Reads| match reads {
+            Reads::Shape(functional, _) => functional.len(),
+            Reads::Contact(_) => 16,
+            Reads::Nothing => 0,
+        };
+        2.0 * self.solved.stored_numbers() as f64 + self.sensors.iter().map(weights).sum::<usize>() as f64
     }
 }
 

@@ -15,10 +15,12 @@ use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, InfluenceFunction, InsensitiveSensor, Surface};
+use super::{
+    Extent, InfluenceFunction, InsensitiveSensor, Proportional, ReadingsByContact, ResponseFunction, Surface,
+};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
-use influence::{NotANumber, PlateInfluence, full_scales};
+use influence::{NotANumber, PlateInfluence, PlateReadings, full_scales};
 use solved::Solved;
 
 /// A plate that was checked, whose equations are factored when they are first asked for, once for all its clones.
@@ -150,6 +152,23 @@ impl Surface for Plate {
         };
         let all = PlateInfluence::of_all(&self.spec, solved, kind, sensors).into_iter();
         all.map(|function| Arc::new(function) as Arc<dyn InfluenceFunction>).collect()
+    }
+
+    fn response_functions(
+        &self,
+        kind: SensorKind,
+        sensors: &[Position],
+    ) -> Vec<Arc<dyn ResponseFunction + '_>> {
+        let influences = self.influence_functions(kind, sensors).into_iter();
+        influences.map(|influence| Arc::new(Proportional(influence)) as Arc<dyn ResponseFunction>).collect()
+    }
+
+    /// By reciprocity; `None` when [`Plate::solve`] fails.
+    fn readings_by_contact(
+        &self,
+        sensors: &[(SensorKind, Position)],
+    ) -> Option<Arc<dyn ReadingsByContact + '_>> {
+        Some(Arc::new(PlateReadings::new(&self.spec, self.solved().ok()?, sensors)))
     }
 
     fn is_supported_at(&self, position: Position) -> bool {

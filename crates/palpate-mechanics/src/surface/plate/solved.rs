@@ -27,7 +27,7 @@ pub(super) struct Solved {
 }
 
 /// Loads that are solved for in one sweep through the factor: more would cost memory and save little.
-const TOGETHER: usize = 24;
+pub(super) const TOGETHER: usize = 24;
 
 /// Constraint equations of the simple supports.
 struct SimpleSupports {

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use proptest::prelude::*;
 
 use super::*;
+use crate::surface::ContactLoad;
 
 const LENGTH_M: f64 = 0.3;
 const WIDTH_M: f64 = 0.2;
@@ -216,5 +217,39 @@ fn positions_off_the_plate_are_answered_without_a_panic() {
     let influence = MIXED.influence_function(SensorKind::Deflection, at(f64::NAN, -3.0));
     for contact in [at(-1.0, 0.1), at(1e300, 0.1), at(0.1, f64::INFINITY), at(f64::NAN, f64::NAN)] {
         let _ = (influence.at(contact), influence.gradient(contact));
+    }
+}
+
+#[test]
+fn readings_by_contact_are_those_of_the_influence_functions() {
+    for plate in [&*MIXED, &*ON_POINTS] {
+        let places = [(0.041, 0.052), (0.15, 0.1), (0.222, 0.143), (0.3, 0.2)];
+        let mut sensors: Vec<(SensorKind, Position)> =
+            KINDS.iter().flat_map(|kind| places.map(|(x_m, y_m)| (*kind, at(x_m, y_m)))).collect();
+        let supports = plate.spec().supports.iter();
+        sensors.extend(supports.map(|support| (SensorKind::Reaction, support.position)));
+        sensors.push((SensorKind::Raw, at(0.1, 0.1)));
+        let readings = plate.readings_by_contact(&sensors).unwrap();
+        for contact in [at(0.07, 0.03), at(0.15, 0.1), at(0.29, 0.19)] {
+            let under = readings.under(&ContactLoad::all(contact));
+            let around = readings.degrees(contact);
+            let loads: Vec<ContactLoad> =
+                around.iter().map(|(degree, _)| ContactLoad::Degree(*degree)).collect();
+            let nodal = readings.under(&loads);
+            for (i, (kind, sensor)) in sensors.iter().enumerate() {
+                let function = plate.influence_function(*kind, *sensor);
+                let [along, across] = function.gradient(contact);
+                let summed: f64 = around.iter().zip(&nodal).map(|((_, weight), of)| weight * of[i]).sum();
+                let scale = plate.full_scale(*kind).max(1e-30);
+                for (found, expected, scale) in [
+                    (under[0][i], function.at(contact), scale),
+                    (summed, function.at(contact), scale),
+                    (under[1][i], along, scale / WIDTH_M),
+                    (under[2][i], across, scale / WIDTH_M),
+                ] {
+                    assert!((found - expected).abs() < 1e-9 * scale, "{kind} {sensor:?}: {found} {expected}");
+                }
+            }
+        }
     }
 }

@@ -1,0 +1,212 @@
+//! What the sensors of a limit read under a contact, and how that changes with it.
+//!
+//! Few sensors have a response function each. Of many on a surface that is solved by elements those would fill the memory and take
+//! as many solutions; by reciprocity three solutions for a contact tell what all of them read there and its derivatives, and these are kept.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::contact::{Contact, Position};
+use crate::sensing::{Layout, SensorKind};
+use crate::surface::{ContactLoad, ReadingsByContact, ResponseFunction, ResponseGradient, Surface};
+use palpate_numerics::small::add_multiple;
+use palpate_numerics::watch::{Cancelled, Watch};
+
+/// More sensors than this are solved for by contact: about as many as solutions for the contacts of a whole plane.
+const MOST_FUNCTIONS: usize = 1500;
+/// Bytes of what is kept of contacts, at most.
+const MOST_KEPT: usize = 256 << 20;
+/// Bytes of readings under loads on degrees of freedom, at most.
+const MOST_OF_DEGREES: usize = 192 << 20;
+
+/// Responses of the live sensors, in their order.
+#[derive(Clone)]
+pub(super) enum Responses<'a> {
+    BySensor(Vec<Arc<dyn ResponseFunction + 'a>>),
+    ByContact(ByContact<'a>),
+}
+
+/// Influences of all sensors, contact by contact.
+#[derive(Clone)]
+pub(super) struct ByContact<'a> {
+    readings: Arc<dyn ReadingsByContact + 'a>,
+    sensors: usize,
+    /// By the bits of a contact's position.
+    kept: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
+    /// Readings of all sensors under loads on degrees of freedom, for contacts that are asked for one by one near each other.
+    degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
+}
+
+/// Readings of all sensors per newton at a contact, and their derivatives along and across, per metre.
+type Influences = [Vec<f64>; 3];
+
+/// What it takes to look all over a surface for what many sensors tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparation {
+    /// Multiply-adds of the solutions for contacts all over the surface. The search for contacts that read alike solves for others: up to
+    /// some 12 times as many.
+    pub multiply_adds: f64,
+    /// Memory of what is kept, in bytes.
+    pub memory_bytes: f64,
+}
+
+impl<'a> Responses<'a> {
+    /// Responses of the sensors of a layout that are alive.
+    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
+        Self::with_most_functions(surface, layout, MOST_FUNCTIONS)
+    }
+
+    pub(super) fn with_most_functions(surface: &'a dyn Surface, layout: &Layout, most: usize) -> Self {
+        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
+        let sensors: Vec<(SensorKind, Position)> =
+            alive.map(|sensor| (sensor.kind, sensor.position)).collect();
+        if sensors.len() > most
+            && let Some(readings) = surface.readings_by_contact(&sensors)
+        {
+            return Self::ByContact(ByContact {
+                readings,
+                sensors: sensors.len(),
+                kept: Arc::default(),
+                degrees: Arc::default(),
+            });
+        }
+        let of_a_kind = sensors.chunk_by(|a, b| a.0 == b.0).flat_map(|sensors| {
+            let positions: Vec<Position> = sensors.iter().map(|(_, position)| *position).collect();
+            surface.response_functions(sensors[0].0, &positions)
+        });
+        Self::BySensor(of_a_kind.collect())
+    }
+
+    /// Reading of each sensor under a force at each of some positions.
+    pub fn readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
+        match self {
+            Self::BySensor(functions) => {
+                let at = |&position: &Position| {
+                    let contact = Contact { position, force_n };
+                    functions.iter().map(|function| function.at(contact)).collect()
+                };
+                positions.iter().map(at).collect()
+            }
+            Self::ByContact(by_contact) => by_contact.readings(positions, force_n),
+        }
+    }
+
+    /// Reading of each sensor, and its derivatives.
+    pub fn gradients(&self, contact: Contact) -> Vec<(f64, ResponseGradient)> {
+        match self {
+            Self::BySensor(functions) => {
+                functions.iter().map(|function| (function.at(contact), function.gradient(contact))).collect()
+            }
+            Self::ByContact(by_contact) => by_contact.gradients(contact),
+        }
+    }
+
+    /// What [`Responses::prepare`] takes; `None` where there is nothing to prepare.
+    pub fn preparation(&self, positions: usize) -> Option<Preparation> {
+        let Self::ByContact(by_contact) = self else { return None };
+        let loads = 3.0 * positions as f64;
+        let reading = (size_of::<f64>() * by_contact.sensors) as f64;
+        // The search compares readings and derivatives of its own.
+        let compared = 4.0 * positions as f64 * reading;
+        Some(Preparation {
+            multiply_adds: loads * by_contact.readings.multiply_adds(),
+            memory_bytes: (loads * reading).min(MOST_KEPT as f64) + compared + MOST_OF_DEGREES as f64,
+        })
+    }
+
+    /// Solves for contacts, many together, as long as there is room to keep them.
+    pub fn prepare(&self, positions: &[Position], watch: Watch) -> Result<(), Cancelled> {
+        match self {
+            Self::BySensor(_) => Ok(()),
+            Self::ByContact(by_contact) => by_contact.prepare(positions, watch),
+        }
+    }
+}
+
+impl ByContact<'_> {
+    fn readings(&self, positions: &[Position], force_n: f64) -> Vec<Vec<f64>> {
+        let of = |position: &Position| {
+            let mut readings = match self.kept(*position) {
+                Some(kept) => kept[0].clone(),
+                None => self.interpolated(*position),
+            };
+            readings.iter_mut().for_each(|reading| *reading *= force_n);
+            readings
+        };
+        positions.iter().map(of).collect()
+    }
+
+    /// Readings per newton at a contact, from those under loads on the degrees of freedom around it.
+    fn interpolated(&self, position: Position) -> Vec<f64> {
+        let around = self.readings.degrees(position);
+        let mut degrees = self.degrees.lock().unwrap_or_else(PoisonError::into_inner);
+        if (degrees.len() + around.len()) * size_of::<f64>() * self.sensors > MOST_OF_DEGREES {
+            degrees.clear();
+        }
+        let new = around.iter().map(|(degree, _)| *degree).filter(|degree| !degrees.contains_key(degree));
+        let new: Vec<usize> = new.collect();
+        let loads: Vec<ContactLoad> = new.iter().copied().map(ContactLoad::Degree).collect();
+        degrees.extend(new.into_iter().zip(self.readings.under(&loads)));
+        let mut sum = vec![0.0; self.sensors];
+        for (degree, weight) in &around {
+            if let Some(readings) = degrees.get(degree) {
+                add_multiple(&mut sum, *weight, readings);
+            }
+        }
+        sum
+    }
+
+    fn gradients(&self, Contact { position, force_n }: Contact) -> Vec<(f64, ResponseGradient)> {
+        let influences = self
+            .kept(position)
+            .unwrap_or_else(|| self.solve(&[position]).into_iter().next().unwrap_or_default());
+        let [at, along, across] = &*influences;
+        let gradient = |((at, along), across): ((&f64, &f64), &f64)| {
+            let position = [force_n * along, force_n * across];
+            (force_n * at, ResponseGradient { position, force: *at })
+        };
+        at.iter().zip(along).zip(across).map(gradient).collect()
+    }
+
+    fn prepare(&self, positions: &[Position], watch: Watch) -> Result<(), Cancelled> {
+        let together = (self.readings.together() / 3).max(1);
+        for (i, batch) in positions.chunks(together).enumerate() {
+            let share = (i * together) as f64 / positions.len() as f64;
+            watch.stage("readings under contacts all over the surface", share)?;
+            if !self.has_room() {
+                break;
+            }
+            self.solve(batch);
+        }
+        Ok(())
+    }
+
+    fn kept(&self, position: Position) -> Option<Arc<Influences>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(&key(position)).cloned()
+    }
+
+    fn has_room(&self) -> bool {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner).len();
+        (kept + 1) * 3 * size_of::<f64>() * self.sensors <= MOST_KEPT
+    }
+
+    /// Influences at contacts, which are kept while there is room.
+    fn solve(&self, positions: &[Position]) -> Vec<Arc<Influences>> {
+        let loads: Vec<ContactLoad> = positions.iter().copied().flat_map(ContactLoad::all).collect();
+        let mut under = self.readings.under(&loads).into_iter();
+        let influences = positions.iter().map(|position| {
+            let influences: Arc<Influences> = Arc::new([(); 3].map(|()| under.next().unwrap_or_default()));
+            if self.has_room() {
+                let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+                kept.insert(key(*position), influences.clone());
+            }
+            influences
+        });
+        influences.collect()
+    }
+}
+
+/// The bits of a position, by which what was found there is kept.
+pub(super) fn key(position: Position) -> [u64; 2] {
+    [position.x_m, position.y_m].map(f64::to_bits)
+}

@@ -1,0 +1,276 @@
+//! Contacts whose readings are alike though they are far apart.
+
+use super::bound::norm;
+use super::responses::Responses;
+use super::zone::Grid;
+use super::{Columns, CramerRaoBound, Force};
+use crate::contact::{Contact, Position};
+
+/// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
+/// for the other contact's more than once in a hundred times (2·2.326).
+pub(super) const AMBIGUOUS_DISTANCE: f64 = 4.653;
+/// Points of the straight way between two contacts at which their difference is looked at, from the middle outwards.
+const WAY_POINTS: i32 = 47;
+/// Pitches of the grid around a position in which its derivatives foretell twins, and in which one is searched for where a reading takes a
+/// solution: farther away another position of the grid is nearer.
+const REACH: f64 = 1.5;
+/// Such a search is given up where it is farther above the bound than so many times what steps of the last length have gained.
+const HOPELESS: f64 = 10.0;
+/// The search for the nearest reading ends at this share of the grid's pitch.
+const FINEST: f64 = 1e-3;
+
+/// The contact whose readings are nearest, somewhere else on the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Twin {
+    pub position: Position,
+    /// Distance of the readings, in standard deviations of their noise.
+    pub distance: f64,
+}
+
+/// The whitened readings of a whole surface, to be compared with.
+///
+/// For a known force W two contacts differ by |y(a) − y(b)|. For an unknown force the second one may have any force, and
+/// what is left is the distance of y(a) from the ray through y(b): |y(a)|·sin of the angle between their directions.
+pub(super) struct TwinSearch<'a> {
+    limit: &'a CramerRaoBound<'a>,
+    force_n: f64,
+    force: Force,
+    grid: Grid,
+    /// Of each position of the grid.
+    places: Vec<Place>,
+    /// How far from where it began the search for the nearest reading may go: anywhere where readings cost little.
+    reach_m: f64,
+}
+
+/// What a position of the grid reads, and by how much that differs around it.
+struct Place {
+    shape: Shape,
+    /// The largest difference of its direction or reading from a neighbour's.
+    spread: f64,
+    /// Derivatives of what is compared, along and across, per metre.
+    slopes: [Vec<f64>; 2],
+    /// The largest difference of a neighbour's from what the derivatives foretell.
+    bend: f64,
+}
+
+/// What is compared of a reading: the reading itself for a known force, its direction for an unknown one.
+#[derive(Clone)]
+struct Shape {
+    values: Vec<f64>,
+    /// Length of the whitened reading.
+    length: f64,
+}
+
+impl<'a> TwinSearch<'a> {
+    pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force) -> Self {
+        let grid = Grid::over_surface(limit.extent);
+        let reach_m = match limit.responses {
+            Responses::BySensor(_) => f64::INFINITY,
+            Responses::ByContact(_) => REACH * grid.pitch_m(),
+        };
+        let mut search = Self { limit, force_n, force, grid, places: Vec::new(), reach_m };
+        let positions = &search.grid.positions;
+        let shapes: Vec<Shape> = positions.iter().map(|position| search.shape(*position)).collect();
+        let place = |(i, shape): (usize, &Shape)| {
+            let slopes = search.slopes(positions[i], shape);
+            let apart = |j: usize| [positions[j].x_m - positions[i].x_m, positions[j].y_m - positions[i].y_m];
+            let bent = |j: usize| left_of(&slopes, apart(j), &difference(&shapes[j].values, &shape.values));
+            let spreads = search.grid.neighbours(i).map(|j| distance(&shape.values, &shapes[j].values));
+            Place {
+                spread: spreads.fold(0.0, f64::max),
+                bend: search.grid.neighbours(i).map(bent).fold(0.0, f64::max),
+                shape: shape.clone(),
+                slopes,
+            }
+        };
+        search.places = shapes.iter().enumerate().map(place).collect();
+        search
+    }
+
+    /// The nearest twin within the bound that is not just a neighbour: on the way to it the readings differ by more.
+    pub fn twin_of(&self, position: Position) -> Option<Twin> {
+        let target = self.shape(position);
+        let distances: Vec<f64> =
+            self.places.iter().map(|place| self.distance(&target, &place.shape.values)).collect();
+        // From the contact itself the way down leads nowhere.
+        let elsewhere = |i: &usize| self.grid.positions[*i] != position;
+        let lowest = |i: &usize| self.grid.neighbours(*i).all(|j| distances[*i] <= distances[j]);
+        let starts = (0..distances.len())
+            .filter(elsewhere)
+            .filter(|i| self.is_reachable(&target, *i, distances[*i]))
+            .filter(lowest);
+        let twins = starts.map(|i| self.descend(&target, self.grid.positions[i], distances[i]));
+        twins
+            .filter(|twin| {
+                twin.distance <= AMBIGUOUS_DISTANCE && self.apart(&target, position, twin.position)
+            })
+            .min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+
+    /// Whether a twin may be between a position of the grid and its neighbours: as near as they differ from it, and as its derivatives
+    /// foretell within what they err at the neighbours.
+    fn is_reachable(&self, target: &Shape, i: usize, found: f64) -> bool {
+        let place = &self.places[i];
+        let scale = if self.force == Force::Known { 1.0 } else { target.length };
+        if found - scale * place.spread > AMBIGUOUS_DISTANCE {
+            return false;
+        }
+        let left = difference(&target.values, &place.shape.values);
+        let step_m = Normal::of(&place.slopes, &left).step().unwrap_or_default();
+        let most_m = REACH * self.grid.pitch_m();
+        let step_m = step_m.map(|step_m| step_m.clamp(-most_m, most_m));
+        scale * (left_of(&place.slopes, step_m, &left) - place.bend) <= AMBIGUOUS_DISTANCE
+    }
+
+    fn shape(&self, position: Position) -> Shape {
+        self.shapes(&[position]).pop().unwrap_or_else(|| Shape { values: Vec::new(), length: 0.0 })
+    }
+
+    fn shapes(&self, positions: &[Position]) -> Vec<Shape> {
+        let readings = self.limit.whitened_readings(positions, self.force_n);
+        let shape = |mut values: Vec<f64>| {
+            let length = norm(&values);
+            if self.force == Force::Unknown && length > 0.0 {
+                values.iter_mut().for_each(|value| *value /= length);
+            }
+            Shape { values, length }
+        };
+        readings.into_iter().map(shape).collect()
+    }
+
+    /// Derivatives of what is compared, along and across: of a direction, those of the reading without their part along it, over its
+    /// length.
+    fn slopes(&self, position: Position, shape: &Shape) -> [Vec<f64>; 2] {
+        let Columns { along, across, .. } =
+            self.limit.derivatives(Contact { position, force_n: self.force_n });
+        let mut slopes = [along, across.unwrap_or_default()];
+        if self.force == Force::Unknown && shape.length > 0.0 {
+            for slope in &mut slopes {
+                let part = dot(slope, &shape.values);
+                for (slope, value) in slope.iter_mut().zip(&shape.values) {
+                    *slope = (*slope - part * value) / shape.length;
+                }
+            }
+        }
+        slopes
+    }
+
+    fn distance(&self, target: &Shape, other: &[f64]) -> f64 {
+        match self.force {
+            Force::Known => distance(&target.values, other),
+            Force::Unknown => {
+                // A force pushes, so a direction that points the other way is no nearer than no contact at all.
+                let along = dot(&target.values, other).max(0.0);
+                let off = sum_in_strands(&target.values, other, |a, b| (a - along * b).powi(2));
+                target.length * off.sqrt()
+            }
+        }
+    }
+
+    /// From a position of the grid down to the nearest reading around it, by ever smaller steps along x and y. Those end in a curved
+    /// valley as well, where Gauss-Newton steps would follow it to the contact itself.
+    fn descend(&self, target: &Shape, start: Position, distance: f64) -> Twin {
+        let mut twin = Twin { position: start, distance };
+        let finest_m = FINEST * self.grid.pitch_m();
+        // What the distance was before steps of this length, and whether longer ones were tried.
+        let (mut before, mut tried) = (distance, false);
+        let mut step_m = 0.5 * self.grid.pitch_m();
+        while step_m > finest_m {
+            let Position { x_m, y_m } = twin.position;
+            let around = [(step_m, 0.0), (-step_m, 0.0), (0.0, step_m), (0.0, -step_m)];
+            let mut around = around.map(|(dx, dy)| Position { x_m: x_m + dx, y_m: y_m + dy }).to_vec();
+            around.retain(|&at| self.limit.extent.contains(at) && start.distance_m(at) <= self.reach_m);
+            let distances = self.shapes(&around).into_iter().map(|near| self.distance(target, &near.values));
+            let near = around.iter().zip(distances).find(|(_, distance)| *distance < twin.distance);
+            match near {
+                Some((&position, distance)) => twin = Twin { position, distance },
+                None => {
+                    let gained = before - twin.distance;
+                    if tried
+                        && self.reach_m.is_finite()
+                        && twin.distance - AMBIGUOUS_DISTANCE > HOPELESS * gained
+                    {
+                        return twin;
+                    }
+                    (before, tried) = (twin.distance, true);
+                    step_m *= 0.5;
+                }
+            }
+        }
+        twin
+    }
+
+    fn apart(&self, target: &Shape, from: Position, to: Position) -> bool {
+        let mut shares: Vec<f64> =
+            (1..=WAY_POINTS).map(|i| f64::from(i) / f64::from(WAY_POINTS + 1)).collect();
+        shares.sort_by(|a, b| (a - 0.5).abs().total_cmp(&(b - 0.5).abs()));
+        let between = |a: f64, b: f64, share: f64| a + share * (b - a);
+        let at = |share: &f64| Position {
+            x_m: between(from.x_m, to.x_m, *share),
+            y_m: between(from.y_m, to.y_m, *share),
+        };
+        shares.iter().map(at).any(|at| self.distance(target, &self.shape(at).values) > AMBIGUOUS_DISTANCE)
+    }
+}
+
+/// The normal equations of a step that is to take off what is left.
+struct Normal {
+    /// Products of the slopes: along with along, along with across, across with across.
+    products: [f64; 3],
+    /// Products of the slopes with what is left.
+    right: [f64; 2],
+}
+
+impl Normal {
+    fn of([along, across]: &[Vec<f64>; 2], left: &[f64]) -> Self {
+        Self {
+            products: [dot(along, along), dot(along, across), dot(across, across)],
+            right: [dot(along, left), dot(across, left)],
+        }
+    }
+
+    /// The step; `None` where nothing changes with the position.
+    fn step(&self) -> Option<[f64; 2]> {
+        let Self { products: [xx, xy, yy], right: [x, y] } = *self;
+        if yy == 0.0 {
+            return (xx > 0.0).then(|| [x / xx, 0.0]);
+        }
+        let determinant = xx * yy - xy * xy;
+        let step = [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant];
+        step.iter().all(|step| step.is_finite()).then_some(step)
+    }
+}
+
+/// What is left of a difference after a step, by its length.
+fn left_of([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
+    let mut left = difference.to_vec();
+    for (slope, step_m) in [(along, dx_m), (across, dy_m)] {
+        left.iter_mut().zip(slope).for_each(|(left, slope)| *left -= step_m * slope);
+    }
+    norm(&left)
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    sum_in_strands(a, b, |a, b| (a - b).powi(2)).sqrt()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    sum_in_strands(a, b, |a, b| a * b)
+}
+
+/// Sum of a term over the sensors, in eight strands, none of which waits for another: of many sensors that is most of the search.
+fn sum_in_strands(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut strands = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        for (strand, (a, b)) in strands.iter_mut().zip(a.iter().zip(b)) {
+            *strand += term(*a, *b);
+        }
+    }
+    let rest = a_rest.iter().zip(b_rest).map(|(a, b)| term(*a, *b));
+    strands.into_iter().chain(rest).sum()
+}
