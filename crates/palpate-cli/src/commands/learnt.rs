@@ -1,4 +1,4 @@
-//! What a recording has told of a surface without a model, in words and as JSON.
+//! Structure, drift, scatter and noise that a recording has told of a surface without a model, in words and as JSON.
 
 use crate::json::object;
 use palpate_estimators::estimator::{Locator, Method};

@@ -205,7 +205,7 @@ fn limits<'a>(
     })
 }
 
-/// What the limit of many sensors will take, in words, where it is noticeable.
+/// Time and memory of the limit of many sensors, in words, where they are noticeable.
 fn noticeable(preparation: Preparation) -> Option<String> {
     /// Multiply-adds of a core in a second, and how many times as many a search for contacts that read alike may need.
     const PRODUCTS: f64 = 7e9;

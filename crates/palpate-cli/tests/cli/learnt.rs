@@ -1,4 +1,4 @@
-//! What a recording has told of a surface without a model, said by `fit` and `inspect`.
+//! Structure, drift, scatter and noise of a surface without a model, said by `fit` and `inspect`.
 
 use crate::support::board::{Board, RIG, Touch};
 use crate::support::command::{complained, folder, run, said};

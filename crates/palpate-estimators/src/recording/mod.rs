@@ -52,7 +52,7 @@ pub struct Row {
     pub position: Position,
     /// Its force in newtons, positive downward; `None` where nobody measured it, 0 where nothing touched.
     pub force_n: Option<f64>,
-    /// What else shapes the reading, is known here, and is unknown when a reading is to be located: the depth of indentation and
+    /// Coordinates that shape the reading, are known here, and are unknown when a reading is to be located: the depth of indentation and
     /// the temperature, say. In the SI units of their columns and in their order; empty where the recording has no such columns.
     pub nuisances: Vec<f64>,
     /// Its time in seconds, where the recording has one: since whenever its file counts from, or since its first row where that

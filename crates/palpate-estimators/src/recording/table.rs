@@ -42,7 +42,7 @@ impl TableColumn {
         }
     }
 
-    /// Whether each row is marked by 1, a yes or the like; `None` where a row has neither that nor a no, 0 or nothing.
+    /// Marks of the rows, true by 1, a yes or the like; `None` where a row has neither that nor a no, 0 or nothing.
     pub fn marks(&self) -> Option<Vec<bool>> {
         let mark = |number: Option<f64>| match number {
             Some(1.0) => Some(true),
@@ -202,7 +202,7 @@ struct Column {
     filled: usize,
     numbers: Vec<Option<f64>>,
     times: usize,
-    /// Whether each row is marked; nothing from the first that is neither marked nor not.
+    /// Marks of the rows; nothing from the first that is neither marked nor not.
     marks: Option<Vec<bool>>,
     /// The line of the first row without anything.
     gap: Option<usize>,

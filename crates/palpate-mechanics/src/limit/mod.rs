@@ -128,7 +128,7 @@ impl<'a> CramerRaoBound<'a> {
         Self { extent, model: None, channels, responses: Responses::BySensor(responses) }
     }
 
-    /// What [`CramerRaoBound::prepare`] takes with so many other contacts; `None` where nothing is to be prepared.
+    /// Work and memory of [`CramerRaoBound::prepare`] with so many other contacts; `None` where nothing is to be prepared.
     pub fn preparation(&self, others: usize) -> Option<Preparation> {
         self.responses.preparation(Grid::over_surface(self.extent).positions.len() + others)
     }

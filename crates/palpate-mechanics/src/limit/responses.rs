@@ -1,4 +1,4 @@
-//! What the sensors of a limit read under a contact, and how that changes with it.
+//! Readings of the sensors of a limit under a contact, and their derivatives by its position.
 //!
 //! Few sensors have a response function each. Of many on a surface that is solved by elements those would fill the memory and take
 //! as many solutions; by reciprocity three solutions for a contact tell what all of them read there and its derivatives, and these are kept.
@@ -40,7 +40,7 @@ pub(super) struct ByContact<'a> {
 /// Readings of all sensors per newton at a contact, and their derivatives along and across, per metre.
 type Influences = [Vec<f64>; 3];
 
-/// What it takes to look all over a surface for what many sensors tell.
+/// Work and memory of the limit of many sensors all over a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
     /// Multiply-adds of the solutions for contacts all over the surface. The search for contacts that read alike solves for others: up to
@@ -101,7 +101,7 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// What [`Responses::prepare`] takes; `None` where there is nothing to prepare.
+    /// Work and memory of [`Responses::prepare`]; `None` where there is nothing to prepare.
     pub fn preparation(&self, positions: usize) -> Option<Preparation> {
         let Self::ByContact(by_contact) = self else { return None };
         let loads = 3.0 * positions as f64;

@@ -38,11 +38,11 @@ pub(super) struct TwinSearch<'a> {
     grid: Grid,
     /// Of each position of the grid.
     places: Vec<Place>,
-    /// How far from where it began the search for the nearest reading may go: anywhere where readings cost little.
+    /// Greatest way of the search for the nearest reading from its start; none where readings cost little.
     reach_m: f64,
 }
 
-/// What a position of the grid reads, and by how much that differs around it.
+/// Reading at a position of the grid, and its greatest difference from those around it.
 struct Place {
     shape: Shape,
     /// The largest difference of its direction or reading from a neighbour's.
@@ -53,7 +53,7 @@ struct Place {
     bend: f64,
 }
 
-/// What is compared of a reading: the reading itself for a known force, its direction for an unknown one.
+/// The part of a reading that is compared: all of it for a known force, its direction for an unknown one.
 #[derive(Clone)]
 struct Shape {
     values: Vec<f64>,
@@ -241,7 +241,7 @@ impl Normal {
     }
 }
 
-/// What is left of a difference after a step, by its length.
+/// The rest of a difference after a step, by its length.
 fn left_of([along, across]: &[Vec<f64>; 2], [dx_m, dy_m]: [f64; 2], difference: &[f64]) -> f64 {
     let mut left = difference.to_vec();
     for (slope, step_m) in [(along, dx_m), (across, dy_m)] {

@@ -60,7 +60,7 @@ pub trait Surface: Send + Sync {
         sensors.iter().map(|sensor| self.response_function(kind, *sensor)).collect()
     }
 
-    /// What many sensors read, contact by contact; `None` where a surface has nothing that is sooner than their influence
+    /// Readings of many sensors, contact by contact; `None` where a surface has nothing that is sooner than their influence
     /// functions.
     fn readings_by_contact(
         &self,
@@ -118,7 +118,7 @@ pub trait InfluenceFunction: Send + Sync {
 /// Readings of many sensors on a surface that bends in proportion to the force, by contact: by reciprocity one solution for a
 /// contact tells all of them, where influence functions are one solution for each sensor.
 pub trait ReadingsByContact: Send + Sync {
-    /// What the sensors read, in their order, under each of `loads`.
+    /// Readings of the sensors, in their order, under each of `loads`.
     fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
 
     /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor: contacts near each other share them.

@@ -20,7 +20,7 @@ const LEAST_GAIN: f64 = 10.0;
 /// and each of its parameters from this much.
 const LEAST_MORE: f64 = 3.0;
 
-/// What is known of presses but for noise that differs by place.
+/// Presses, with all that was learnt of them but noise that differs by place.
 pub(super) struct PlaceNoiseSearch<'a> {
     pub presses: &'a Presses,
     pub prior: &'a Prior,
@@ -47,7 +47,7 @@ impl Score {
         self.information.solve(&self.slope)
     }
 
-    /// What the evidence would gain on it.
+    /// Gain of the evidence on it.
     fn gain(&self) -> f64 {
         0.5 * self.slope.dot(&self.way())
     }

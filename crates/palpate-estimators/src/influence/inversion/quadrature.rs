@@ -83,7 +83,7 @@ struct Point {
     place: [f64; 2],
     weight: f64,
     found: Explained,
-    /// What the cost rises more from the middle than that of the normal density.
+    /// Rise of the cost from the middle, less that of the normal density's.
     bend: f64,
 }
 
@@ -103,7 +103,7 @@ fn square([u, v]: [f64; 2]) -> f64 {
     u * u + v * v
 }
 
-/// Whether two rules tell the same mean, to a tenth of a standard deviation, and the same variances, to a fifth.
+/// True of rules that tell the same mean, to a tenth of a standard deviation, and the same variances, to a fifth.
 fn agree(points: &[Point], finer: &[Point]) -> bool {
     let moments = |points: &[Point]| {
         let (mut sum, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
@@ -151,7 +151,7 @@ impl Normal {
         [self.mean[0] + self.along * u, self.mean[1] + self.both * u + self.across * v]
     }
 
-    /// What a reading has at the points of a rule; that of the `middle` is known.
+    /// The points of a rule, with the costs that a reading has there; that of the `middle` is known.
     fn points<E: Explain>(
         &self,
         reading: &mut E,

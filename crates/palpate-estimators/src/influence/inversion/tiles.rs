@@ -164,7 +164,7 @@ impl Lattice {
         [0, 1].map(|k| (tile[k] as f64 + 0.5) * self.steps[k])
     }
 
-    /// From one end of a tile to the other along axis k, in nodes.
+    /// Ends of a tile along axis k, in nodes.
     pub fn span(self, tile: [usize; 2], k: usize) -> (f64, f64) {
         (tile[k] as f64 * self.steps[k], (tile[k] + 1) as f64 * self.steps[k])
     }

@@ -41,7 +41,7 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    /// Of whitened means, those of a window's nodes one after the other; `weights` are 1/V of the channels.
+    /// The curve through whitened means, those of a window's nodes one after the other; `weights` are 1/V of the channels.
     pub fn new(reading: &[Lanes], means: &[Lanes], weights: impl Fn(usize) -> Lanes, window: Window) -> Self {
         let (middle, coefficients) = coefficients(window.nodes);
         let products = InstructionSet::best().run(Products {

@@ -112,7 +112,7 @@ impl Presses {
         Ok(Whitening::from_covariances(noise, &(signal * square))?)
     }
 
-    /// What nuisance coordinates beyond the first do to readings in use, where nobody knows them: Σ s²·J·Jᵀ to first order, s² a
+    /// Covariance that nuisance coordinates beyond the first give to readings in use, where nobody knows them: Σ s²·J·Jᵀ to first order, s² a
     /// coordinate's variance and J the slopes by it, on average over the presses.
     fn of_further(&self, process: &GaussianProcess) -> Array2<f64> {
         /// Presses that are averaged over.
