@@ -74,7 +74,7 @@ impl Axis {
     }
 }
 
-/// Whether a place, in nodes, is in a margin.
+/// True of a place, in nodes, in a margin.
 pub(super) fn is_margin(axes: [Axis; 2], place: [f64; 2]) -> bool {
     (0..2).any(|k| axes[k].margin_cost(place[k]) > 0.0)
 }

@@ -156,7 +156,7 @@ impl Influence {
     }
 }
 
-/// Whether a coordinate beside position and force shapes the readings.
+/// True of a recording with coordinates beside position and force that shape the readings.
 fn has_nuisance(recording: &Recording) -> bool {
     recording.rows.iter().any(|row| !row.nuisances.is_empty())
 }

@@ -1,20 +1,20 @@
 //! Contacts whose readings are alike though they are far apart.
 
 use super::bound::norm;
-use super::responses::Responses;
 use super::zone::Grid;
 use super::{Columns, CramerRaoBound, Force};
 use crate::contact::{Contact, Position};
+use palpate_numerics::small::Ldl;
 
 /// Two contacts whose readings differ by fewer standard deviations than this are called ambiguous: a reading is then taken
 /// for the other contact's more than once in a hundred times (2·2.326).
 pub(super) const AMBIGUOUS_DISTANCE: f64 = 4.653;
 /// Points of the straight way between two contacts at which their difference is looked at, from the middle outwards.
 const WAY_POINTS: i32 = 47;
-/// Pitches of the grid around a position in which its derivatives foretell twins, and in which one is searched for where a reading takes a
-/// solution: farther away another position of the grid is nearer.
+/// Pitches of the grid around a position in which its derivatives foretell twins, and in which one is searched for: farther away another
+/// position of the grid is nearer, and a search that wanders along a valley ends at the contact itself.
 const REACH: f64 = 1.5;
-/// Such a search is given up where it is farther above the bound than so many times what steps of the last length have gained.
+/// A search is given up where it is farther above the bound than so many times what steps of the last length have gained.
 const HOPELESS: f64 = 10.0;
 /// The search for the nearest reading ends at this share of the grid's pitch.
 const FINEST: f64 = 1e-3;
@@ -36,10 +36,8 @@ pub(super) struct TwinSearch<'a> {
     force_n: f64,
     force: Force,
     grid: Grid,
-    /// Of each position of the grid.
+    /// Readings at the positions of the grid.
     places: Vec<Place>,
-    /// Greatest way of the search for the nearest reading from its start; none where readings cost little.
-    reach_m: f64,
 }
 
 /// Reading at a position of the grid, and its greatest difference from those around it.
@@ -64,11 +62,7 @@ struct Shape {
 impl<'a> TwinSearch<'a> {
     pub fn new(limit: &'a CramerRaoBound<'a>, force_n: f64, force: Force) -> Self {
         let grid = Grid::over_surface(limit.extent);
-        let reach_m = match limit.responses {
-            Responses::BySensor(_) => f64::INFINITY,
-            Responses::ByContact(_) => REACH * grid.pitch_m(),
-        };
-        let mut search = Self { limit, force_n, force, grid, places: Vec::new(), reach_m };
+        let mut search = Self { limit, force_n, force, grid, places: Vec::new() };
         let positions = &search.grid.positions;
         let shapes: Vec<Shape> = positions.iter().map(|position| search.shape(*position)).collect();
         let place = |(i, shape): (usize, &Shape)| {
@@ -107,7 +101,7 @@ impl<'a> TwinSearch<'a> {
             .min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
-    /// Whether a twin may be between a position of the grid and its neighbours: as near as they differ from it, and as its derivatives
+    /// True where a twin may be between a position of the grid and its neighbours: as near as they differ from it, and as its derivatives
     /// foretell within what they err at the neighbours.
     fn is_reachable(&self, target: &Shape, i: usize, found: f64) -> bool {
         let place = &self.places[i];
@@ -116,9 +110,8 @@ impl<'a> TwinSearch<'a> {
             return false;
         }
         let left = difference(&target.values, &place.shape.values);
-        let step_m = Normal::of(&place.slopes, &left).step().unwrap_or_default();
         let most_m = REACH * self.grid.pitch_m();
-        let step_m = step_m.map(|step_m| step_m.clamp(-most_m, most_m));
+        let step_m = foretold_step(&place.slopes, &left).map(|step_m| step_m.clamp(-most_m, most_m));
         scale * (left_of(&place.slopes, step_m, &left) - place.bend) <= AMBIGUOUS_DISTANCE
     }
 
@@ -167,11 +160,11 @@ impl<'a> TwinSearch<'a> {
         }
     }
 
-    /// From a position of the grid down to the nearest reading around it, by ever smaller steps along x and y. Those end in a curved
-    /// valley as well, where Gauss-Newton steps would follow it to the contact itself.
+    /// The nearest reading around a position of the grid, by ever smaller steps along x and y. Those end in a curved valley as well, where
+    /// Gauss-Newton steps would follow it to the contact itself.
     fn descend(&self, target: &Shape, start: Position, distance: f64) -> Twin {
         let mut twin = Twin { position: start, distance };
-        let finest_m = FINEST * self.grid.pitch_m();
+        let (finest_m, reach_m) = (FINEST * self.grid.pitch_m(), REACH * self.grid.pitch_m());
         // What the distance was before steps of this length, and whether longer ones were tried.
         let (mut before, mut tried) = (distance, false);
         let mut step_m = 0.5 * self.grid.pitch_m();
@@ -179,17 +172,14 @@ impl<'a> TwinSearch<'a> {
             let Position { x_m, y_m } = twin.position;
             let around = [(step_m, 0.0), (-step_m, 0.0), (0.0, step_m), (0.0, -step_m)];
             let mut around = around.map(|(dx, dy)| Position { x_m: x_m + dx, y_m: y_m + dy }).to_vec();
-            around.retain(|&at| self.limit.extent.contains(at) && start.distance_m(at) <= self.reach_m);
+            around.retain(|&at| self.limit.extent.contains(at) && start.distance_m(at) <= reach_m);
             let distances = self.shapes(&around).into_iter().map(|near| self.distance(target, &near.values));
             let near = around.iter().zip(distances).find(|(_, distance)| *distance < twin.distance);
             match near {
                 Some((&position, distance)) => twin = Twin { position, distance },
                 None => {
                     let gained = before - twin.distance;
-                    if tried
-                        && self.reach_m.is_finite()
-                        && twin.distance - AMBIGUOUS_DISTANCE > HOPELESS * gained
-                    {
+                    if tried && twin.distance - AMBIGUOUS_DISTANCE > HOPELESS * gained {
                         return twin;
                     }
                     (before, tried) = (twin.distance, true);
@@ -213,32 +203,11 @@ impl<'a> TwinSearch<'a> {
     }
 }
 
-/// The normal equations of a step that is to take off what is left.
-struct Normal {
-    /// Products of the slopes: along with along, along with across, across with across.
-    products: [f64; 3],
-    /// Products of the slopes with what is left.
-    right: [f64; 2],
-}
-
-impl Normal {
-    fn of([along, across]: &[Vec<f64>; 2], left: &[f64]) -> Self {
-        Self {
-            products: [dot(along, along), dot(along, across), dot(across, across)],
-            right: [dot(along, left), dot(across, left)],
-        }
-    }
-
-    /// The step; `None` where nothing changes with the position.
-    fn step(&self) -> Option<[f64; 2]> {
-        let Self { products: [xx, xy, yy], right: [x, y] } = *self;
-        if yy == 0.0 {
-            return (xx > 0.0).then(|| [x / xx, 0.0]);
-        }
-        let determinant = xx * yy - xy * xy;
-        let step = [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant];
-        step.iter().all(|step| step.is_finite()).then_some(step)
-    }
+/// The step that takes the most off a difference, by the slopes; 0 along what changes nothing.
+fn foretold_step([along, across]: &[Vec<f64>; 2], left: &[f64]) -> [f64; 2] {
+    let both = dot(along, across);
+    let products = [[dot(along, along), both], [both, dot(across, across)]];
+    Ldl::semidefinite(&products).solve([dot(along, left), dot(across, left)])
 }
 
 /// The rest of a difference after a step, by its length.

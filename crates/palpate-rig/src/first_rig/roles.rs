@@ -387,7 +387,7 @@ impl Name {
         self.words.iter().any(|word| names.contains(&word.as_str())) && self.words.iter().all(others)
     }
 
-    /// Whether it says that a row is untouched.
+    /// True of a name that says that a row is untouched.
     fn is_of_untouched(&self) -> bool {
         let words: Vec<&str> = self.words.iter().map(String::as_str).filter(|word| *word != "is").collect();
         UNTOUCHED.contains(&words.concat().as_str())

@@ -6,9 +6,9 @@
 //!
 //! p(a | d) ∝ ∫ Π S_k^(−½)·exp(−(d_k − F·f_k)²/(2·S_k)) dF,
 //!
-//! where the noise differs by place its multiplier m(a) in the place of the 1, S taken at the force of the least misfit. Where the response to the force is not linear, F stands for φ(F), and the estimate is
-//! turned back. The determinant belongs there: between presses, where v is large, everything would
-//! explain a reading otherwise.
+//! where the noise differs by place its multiplier m(a) in the place of the 1, S taken at the force of the least misfit. Where the response
+//! to the force is not linear, F stands for φ(F), and the estimate is turned back. The determinant belongs there: between presses, where v
+//! is large, everything would explain a reading otherwise.
 
 use super::drift::DriftCourse;
 use super::posterior::Functions;
@@ -512,10 +512,14 @@ impl ForceLinearLocator {
         self.stored.noise_freedom / (self.stored.noise_freedom - 2.0)
     }
 
-    /// Variance of the noise at a place of the grid over that of an untouched board.
+    /// Variance of the noise at a place of the grid, in nodes, over that of an untouched board.
     fn noise_at(&self, [x, y]: [f64; 2]) -> f64 {
-        let at_m = [self.stored.x.value(x), self.stored.y.value(y)];
-        self.stored.prior.noise_at(&at_m[..self.stored.prior.extent.dimensions()])
+        self.noise_at_position(Position { x_m: self.stored.x.value(x), y_m: self.stored.y.value(y) })
+    }
+
+    fn noise_at_position(&self, Position { x_m, y_m }: Position) -> f64 {
+        let prior = &self.stored.prior;
+        prior.noise_at(&[x_m, y_m][..prior.extent.dimensions()])
     }
 
     /// Place `place` of the grid along and across.
@@ -750,9 +754,7 @@ impl LearntResponse<'_> {
 
     /// Standard deviation of the noise at a place over that of an untouched board.
     fn noise(&self, position: Position) -> f64 {
-        let at_m = [position.x_m, position.y_m];
-        let prior = &self.locator.stored.prior;
-        prior.noise_at(&at_m[..prior.extent.dimensions()]).sqrt()
+        self.locator.noise_at_position(position).sqrt()
     }
 }
 

@@ -52,20 +52,26 @@ fn terms(dimensions: usize, degree: usize) -> usize {
     if dimensions == 1 { degree } else { (1..=degree).map(|degree| degree + 1).sum() }
 }
 
+/// Lowest and highest value of each coordinate.
+fn spans_m(places_m: &[&[f64]]) -> Vec<[f64; 2]> {
+    let dimensions = places_m.first().map_or(1, |place_m| place_m.len());
+    let span_m = |k: usize| {
+        places_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place_m| {
+            [low.min(place_m[k]), high.max(place_m[k])]
+        })
+    };
+    (0..dimensions).map(span_m).collect()
+}
+
 /// The highest degree along a line, and on a plane.
 const MOST_DEGREES: [usize; 2] = [5, 3];
 
 impl PlaceNoise {
     /// Noise that is the same at all places: θ of 0.
     pub fn even(places_m: &[&[f64]], shape: Shape) -> Self {
-        let dimensions = places_m.first().map_or(1, |place_m| place_m.len());
-        let span = |k: usize| {
-            places_m.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place_m| {
-                [low.min(place_m[k]), high.max(place_m[k])]
-            })
-        };
-        let coefficients = vec![0.0; shape.coefficients(dimensions)];
-        Self { spans_m: (0..dimensions).map(span).collect(), shape, coefficients, least: 0.0 }
+        let spans_m = spans_m(places_m);
+        let coefficients = vec![0.0; shape.coefficients(spans_m.len())];
+        Self { spans_m, shape, coefficients, least: 0.0 }
     }
 
     /// The highest degree that is looked for.
@@ -75,9 +81,8 @@ impl PlaceNoise {
 
     /// Steps to look for: between neighbouring coordinates that were pressed, with two on either side, at most so many along each.
     pub fn steps(places_m: &[&[f64]], most: usize) -> Vec<Shape> {
-        let Self { spans_m, .. } = Self::even(places_m, Shape::Smooth { degree: 1 });
         let mut steps = Vec::new();
-        for (coordinate, [low, high]) in spans_m.into_iter().enumerate() {
+        for (coordinate, [low, high]) in spans_m(places_m).into_iter().enumerate() {
             let mut shares: Vec<f64> =
                 places_m.iter().map(|place_m| (place_m[coordinate] - low) / (high - low)).collect();
             shares.retain(|share| share.is_finite());

@@ -45,7 +45,8 @@ pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<V
     let [[xx, xy, _], [_, yy, _], _] = Ldl::of_free(&minimum.information, free)?.inverse();
     let mut normal = Normal::new([x, y], [xx, xy, yy]);
     let mut middle = minimum.found;
-    for fits in 1.. {
+    let mut fits = 0;
+    let points = loop {
         if !normal.is_clear(axes) {
             return None;
         }
@@ -53,17 +54,18 @@ pub(super) fn around<E: Explain>(reading: &mut E, minimum: &Minimum) -> Option<V
         if points.iter().all(|point| point.bend.abs() <= MOST_BENT * point.rise().max(1.0)) {
             return Some(points.iter().map(Point::weighed).collect());
         }
+        fits += 1;
         if fits == MOST_FITS {
-            if varies != [true; 2] {
-                return None;
-            }
-            let finer = normal.points(reading, latent, middle, product([&FIVE_POINTS; 2]));
-            return agree(&points, &finer).then(|| finer.iter().map(Point::weighed).collect());
+            break points;
         }
         normal = normal.fitted(&points, varies)?;
         middle = reading.explain(normal.mean, latent);
+    };
+    if varies != [true; 2] {
+        return None;
     }
-    None
+    let finer = normal.points(reading, latent, middle, product([&FIVE_POINTS; 2]));
+    agree(&points, &finer).then(|| finer.iter().map(Point::weighed).collect())
 }
 
 /// A normal density over the grid, in nodes.

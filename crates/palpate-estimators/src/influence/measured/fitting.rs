@@ -107,14 +107,14 @@ impl Presses {
             return Ok(known.widened(factor));
         }
         let square = factor * factor;
-        let covariance = noise.covariance * square + self.of_further(process);
+        let covariance = noise.covariance * square + self.covariance_of_further(process);
         let noise = Noise { covariance, gain: noise.gain * factor };
         Ok(Whitening::from_covariances(noise, &(signal * square))?)
     }
 
     /// Covariance that nuisance coordinates beyond the first give to readings in use, where nobody knows them: Σ s²·J·Jᵀ to first order, s² a
     /// coordinate's variance and J the slopes by it, on average over the presses.
-    fn of_further(&self, process: &GaussianProcess) -> Array2<f64> {
+    fn covariance_of_further(&self, process: &GaussianProcess) -> Array2<f64> {
         /// Presses that are averaged over.
         const TRIED: usize = 1000;
         let (channels, d) = (process.outputs(), process.coordinates());

@@ -32,6 +32,11 @@ impl WhiteNoise {
         Self { signal: in_lanes(&whitening.signal), gain: whitening.gain }
     }
 
+    /// 1/V of the channels of a group, v being the process's variance over its signal's.
+    pub fn weights(&self, v: f64, group: usize) -> Lanes {
+        self.signal[group].map(|signal| 1.0 / (1.0 + v * signal))
+    }
+
     /// The same where no gain scatters.
     pub fn without_gain(&self) -> Self {
         Self { signal: self.signal.clone(), gain: 0.0 }

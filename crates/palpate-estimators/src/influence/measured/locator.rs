@@ -282,7 +282,7 @@ impl Seen<'_> {
             let Search { means, noise, .. } = &self.locator.search;
             means.interpolate(place, window.first..window.first + window.nodes, &mut self.means);
             let v = self.variance(near);
-            let weights = |g: usize| noise.signal[g].map(|signal| 1.0 / (1.0 + v * signal));
+            let weights = |group: usize| noise.weights(v, group);
             match Curve::new(&self.reading, &self.means, weights, window).integral(near) {
                 Ok(found) => return Some(found),
                 Err(node) => near = node.filter(|node| Window::around(*node, nodes) != window)?,
@@ -419,10 +419,10 @@ impl Explain for Seen<'_> {
 
     fn weigh(&mut self, [x, y, latent]: Unknowns) {
         self.interpolate_variances([x, y]);
-        let v = if self.nodes() > 1 { self.variance(latent) } else { self.variance(0.0) };
-        let signal = &self.locator.search.noise.signal;
+        let v = self.variance(if self.nodes() > 1 { latent } else { 0.0 });
+        let noise = &self.locator.search.noise;
         self.weights.clear();
-        self.weights.extend(signal.iter().map(|signal| signal.map(|signal| 1.0 / (1.0 + v * signal))));
+        self.weights.extend((0..self.reading.len()).map(|group| noise.weights(v, group)));
     }
 
     fn equations(&mut self, at: Unknowns) -> Equations {

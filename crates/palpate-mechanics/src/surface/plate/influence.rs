@@ -84,7 +84,7 @@ fn curvature(mesh: &Mesh, at: Position) -> Functional {
     }
 }
 
-/// What a sensor reads.
+/// Dependence of a sensor's reading on a load.
 enum Reads {
     /// A functional of the plate's shape under the load, upward as the shape functions are, times a factor.
     Shape(Functional, f64),

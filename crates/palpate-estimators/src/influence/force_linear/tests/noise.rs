@@ -31,7 +31,8 @@ fn rising(at: Position) -> f64 {
 #[derive(Default)]
 struct Halves {
     errors_mm: [Vec<f64>; 2],
-    covered: [Vec<f64>; 2],
+    /// Number of touches in their intervals.
+    covered: [f64; 2],
     found: usize,
     /// Greatest over least standard deviation of the noise, where it was found to differ.
     ratios: Vec<f64>,
@@ -46,18 +47,14 @@ impl Halves {
                 touches.iter().filter(|row| (row.position.x_m > middle_m) == (side == 1)).cloned().collect();
             let (errors, covered) = errors_mm(locator, &own);
             self.errors_mm[side].extend(errors);
-            self.covered[side].push(covered * own.len() as f64);
-            self.covered[side].push(0.0);
+            self.covered[side] += covered * own.len() as f64;
         }
     }
 
     fn summary(&self) -> [(f64, f64); 2] {
         [0, 1].map(|side| {
             let errors = &self.errors_mm[side];
-            (
-                mean(errors.iter().copied()),
-                100.0 * self.covered[side].iter().sum::<f64>() / errors.len() as f64,
-            )
+            (mean(errors.iter().copied()), 100.0 * self.covered[side] / errors.len() as f64)
         })
     }
 }
