@@ -9,8 +9,9 @@ use palpate_mechanics::surface::Extent;
 use palpate_mechanics::units::Unit;
 
 /// Writes `recording` with the columns of [`Columns::own`], so that reading it back gives the same numbers; the time
-/// and the force are written where every row has one, nuisance coordinates never. `extent` says whether positions have one coordinate or
-/// two. `comment` says where the recording comes from, in a first line that begins with `#`.
+/// and the force are written where every row has one, nuisance coordinates as `nuisance_1`, `nuisance_2`, … in SI units, empty in rows
+/// without contact that have none. `extent` says whether positions have one coordinate or two. `comment` says where the recording comes
+/// from, in a first line that begins with `#`.
 ///
 /// ```
 /// use palpate_estimators::{arrangement::Training, recording, setup::Setup};
@@ -31,6 +32,7 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Wri
     let columns = Columns::own(&recording.channels, &recording.kinds, extent);
     let forces_known = recording.rows.iter().all(|row| row.force_n.is_some());
     let columns = Columns { force: columns.force.filter(|_| forces_known), ..columns };
+    let columns = with_nuisances(columns, recording);
     let times_known = recording.times_s().is_some();
     let timed = |time: Option<String>, rest: Vec<String>| -> Vec<String> {
         time.into_iter().filter(|_| times_known).chain(rest).collect()
@@ -47,6 +49,7 @@ pub fn write(recording: &Recording, extent: Extent, comment: &str, out: impl Wri
 /// Whatever `out` reports.
 pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, out: impl Write) -> io::Result<()> {
     let columns = Columns::own(&timed.recording.channels, &timed.recording.kinds, extent);
+    let columns = with_nuisances(columns, &timed.recording);
     let timed_record = |time: String, second: [String; 2], rest: Vec<String>| {
         let second = second.into_iter().filter(|_| !timed.second.is_empty());
         std::iter::once(time).chain(second).chain(rest).collect::<Vec<_>>()
@@ -59,6 +62,13 @@ pub fn write_timed(timed: &TimedRecording, extent: Extent, comment: &str, out: i
         timed_record(Unit::NONE.format_si(*time_s), second, record(row, &columns))
     });
     write_lines(comment, std::iter::once(heading).chain(rows), out)
+}
+
+/// The columns with one for each nuisance coordinate of the recording.
+fn with_nuisances(columns: Columns, recording: &Recording) -> Columns {
+    let count = recording.rows.iter().map(|row| row.nuisances.len()).max().unwrap_or(0);
+    (1..=count)
+        .fold(columns, |columns, number| columns.nuisance(format!("nuisance_{number}").as_str(), Unit::NONE))
 }
 
 fn write_lines(
@@ -100,8 +110,9 @@ fn header(columns: &Columns) -> Vec<String> {
         PositionColumns::Plane { x, y } => vec![x, y],
     };
     let force = columns.force.iter().map(|force| &force.values.column);
+    let nuisances = columns.nuisances().map(|nuisance| &nuisance.column);
     let channels = columns.channels.iter().map(|channel| &channel.column);
-    let all = position.into_iter().chain(force).chain(channels);
+    let all = position.into_iter().chain(force).chain(nuisances).chain(channels);
     let name = |column: &Column| match column {
         Column::Name(name) => name.clone(),
         Column::Number(number) => number.to_string(),
@@ -117,6 +128,9 @@ fn record(row: &Row, columns: &Columns) -> Vec<String> {
     if let (Some(force), Some(force_n)) = (&columns.force, row.force_n) {
         record.push(force.values.unit.format_si(force_n));
     }
+    record.extend(columns.nuisances().enumerate().map(|(i, nuisance)| {
+        row.nuisances.get(i).map_or_else(String::new, |value| nuisance.unit.format_si(*value))
+    }));
     record.extend(
         columns.channels.iter().zip(&row.reading).map(|(channel, value)| channel.unit.format_si(*value)),
     );

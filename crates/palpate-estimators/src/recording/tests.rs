@@ -371,6 +371,33 @@ fn channels_that_look_wrong_are_named() {
     insta::assert_snapshot!(messages.join("\n"));
 }
 
+#[test]
+fn a_slow_drift_is_no_disagreement_and_hides_none() {
+    let ripple = |position: usize, sweep: usize| 0.01 * ((position * 31 + sweep * 17) % 7) as f64;
+    let courses: [fn(f64) -> f64; 2] = [|t| 2.0 * t, |t| 2.0 * (3.0 * t).sin()];
+    for course in courses {
+        let drifting = |bad: f64| {
+            sweeps(|position, sweep| {
+                let of_row = if (position, sweep) == (3, 2) { bad } else { 0.0 };
+                position as f64
+                    + ripple(position, sweep)
+                    + course((10 * sweep + position) as f64 / 50.0)
+                    + of_row
+            })
+        };
+        let disagreements = |recording: &Recording| {
+            let warnings = recording.warnings().into_iter();
+            warnings.filter(|warning| matches!(warning, Warning::RepeatsDisagree { .. })).collect::<Vec<_>>()
+        };
+        assert_eq!(disagreements(&drifting(0.0)), []);
+        let found = disagreements(&drifting(0.5));
+        let [Warning::RepeatsDisagree { rows: 1, worst_row: 24, deviation, .. }] = &found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((deviation.value - 0.5).abs() < 0.1, "{}", deviation.value);
+    }
+}
+
 fn number() -> impl Strategy<Value = f64> {
     proptest::num::f64::NORMAL.prop_filter("what can be written in all units", |value| value.abs() < 1e290)
 }
@@ -378,15 +405,16 @@ fn number() -> impl Strategy<Value = f64> {
 proptest! {
     #[test]
     fn a_recording_survives_writing_and_reading(
-        rows in proptest::collection::vec((0.0..=0.1, number(), [number(), number()]), 1..20),
+        rows in proptest::collection::vec((0.0..=0.1, number(), [number(), number()], [number(), number()]), 1..20),
         start_s in proptest::option::of(0.0..1e9),
+        nuisances in 0..=2_usize,
     ) {
         let kind = SensorKind::Deflection;
         let layout = Layout::even(kind, 2, 0.1);
-        let rows = rows.into_iter().enumerate().map(|(i, (x_m, force_n, reading))| Row {
+        let rows = rows.into_iter().enumerate().map(|(i, (x_m, force_n, reading, nuisance))| Row {
             position: Position::along(x_m),
             force_n: Some(force_n),
-            nuisances: Vec::new(),
+            nuisances: nuisance[..nuisances].to_vec(),
             time_s: start_s.map(|start_s| start_s + 0.1 * i as f64),
             reading: reading.to_vec(),
         });
@@ -395,6 +423,7 @@ proptest! {
         let mut bytes = Vec::new();
         write(&recording, *STRIP, "a\ntest", &mut bytes).unwrap();
         let columns = Columns::own(&recording.channels, &recording.kinds, *STRIP);
+        let columns = ["nuisance_1", "nuisance_2"][..nuisances].iter().fold(columns, |columns, name| columns.nuisance(*name, Unit::NONE));
         let schema = Schema { columns: &columns, layout: &layout, extent: *STRIP, known_force_n: None };
         prop_assert_eq!(read("", bytes.as_slice(), &schema).unwrap().rows, recording.rows);
     }

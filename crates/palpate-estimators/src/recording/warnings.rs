@@ -29,10 +29,11 @@ pub enum Warning {
         of: usize,
     },
     /// Rows lie further from the median of their repeats than 8 standard deviations of a repeat and than 1 % of the
-    /// channel's span.
+    /// channel's span, after a slow drift is taken off.
     ///
     /// Repeats are rows with the same position and force. The standard deviation is 1.4826/√2 times the median magnitude of
-    /// the difference between one repeat and the next, so that a few bad rows do not hide themselves.
+    /// the difference between one repeat and the next, so that a few bad rows do not hide themselves. The drift is a polyline through
+    /// the medians of up to 20 blocks of 5 rows or more, fitted in turns with the medians of the repeats.
     RepeatsDisagree {
         /// The channel's name.
         channel: String,
@@ -42,7 +43,7 @@ pub enum Warning {
         of: usize,
         /// The row that lies furthest out, counted from 1 below the header.
         worst_row: usize,
-        /// Distance from the median of its repeats.
+        /// Distance from the median of its repeats, without the drift.
         deviation: Quantity,
         /// The standard deviation of a repeat.
         spread: Quantity,
@@ -68,6 +69,11 @@ const SATURATED_SHARE: f64 = 0.1;
 const SATURATED_POSITIONS: usize = 3;
 const FAR_OUT_DEVIATIONS: f64 = 8.0;
 const FAR_OUT_SPAN: f64 = 0.01;
+/// Blocks of rows whose medians tell the course of a drift, at most, and rows in each, at least.
+const MOST_BLOCKS: usize = 20;
+const LEAST_BLOCK: usize = 5;
+/// Turns of fitting the drift and the medians of the repeats; a linear drift over repeats in random order has settled to 1 % in 10.
+const DRIFT_TURNS: usize = 10;
 const DRIFT_SHARE: f64 = 0.5;
 const DRIFT_DEVIATIONS: f64 = 4.0;
 
@@ -130,16 +136,17 @@ impl<'a> Channel<'a> {
     }
 
     fn repeats_disagree(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
+        let values = self.without_drift(repeats);
         let pairs = repeats.iter().flat_map(|rows| rows.windows(2));
-        let steps = pairs.map(|pair| (self.values[pair[1]] - self.values[pair[0]]).abs()).collect();
+        let steps = pairs.map(|pair| (values[pair[1]] - values[pair[0]]).abs()).collect();
         let spread = 1.4826 / std::f64::consts::SQRT_2 * median(steps)?;
         let bound = (FAR_OUT_DEVIATIONS * spread).max(FAR_OUT_SPAN * (self.highest - self.lowest));
         let mut rows = 0;
         let mut worst = (0, 0.0);
         for group in repeats {
-            let Some(middle) = median(group.iter().map(|i| self.values[*i]).collect()) else { continue };
+            let Some(middle) = median_of(&values, group) else { continue };
             for i in group {
-                let deviation = self.values[*i] - middle;
+                let deviation = values[*i] - middle;
                 rows += usize::from(deviation.abs() > bound);
                 if deviation.abs() > f64::abs(worst.1) {
                     worst = (*i, deviation);
@@ -154,6 +161,33 @@ impl<'a> Channel<'a> {
             deviation: self.quantity(worst.1),
             spread: self.quantity(spread),
         })
+    }
+
+    /// The values less the course of a slow drift, which is fitted in turns with the medians of the repeats.
+    fn without_drift(&self, repeats: &[Vec<usize>]) -> Vec<f64> {
+        let mut rows: Vec<usize> = repeats.iter().flatten().copied().collect();
+        rows.sort_unstable();
+        let blocks = (rows.len() / LEAST_BLOCK).min(MOST_BLOCKS);
+        let mut values = self.values.clone();
+        if blocks < 2 {
+            return values;
+        }
+        let mut off = vec![0.0; values.len()];
+        for _ in 0..DRIFT_TURNS {
+            for group in repeats {
+                let middle = median_of(&values, group).unwrap_or_default();
+                group.iter().for_each(|i| off[*i] = self.values[*i] - middle);
+            }
+            let knots = rows.chunks(rows.len().div_ceil(blocks)).filter_map(|block| {
+                let at = block.iter().sum::<usize>() as f64 / block.len() as f64;
+                Some((at, median_of(&off, block)?))
+            });
+            let knots: Vec<(f64, f64)> = knots.collect();
+            for i in &rows {
+                values[*i] = self.values[*i] - on_polyline(&knots, *i as f64);
+            }
+        }
+        values
     }
 
     fn drift(&self, repeats: &[Vec<usize>]) -> Option<Warning> {
@@ -189,6 +223,18 @@ impl<'a> Channel<'a> {
             .map_or(palpate_mechanics::units::Dimension::None, |k| k.dimension());
         Quantity { value, dimension }
     }
+}
+
+/// Median of the values of these rows; `None` without rows.
+fn median_of(values: &[f64], rows: &[usize]) -> Option<f64> {
+    median(rows.iter().map(|i| values[*i]).collect())
+}
+
+/// Height at `at` of the polyline through two or more knots, whose outer pieces go on beyond its ends.
+fn on_polyline(knots: &[(f64, f64)], at: f64) -> f64 {
+    let piece = knots.partition_point(|(x, _)| *x < at).clamp(1, knots.len() - 1);
+    let ((x0, y0), (x1, y1)) = (knots[piece - 1], knots[piece]);
+    y0 + (y1 - y0) * (at - x0) / (x1 - x0)
 }
 
 impl fmt::Display for Warning {
