@@ -14,7 +14,7 @@
 
 use super::evidence::{ChannelFit, Evidence};
 use super::posterior::of_equal_ratio;
-use super::presses::{Presses, compare};
+use super::presses::Presses;
 use super::prior::Prior;
 use crate::influence::measured::MeasuredError;
 use ndarray::{Array1, Array2};
@@ -37,13 +37,13 @@ impl Presses {
         let (untouched, touched): (Vec<usize>, Vec<usize>) =
             (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
         let untouched = (!untouched.is_empty()).then_some(untouched);
-        let pairs = all.cells(&touched, most / 2);
+        let pairs = self.cells(&touched, most / 2, &prior.lengths_m);
         let mut few = self.select(&[]);
         pairs.iter().chain(&untouched).for_each(|cell| few.add_pair(&all, cell));
         if pairs.iter().all(|cell| all.is_one_place(cell)) {
             return Ok(few);
         }
-        let cells = all.cells(&touched, most);
+        let cells = self.cells(&touched, most, &prior.lengths_m);
         for _ in 0..ROUNDS {
             let estimate = Estimate::new(few, prior, fits)?;
             few = self.select(&[]);
@@ -170,37 +170,6 @@ impl All<'_> {
 
     fn is_one_place(&self, cell: &[usize]) -> bool {
         cell.iter().all(|i| self.presses.positions_m[*i] == self.presses.positions_m[cell[0]])
-    }
-
-    /// Cells of near positions, no more than `most`; each position has one of its own where so many suffice. Presses at the same
-    /// position follow each other in a cell.
-    fn cells(&self, touched: &[usize], most: usize) -> Vec<Vec<usize>> {
-        let position_m = |i: usize| self.presses.positions_m[i].as_slice();
-        let mut touched = touched.to_vec();
-        touched.sort_by(|a, b| compare(position_m(*a), position_m(*b)));
-        let places: Vec<&[usize]> = touched.chunk_by(|a, b| position_m(*a) == position_m(*b)).collect();
-        let mut cells = Vec::new();
-        let mut open = vec![(places, most.max(1))];
-        while let Some((mut places, share)) = open.pop() {
-            if share == 1 || places.len() <= 1 {
-                cells.extend((!places.is_empty()).then(|| places.concat()));
-                continue;
-            }
-            let at = |place: &[usize], k: usize| position_m(place[0])[k] / self.prior.lengths_m[k];
-            let width = |k: usize| {
-                let coordinates = places.iter().map(|place| at(place, k));
-                coordinates.clone().fold(f64::NEG_INFINITY, f64::max)
-                    - coordinates.fold(f64::INFINITY, f64::min)
-            };
-            let widest =
-                (0..self.prior.lengths_m.len()).max_by(|a, b| width(*a).total_cmp(&width(*b))).unwrap_or(0);
-            places.sort_by(|a, b| at(a, widest).total_cmp(&at(b, widest)));
-            let low_share = share / 2;
-            let high = places.split_off((places.len() * low_share / share).max(1));
-            open.push((high, share - low_share));
-            open.push((places, low_share));
-        }
-        cells
     }
 }
 

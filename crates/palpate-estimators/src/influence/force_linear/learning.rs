@@ -7,21 +7,20 @@
 
 use super::drift::DriftCourse;
 use super::evidence::{ALL_DECADES, ChannelFit, Evidence};
+use super::outliers::OutlierTest;
 use super::place_noise::PlaceNoise;
 use super::place_noise_search::PlaceNoiseSearch;
 use super::posterior::{Functions, functions, of_equal_ratio, offsets, readings};
 use super::presses::{Presses, Repeats, compare};
 use super::prior::{Prior, Source};
-use super::residuals::Residuals;
 use crate::influence::config::Structure;
 use crate::influence::measured::MeasuredError;
 use crate::recording::Recording;
 use crate::setup::Setup;
-use ndarray::Zip;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::regression::Kernel;
 use palpate_numerics::watch::{Cancelled, Watch};
-use palpate_numerics::{bisect, chi_squared_critical_value, mean};
+use palpate_numerics::{bisect, mean};
 
 /// Presses that the search for kernel and length scales looks at.
 const MOST_SEARCHED: usize = 150;
@@ -90,7 +89,7 @@ impl Learnt {
         let mut set_aside = Vec::new();
         for _ in 0..ROUNDS {
             let Some(learnt) = learn(&set_aside)? else { return Ok(None) };
-            let outliers = learnt.outliers()?;
+            let outliers = learnt.outliers(watch)?;
             let most = (MOST_SET_ASIDE * recording.rows.len() as f64) as usize;
             if outliers.is_empty() || set_aside.len() + outliers.len() > most {
                 return Ok(Some(learnt));
@@ -181,6 +180,18 @@ impl Learnt {
         Ok(Some(all))
     }
 
+    /// First rows of presses that nothing explains.
+    fn outliers(&self, watch: Watch) -> Result<Vec<usize>, MeasuredError> {
+        /// Learning anew after each would take long.
+        const AT_ONCE: usize = 3;
+        let test = OutlierTest { prior: &self.prior, fits: &self.fits, sensors_m: &self.sensors_m };
+        if self.presses.len() == self.pressed.len() {
+            Ok(test.worst(&self.pressed, self.pressed.len(), AT_ONCE)?)
+        } else {
+            test.by_parts(&self.pressed, watch)
+        }
+    }
+
     /// Noise that differs by place; `None` where the presses do not tell it.
     fn noise_by_place(&self, watch: Watch) -> Result<Option<PlaceNoise>, MeasuredError> {
         /// The noise is told as well by one of so many places of sensors.
@@ -192,49 +203,6 @@ impl Learnt {
         let searched = self.pressed.thinned(MOST_SEARCHED);
         let few: Vec<Vec<f64>> = self.sensors_m.iter().step_by(ONE_OF).cloned().collect();
         PlaceNoiseSearch { presses: &searched, prior: &self.prior, sensors_m: &few, watch }.found()
-    }
-
-    /// First rows of presses that are further off what all others say of them than noise is in one of a hundred recordings.
-    ///
-    /// The error of each, as the others predict it, is taken over a deviation that it has no part in (externally studentized residuals; Cook and Weisberg, *Residuals and Influence in Regression*, 1982, section 2.2.1).
-    ///
-    /// Presses that stand for others have averaged what is wrong with a row, and name none.
-    fn outliers(&self) -> Result<Vec<usize>, MeasuredError> {
-        if self.presses.len() < self.pressed.len() {
-            return Ok(Vec::new());
-        }
-        const TAIL: f64 = 1e-2;
-        /// The worst are set aside first; others may be none without them.
-        const AT_ONCE: usize = 3;
-        /// Share of the noise's variance in the error of a press, below which it is not judged.
-        const LEAST_TOLD: f64 = 1e-6;
-        let n = self.presses.len();
-        let Residuals { squares, told, freedom } =
-            Residuals::new(&self.presses, &self.prior, &self.fits, &self.sensors_m)?;
-        let freedom = freedom - 3.0;
-        if freedom < 5.0 {
-            return Ok(Vec::new());
-        }
-        let externally = |square: f64, told: f64| {
-            let others = (freedom - square).max(1e-3 * freedom);
-            // The others say next to nothing of a press alone at its place.
-            if told < LEAST_TOLD { 0.0 } else { square * (freedom - 1.0) / others }
-        };
-        let squares = Zip::from(&squares).and(&told).map_collect(|square, told| externally(*square, *told));
-        let channels = self.fits.len();
-        let bound = |count: usize, tests: usize| {
-            let bound = chi_squared_critical_value(TAIL / tests as f64, count);
-            let freedom = freedom * count as f64;
-            freedom * ((bound / freedom).exp() - 1.0)
-        };
-        let (of_all, of_one) = (bound(channels, 2 * n), bound(1, 2 * n * channels));
-        let excess = |i: usize| {
-            let row = squares.row(i);
-            (row.sum() / of_all).max(row.iter().fold(0.0, |most: f64, square| most.max(*square)) / of_one)
-        };
-        let mut found: Vec<usize> = (0..n).filter(|i| excess(*i) > 1.0).collect();
-        found.sort_by(|a, b| excess(*b).total_cmp(&excess(*a)));
-        Ok(found.into_iter().take(AT_ONCE).map(|i| self.presses.row[i]).collect())
     }
 }
 

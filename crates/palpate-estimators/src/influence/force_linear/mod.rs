@@ -8,6 +8,7 @@ mod drift;
 mod evidence;
 mod learning;
 mod locator;
+mod outliers;
 mod place_noise;
 mod place_noise_search;
 mod posterior;

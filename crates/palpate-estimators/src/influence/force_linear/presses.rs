@@ -61,7 +61,7 @@ impl RowPress<'_> {
 }
 
 impl Presses {
-    /// The presses of a recording but for rows that are set aside; `None` where the force of a row is not known.
+    /// The presses of a recording but for rows that are set aside, in rising order; `None` where the force of a row is not known.
     pub fn of_recording(
         setup: &Setup,
         recording: &Recording,
@@ -78,7 +78,7 @@ impl Presses {
                 0.0 => vec![0.0; extent.dimensions()],
                 _ => extent.coordinates_m(found.position).collect(),
             };
-            if !set_aside.contains(&row) {
+            if set_aside.binary_search(&row).is_err() {
                 rows.push(RowPress { position_m, force_n, time: times[row], row, reading: &found.reading });
             }
         }
@@ -198,6 +198,53 @@ impl Presses {
         let kept: Vec<usize> =
             (0..).map(|i| (f64::from(i) * step) as usize).take_while(|i| *i < self.len()).collect();
         self.select(&kept)
+    }
+
+    /// Cells of near positions in length scales, no more than `most`, of these presses; each position has one of its own where so many suffice. Presses at the same
+    /// position follow each other in a cell.
+    pub fn cells(&self, touched: &[usize], most: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
+        let position_m = |i: usize| self.positions_m[i].as_slice();
+        let mut touched = touched.to_vec();
+        touched.sort_by(|a, b| compare(position_m(*a), position_m(*b)));
+        let places: Vec<&[usize]> = touched.chunk_by(|a, b| position_m(*a) == position_m(*b)).collect();
+        let mut cells = Vec::new();
+        let mut open = vec![(places, most.max(1))];
+        while let Some((mut places, share)) = open.pop() {
+            if share == 1 || places.len() <= 1 {
+                cells.extend((!places.is_empty()).then(|| places.concat()));
+                continue;
+            }
+            let at = |place: &[usize], k: usize| position_m(place[0])[k] / lengths_m[k];
+            let width = |k: usize| {
+                let coordinates = places.iter().map(|place| at(place, k));
+                coordinates.clone().fold(f64::NEG_INFINITY, f64::max)
+                    - coordinates.fold(f64::INFINITY, f64::min)
+            };
+            let widest = (0..lengths_m.len()).max_by(|a, b| width(*a).total_cmp(&width(*b))).unwrap_or(0);
+            places.sort_by(|a, b| at(a, widest).total_cmp(&at(b, widest)));
+            let low_share = share / 2;
+            let high = places.split_off((places.len() * low_share / share).max(1));
+            open.push((high, share - low_share));
+            open.push((places, low_share));
+        }
+        cells
+    }
+
+    /// Parts of near positions, of about `size` presses each, with presses without force in all of them.
+    pub fn parts(&self, size: usize, lengths_m: &[f64]) -> Vec<Vec<usize>> {
+        let (untouched, touched): (Vec<usize>, Vec<usize>) =
+            (0..self.len()).partition(|i| self.force_n[*i] == 0.0);
+        let cells = self.cells(&touched, self.len().div_ceil(size), lengths_m);
+        // One place may have been pressed more often than that.
+        let mut parts: Vec<Vec<usize>> =
+            cells.iter().flat_map(|cell| cell.chunks(2 * size)).map(<[usize]>::to_vec).collect();
+        let count = parts.len().max(1);
+        for (k, i) in untouched.into_iter().enumerate() {
+            if let Some(part) = parts.get_mut(k % count) {
+                part.push(i);
+            }
+        }
+        parts
     }
 }
 

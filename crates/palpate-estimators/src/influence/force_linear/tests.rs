@@ -667,3 +667,37 @@ fn many_presses_all_over_a_plate_are_condensed_with_hardly_a_loss() {
     eprintln!("plate, 900 presses: mean {exact_mm:.3} mm; {condensed_mm:.3} mm from 300 in their place");
     assert!(condensed_mm < 1.03 * exact_mm, "{condensed_mm} mm, {exact_mm} mm");
 }
+
+#[test]
+fn presses_that_nothing_explains_are_set_aside_among_many() {
+    let plate = |seed| {
+        let mut bench = Bench::plate(seed);
+        bench.presses = bench.touches(450);
+        bench
+    };
+    for mut bench in [Bench::strip(21, 450, 60), plate(22)] {
+        let condensed = |bench: &Bench| {
+            let (setup, recording) = (bench.setup(), bench.recording());
+            fit_condensed(FitTask::new(&setup, &recording), Structure::ForceLinear, 150).unwrap().unwrap()
+        };
+        let touches = bench.touches(200);
+        let clean = condensed(&bench);
+        assert_eq!(clean.set_aside(), [0usize; 0]);
+        // Some were pressed elsewhere, and a gauge of others was read wrong.
+        let moved = [17, 170, 333];
+        let misread = [40, 41, 42, 200, 420];
+        for row in moved {
+            let x_m = &mut bench.presses[row].position.x_m;
+            *x_m += if *x_m < 0.1 { 0.06 } else { -0.06 };
+        }
+        for row in misread {
+            bench.presses[row].reading[2] += 100.0;
+        }
+        let mut wrong = [&moved[..], &misread[..]].concat();
+        wrong.sort_unstable();
+        let locator = condensed(&bench);
+        assert_eq!(locator.set_aside(), wrong);
+        let [mended, clean] = [locator, clean].map(|locator| mean(errors_mm(&locator, &touches).0));
+        assert!(mended < 1.05 * clean, "{mended} mm, {clean} mm without outliers");
+    }
+}
