@@ -27,6 +27,8 @@ pub struct GaussianProcess {
     weights: Array2<f64>,
     /// β, m×q.
     trend: Array2<f64>,
+    /// Covariance of the process at its points and of β over the signal's variance: of one that some points tell and that was just fitted.
+    covariance: Option<Array2<f64>>,
 }
 
 /// Points up to which the posterior is that of all of them.
@@ -162,7 +164,8 @@ impl GaussianProcess {
         };
         let points = Points::new(&inputs.view(), &groups.centre, &groups.spread, scales, trend);
         let reduced = Reduced::new(kernel, &points.scaled.view(), (0..first).collect(), &learnt.variance)?;
-        Ok(Self::assemble(data, points, Variance::Reduced(reduced)))
+        let process = Self::assemble(data, points, Variance::Reduced(reduced));
+        Ok(Self { covariance: Some(learnt.covariance), ..process })
     }
 
     fn assemble(data: PosteriorData, points: Points, variance: Variance) -> Self {
@@ -174,7 +177,7 @@ impl GaussianProcess {
         let weights = shape(&data.weights, m, n);
         let trend = shape(&data.trend_coefficients, m, data.trend.size(d));
         let blocks = Blocks::new(data.kernel, &points.scaled.view(), &weights.view());
-        Self { data, points, blocks, variance, weights, trend }
+        Self { data, points, blocks, variance, weights, trend, covariance: None }
     }
 
     /// Coordinates of a point, d.
@@ -323,40 +326,76 @@ impl GaussianProcess {
         }
     }
 
-    /// E f_j(x) for every output; returns Var f_j(x) over the signal's variance, for tables that are made once: where the points that tell
-    /// the variance are not all, also by the nearest, and the less of both. Neither is less than that of all points.
+    /// E f_j(x) for every output; returns Var f_j(x) over the signal's variance, for tables that are made once after a fit: where the points
+    /// that tell the variance are not all, also by the nearest, and the less of both.
     ///
     /// # Panics
     /// When `point` is not d long, or `means` not m.
     pub fn tabulate_into(&self, point: &[f64], means: &mut [f64], scratch: &mut PredictionScratch) -> f64 {
         self.mean_into(point, means, scratch);
-        if let (Variance::Reduced(reduced), None) = (&self.variance, &self.data.sparse) {
-            let all = scratch.correlations.as_flattened()[..self.kept()].to_vec();
-            let by_chosen = reduced.variance(&all, &scratch.basis, &mut scratch.reduced);
-            return self
-                .variance_by_nearest(&all, &scratch.basis)
-                .map_or(by_chosen, |near| near.min(by_chosen));
-        }
-        self.relative_variance(scratch)
+        let variance = self.relative_variance(scratch);
+        let correlations = &scratch.correlations.as_flattened()[..self.kept()];
+        let by_nearest = match (&self.variance, &self.data.sparse, &self.covariance) {
+            (Variance::Reduced(_), None, _) => self.variance_by_nearest(correlations, &scratch.basis),
+            (Variance::Reduced(_), Some(_), Some(covariance)) => {
+                self.variance_by_nearest_values(covariance, correlations, &scratch.basis)
+            }
+            _ => None,
+        };
+        by_nearest.map_or(variance, |near| near.min(variance))
     }
 
-    /// Variance over the signal's, from the points of greatest correlation; `None` where they have no factor.
-    fn variance_by_nearest(&self, correlations: &[f64], h: &[f64]) -> Option<f64> {
+    /// The nearest points, in no order, with their correlations.
+    fn nearest(correlations: &[f64]) -> (Vec<usize>, Array1<f64>) {
         const NEAREST: usize = 32;
         let mut order: Vec<usize> = (0..correlations.len()).collect();
         let by_distance = |a: &usize, b: &usize| correlations[*b].total_cmp(&correlations[*a]).then(a.cmp(b));
         order.select_nth_unstable_by(NEAREST.min(correlations.len() - 1), by_distance);
         order.truncate(NEAREST);
+        let here = order.iter().map(|i| correlations[*i]).collect();
+        (order, here)
+    }
+
+    /// Variance over the signal's, from the rows at the nearest points, never less than that of all; `None` where they have no factor.
+    fn variance_by_nearest(&self, correlations: &[f64], h: &[f64]) -> Option<f64> {
+        let (nearest, here) = Self::nearest(correlations);
         let points = Points {
-            scaled: self.points.scaled.select(Axis(1), &order),
-            basis: self.points.basis.select(Axis(0), &order),
+            scaled: self.points.scaled.select(Axis(1), &nearest),
+            basis: self.points.basis.select(Axis(0), &nearest),
         };
-        let noise: Vec<f64> = order.iter().map(|i| self.data.noise[*i]).collect();
-        let here: Array1<f64> = order.iter().map(|i| correlations[*i]).collect();
+        let noise: Vec<f64> = nearest.iter().map(|i| self.data.noise[*i]).collect();
         let covariance = Covariance::regularised(&points, self.data.kernel, &noise).ok()?;
         let half = covariance.factor.solve_lower(&here);
         let rest = covariance.trend.solve_lower(&(&ArrayView1::from(h) - &half.dot(&covariance.basis)));
         Some((1.0 - half.dot(&half) + rest.dot(&rest)).max(0.0))
+    }
+
+    /// Variance over the signal's, from the values that all rows tell at the nearest points and what these leave open; `None` where they
+    /// have no factor.
+    fn variance_by_nearest_values(
+        &self,
+        covariance: &Array2<f64>,
+        correlations: &[f64],
+        h: &[f64],
+    ) -> Option<f64> {
+        let (nearest, here) = Self::nearest(correlations);
+        let without_trend = Array2::zeros((nearest.len(), 0));
+        let points = Points { scaled: self.points.scaled.select(Axis(1), &nearest), basis: without_trend };
+        let without_noise = vec![0.0; nearest.len()];
+        let factor = Covariance::regularised(&points, self.data.kernel, &without_noise).ok()?.factor;
+        let half = factor.solve_lower(&here);
+        let open = (1.0 - half.dot(&half)).max(0.0);
+        let weights: Vec<f64> = factor.solve_upper(&half).iter().chain(h).copied().collect();
+        let trend = self.kept()..self.kept() + h.len();
+        let entries: Vec<usize> = nearest.into_iter().chain(trend).collect();
+        let told: f64 = entries
+            .iter()
+            .zip(&weights)
+            .map(|(i, wi)| {
+                wi * entries.iter().zip(&weights).map(|(j, wj)| wj * covariance[[*i, *j]]).sum::<f64>()
+            })
+            .sum();
+        Some(open + told.max(0.0))
     }
 
     /// E f_j(x) and Var f_j(x), allocating.

@@ -151,6 +151,8 @@ pub(super) struct Learnt {
     pub log_determinant: f64,
     /// R of the first [`OF_VARIANCE`] points.
     pub variance: Cholesky,
+    /// Covariance of the process at the chosen points and of β over the signal's variance, (k+q)².
+    pub covariance: Array2<f64>,
 }
 
 /// Regression on the functions of the chosen points, those of greatest variance first.
@@ -203,6 +205,10 @@ pub(super) fn learn(
         weights.column_mut(j).assign(&whiten.solve_upper(&solved.slice(s![..all]).to_owned()));
         trend.column_mut(j).assign(&solved.slice(s![all..]));
     }
+    // The process is L·w at the chosen points.
+    let mut values = factor.inverse_lower();
+    let at_points = values.slice(s![.., ..all]).dot(&whiten.lower().t());
+    values.slice_mut(s![.., ..all]).assign(&at_points);
     Ok(Learnt {
         weights,
         trend,
@@ -213,6 +219,7 @@ pub(super) fn learn(
             .collect(),
         log_determinant: log_noise + factor.log_determinant() + terms as f64 * TREND_VARIANCE.ln(),
         variance: Cholesky::factor(of_variance.precision)?,
+        covariance: values.t().dot(&values),
     })
 }
 

@@ -416,6 +416,47 @@ fn chosen_points_tell_what_all_do() {
 }
 
 #[test]
+fn tables_of_a_rough_process_are_as_sure_as_all_rows_make_them() {
+    // Too rough for the few points that tell the variance of a prediction.
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(13);
+    let x = Array2::<f64>::from_shape_fn((2500, 2), |_| rng.random_range(0.0..1.0));
+    let y = Array2::from_shape_fn((2500, 1), |(i, _)| (9.0 * x[[i, 0]]).sin() * (7.0 * x[[i, 1]]).cos());
+    let groups = Groups::new(samples(&x, &y, None)).unwrap();
+    let (kernel, trend) = (Kernel::Matern52, Trend::Linear);
+    let found = Hyperparameters { length_scales: vec![0.08, 0.1], noise_ratio: 1e-3 };
+    let [all, sparse] = [GaussianProcess::of_groups, GaussianProcess::of_chosen]
+        .map(|posterior| posterior(&groups, kernel, trend, &found, Watch::NONE).unwrap());
+    let points = Points::of_groups(&groups, &found.length_scales, trend);
+    let noise = groups.noise_ratios(found.noise_ratio);
+    let covariance = Covariance::regularised(&points, kernel, &noise).unwrap();
+    let (mut means, mut scratch) = (vec![0.0], sparse.scratch());
+    let mut sums = [0.0; 3];
+    for _ in 0..100 {
+        let at: Vec<f64> = (0..2).map(|_| rng.random_range(0.0..1.0)).collect();
+        let here = Array2::from_shape_vec((2, 1), at.clone()).unwrap();
+        let here = Points::new(&here.view(), &groups.centre, &groups.spread, &found.length_scales, trend);
+        let squares = |i: usize| (0..2).map(|k| (here.scaled[[k, 0]] - points.scaled[[k, i]]).powi(2)).sum();
+        let correlations: Array1<f64> = (0..2500).map(|i| kernel.correlation(squares(i))).collect();
+        let half = covariance.factor.solve_lower(&correlations);
+        let rest = covariance.trend.solve_lower(&(&here.basis.row(0) - &half.dot(&covariance.basis)));
+        let exact = 1.0 - half.dot(&half) + rest.dot(&rest);
+        let tabled = sparse.tabulate_into(&at, &mut means, &mut scratch);
+        let predicted = sparse.predict(&at).1[0] / sparse.signal_variance(0);
+        assert!((means[0] - all.predict(&at).0[0]).abs() < 0.01, "{at:?}");
+        assert!(tabled > 0.8 * exact && tabled <= predicted, "{at:?}: {tabled}, {predicted}, {exact}");
+        sums.iter_mut().zip([exact, tabled, predicted]).for_each(|(sum, variance)| *sum += variance);
+    }
+    let [exact, tabled, predicted] = sums;
+    eprintln!(
+        "mean variance {:.2e} of all rows, {:.2} of it in tables, {:.2} in predictions",
+        exact / 100.0,
+        tabled / exact,
+        predicted / exact
+    );
+    assert!(tabled < 2.0 * exact && predicted > 5.0 * exact, "{tabled} {predicted} {exact}");
+}
+
+#[test]
 fn blocks_correlate_as_the_kernel_does() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(12);
     let points = Array2::from_shape_fn((3, 21), |_| rng.random_range(-2.0..2.0));
