@@ -1,4 +1,4 @@
-//! The cost of a fit, told before it is begun, and refused where it exceeds the limit.
+//! The cost of long work, told before it is begun, and refused where it exceeds the limit.
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
@@ -7,16 +7,19 @@ use palpate_estimators::estimator::{Estimator, FitCost, contenders};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
 
-/// The limit of memory of commands that fit.
+/// The limit of memory of commands whose work may need much.
 #[derive(clap::Args)]
 pub struct MemoryLimit {
-    /// Refuse a fit that is estimated to need more memory than this
+    /// Refuse work that is estimated to need more memory than this
     #[arg(long, value_name = "SIZE", value_parser = input::memory)]
     memory_limit: Option<f64>,
 }
 
 /// A fit that takes longer, or more memory, is announced.
 const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 20.0 };
+
+/// The same of other work, in seconds, which is short as a rule.
+const NOTICEABLE_WORK_S: f64 = 3.0;
 
 impl MemoryLimit {
     /// Estimates a fit, announces one that takes long, and refuses one that takes more memory than it may.
@@ -49,12 +52,33 @@ impl MemoryLimit {
 
     /// Reason why an estimator may not be fitted; `None` where it may.
     pub fn refusal(&self, estimator: &Estimator, cost: FitCost) -> Option<String> {
-        let limit = self.memory_limit.filter(|limit| cost.memory_bytes > *limit)?;
-        let (needed, limit) = (size(cost.memory_bytes), size(limit));
-        Some(format!(
-            "the fit of {} needs about {needed} of memory; --memory-limit is {limit}",
-            estimator.kind()
-        ))
+        self.excess(&format!("the fit of {}", estimator.kind()), cost.memory_bytes)
+    }
+
+    /// Announces other work where it is noticeable, and refuses what needs more memory than it may.
+    pub fn check_work(
+        &self,
+        what: &str,
+        [least_s, most_s]: [f64; 2],
+        bytes: f64,
+        remedy: &str,
+    ) -> Result<(), Failure> {
+        if let Some(why) = self.excess(what, bytes) {
+            return Err(Complaint::new(why).help(format!("raise the limit, or {remedy}")).into());
+        }
+        if most_s > NOTICEABLE_WORK_S || bytes > NOTICEABLE.memory_bytes {
+            let [least, most] = [least_s, most_s].map(duration);
+            let time = if least == most { most } else { format!("{least} to {most}") };
+            eprintln!("{what} will take some {time} and {} of memory", size(bytes));
+        }
+        Ok(())
+    }
+
+    /// "X needs about 2.0 GB of memory; --memory-limit is 1.0 GB", where it does.
+    fn excess(&self, what: &str, bytes: f64) -> Option<String> {
+        let limit = self.memory_limit.filter(|limit| bytes > *limit)?;
+        let (needed, limit) = (size(bytes), size(limit));
+        Some(format!("{what} needs about {needed} of memory; --memory-limit is {limit}"))
     }
 }
 

@@ -91,6 +91,7 @@ impl Observer {
         match progress {
             Progress::Round => self.round(&mut state),
             Progress::Stage { name, share } => self.stage(&mut state, name, share),
+            Progress::Counted { name, unit, done, of } => self.counted(&mut state, name, unit, done, of),
         }
         !interrupted()
     }
@@ -109,18 +110,40 @@ impl Observer {
     }
 
     fn stage(&self, state: &mut State, name: &'static str, share: f64) {
-        if state.stage != name {
-            state.stage = name;
-            state.start = Instant::now();
-            self.bar.set_message(name);
-            self.bar.set_prefix("");
-        }
+        self.begin(state, name, STAGE_STEPS as u64);
         if share > 0.0 {
             self.bar.set_position((share * STAGE_STEPS) as u64);
             let left_s = state.start.elapsed().as_secs_f64() * (1.0 - share) / share;
             self.bar.set_prefix(format!("about {} left of this", duration(left_s)));
         }
     }
+
+    fn counted(&self, state: &mut State, name: &'static str, unit: &str, done: usize, of: usize) {
+        self.begin(state, name, of as u64);
+        if done > 0 {
+            self.bar.set_position(done as u64);
+            let rate = done as f64 / state.start.elapsed().as_secs_f64();
+            let left = duration(of.saturating_sub(done) as f64 / rate);
+            self.bar.set_prefix(format!("{} {unit}/s, about {left} left of this", per_second(rate)));
+        }
+    }
+
+    /// Begins the bar anew with every stage.
+    fn begin(&self, state: &mut State, name: &'static str, length: u64) {
+        if state.stage != name {
+            state.stage = name;
+            state.start = Instant::now();
+            self.bar.set_position(0);
+            self.bar.set_prefix("");
+            self.bar.set_length(length);
+            self.bar.set_message(name);
+        }
+    }
+}
+
+/// A rate with two or more digits.
+fn per_second(rate: f64) -> String {
+    if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") }
 }
 
 impl Drop for Observer {
@@ -142,6 +165,11 @@ pub fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rates_read_well() {
+        assert_eq!([0.25, 9.9, 127.4, 5210.0].map(per_second), ["0.2", "9.9", "127", "5210"]);
+    }
 
     #[test]
     fn durations_read_well() {

@@ -12,6 +12,17 @@ pub enum Progress {
         /// The share that is done; NaN where nobody can tell.
         share: f64,
     },
+    /// A stage that goes through many of something, so that its rate can be told.
+    Counted {
+        /// The stage, in words.
+        name: &'static str,
+        /// What it goes through, in words and in the plural: "positions".
+        unit: &'static str,
+        /// How many of them are done.
+        done: usize,
+        /// How many there are.
+        of: usize,
+    },
 }
 
 /// Work that was stopped by the one who watched it; what was finished before is kept where the caller keeps it.
@@ -65,6 +76,20 @@ impl<'a> Watch<'a> {
     /// [`Cancelled`] when the work is to stop.
     pub fn stage(&self, name: &'static str, share: f64) -> Result<(), Cancelled> {
         self.report(Progress::Stage { name, share })
+    }
+
+    /// Reports how many of something a stage has gone through: `watch.counted("all over the surface", "positions", done, of)`.
+    ///
+    /// # Errors
+    /// [`Cancelled`] when the work is to stop.
+    pub fn counted(
+        &self,
+        name: &'static str,
+        unit: &'static str,
+        done: usize,
+        of: usize,
+    ) -> Result<(), Cancelled> {
+        self.report(Progress::Counted { name, unit, done, of })
     }
 
     /// Reports any progress.

@@ -1,11 +1,11 @@
 //! `palpate limit`: what physics allows on a bench, position by position, and the lightest touch that is told from noise.
 
-use crate::cost::size;
+use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::{self, RigOrLocator};
 use crate::json::object;
 use crate::output::{self, Table, figure};
-use crate::progress::{Observer, duration};
+use crate::progress::Observer;
 use crate::tables::{self, CsvTable};
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::{ForceLinearLocator, Influence, InfluenceLocator};
@@ -14,8 +14,8 @@ use palpate_estimators::setup::Setup;
 use palpate_estimators::status::FalseAlarmRate;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::{
-    Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, Preparation,
-    limit_warnings, positions_with_spacing,
+    Bound, CramerRaoBound, Force, LimitCurve, LimitError, LimitSummary, LimitWarning, limit_warnings,
+    positions_with_spacing,
 };
 use palpate_mechanics::sensing::{NoiseError, Sensor};
 use palpate_mechanics::surface::Extent;
@@ -49,6 +49,8 @@ pub struct Arguments {
     /// Folder for a report, with `limit.csv`, all over the surface
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    memory: MemoryLimit,
     /// Print the limit as JSON
     #[arg(long)]
     json: bool,
@@ -72,10 +74,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let bench = RigOrLocator::read(&arguments.rig)?;
     let setup = setup(&bench, arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
+    let extent = setup.surface().extent();
+    let listed = match arguments.every {
+        Some(every_m) => positions_with_spacing(extent, every_m).map_err(complain)?,
+        None => a_few(extent),
+    };
+    check_cost(&setup, listed.len(), arguments)?;
     let (limit, touch);
     match learnt(&bench) {
         Some(linear) => {
-            limit = linear.cramer_rao_bound(setup.surface().extent());
+            limit = linear.cramer_rao_bound(extent);
             touch = linear.lightest_touch();
         }
         None => {
@@ -85,7 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     let limits = Observer::of_stages()
-        .watch(|watch| limits(&limit, &touch, &setup, arguments, watch))
+        .watch(|watch| limits(&limit, &touch, &setup, listed, arguments, watch))
         .map_err(complain)?;
     if let Some(out) = &arguments.out {
         write_report(&limits, &setup, arguments, out)?;
@@ -95,6 +103,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     } else {
         print(&limits, &setup, arguments)
     }
+}
+
+/// Announces the limit of many sensors, and refuses one that takes more memory than it may.
+fn check_cost(setup: &Setup, listed: usize, arguments: &Arguments) -> Result<(), Failure> {
+    let Some(surface) = setup.surface().model() else { return Ok(()) };
+    let cost = CramerRaoBound::cost(surface, setup.layout(), listed);
+    let what = format!("the limit of {} sensors", format_count(setup.layout().len() as u64));
+    arguments.memory.check_work(&what, cost.seconds, cost.memory_bytes, "take fewer sensors or `elements`")
 }
 
 /// The influence functions that a locator of a surface without a model has learnt.
@@ -175,20 +191,13 @@ fn limits<'a>(
     limit: &'a CramerRaoBound<'a>,
     touch: &'a LightestTouch<'a>,
     setup: &Setup,
+    listed: Vec<Position>,
     arguments: &Arguments,
     watch: Watch,
 ) -> Result<Limits<'a>, LimitError> {
     let force_n = arguments.force.or(setup.force_n()).ok_or(LimitError::NoForce)?;
     let unknown = arguments.unknown_force || setup.force_n().is_none();
     let force = if unknown { Force::Unknown } else { Force::Known };
-    let extent = setup.surface().extent();
-    let listed = match arguments.every {
-        Some(every_m) => positions_with_spacing(extent, every_m)?,
-        None => a_few(extent),
-    };
-    if let Some(words) = limit.preparation(listed.len()).and_then(noticeable) {
-        eprintln!("limit of {} sensors: {words}", format_count(limit.alive() as u64));
-    }
     limit.prepare(&listed, watch)?;
     let known = LimitCurve::over_surface(limit, force_n, Force::Known)?;
     let positions: Vec<Position> = known.points.iter().map(|point| point.position).collect();
@@ -203,20 +212,6 @@ fn limits<'a>(
         listed,
         warnings: limit_warnings(limit, force_n, force, watch)?,
     })
-}
-
-/// Time and memory of the limit of many sensors, in words, where they are noticeable.
-fn noticeable(preparation: Preparation) -> Option<String> {
-    /// Multiply-adds of a core in a second, and how many times as many a search for contacts that read alike may need.
-    const PRODUCTS: f64 = 7e9;
-    const SEARCH: f64 = 12.0;
-    const SECONDS: f64 = 10.0;
-    let seconds = preparation.multiply_adds / PRODUCTS;
-    let words = || {
-        let [least, most] = [seconds, SEARCH * seconds].map(duration);
-        format!("it will take some {least} to {most} and {} of memory", size(preparation.memory_bytes))
-    };
-    (SEARCH * seconds > SECONDS).then(words)
 }
 
 /// Positions from one end to the other: for the paper's beam 1, 20, 50, 100, 200 mm and mirrored; on a plane rows of them from one

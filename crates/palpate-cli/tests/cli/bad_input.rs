@@ -157,3 +157,17 @@ fn a_fit_that_needs_more_memory_than_it_may_is_refused_with_the_bound() {
         assert!(refused(wrong).contains("memory"), "{wrong}");
     }
 }
+
+#[test]
+fn limits_and_designs_that_need_more_memory_than_they_may_are_refused_with_the_bound() {
+    for (command, what) in [
+        (&["limit", "rig.toml"][..], "the limit of 9 sensors needs about "),
+        (&["design", "sensors", "rig.toml"], "the design with 841 candidate sensors needs about "),
+    ] {
+        let arguments = [command, &["--memory-limit", "1 MB"]].concat();
+        let complaint = complaint(&[("rig.toml", PLATE.as_bytes())], &arguments);
+        for part in [what, " MB of memory; --memory-limit is 1 MB", "raise the limit, or "] {
+            assert!(complaint.contains(part), "{part}: {complaint}");
+        }
+    }
+}

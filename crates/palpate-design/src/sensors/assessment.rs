@@ -9,7 +9,7 @@ use super::candidates::{PlacedSensor, exclusion, mirrored};
 use super::design::DesignError;
 use super::design::Symmetry;
 use super::objective::{Block, ForceBelief};
-use super::sensitivity::Sensitivity;
+use super::sensitivity::{Sensitivity, SensorAt};
 use crate::verification::Verification;
 use palpate_estimators::arrangement::cells;
 use palpate_estimators::estimator::{Estimator, FitError};
@@ -87,10 +87,8 @@ impl SensorProblem<'_> {
 
     /// The criterion's value, and the worst when one sensor is dead.
     fn scores(&self, layout: &Layout) -> (f64, Option<f64>) {
-        let live = || layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
-        let rows: Vec<Vec<Block>> = live()
-            .map(|sensor| self.sensitivity.row(sensor.kind, sensor.position, &sensor.channel))
-            .collect();
+        let live = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
+        let rows = self.sensitivity.rows(&live.map(SensorAt::from).collect::<Vec<_>>());
         let value = |dead: Option<usize>| {
             let left: Vec<&[Block]> = rows
                 .iter()

@@ -6,6 +6,7 @@ use super::design::DesignCriterion;
 use super::design::{DesignError, MustHave, SensorOffer, Supply};
 use super::exchange::{Found, Search};
 use super::principal::{PrincipalComponents, Reconstruction};
+use super::sensitivity::SensorAt;
 use super::{Assessment, PlacedSensor, SensorProblem, exhaustive, genetic, pivoting, refine};
 use palpate_estimators::arrangement::{inner_grid, squarest};
 use palpate_mechanics::contact::Position;
@@ -214,8 +215,8 @@ impl SensorProblem<'_> {
             let found = search.greedy_exchange(&self.feasible, seed)?;
             designed.push(self.designed(Method::DOptimal, &found.selection)?);
         }
-        let components =
-            PrincipalComponents::from_readings(&self.sensitivity.readings(&self.pool.sensors, design));
+        let candidates = SensorAt::of_design(&self.pool.sensors, design);
+        let components = PrincipalComponents::from_readings(&self.sensitivity.readings(&candidates, watch)?);
         let search = Search { objective: &Reconstruction::new(&components), ..self.search(watch) };
         let found = search.greedy_exchange(&self.feasible, seed)?;
         designed.push(self.designed(Method::PrincipalComponents, &found.selection)?);

@@ -50,6 +50,7 @@ pub use design::{DesignCriterion, DesignError, Exclusion, FixedList, KeepOut, Mu
 pub use design::{SensorOffer, Sites, Supply, Symmetry};
 pub use method::{Designed, Method, best_design};
 pub use pivoting::{condition_number, pivoted_columns};
+pub use sensitivity::DesignCost;
 
 use std::sync::Arc;
 
@@ -59,7 +60,7 @@ use palpate_estimators::setup::Setup;
 use palpate_mechanics::limit::{Force, LimitError};
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::Watch;
-use sensitivity::Sensitivity;
+use sensitivity::{Sensitivity, SensorAt};
 
 /// A design made ready: the sensitivity of every candidate to every contact, and a layout that keeps all constraints.
 pub struct SensorProblem<'a> {
@@ -76,22 +77,25 @@ pub struct SensorProblem<'a> {
 impl<'a> SensorProblem<'a> {
     /// Makes a design for a setup ready; the setup's own layout is only what [`Method::Existing`] gives.
     ///
+    /// Of more candidates on a plate than three times the contacts, it is solved for these: by reciprocity three solutions for a contact tell
+    /// what every sensor reads there and its derivatives.
+    ///
     /// # Errors
     /// [`DesignError`], with the constraint that no layout can keep or the number that is out of its range, or when the watch
     /// stopped it.
     pub fn new(setup: &'a Setup, design: &SensorDesign, watch: Watch) -> Result<Self, DesignError> {
-        let surface = setup.surface().model().ok_or(LimitError::NoModel)?;
-        let force_n = setup.force_n().ok_or(LimitError::NoForce)?;
-        design.check(surface.extent())?;
-        let noiseless = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
-        if let Some(offer) = noiseless {
-            return Err(DesignError::SingularNoise { kind: offer.kind });
-        }
-        let contacts = WeightedContacts::from_prior(&design.contacts, surface.extent())?;
-        let sensitivity = Sensitivity { surface, contacts, force_n, force: design.force };
-        let candidates = Candidates::new(surface, design)?;
-        let table = Arc::new(sensitivity.table(&candidates.sensors, design, watch)?);
-        Self::with_table(setup, sensitivity, candidates, table, design)
+        let (sensitivity, candidates) = checked(setup, design)?;
+        let table = sensitivity.table(&SensorAt::of_design(&candidates.sensors, design), watch)?;
+        Self::with_table(setup, sensitivity, candidates, Arc::new(table), design)
+    }
+
+    /// Work and memory of [`SensorProblem::new`] and [`SensorProblem::all`], by an estimate that solves nothing.
+    ///
+    /// # Errors
+    /// [`DesignError`] for a number out of its range, or a constraint on candidates that contradicts the surface.
+    pub fn estimated_cost(setup: &'a Setup, design: &SensorDesign) -> Result<DesignCost, DesignError> {
+        let (sensitivity, candidates) = checked(setup, design)?;
+        Ok(sensitivity.cost(candidates.sensors.len(), design.count))
     }
 
     /// The same for another number of sensors.
@@ -147,11 +151,27 @@ impl<'a> SensorProblem<'a> {
         self.pool.sensors.len()
     }
 
-    /// The sensitivities of a sensor to the contacts.
-    fn row(&self, sensor: &PlacedSensor) -> Vec<Block> {
-        let offer = &self.pool.design.offers[sensor.offer];
-        self.sensitivity.row(offer.kind, sensor.position, &offer.channel)
+    /// The sensitivities of some sensors to the contacts.
+    fn rows(&self, sensors: &[PlacedSensor]) -> Vec<Vec<Block>> {
+        self.sensitivity.rows(&SensorAt::of_design(sensors, &self.pool.design))
     }
+}
+
+/// The contacts and candidates of a design whose numbers are in their ranges.
+fn checked<'a>(
+    setup: &'a Setup,
+    design: &SensorDesign,
+) -> Result<(Sensitivity<'a>, Candidates), DesignError> {
+    let surface = setup.surface().model().ok_or(LimitError::NoModel)?;
+    let force_n = setup.force_n().ok_or(LimitError::NoForce)?;
+    design.check(surface.extent())?;
+    let noiseless = design.offers.iter().find(|offer| offer.channel.reading_sd() <= 0.0);
+    if let Some(offer) = noiseless {
+        return Err(DesignError::SingularNoise { kind: offer.kind });
+    }
+    let contacts = WeightedContacts::from_prior(&design.contacts, surface.extent())?;
+    let sensitivity = Sensitivity { surface, contacts, force_n, force: design.force };
+    Ok((sensitivity, Candidates::new(surface, design)?))
 }
 
 #[cfg(test)]

@@ -24,13 +24,13 @@ pub(super) fn refine(
     watch: Watch,
 ) -> Result<Vec<PlacedSensor>, Cancelled> {
     let pool = &problem.pool;
-    let mut groups: Vec<Vec<PlacedSensor>> = selection
-        .iter()
-        .map(|unit| pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect())
-        .collect();
-    let Some(mut step_m) = pool.design.sites.distance_m(pool.extent.length_m()) else {
-        return Ok(groups.concat());
+    let members = |unit: &usize| -> Vec<PlacedSensor> {
+        pool.units[*unit].members().map(|candidate| pool.sensors[candidate]).collect()
     };
+    let Some(mut step_m) = pool.design.sites.distance_m(pool.extent.length_m()) else {
+        return Ok(selection.iter().flat_map(members).collect());
+    };
+    let mut groups: Vec<Group> = selection.iter().map(|unit| Group::new(problem, members(unit))).collect();
     let halvings = match pool.extent {
         Extent::Line { .. } => HALVINGS,
         Extent::Plane { .. } => HALVINGS_ON_A_PLANE,
@@ -48,29 +48,50 @@ pub(super) fn refine(
         }
         step_m *= 0.5;
     }
-    Ok(groups.concat())
+    Ok(groups.into_iter().flat_map(|group| group.sensors).collect())
+}
+
+/// Sensors that move together, with the row of each: on a plate that is a solution.
+struct Group {
+    sensors: Vec<PlacedSensor>,
+    rows: Vec<Vec<Block>>,
+}
+
+impl Group {
+    fn new(problem: &SensorProblem, sensors: Vec<PlacedSensor>) -> Self {
+        Self { rows: problem.rows(&sensors), sensors }
+    }
+
+    /// The score of others with this group.
+    fn score(&self, problem: &SensorProblem, others: &State) -> f64 {
+        match self.rows.as_slice() {
+            [one] => problem.objective.score_with(others, one),
+            [one, twin] => problem.objective.score_with(&problem.objective.updated(others, one), twin),
+            _ => f64::INFINITY,
+        }
+    }
 }
 
 /// Moves one group by a step, if that improves the score.
-fn improve(problem: &SensorProblem, groups: &mut [Vec<PlacedSensor>], index: usize, step_m: f64) -> bool {
+fn improve(problem: &SensorProblem, groups: &mut [Group], index: usize, step_m: f64) -> bool {
     let pool = &problem.pool;
-    if pool.design.offers[groups[index][0].offer].kind == SensorKind::Reaction {
+    if pool.design.offers[groups[index].sensors[0].offer].kind == SensorKind::Reaction {
         return false;
     }
-    let others: Vec<PlacedSensor> =
-        groups.iter().enumerate().filter(|(i, _)| *i != index).flat_map(|(_, group)| group.clone()).collect();
-    let rows: Vec<Vec<Block>> = others.iter().map(|sensor| problem.row(sensor)).collect();
-    let state =
-        problem.objective.state(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>(), ForceBelief::Vague);
-    let mut least = score(problem, &state, &groups[index]);
+    let left = || groups.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, group)| group);
+    let others: Vec<PlacedSensor> = left().flat_map(|group| group.sensors.iter().copied()).collect();
+    let rows: Vec<&[Block]> = left().flat_map(|group| group.rows.iter().map(Vec::as_slice)).collect();
+    let state = problem.objective.state(&rows, ForceBelief::Vague);
+    let mut least = groups[index].score(problem, &state);
     let mut moved = false;
     let directions = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
     for [x, y] in directions.into_iter().take(2 * pool.extent.dimensions()) {
-        let group = shifted(problem, &groups[index], [x * step_m, y * step_m]);
-        if !is_allowed(problem, &group, &others) {
+        let sensors = shifted(problem, &groups[index].sensors, [x * step_m, y * step_m]);
+        if !is_allowed(problem, &sensors, &others) {
             continue;
         }
-        let score = score(problem, &state, &group);
+        let group = Group::new(problem, sensors);
+        let score = group.score(problem, &state);
         if score < least {
             (least, moved) = (score, true);
             groups[index] = group;
@@ -109,13 +130,4 @@ fn is_allowed(problem: &SensorProblem, group: &[PlacedSensor], others: &[PlacedS
             && reads_something(problem.sensitivity.surface, kind(sensor), sensor.position)
             && others.iter().chain(&group[..i]).all(|other| together(sensor, other))
     })
-}
-
-fn score(problem: &SensorProblem, state: &State, group: &[PlacedSensor]) -> f64 {
-    let rows: Vec<Vec<Block>> = group.iter().map(|sensor| problem.row(sensor)).collect();
-    match rows.as_slice() {
-        [one] => problem.objective.score_with(state, one),
-        [one, twin] => problem.objective.score_with(&problem.objective.updated(state, one), twin),
-        _ => f64::INFINITY,
-    }
 }

@@ -1,27 +1,66 @@
 //! Sensitivities of sensors to contacts: the rows that criteria work on.
 
+use std::convert::Infallible;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use ndarray::Array2;
 
 use super::candidates::PlacedSensor;
-use super::design::DesignError;
-use super::design::{DesignCriterion, SensorDesign};
+use super::design::{DesignCriterion, DesignError, SensorDesign};
 use super::limit_objective::LimitObjective;
 use super::objective::{Block, LANES, Objective};
 use crate::contacts::WeightedContacts;
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::limit::Force;
-use palpate_mechanics::sensing::{ChannelModel, SensorKind};
-use palpate_mechanics::surface::{ResponseGradient, Surface};
-use palpate_numerics::watch::Watch;
+use palpate_mechanics::sensing::{ChannelModel, Sensor, SensorKind};
+use palpate_mechanics::surface::{
+    ContactLoad, ReadingsByContact, ResponseFunction, ResponseGradient, Solving, Surface,
+};
+use palpate_numerics::watch::{Cancelled, Watch};
 
 /// More bytes than the rows of all candidates may take.
 const MOST_BYTES: f64 = 4e9;
-/// Candidates between two questions whether to go on.
-const ASK_EVERY: usize = 64;
+/// Sensors whose response functions are had together: a plate solves for them in few sweeps, and each fills some 200 kB there.
+const TOGETHER: usize = 48;
 /// Contacts that principal components are taken over, at most.
 const MOST_SNAPSHOTS: usize = 64;
+
+/// Work and memory of placing sensors, by an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DesignCost {
+    /// Candidate sensors.
+    pub candidates: usize,
+    /// Memory at its peak, in bytes, besides the program itself.
+    pub memory_bytes: f64,
+    /// Time of the searches, in seconds of a core of some 3 GHz; simulated calibrations come on top.
+    pub seconds: f64,
+}
+
+/// A sensor somewhere on the surface.
+#[derive(Clone, Copy)]
+pub(super) struct SensorAt<'a> {
+    pub kind: SensorKind,
+    pub position: Position,
+    pub channel: &'a ChannelModel,
+}
+
+impl<'a> SensorAt<'a> {
+    /// Candidates of a design.
+    pub fn of_design(placed: &[PlacedSensor], design: &'a SensorDesign) -> Vec<Self> {
+        let at = |PlacedSensor { offer, position }: &PlacedSensor| {
+            let offer = &design.offers[*offer];
+            Self { kind: offer.kind, position: *position, channel: &offer.channel }
+        };
+        placed.iter().map(at).collect()
+    }
+}
+
+impl<'a> From<&'a Sensor> for SensorAt<'a> {
+    fn from(Sensor { kind, position, channel, .. }: &'a Sensor) -> Self {
+        Self { kind: *kind, position: *position, channel }
+    }
+}
 
 /// The contacts of a design on its surface: what sensitivities are to.
 #[derive(Clone)]
@@ -43,58 +82,138 @@ impl Sensitivity<'_> {
         self.unknowns() * self.contacts.len().div_ceil(LANES)
     }
 
-    /// Row of a sensor: derivatives of its whitened reading at every contact by ln W where the force is unknown, by x, and by y on a
-    /// plane; 0 where it is saturated.
-    pub fn row(&self, kind: SensorKind, position: Position, channel: &ChannelModel) -> Vec<Block> {
-        let mut row = vec![[0.0; LANES]; self.row_size()];
-        self.fill(&mut row, kind, position, channel);
-        row
+    /// Rows of some sensors: derivatives of the whitened reading at every contact by ln W where the force is unknown, by x, and by y on
+    /// a plane; 0 where it is saturated.
+    pub fn rows(&self, sensors: &[SensorAt]) -> Vec<Vec<Block>> {
+        let mut rows = vec![vec![[0.0; LANES]; self.row_size()]; sensors.len()];
+        let Ok(()) = for_each_response(self.surface, sensors, |i, response| {
+            self.fill_row(&mut rows[i], response, sensors[i].channel);
+            Ok::<(), Infallible>(())
+        });
+        rows
     }
 
     /// Writes the row of a sensor where zeros are.
-    fn fill(&self, row: &mut [Block], kind: SensorKind, position: Position, channel: &ChannelModel) {
-        let response = self.surface.response_function(kind, position);
-        let sd = channel.reading_sd();
-        let blocks = self.contacts.len().div_ceil(LANES);
-        let first = usize::from(self.force == Force::Known);
-        let unknown = first..first + self.unknowns();
+    fn fill_row(&self, row: &mut [Block], response: &dyn ResponseFunction, channel: &ChannelModel) {
         for (i, &position) in self.contacts.positions.iter().enumerate() {
             let contact = Contact { position, force_n: self.force_n };
-            let free = channel.range.is_none_or(|(low, high)| {
-                let reading = response.at(contact);
-                low < reading && reading < high
-            });
-            let weight = if free { 1.0 / sd } else { 0.0 };
-            let ResponseGradient { position: [along, across], force } = response.gradient(contact);
-            let told = [self.force_n * force, along, across];
-            for (column, value) in told[unknown.clone()].iter().enumerate() {
-                row[column * blocks + i / LANES][i % LANES] = weight * value;
-            }
+            self.put(row, i, response.at(contact), response.gradient(contact), channel);
         }
     }
 
-    /// The rows of all candidates, one after the other.
-    pub fn table(
+    /// Writes what a sensor tells of one contact into its row.
+    fn put(
         &self,
-        sensors: &[PlacedSensor],
-        design: &SensorDesign,
+        row: &mut [Block],
+        contact: usize,
+        reading: f64,
+        gradient: ResponseGradient,
+        channel: &ChannelModel,
+    ) {
+        let blocks = self.contacts.len().div_ceil(LANES);
+        let free = channel.range.is_none_or(|(low, high)| low < reading && reading < high);
+        let weight = if free { 1.0 / channel.reading_sd() } else { 0.0 };
+        let ResponseGradient { position: [along, across], force } = gradient;
+        let first = usize::from(self.force == Force::Known);
+        let told = &[self.force_n * force, along, across][first..first + self.unknowns()];
+        for (column, value) in told.iter().enumerate() {
+            row[column * blocks + contact / LANES][contact % LANES] = weight * value;
+        }
+    }
+
+    /// The rows of all candidates, one after the other, solved for in the way that is sooner.
+    pub fn table(&self, candidates: &[SensorAt], watch: Watch) -> Result<Vec<Block>, DesignError> {
+        self.table_by(Solving::sooner(candidates.len(), self.contacts.len()), candidates, watch)
+    }
+
+    pub(super) fn table_by(
+        &self,
+        solving: Solving,
+        candidates: &[SensorAt],
         watch: Watch,
     ) -> Result<Vec<Block>, DesignError> {
-        let (sites, contacts) = (sensors.len(), self.contacts.len());
-        let size = self.row_size();
-        let bytes = (sites * size * LANES * 8) as f64;
+        const STAGE: &str = "sensitivities of the sites";
+        let (sites, contacts, bytes) =
+            (candidates.len(), self.contacts.len(), self.table_bytes(candidates.len()));
         if bytes > MOST_BYTES {
             return Err(DesignError::TooLarge { sites, contacts, bytes, most: MOST_BYTES });
         }
+        let size = self.row_size();
         let mut table = vec![[0.0; LANES]; sites * size];
-        for (done, (sensor, row)) in sensors.iter().zip(table.chunks_exact_mut(size.max(1))).enumerate() {
-            if done.is_multiple_of(ASK_EVERY) {
-                watch.stage("sensitivities of the sites", done as f64 / sites as f64)?;
+        let row = |sensor: usize| sensor * size..(sensor + 1) * size;
+        match self.by_contact(solving, candidates) {
+            Some(readings) => {
+                readings.for_each_contact(
+                    &self.contacts.positions,
+                    STAGE,
+                    watch,
+                    |contact, influences| {
+                        for (i, sensor) in candidates.iter().enumerate() {
+                            let [at, along, across] = influences.each_ref().map(|each| each[i]);
+                            let position = [self.force_n * along, self.force_n * across];
+                            let gradient = ResponseGradient { position, force: at };
+                            self.put(
+                                &mut table[row(i)],
+                                contact,
+                                self.force_n * at,
+                                gradient,
+                                sensor.channel,
+                            );
+                        }
+                        ControlFlow::Continue(())
+                    },
+                )?;
             }
-            let offer = &design.offers[sensor.offer];
-            self.fill(row, offer.kind, sensor.position, &offer.channel);
+            None => for_each_response(self.surface, candidates, |i, response| {
+                if i.is_multiple_of(TOGETHER) {
+                    watch.counted(STAGE, "sensors", i, sites)?;
+                }
+                self.fill_row(&mut table[row(i)], response, candidates[i].channel);
+                Ok::<(), Cancelled>(())
+            })?,
         }
         Ok(table)
+    }
+
+    /// Work and memory of the rows of so many candidates, and of searching layouts of so many sensors among them.
+    pub fn cost(&self, candidates: usize, count: usize) -> DesignCost {
+        /// Sums that a search takes over all candidates, for each sensor of a layout; and what a number of a row costs in one.
+        const PASSES: f64 = 12.0;
+        const SECONDS_EACH: f64 = 1e-9;
+        /// Solutions that refining takes for each sensor of a layout, one by one, as many of those that are had together.
+        const REFINING: f64 = 200.0;
+        let table = self.table_bytes(candidates);
+        let sums = PASSES * count as f64 * table / size_of::<f64>() as f64;
+        // Whitened readings, their transposed copy, and components.
+        let snapshots = self.contacts.len().min(MOST_SNAPSHOTS);
+        let readings = (3 * snapshots * candidates * size_of::<f64>()) as f64;
+        let solving = Solving::sooner(candidates, self.contacts.len());
+        let (at_once, solutions) = match solving {
+            Solving::BySensor => (TOGETHER, candidates),
+            Solving::ByContact => (candidates, ContactLoad::EACH * (self.contacts.len() + snapshots)),
+        };
+        let solution = self.surface.solution_cost(at_once, solving);
+        DesignCost {
+            candidates,
+            memory_bytes: table + readings + solution.map_or(0.0, |cost| cost.memory_bytes),
+            seconds: sums * SECONDS_EACH
+                + solution
+                    .map_or(0.0, |cost| (solutions as f64 + REFINING * count as f64) * cost.seconds_each),
+        }
+    }
+
+    /// Bytes of the rows of so many candidates.
+    fn table_bytes(&self, candidates: usize) -> f64 {
+        (candidates * self.row_size() * size_of::<Block>()) as f64
+    }
+
+    /// What solves for contacts, where that is the way and the surface has it.
+    fn by_contact(&self, solving: Solving, sensors: &[SensorAt]) -> Option<Arc<dyn ReadingsByContact + '_>> {
+        if solving == Solving::BySensor {
+            return None;
+        }
+        let places: Vec<_> = sensors.iter().map(|sensor| (sensor.kind, sensor.position)).collect();
+        self.surface.readings_by_contact(&places)
     }
 
     /// A criterion on such rows.
@@ -124,17 +243,146 @@ impl Sensitivity<'_> {
 
     /// Whitened readings of all candidates, a contact a row, each row times the root of the contact's share; of many contacts
     /// an even sample.
-    pub fn readings(&self, sensors: &[PlacedSensor], design: &SensorDesign) -> Array2<f64> {
-        let contacts = self.contacts.sample(MOST_SNAPSHOTS);
-        let mut readings = Array2::zeros((contacts.len(), sensors.len()));
-        for (column, sensor) in sensors.iter().enumerate() {
-            let offer = &design.offers[sensor.offer];
-            let response = self.surface.response_function(offer.kind, sensor.position);
-            for (row, (&position, weight)) in contacts.positions.iter().zip(&contacts.weights).enumerate() {
-                let reading = response.at(Contact { position, force_n: self.force_n });
-                readings[[row, column]] = weight.sqrt() * reading / offer.channel.reading_sd();
+    pub fn readings(&self, candidates: &[SensorAt], watch: Watch) -> Result<Array2<f64>, Cancelled> {
+        let sample = self.contacts.sample(MOST_SNAPSHOTS);
+        self.readings_by(Solving::sooner(candidates.len(), sample.len()), candidates, &sample, watch)
+    }
+
+    fn readings_by(
+        &self,
+        solving: Solving,
+        candidates: &[SensorAt],
+        contacts: &WeightedContacts,
+        watch: Watch,
+    ) -> Result<Array2<f64>, Cancelled> {
+        const STAGE: &str = "readings of the sites";
+        let mut readings = Array2::zeros((contacts.len(), candidates.len()));
+        let whitened = |contact: usize, sensor: usize, reading: f64| {
+            contacts.weights[contact].sqrt() * reading / candidates[sensor].channel.reading_sd()
+        };
+        match self.by_contact(solving, candidates) {
+            Some(by_contact) => {
+                by_contact.for_each_contact(&contacts.positions, STAGE, watch, |row, [at, ..]| {
+                    for (i, influence) in at.iter().enumerate() {
+                        readings[[row, i]] = whitened(row, i, self.force_n * influence);
+                    }
+                    ControlFlow::Continue(())
+                })?;
             }
+            None => for_each_response(self.surface, candidates, |i, response| {
+                if i.is_multiple_of(TOGETHER) {
+                    watch.counted(STAGE, "sensors", i, candidates.len())?;
+                }
+                for (row, &position) in contacts.positions.iter().enumerate() {
+                    let reading = response.at(Contact { position, force_n: self.force_n });
+                    readings[[row, i]] = whitened(row, i, reading);
+                }
+                Ok::<(), Cancelled>(())
+            })?,
         }
-        readings
+        Ok(readings)
+    }
+}
+
+/// Calls with the index and response function of each sensor, a few of which are solved for together.
+fn for_each_response<E>(
+    surface: &dyn Surface,
+    sensors: &[SensorAt],
+    mut take: impl FnMut(usize, &dyn ResponseFunction) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut first = 0;
+    for of_a_kind in sensors.chunk_by(|a, b| a.kind == b.kind) {
+        for few in of_a_kind.chunks(TOGETHER) {
+            let positions: Vec<Position> = few.iter().map(|sensor| sensor.position).collect();
+            for (i, response) in surface.response_functions(few[0].kind, &positions).iter().enumerate() {
+                take(first + i, &**response)?;
+            }
+            first += few.len();
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contacts::ContactPrior;
+    use crate::fixtures::plate;
+    use palpate_mechanics::sensing::SensorKind::{Deflection, Slope, Strain};
+    use palpate_mechanics::surface::Extent;
+
+    /// Sensors of three kinds, one of which saturates.
+    fn sensors<'a>(channels: &'a [ChannelModel; 2], extent: Extent) -> Vec<SensorAt<'a>> {
+        let place = |i: usize| {
+            let [x, y] = [i as f64 * 0.618, i as f64 * 0.755].map(|share| share.fract().clamp(0.01, 0.99));
+            Position { x_m: x * extent.length_m(), y_m: y * extent.width_m().unwrap_or_default() }
+        };
+        let kinds = [(Deflection, 60), (Slope, 50), (Strain, 7), (Deflection, 3)].into_iter();
+        let of_kinds = kinds.flat_map(|(kind, count)| std::iter::repeat_n(kind, count));
+        let sensor = |(i, kind)| SensorAt { kind, position: place(i), channel: &channels[i % 2] };
+        of_kinds.enumerate().map(sensor).collect()
+    }
+
+    #[test]
+    fn sensors_and_contacts_solved_for_tell_the_same() {
+        let setup = plate(12).setup;
+        let surface = setup.surface().model().unwrap();
+        let noisy = ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() };
+        let channels = [noisy, ChannelModel { noise_sd: 2e-6, range: Some((-2e-4, 2e-4)), ..noisy }];
+        let candidates = sensors(&channels, surface.extent());
+        let extent = surface.extent();
+        let prior = ContactPrior { every_m: 0.037, ..ContactPrior::all_over(extent) };
+        let contacts = WeightedContacts::from_prior(&prior, extent).unwrap();
+        for force in [Force::Known, Force::Unknown] {
+            let sensitivity = Sensitivity { surface, contacts: contacts.clone(), force_n: 5.0, force };
+            let [one, other] = [Solving::BySensor, Solving::ByContact].map(|solving| {
+                let table = sensitivity.table_by(solving, &candidates, Watch::NONE).unwrap();
+                let readings = sensitivity.readings_by(solving, &candidates, &contacts, Watch::NONE).unwrap();
+                (table, readings)
+            });
+            let rows = sensitivity.rows(&candidates).concat();
+            assert_eq!(rows, one.0);
+            // Of one sensor all numbers of one unknown have one unit.
+            let blocks = contacts.len().div_ceil(LANES);
+            for (i, (a, b)) in one.0.chunks(blocks).zip(other.0.chunks(blocks)).enumerate() {
+                let (a, b) = (a.as_flattened(), b.as_flattened());
+                let scale = a.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+                let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(scale > 0.0 && apart < 1e-9 * scale, "{i}: {apart} of {scale}");
+            }
+            let saturated = one.0.chunks(blocks).filter(|row| row[0].contains(&0.0)).count();
+            assert!((1..candidates.len()).contains(&saturated), "{saturated}");
+            let largest = one.1.iter().fold(0.0f64, |largest, value| largest.max(value.abs()));
+            assert!(one.1.iter().zip(&other.1).all(|(a, b)| (a - b).abs() < 1e-9 * largest));
+        }
+    }
+
+    #[test]
+    fn progress_counts_up_and_stops() {
+        use palpate_numerics::watch::Progress;
+        use std::sync::Mutex;
+        let setup = plate(8).setup;
+        let surface = setup.surface().model().unwrap();
+        let channels = [ChannelModel { noise_sd: 5e-6, ..ChannelModel::default() }; 2];
+        let candidates = sensors(&channels, surface.extent());
+        let prior = ContactPrior::all_over(surface.extent());
+        let contacts = WeightedContacts::from_prior(&prior, surface.extent()).unwrap();
+        let sensitivity = Sensitivity { surface, contacts, force_n: 5.0, force: Force::Known };
+        for solving in [Solving::BySensor, Solving::ByContact] {
+            let seen = Mutex::new(Vec::new());
+            let stop_at_third = |progress| {
+                let Progress::Counted { done, of, .. } = progress else { return true };
+                let mut seen = seen.lock().unwrap();
+                seen.push((done, of));
+                seen.len() < 3
+            };
+            let stopped = sensitivity.table_by(solving, &candidates, Watch::new(&stop_at_third));
+            assert_eq!(stopped, Err(DesignError::Cancelled(Cancelled)));
+            let seen = seen.into_inner().unwrap();
+            assert!(
+                seen[0].0 == 0 && seen.is_sorted() && seen.iter().all(|(done, of)| done < of),
+                "{seen:?}"
+            );
+        }
     }
 }

@@ -19,7 +19,7 @@ mod zone;
 
 pub use bound::Bound;
 pub use curve::{LimitCurve, LimitPoint, LimitSummary, positions_with_spacing};
-pub use responses::Preparation;
+pub use responses::LimitCost;
 pub use warning::{LimitWarning, limit_warnings};
 pub use zone::Zone;
 
@@ -128,9 +128,10 @@ impl<'a> CramerRaoBound<'a> {
         Self { extent, model: None, channels, responses: Responses::BySensor(responses) }
     }
 
-    /// Work and memory of [`CramerRaoBound::prepare`] with so many other contacts; `None` where nothing is to be prepared.
-    pub fn preparation(&self, others: usize) -> Option<Preparation> {
-        self.responses.preparation(Grid::over_surface(self.extent).positions.len() + others)
+    /// Work and memory of the limit of a surface read by `layout`, all over it and at so many other contacts.
+    pub fn cost(surface: &dyn Surface, layout: &Layout, others: usize) -> LimitCost {
+        let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead).count();
+        Responses::cost(surface, alive, Grid::over_surface(surface.extent()).positions.len() + others)
     }
 
     /// Solves for contacts all over the surface, which curves and warnings ask of, and for others, so that they need not be solved for

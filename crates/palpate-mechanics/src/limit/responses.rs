@@ -4,11 +4,14 @@
 //! as many solutions; by reciprocity three solutions for a contact tell what all of them read there and its derivatives, and these are kept.
 
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::contact::{Contact, Position};
 use crate::sensing::{Layout, SensorKind};
-use crate::surface::{ContactLoad, ReadingsByContact, ResponseFunction, ResponseGradient, Surface};
+use crate::surface::{
+    ContactLoad, Influences, ReadingsByContact, ResponseFunction, ResponseGradient, Solving, Surface,
+};
 use palpate_numerics::small::add_multiple;
 use palpate_numerics::watch::{Cancelled, Watch};
 
@@ -18,6 +21,19 @@ const MOST_FUNCTIONS: usize = 1500;
 const MOST_KEPT: usize = 256 << 20;
 /// Bytes of readings under loads on degrees of freedom, at most.
 const MOST_OF_DEGREES: usize = 192 << 20;
+
+/// Solutions that the search for contacts that read alike may need for others than those all over the surface, as a multiple of these.
+const MOST_SOLUTIONS: f64 = 12.0;
+
+/// Work and memory of a limit all over a surface, by an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitCost {
+    /// Memory, in bytes.
+    pub memory_bytes: f64,
+    /// Time of the solutions, at least and at most, in seconds of a core of some 3 GHz: for how many contacts the search for those that read
+    /// alike solves is known when it has ended.
+    pub seconds: [f64; 2],
+}
 
 /// Responses of the live sensors, in their order.
 #[derive(Clone)]
@@ -35,19 +51,6 @@ pub(super) struct ByContact<'a> {
     kept: Arc<Mutex<HashMap<[u64; 2], Arc<Influences>>>>,
     /// Readings of all sensors under loads on degrees of freedom, for contacts that are asked for one by one near each other.
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
-}
-
-/// Readings of all sensors per newton at a contact, and their derivatives along and across, per metre.
-type Influences = [Vec<f64>; 3];
-
-/// Work and memory of the limit of many sensors all over a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Preparation {
-    /// Multiply-adds of the solutions for contacts all over the surface. The search for contacts that read alike solves for others: up to
-    /// some 12 times as many.
-    pub multiply_adds: f64,
-    /// Memory of what is kept, in bytes.
-    pub memory_bytes: f64,
 }
 
 impl<'a> Responses<'a> {
@@ -101,17 +104,28 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Work and memory of [`Responses::prepare`]; `None` where there is nothing to prepare.
-    pub fn preparation(&self, positions: usize) -> Option<Preparation> {
-        let Self::ByContact(by_contact) = self else { return None };
-        let loads = 3.0 * positions as f64;
-        let reading = (size_of::<f64>() * by_contact.sensors) as f64;
-        // The search compares readings and derivatives of its own.
+    /// Work and memory of the responses of so many sensors at so many positions, and of comparing them.
+    pub fn cost(surface: &dyn Surface, sensors: usize, positions: usize) -> LimitCost {
+        let solving = if sensors > MOST_FUNCTIONS { Solving::ByContact } else { Solving::BySensor };
+        let reading = (size_of::<f64>() * sensors) as f64;
+        // The search for contacts that read alike keeps readings and derivatives of its own.
         let compared = 4.0 * positions as f64 * reading;
-        Some(Preparation {
-            multiply_adds: loads * by_contact.readings.multiply_adds(),
-            memory_bytes: (loads * reading).min(MOST_KEPT as f64) + compared + MOST_OF_DEGREES as f64,
-        })
+        let Some(cost) = surface.solution_cost(sensors, solving) else {
+            return LimitCost { memory_bytes: compared, seconds: [0.0; 2] };
+        };
+        let loads = (ContactLoad::EACH * positions) as f64;
+        let (solutions, most, kept) = match solving {
+            Solving::BySensor => (sensors as f64, sensors as f64, 0.0),
+            Solving::ByContact => (
+                loads,
+                MOST_SOLUTIONS * loads,
+                (loads * reading).min(MOST_KEPT as f64) + MOST_OF_DEGREES as f64,
+            ),
+        };
+        LimitCost {
+            memory_bytes: cost.memory_bytes + kept + compared,
+            seconds: [solutions, most].map(|solutions| solutions * cost.seconds_each),
+        }
     }
 
     /// Solves for contacts, many together, as long as there is room to keep them.
@@ -157,9 +171,7 @@ impl ByContact<'_> {
     }
 
     fn gradients(&self, Contact { position, force_n }: Contact) -> Vec<(f64, ResponseGradient)> {
-        let influences = self
-            .kept(position)
-            .unwrap_or_else(|| self.solve(&[position]).into_iter().next().unwrap_or_default());
+        let influences = self.kept(position).unwrap_or_else(|| self.solved(position));
         let [at, along, across] = &*influences;
         let gradient = |((at, along), across): ((&f64, &f64), &f64)| {
             let position = [force_n * along, force_n * across];
@@ -169,16 +181,14 @@ impl ByContact<'_> {
     }
 
     fn prepare(&self, positions: &[Position], watch: Watch) -> Result<(), Cancelled> {
-        let together = (self.readings.together() / 3).max(1);
-        for (i, batch) in positions.chunks(together).enumerate() {
-            let share = (i * together) as f64 / positions.len() as f64;
-            watch.stage("readings under contacts all over the surface", share)?;
+        let stage = "readings under contacts all over the surface";
+        self.readings.for_each_contact(positions, stage, watch, |i, influences| {
             if !self.has_room() {
-                break;
+                return ControlFlow::Break(());
             }
-            self.solve(batch);
-        }
-        Ok(())
+            self.keep(positions[i], Arc::new(influences));
+            ControlFlow::Continue(())
+        })
     }
 
     fn kept(&self, position: Position) -> Option<Arc<Influences>> {
@@ -190,19 +200,18 @@ impl ByContact<'_> {
         (kept + 1) * 3 * size_of::<f64>() * self.sensors <= MOST_KEPT
     }
 
-    /// Influences at contacts, which are kept while there is room.
-    fn solve(&self, positions: &[Position]) -> Vec<Arc<Influences>> {
-        let loads: Vec<ContactLoad> = positions.iter().copied().flat_map(ContactLoad::all).collect();
-        let mut under = self.readings.under(&loads).into_iter();
-        let influences = positions.iter().map(|position| {
-            let influences: Arc<Influences> = Arc::new([(); 3].map(|()| under.next().unwrap_or_default()));
-            if self.has_room() {
-                let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-                kept.insert(key(*position), influences.clone());
-            }
-            influences
-        });
-        influences.collect()
+    fn keep(&self, position: Position, influences: Arc<Influences>) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.insert(key(position), influences);
+    }
+
+    /// Influences at a contact, which are kept while there is room.
+    fn solved(&self, position: Position) -> Arc<Influences> {
+        let influences = Arc::new(self.readings.influences(&[position]).pop().unwrap_or_default());
+        if self.has_room() {
+            self.keep(position, influences.clone());
+        }
+        influences
     }
 }
 

@@ -170,9 +170,9 @@ impl Survey<'_> {
                 && self.sd_m(position, self.force).is_some_and(|sd_m| sd_m <= self.blind_from_m())
         };
         let mut found = HashMap::new();
-        let count = self.grid.positions.len() as f64;
+        let count = self.grid.positions.len();
         for (done, &position) in self.grid.positions.iter().enumerate() {
-            watch.stage("contacts that read alike", done as f64 / count)?;
+            watch.counted("contacts that read alike", "positions", done, count)?;
             found.insert(key(position), clear(position).then(|| search.twin_of(position)).flatten());
         }
         let twin = |position: Position| match found.get(&key(position)) {

@@ -1,6 +1,7 @@
 //! Surfaces and their influence functions: the reading of a sensor when a unit force acts somewhere; nothing of recordings or estimators.
 
 mod beam;
+mod by_contact;
 mod digit;
 mod elastica;
 mod load;
@@ -11,6 +12,7 @@ mod supported_beam;
 
 pub use crate::contact::Extent;
 pub use beam::{Beam, BeamError};
+pub use by_contact::{ContactLoad, Influences, ReadingsByContact, SolutionCost, Solving};
 pub use digit::{Digit, DigitError};
 pub use elastica::{Elastica, ForceDirection};
 pub use load::{UniformLoad, midpoints};
@@ -69,6 +71,12 @@ pub trait Surface: Send + Sync {
         None
     }
 
+    /// Work and memory of solving the surface for so many sensors, by an estimate that solves nothing; `None` where closed forms take next
+    /// to none, and nothing is solved by contact.
+    fn solution_cost(&self, _sensors: usize, _solving: Solving) -> Option<SolutionCost> {
+        None
+    }
+
     /// One value of an influence function, where no other of the same sensor is wanted.
     fn influence(&self, kind: SensorKind, sensor: Position, contact: Position) -> f64 {
         self.influence_function(kind, sensor).at(contact)
@@ -113,42 +121,6 @@ pub trait InfluenceFunction: Send + Sync {
     /// Its derivatives by the contact's position along x and along y, in its unit per metre; 0 along y on a
     /// one-dimensional surface. Where the influence has a kink, some value between those of its two sides.
     fn gradient(&self, contact: Position) -> [f64; 2];
-}
-
-/// Readings of many sensors on a surface that bends in proportion to the force, by contact: by reciprocity one solution for a
-/// contact tells all of them, where influence functions are one solution for each sensor.
-pub trait ReadingsByContact: Send + Sync {
-    /// Readings of the sensors, in their order, under each of `loads`.
-    fn under(&self, loads: &[ContactLoad]) -> Vec<Vec<f64>>;
-
-    /// A unit force at a contact as a sum of loads on degrees of freedom, each with its factor: contacts near each other share them.
-    fn degrees(&self, contact: Position) -> Vec<(usize, f64)>;
-
-    /// Loads that are sooner solved for together than one by one; more at a time cost memory and save nothing.
-    fn together(&self) -> usize;
-
-    /// Multiply-adds that one load costs.
-    fn multiply_adds(&self) -> f64;
-}
-
-/// A unit load on a surface at a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ContactLoad {
-    /// A downward unit force: sensors read their influence.
-    Force(Position),
-    /// Its derivative by x: sensors read the derivative of their influence along the length, per metre.
-    ByX(Position),
-    /// Its derivative by y, across the width.
-    ByY(Position),
-    /// One on a degree of freedom of [`ReadingsByContact::degrees`].
-    Degree(usize),
-}
-
-impl ContactLoad {
-    /// The force at a contact and its derivatives.
-    pub const fn all(contact: Position) -> [Self; 3] {
-        [Self::Force(contact), Self::ByX(contact), Self::ByY(contact)]
-    }
 }
 
 /// Response function of one sensor: its reading as a function of the contact's position and force.

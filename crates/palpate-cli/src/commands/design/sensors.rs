@@ -1,6 +1,7 @@
 //! `palpate design sensors`: which sensors where, against the even layout.
 
 use super::{changed_rig, design_complaint, say_files, to_micrometre, toml_position};
+use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::{Object, fields, object};
@@ -61,6 +62,8 @@ pub struct Arguments {
     /// Folder for a report
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    memory: MemoryLimit,
     /// Print the designs as JSON
     #[arg(long)]
     json: bool,
@@ -90,10 +93,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         output::check_writable(path)?;
     }
     let (setup, design) = what_to_design(arguments, &rig)?;
+    let complain = |error: DesignError| complaint(&error, &arguments.rig);
+    let cost = SensorProblem::estimated_cost(&setup, &design).map_err(complain)?;
+    let what = format!("the design with {} candidate sensors", format_count(cost.candidates as u64));
+    let remedy = "set `sites` or the contacts' `every` wider apart";
+    arguments.memory.check_work(&what, [cost.seconds; 2], cost.memory_bytes, remedy)?;
     let observer = Observer::of_stages();
-    let problem = observer
-        .watch(|watch| SensorProblem::new(&setup, &design, watch))
-        .map_err(|error| complaint(&error, &arguments.rig))?;
+    let problem = observer.watch(|watch| SensorProblem::new(&setup, &design, watch)).map_err(complain)?;
     let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
     if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {

@@ -36,6 +36,11 @@ impl PlateInfluence {
         degrees.map(|degrees| Self { mesh: solved.mesh, degrees }).collect()
     }
 
+    /// Bytes that one takes.
+    pub fn bytes(spec: &PlateSpec) -> f64 {
+        (size_of::<f64>() * Mesh::new(spec.extent(), spec.elements).degrees()) as f64
+    }
+
     /// The largest magnitude at the nodes.
     pub fn largest(&self) -> f64 {
         let deflections = self.degrees.iter().step_by(NODE_DEGREES);
@@ -129,6 +134,9 @@ pub(super) struct PlateReadings<'a> {
 }
 
 impl<'a> PlateReadings<'a> {
+    /// Bytes that a sensor takes: a functional of the four nodes around it.
+    pub const BYTES_EACH: f64 = (size_of::<Reads>() + 4 * NODE_DEGREES * size_of::<(usize, f64)>()) as f64;
+
     pub fn new(spec: &PlateSpec, solved: &'a Solved, sensors: &[(SensorKind, Position)]) -> Self {
         let sensors = sensors.iter().map(|(kind, at)| Reads::new(spec, solved, *kind, *at)).collect();
         Self { solved, sensors }
@@ -168,15 +176,6 @@ impl ReadingsByContact for PlateReadings<'_> {
 
     fn together(&self) -> usize {
         TOGETHER
-    }
-
-    fn multiply_adds(&self) -> f64 {
-        let weights = |reads: &Reads| match reads {
-            Reads::Shape(functional, _) => functional.len(),
-            Reads::Contact(_) => 16,
-            Reads::Nothing => 0,
-        };
-        2.0 * self.solved.stored_numbers() as f64 + self.sensors.iter().map(weights).sum::<usize>() as f64
     }
 }
 

@@ -16,7 +16,8 @@ use std::sync::{Arc, OnceLock};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Extent, InfluenceFunction, InsensitiveSensor, Proportional, ReadingsByContact, ResponseFunction, Surface,
+    Extent, InfluenceFunction, InsensitiveSensor, Proportional, ReadingsByContact, ResponseFunction,
+    SolutionCost, Solving, Surface,
 };
 use crate::contact::Position;
 use crate::sensing::SensorKind;
@@ -169,6 +170,20 @@ impl Surface for Plate {
         sensors: &[(SensorKind, Position)],
     ) -> Option<Arc<dyn ReadingsByContact + '_>> {
         Some(Arc::new(PlateReadings::new(&self.spec, self.solved().ok()?, sensors)))
+    }
+
+    fn solution_cost(&self, sensors: usize, solving: Solving) -> Option<SolutionCost> {
+        /// Multiply-adds in a second, of two dozen solutions in one sweep.
+        const PRODUCTS: f64 = 7e9;
+        let sensors = sensors as f64;
+        // Two sweeps through the factor; by contact, readings and derivatives at 16 degrees of freedom a sensor.
+        let sweeps = 2.0 * spec::estimated_factor_size(&self.spec);
+        let (kept, multiply_adds) = match solving {
+            Solving::BySensor => (PlateInfluence::bytes(&self.spec), sweeps),
+            Solving::ByContact => (PlateReadings::BYTES_EACH, sweeps + 16.0 * sensors),
+        };
+        let memory_bytes = self.estimated_bytes() + sensors * kept;
+        Some(SolutionCost { memory_bytes, seconds_each: multiply_adds / PRODUCTS })
     }
 
     fn is_supported_at(&self, position: Position) -> bool {

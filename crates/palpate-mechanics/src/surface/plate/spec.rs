@@ -389,6 +389,15 @@ fn check_memory(spec: &PlateSpec) -> Result<(), PlateError> {
     }
 }
 
+/// Matrix elements by which two nodes couple.
+const PAIR: f64 = (NODE_DEGREES * NODE_DEGREES) as f64;
+
+/// Numbers of the factor of the equations, without those that are stored though they are zeros.
+pub(super) fn estimated_factor_size(spec: &PlateSpec) -> f64 {
+    let (columns, rows) = Mesh::new(spec.extent(), spec.elements).nodes();
+    PAIR * coupled_pairs(columns, rows)
+}
+
 /// Bytes that the equations of the plate need at most: the factor, which couples pairs of nodes; the stiffness matrix, where
 /// a node couples with itself and its eight neighbours; and the solutions that hold the simple supports.
 pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
@@ -399,10 +408,9 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     const ELEMENT_BYTES: f64 = 2.0 * (8.0 + 8.0);
     let mesh = Mesh::new(spec.extent(), spec.elements);
     let (columns, rows) = mesh.nodes();
-    let pair = (NODE_DEGREES * NODE_DEGREES) as f64;
     let nodes = columns as f64 * rows as f64;
-    let factor = PADDING * pair * coupled_pairs(columns, rows) * NUMBER_BYTES;
-    let matrix = nodes * pair * 5.0 * ELEMENT_BYTES;
+    let factor = PADDING * estimated_factor_size(spec) * NUMBER_BYTES;
+    let matrix = nodes * PAIR * 5.0 * ELEMENT_BYTES;
     let rigid = spec.supports.iter().filter(|support| support.is_rigid()).count();
     let solutions = (rigid + 8) as f64 * nodes * NODE_DEGREES as f64 * NUMBER_BYTES;
     factor + matrix + solutions
