@@ -97,6 +97,11 @@ pub struct RecordingFiles {
 }
 
 impl RecordingFiles {
+    /// The files that are named.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        [&self.data, &self.contacts].into_iter().flatten().map(PathBuf::as_path)
+    }
+
     /// The recording of this bench, with its dialect and its warnings said on stderr; `None` where no file is named.
     pub fn read(&self, setup: &Setup) -> Result<Option<Recording>, Failure> {
         let Some(data) = &self.data else { return Ok(None) };

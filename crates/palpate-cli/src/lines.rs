@@ -1,7 +1,7 @@
 //! Readings of a file, or of stdin, as they come.
 
 use crate::failure::{Complaint, Failure};
-use crate::{input, output, progress};
+use crate::{input, progress, target};
 use palpate_estimators::recording::{Column, Columns, Dialect, Header, ReadingParser};
 use palpate_estimators::setup::Setup;
 use std::fs::File;
@@ -27,7 +27,7 @@ impl Lines {
             }
             ("stdin".to_owned(), Box::new(std::io::stdin().lock()))
         } else {
-            let file = File::open(path).map_err(|error| output::cannot("read", path, &error))?;
+            let file = File::open(path).map_err(|error| target::cannot("read", path, &error))?;
             (path.display().to_string(), Box::new(BufReader::new(file)))
         };
         Ok(Self { name, count: 0, source, line: Vec::new() })

@@ -17,6 +17,7 @@ mod output;
 mod progress;
 mod tables;
 mod tare;
+mod target;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -3,12 +3,11 @@
 //! The first line is a comment that names version, inputs and seed; columns have their units in their names.
 
 use crate::failure::Failure;
-use crate::output;
+use crate::target::TargetFolder;
 use palpate_estimators::evaluation::{Evaluation, Located};
 use palpate_estimators::recording::{Provenance, csv_row};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::surface::Extent;
-use std::path::Path;
 
 /// The file with the errors of each position.
 pub const ERRORS_CSV: &str = "errors.csv";
@@ -30,10 +29,9 @@ impl CsvTable {
         self.text += &csv_row(cells);
     }
 
-    /// Writes it into a folder, which is made where it is not there yet.
-    pub fn write(&self, folder: &Path, name: &str) -> Result<(), Failure> {
-        output::make_folder(folder)?;
-        output::write_file(&folder.join(name), self.text.as_bytes())
+    /// Writes it into a folder.
+    pub fn write(&self, folder: &TargetFolder, name: &str) -> Result<(), Failure> {
+        folder.write(name, self.text.as_bytes())
     }
 }
 

@@ -24,6 +24,14 @@ pub struct TareOption {
 }
 
 impl TareOption {
+    /// The file that is named.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.tare {
+            Some(Source::File(path)) => Some(path),
+            _ => None,
+        }
+    }
+
     /// Words behind a description of readings that are judged.
     pub fn in_words(&self) -> &'static str {
         if self.tare.is_some() { ", tared" } else { "" }

@@ -65,7 +65,7 @@ pub mod paper;
 mod results;
 mod run;
 
-pub use networks_csv::{Checkpoint, CheckpointError, NetworksCsv};
+pub use networks_csv::{Checkpoint, CheckpointError, FitRow, NetworksCsv};
 pub use palpate_rig::{Arm, AskedLayout, Judging, Study};
 pub use results::{
     ArmResults, LimitResults, PortionResults, RunFacts, SensorPlace, SetUp, StudyResults, TrainingSpanResults,

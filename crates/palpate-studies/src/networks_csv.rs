@@ -21,10 +21,23 @@ pub struct NetworksCsv<'a> {
 /// Networks that a `networks.csv` holds.
 #[derive(Clone, Debug, Default)]
 pub struct Checkpoint {
-    /// The fits of this study that the file holds.
+    /// The networks of this study that the file holds.
     pub done: Vec<Trained>,
+    /// The rows of all fits, those of other estimators too.
+    pub rows: Vec<FitRow>,
     /// Whether the last line was cut off, as a crash leaves it; it was passed over.
     pub cut_off: bool,
+}
+
+/// The row of a fit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FitRow {
+    /// The arm, by its number from 0.
+    pub arm: usize,
+    /// The seed of the fit.
+    pub seed: u64,
+    /// The row as it is in the file, with its end.
+    pub text: String,
 }
 
 /// Error of resuming a study from a `networks.csv`.
@@ -121,24 +134,27 @@ impl<'a> NetworksCsv<'a> {
             Checkpoint { cut_off: !rows.is_empty() && !rows.ends_with('\n'), ..Checkpoint::default() };
         let whole = rows.rfind('\n').map_or("", |end| &rows[..end]);
         for (i, row) in whole.lines().enumerate() {
-            let trained = self.read_row(row).map_err(|what| CheckpointError::Row { line: i + 3, what })?;
+            let (row, trained) =
+                self.read_row(row).map_err(|what| CheckpointError::Row { line: i + 3, what })?;
+            checkpoint.rows.push(row);
             checkpoint.done.extend(trained);
         }
         Ok(checkpoint)
     }
 
-    /// The network of a row; `None` of a fit of another estimator, which has no weights to go on from.
-    fn read_row(&self, row: &str) -> Result<Option<Trained>, &'static str> {
+    /// A row with its network; `None` of a fit of another estimator, which has no weights to go on from.
+    fn read_row(&self, row: &str) -> Result<(FitRow, Option<Trained>), &'static str> {
         let cells: Vec<&str> = row.split(',').collect();
         let [name, seed, epochs, status, error, .., weights] = cells[..] else {
             return Err("a row has too few cells");
         };
         let arm = self.study.study.arms.iter().position(|arm| arm.name == name);
         let arm = arm.ok_or("the study has no arm of this name")?;
-        if !self.study.is_kept(arm) {
-            return Ok(None);
-        }
         let seed = seed.parse().map_err(|_| "the seed is not a whole number")?;
+        let fit_row = FitRow { arm, seed, text: format!("{row}\n") };
+        if !self.study.is_kept(arm) {
+            return Ok((fit_row, None));
+        }
         let outcome = TrainingOutcome {
             status: status_from(status).ok_or("the status is none that training can have")?,
             epochs: epochs.parse().map_err(|_| "the epochs are not a whole number")?,
@@ -147,7 +163,7 @@ impl<'a> NetworksCsv<'a> {
         let weights = weights.split(' ').map(str::parse).collect::<Result<Vec<f64>, _>>();
         let weights = weights.map_err(|_| "a weight is not a number")?;
         let trained = self.study.restore(arm, seed, weights, outcome);
-        trained.map(Some).ok_or("the number of weights is not the network's")
+        trained.map(|trained| (fit_row, Some(trained))).ok_or("the number of weights is not the network's")
     }
 }
 

@@ -8,6 +8,7 @@ use crate::json::object;
 use crate::output::Table;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits};
+use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, progress, tables};
 use palpate_estimators::estimator::{Comparison, contenders};
 use palpate_estimators::evaluation::{Evaluation, Split, evaluate_splits, limit_ratio, percentage_error};
@@ -16,7 +17,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{ComparisonReport, comparison_report};
 use palpate_rig::Rig;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Every estimator on the same folds of a recording (or on simulated calibrations), against what physics allows.
@@ -58,11 +59,13 @@ type LeftOut = (&'static str, String);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.tare.check_recorded(&arguments.files)?;
+    let inputs = Inputs::new(arguments.files.paths().chain([arguments.rig.as_path()]));
+    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     let rig = input::read_rig(&arguments.rig)?;
     let Trials { data, source, how, trials } = trials(arguments, &rig)?;
     let (comparisons, left_out) = compare(arguments, &rig, &trials)?;
     let readings: usize = trials.iter().map(|trial| trial.judged.rows.len()).sum();
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         write_report(arguments, &rig, &how, &comparisons, &left_out, out)?;
         let comment =
             format!("estimators compared on {}, {source}, seed {}", arguments.rig.display(), arguments.seed);
@@ -99,7 +102,7 @@ fn write_report(
     how: &str,
     comparisons: &[Comparison],
     left_out: &[LeftOut],
-    out: &Path,
+    out: &TargetFolder,
 ) -> Result<(), Failure> {
     let report = ComparisonReport {
         title: &format!("Estimators compared on {}", arguments.rig.display()),
@@ -110,7 +113,7 @@ fn write_report(
         tolerance_m: arguments.tolerance,
         seed: arguments.seed,
     };
-    output::write_report(out, comparison_report(&report))
+    out.write_report(comparison_report(&report))
 }
 
 /// The errors of each estimator at each position.

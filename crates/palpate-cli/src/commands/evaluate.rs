@@ -8,6 +8,7 @@ use crate::output::Table;
 use crate::progress::Observer;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits, tared_recording};
+use crate::target::{Inputs, TargetFolder};
 use crate::{input, output, tables};
 use palpate_estimators::arrangement::all_over;
 use palpate_estimators::estimator::Locator;
@@ -94,12 +95,15 @@ struct Answers {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     arguments.tare.check_recorded(&arguments.files)?;
+    let read = [Some(arguments.subject.as_path()), arguments.tare.path()].into_iter().flatten();
+    let inputs = Inputs::new(arguments.files.paths().chain(read));
+    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     let answers = match RigOrLocator::read(&arguments.subject)? {
         RigOrLocator::Rig(rig) => cross_validated(arguments, rig)?,
         RigOrLocator::Locator(locator) => located(arguments, locator)?,
     };
     let errors = errors_by_portion(arguments, &answers)?;
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         let (folds, seed) = (usize::from(arguments.folds), arguments.seed);
         let report = EvaluationReport {
             title: &format!("Location errors of {}", arguments.subject.display()),
@@ -112,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             portions: &arguments.portion,
             tolerance_m: arguments.tolerance,
         };
-        output::write_report(out, evaluation_report(&report))?;
+        out.write_report(evaluation_report(&report))?;
         errors_table(arguments, &answers).write(out, ERRORS_CSV)?;
     }
     let evaluation = &answers.evaluation;

@@ -7,6 +7,7 @@ use crate::input::RecordingFiles;
 use crate::json::object;
 use crate::progress::{self, Observer};
 use crate::tare::say_drift;
+use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::estimator::{CHOICE_FOLDS, Estimator, TimeLimit, Tried, choose};
 use palpate_estimators::fit::{Fit, FitTask};
@@ -42,7 +43,8 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    output::check_writable(&arguments.out)?;
+    let inputs = Inputs::new(arguments.files.paths().chain([arguments.rig.as_path()]));
+    let out = Target::new(&arguments.out, &inputs)?;
     let rig = input::read_rig(&arguments.rig)?;
     let recording = match arguments.files.read(&rig.setup)? {
         Some(recording) => recording,
@@ -67,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let learnt = learnt::of_locator(&locator);
     let json = locator.to_json().map_err(Complaint::new)?;
-    output::write_file(&arguments.out, json.as_bytes())?;
+    out.write(json.as_bytes())?;
     if arguments.json {
         return output::say_json(&object! {
             "palpate": env!("CARGO_PKG_VERSION"),

@@ -1,6 +1,7 @@
 //! `palpate init`: a first rig for somebody's own recording.
 
 use crate::failure::{Complaint, Failure};
+use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::recording::{Decimal, Separator};
 use palpate_rig::{FirstRig, FirstRigError, Hints, Rig};
@@ -52,13 +53,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(out) = &arguments.out {
-        output::check_writable(out)?;
-        if out.exists() && !arguments.overwrite {
-            let complaint = Complaint::new(format!("{} is there already", out.display()));
-            return Err(complaint.help("name another file, or write over it with --overwrite").into());
-        }
-    }
+    let out = arguments.target()?;
     let name = arguments.recording.display().to_string();
     let bytes = input::read_bytes(&arguments.recording)?;
     let first =
@@ -71,16 +66,27 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
     input::say_dialects(&recording);
     first.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
-    let Some(out) = &arguments.out else {
+    let Some(out) = out else {
         return output::print(&mut std::io::stdout().lock(), text.as_bytes());
     };
-    output::write_file(out, text.as_bytes())?;
+    out.write(text.as_bytes())?;
     output::say(format!("{rig_name}: {}", first.summary()))?;
     output::say("Check what is marked as a guess there; then:")?;
     first.next_commands(&rig_name).iter().try_for_each(|command| output::say(format!("  {command}")))
 }
 
 impl Arguments {
+    /// The rig's file, which is not there yet unless it is to be written over.
+    fn target(&self) -> Result<Option<Target>, Failure> {
+        let Some(out) = &self.out else { return Ok(None) };
+        let target = Target::new(out, &Inputs::new([self.recording.as_path()]))?;
+        if out.exists() && !self.overwrite {
+            let complaint = Complaint::new(format!("{} is there already", out.display()));
+            return Err(complaint.help("name another file, or write over it with --overwrite").into());
+        }
+        Ok(Some(target))
+    }
+
     fn hints(&self) -> Hints {
         Hints {
             position: self.position.clone(),

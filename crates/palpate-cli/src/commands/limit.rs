@@ -7,6 +7,7 @@ use crate::json::object;
 use crate::output::{self, Table, figure};
 use crate::progress::Observer;
 use crate::tables::{self, CsvTable};
+use crate::target::{Inputs, TargetFolder};
 use palpate_estimators::estimator::Method;
 use palpate_estimators::influence::{ForceLinearLocator, Influence, InfluenceLocator};
 use palpate_estimators::lightest_touch::{LightestTouch, TouchSummary};
@@ -71,6 +72,9 @@ struct Limits<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let out = arguments.out.as_ref();
+    let inputs = Inputs::new([arguments.rig.as_path()]);
+    let out = out.map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     let bench = RigOrLocator::read(&arguments.rig)?;
     let setup = setup(&bench, arguments)?;
     let complain = |error| complaint(error, &arguments.rig);
@@ -95,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let limits = Observer::of_stages()
         .watch(|watch| limits(&limit, &touch, &setup, listed, arguments, watch))
         .map_err(complain)?;
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         write_report(&limits, &setup, arguments, out)?;
     }
     if arguments.json {
@@ -237,7 +241,12 @@ impl Limits<'_> {
     }
 }
 
-fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
+fn write_report(
+    limits: &Limits,
+    setup: &Setup,
+    arguments: &Arguments,
+    out: &TargetFolder,
+) -> Result<(), Failure> {
     let report = LimitReport {
         title: &format!("What physics allows: the limit of {}", arguments.rig.display()),
         setup,
@@ -249,7 +258,7 @@ fn write_report(limits: &Limits, setup: &Setup, arguments: &Arguments, out: &Pat
         listed: &limits.listed,
         touch: limits.touch,
     };
-    output::write_report(out, limit_report(&report))?;
+    out.write_report(limit_report(&report))?;
     limit_table(limits, arguments).write(out, "limit.csv")
 }
 

@@ -4,6 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input::RigOrLocator;
 use crate::lines::Readings;
 use crate::output::{self, Table};
+use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{
     CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler, patch_limits,
 };
@@ -35,17 +36,24 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(report) = &arguments.report {
-        output::check_writable(report)?;
-    }
     let path = &arguments.subject;
+    let inputs =
+        Inputs::new([Some(path), arguments.readings.as_ref()].into_iter().flatten().map(PathBuf::as_path));
+    let report = arguments.report.as_ref().map(|report| Target::new(report, &inputs)).transpose()?;
     let subject = RigOrLocator::read(path)?;
     let sensors = match &subject {
         RigOrLocator::Rig(rig) => LoadSensors::from_setup(&rig.setup),
         RigOrLocator::Locator(locator) => locator.load_sensors(),
     };
     let profiler = Profiler::new(sensors.map_err(|error| sensors_complaint(error, path))?);
-    let mut printer = Printer { arguments, subject: &subject, profiler: &profiler, truth: &[], told: 0 };
+    let mut printer = Printer {
+        arguments,
+        subject: &subject,
+        profiler: &profiler,
+        report: report.as_ref(),
+        truth: &[],
+        told: 0,
+    };
     match &arguments.readings {
         Some(readings) => printer.stream(readings),
         None => printer.simulated(),
@@ -64,6 +72,7 @@ struct Printer<'a> {
     arguments: &'a Arguments,
     subject: &'a RigOrLocator,
     profiler: &'a Profiler<'a>,
+    report: Option<&'a Target>,
     /// The loads that were simulated.
     truth: &'a [UniformLoad],
     /// Readings that gave a profile.
@@ -109,8 +118,8 @@ impl Printer<'_> {
         let loads: Vec<UniformLoad> = profile.patches.iter().map(|patch| patch.as_load(extent)).collect();
         let limits = patch_limits(self.profiler.sensors(), &loads);
         self.told += 1;
-        if let (1, Some(path)) = (self.told, &self.arguments.report) {
-            self.write_report(reading, &profile, limits.as_deref(), line, path)?;
+        if let (1, Some(report)) = (self.told, self.report) {
+            self.write_report(reading, &profile, limits.as_deref(), line, report)?;
         }
         let told = JsonProfile::new(self.profiler, &profile, limits.as_deref(), self.truth, line);
         if self.arguments.json {
@@ -118,8 +127,8 @@ impl Printer<'_> {
             return output::say(json);
         }
         print(&told)?;
-        match (self.told, &self.arguments.report) {
-            (1, Some(path)) => output::say(format!("\nReport: {}", path.display())),
+        match (self.told, self.report) {
+            (1, Some(report)) => output::say(format!("\nReport: {}", report.path().display())),
             _ => Ok(()),
         }
     }
@@ -130,7 +139,7 @@ impl Printer<'_> {
         profile: &LoadProfile,
         limits: Option<&[PatchLimit]>,
         line: Option<u64>,
-        path: &Path,
+        target: &Target,
     ) -> Result<(), Failure> {
         let arguments = self.arguments;
         let source = match (&arguments.readings, line) {
@@ -151,7 +160,7 @@ impl Printer<'_> {
         // The page holds its figures; the others are copies of them.
         let files = profile_report(&report);
         let page = files.iter().find(|file| file.name.ends_with(".html"));
-        page.map_or(Ok(()), |page| output::write_file(path, &page.bytes))
+        page.map_or(Ok(()), |page| target.write(&page.bytes))
     }
 }
 

@@ -1,7 +1,8 @@
 //! `palpate simulate`: a recording from the model.
 
 use crate::failure::{Complaint, Failure};
-use crate::{input, output};
+use crate::target::{Inputs, Target};
+use crate::{input, output, target};
 use palpate_estimators::arrangement::{EveryError, every};
 use palpate_estimators::recording;
 use palpate_estimators::simulate::simulate_at;
@@ -29,9 +30,10 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let out = Target::new(&arguments.out, &Inputs::new([arguments.rig.as_path()]))?;
     let rig = input::read_rig(&arguments.rig)?;
     if arguments.moving {
-        return move_contact(arguments, &rig);
+        return move_contact(arguments, &rig, &out);
     }
     let recording = match arguments.every {
         None => rig.simulate(arguments.seed).map_err(|error| error.to_string()),
@@ -49,8 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = recording.map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut csv = Vec::new();
     recording::write(&recording, rig.setup.surface().extent(), &comment(arguments), &mut csv)
-        .map_err(|error| output::cannot("write", &arguments.out, &error))?;
-    output::write_file(&arguments.out, &csv)?;
+        .map_err(|error| target::cannot("write", out.path(), &error))?;
+    out.write(&csv)?;
     output::say(format!(
         "{} rows, {} channels: {}",
         recording.rows.len(),
@@ -59,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
-fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
+fn move_contact(arguments: &Arguments, rig: &Rig, out: &Target) -> Result<(), Failure> {
     let timed =
         rig.simulate_moving(arguments.seed).map_err(|error| Complaint::about(&arguments.rig, error))?;
     let mut csv = Vec::new();
@@ -67,8 +69,8 @@ fn move_contact(arguments: &Arguments, rig: &Rig) -> Result<(), Failure> {
     let how = if swings { "" } else { ", in balance at every reading, without inertia" };
     let comment = comment(arguments) + how;
     recording::write_timed(&timed, rig.setup.surface().extent(), &comment, &mut csv)
-        .map_err(|error| output::cannot("write", &arguments.out, &error))?;
-    output::write_file(&arguments.out, &csv)?;
+        .map_err(|error| target::cannot("write", out.path(), &error))?;
+    out.write(&csv)?;
     let rows = format_count(timed.recording.rows.len() as u64);
     let seconds = timed.times_s.last().copied().unwrap_or(0.0);
     let mut told = format!("{rows} rows in {seconds:.3} s: {}", arguments.out.display());

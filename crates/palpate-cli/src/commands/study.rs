@@ -3,6 +3,7 @@
 use crate::failure::{Complaint, Failure};
 use crate::output::Table;
 use crate::progress::Observer;
+use crate::target::{Inputs, NETWORKS_CSV, RESULTS_JSON, TargetFolder};
 use crate::{input, output, progress};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_mechanics::units::format_count;
@@ -11,7 +12,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_report::{StudyReport, paper_report, study_report};
 use palpate_studies::paper::{Agreement, Claim, PublishedFigure, STUDY_TOML, claims, published_figures};
 use palpate_studies::{
-    ArmOutcome, ArmResults, NetworksCsv, PreparedStudy, RunFacts, RunOptions, StudyResults, StudyRunError,
+    ArmOutcome, ArmResults, Checkpoint, NetworksCsv, PreparedStudy, RunFacts, RunOptions, StudyResults,
+    StudyRunError,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,15 +37,51 @@ pub struct Arguments {
     /// Folder for results and report [default: palpate-out/<study>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on from an earlier run that was stopped: networks are kept, what else there is is fitted again
+    /// Go on from an earlier run, stopped or finished: networks are kept, what else there is is fitted again
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Throw an earlier, unfinished run away
+    /// Throw an earlier run away, finished or not
     #[arg(long)]
     overwrite: bool,
     /// Print results.json instead of tables
     #[arg(long)]
     json: bool,
+}
+
+/// What is done about an earlier run in the same folder.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum EarlierRun {
+    Leave,
+    GoOn,
+    ThrowAway,
+}
+
+impl Arguments {
+    fn earlier_run(&self) -> EarlierRun {
+        match (self.resume, self.overwrite) {
+            (true, _) => EarlierRun::GoOn,
+            (false, true) => EarlierRun::ThrowAway,
+            (false, false) => EarlierRun::Leave,
+        }
+    }
+
+    /// The folder for results and report of a study; it may hold no earlier run unless the command line says what is to become of it.
+    fn folder(&self, study: &str) -> Result<TargetFolder, Failure> {
+        let out = self.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(study));
+        let folder = TargetFolder::for_study(&out, &Inputs::new([self.study.as_path()]))?;
+        let finished = out.join(RESULTS_JSON).exists();
+        let begun = finished || out.join(NETWORKS_CSV).exists();
+        if begun && self.earlier_run() == EarlierRun::Leave {
+            let complaint = match finished {
+                true => format!("{} holds the results of a run that was finished", out.display()),
+                false => format!("{} is of a run that was not finished", out.join(NETWORKS_CSV).display()),
+            };
+            return Err(Complaint::new(complaint)
+                .help("--resume goes on from its networks, --overwrite throws it away, --out names another folder")
+                .into());
+        }
+        Ok(folder)
+    }
 }
 
 /// Content of `results.json`.
@@ -76,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         seeds: arguments.seeds.unwrap_or(study.seeds),
         threads: arguments.threads.map_or_else(cores, usize::from),
     };
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(&study.name));
+    let out = arguments.folder(&study.name)?;
     let prepared = Observer::of_stages()
         .watch(|watch| PreparedStudy::new(study, watch))
         .map_err(|error| complaint(&error, &name, &text))?;
@@ -90,12 +128,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         claims: is_paper.then(|| claims(&outcomes, prepared.judging())),
     };
     let report = StudyReport { study: &prepared, outcomes: &outcomes, results: &results, run: &facts };
-    output::write_report(&out, if is_paper { paper_report(&report) } else { study_report(&report) })?;
-    output::write_file(&out.join("results.json"), (output::to_json(&file)? + "\n").as_bytes())?;
+    out.write_report(if is_paper { paper_report(&report) } else { study_report(&report) })?;
+    out.write(RESULTS_JSON, (output::to_json(&file)? + "\n").as_bytes())?;
     if arguments.json {
         return output::say_json(&file);
     }
-    print_tables(&file, &out)
+    print_tables(&file, out.path())
 }
 
 /// Complaint about a study, with a caret where its file asks for what cannot be had.
@@ -118,18 +156,22 @@ fn cores() -> usize {
 fn train(
     prepared: &PreparedStudy,
     options: RunOptions,
-    out: &Path,
+    out: &TargetFolder,
     arguments: &Arguments,
 ) -> Result<(Vec<ArmOutcome>, RunFacts), Failure> {
     let table = NetworksCsv::new(prepared);
-    output::make_folder(out)?;
-    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_kept(arm));
-    let (file, done) = if keeps {
-        let (file, done) = CheckpointFile::open(out, &table, arguments.resume, arguments.overwrite)?;
-        (Some(file), done)
-    } else {
-        (None, Vec::new())
+    out.make()?;
+    let earlier = match arguments.earlier_run() {
+        EarlierRun::GoOn => fits::read(out, &table)?,
+        EarlierRun::Leave | EarlierRun::ThrowAway => Checkpoint::default(),
     };
+    let surplus = fits::surplus(&earlier.rows, options);
+    let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_kept(arm));
+    let file = match keeps {
+        true => Some(CheckpointFile::begin(out, &table, &earlier.done, &surplus)?),
+        false => None,
+    };
+    let done = earlier.done;
     let resumed: Vec<(usize, u64)> = done.iter().map(|trained| (trained.arm, trained.fit.seed)).collect();
     let tally = Tally::new(prepared, options, &table, file, &done);
     let start = Instant::now();
@@ -142,7 +184,7 @@ fn train(
         return Err(Failure::Interrupted(if keeps {
             let kept = finished.iter().enumerate().filter(|(arm, _)| prepared.is_kept(*arm));
             let kept: u64 = kept.map(|(_, fits)| fits).sum();
-            let path = out.join(fits::NETWORKS_CSV);
+            let path = out.path().join(NETWORKS_CSV);
             format!(
                 "stopped; {kept} of {wanted} networks are in {}; --resume goes on from them",
                 path.display()
@@ -153,7 +195,7 @@ fn train(
         }));
     }
     let outcomes = outcomes.map_err(Complaint::new)?;
-    fits::write_sorted(out, &table, &outcomes)?;
+    fits::write_sorted(out, &table, &outcomes, &surplus)?;
     Ok((outcomes.clone(), facts(prepared, options, &outcomes, &resumed, seconds)))
 }
 

@@ -5,6 +5,7 @@ use crate::json::{Fields, Object, fields, object};
 use crate::lines::{DialectNote, Lines};
 use crate::output::Table;
 use crate::tare::{Taken, TareOption, Taring};
+use crate::target::{Inputs, TargetFolder};
 use crate::{input, output};
 use palpate_estimators::estimator::{
     Across, Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig,
@@ -55,6 +56,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let report = arguments.report_folder()?;
     let locator = input::read_locator(&arguments.locator)?;
     let rig = arguments.rig.as_deref().map(input::read_rig).transpose()?;
     let told = arguments
@@ -94,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     stream.run(&locator)?;
     let (filtered, smoothed) = stream.finish()?;
     stream.say_errors(&filtered, &smoothed);
-    if let Some(folder) = &arguments.report {
+    if let Some(folder) = &report {
         let sweep = match rig.as_ref().and_then(|rig| Some((rig, rig.motion.as_ref()?))) {
             Some((rig, moving)) if beam.is_some() => {
                 let pressed = rig.pressed_setup().map_err(Complaint::new)?;
@@ -107,6 +109,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     match stream.lost {
         0 => Ok(()),
         lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", stream.lines.count))),
+    }
+}
+
+impl Arguments {
+    /// The folder for the report, which must hold none of the files that are read.
+    fn report_folder(&self) -> Result<Option<TargetFolder>, Failure> {
+        let read = [Some(&self.locator), self.readings.as_ref(), self.rig.as_ref()];
+        let read = read.into_iter().flatten().map(PathBuf::as_path).chain(self.tare.path());
+        let inputs = Inputs::new(read);
+        self.report.as_ref().map(|folder| TargetFolder::for_report(folder, &inputs)).transpose()
     }
 }
 
@@ -269,7 +281,7 @@ impl Stream<'_> {
 
     fn report(
         &self,
-        folder: &Path,
+        folder: &TargetFolder,
         (filtered, smoothed): (&[Track], &[Track]),
         sweep: &[SpeedErrors],
     ) -> Result<(), Failure> {
@@ -285,7 +297,7 @@ impl Stream<'_> {
             errors: &self.errors(filtered, smoothed),
             sweep,
         };
-        output::write_report(folder, track_report(&report))
+        folder.write_report(track_report(&report))
     }
 }
 

@@ -10,6 +10,7 @@ mod init;
 mod learnt;
 mod limit;
 mod nuisances;
+mod outputs;
 mod plane;
 mod positions;
 mod profile;

@@ -6,6 +6,7 @@ use crate::input::{self, RecordingFiles};
 use crate::json::object;
 use crate::output::{self, Table};
 use crate::progress::Observer;
+use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::positions::{
     Advice, Placed, Placement, PositionDesign, PositionError, PositionProblem, best_placed, next_press,
 };
@@ -76,10 +77,10 @@ struct Outcome<'a> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = input::read_text(&arguments.rig)?;
     let rig = input::parse_rig(&arguments.rig, &text)?;
-    if let Some(path) = &arguments.output {
-        output::check_writable(path)?;
-    }
     let files = RecordingFiles { data: arguments.data.clone(), contacts: arguments.contacts.clone() };
+    let inputs = Inputs::new(files.paths().chain([arguments.rig.as_path()]));
+    let output = arguments.output.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
+    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     if let Some(recording) = files.read(&rig.setup)? {
         return advise(arguments, &rig, &recording);
     }
@@ -87,13 +88,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let problem = PositionProblem::new(&rig.setup, &what_to_design(arguments, &rig)).map_err(complain)?;
     let placed = Observer::of_stages().watch(|watch| problem.all(watch)).map_err(complain)?;
     let outcome = Outcome { rig: &arguments.rig, estimator: rig.estimator.kind(), problem: &problem, placed };
-    if let (Some(path), Some(best)) = (&arguments.output, best_placed(&outcome.placed)) {
-        let (_, written) = changed_rig(path, &text, "positions", |rig| {
+    if let (Some(target), Some(best)) = (&output, best_placed(&outcome.placed)) {
+        let (_, written) = changed_rig(target.path(), &text, "positions", |rig| {
             place_presses(rig, &best.positions, problem.design().repeats, problem.extent());
         })?;
-        output::write_file(path, written.as_bytes())?;
+        target.write(written.as_bytes())?;
     }
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         write_report(&outcome, &rig, out)?;
     }
     if arguments.json {
@@ -120,7 +121,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> PositionDesign {
     }
 }
 
-fn write_report(outcome: &Outcome, rig: &Rig, out: &Path) -> Result<(), Failure> {
+fn write_report(outcome: &Outcome, rig: &Rig, out: &TargetFolder) -> Result<(), Failure> {
     let report = PositionDesignReport {
         title: &format!("Training positions for {}", outcome.rig.display()),
         setup: &rig.setup,
@@ -128,7 +129,7 @@ fn write_report(outcome: &Outcome, rig: &Rig, out: &Path) -> Result<(), Failure>
         problem: outcome.problem,
         placed: &outcome.placed,
     };
-    output::write_report(out, position_design_report(&report))
+    out.write_report(position_design_report(&report))
 }
 
 fn percent(text: &str) -> Result<f64, String> {

@@ -7,6 +7,7 @@ use crate::input;
 use crate::json::{Object, fields, object};
 use crate::output::{self, Table, figure};
 use crate::progress::Observer;
+use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::sensors::{
     Assessment, CountPoint, DesignCriterion, DesignError, Designed, Method, SensorDesign, SensorProblem,
     Verification, best_design, enough,
@@ -89,9 +90,9 @@ impl Outcome<'_> {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = input::read_text(&arguments.rig)?;
     let rig = input::parse_rig(&arguments.rig, &text)?;
-    if let Some(path) = &arguments.output {
-        output::check_writable(path)?;
-    }
+    let inputs = Inputs::new([arguments.rig.as_path()]);
+    let output = arguments.output.as_ref().map(|path| Target::new(path, &inputs)).transpose()?;
+    let out = arguments.out.as_ref().map(|out| TargetFolder::for_report(out, &inputs)).transpose()?;
     let (setup, design) = what_to_design(arguments, &rig)?;
     let complain = |error: DesignError| complaint(&error, &arguments.rig);
     let cost = SensorProblem::estimated_cost(&setup, &design).map_err(complain)?;
@@ -102,16 +103,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let problem = observer.watch(|watch| SensorProblem::new(&setup, &design, watch)).map_err(complain)?;
     let outcome = observer.watch(|watch| outcome(arguments, &rig, &problem, watch))?;
     drop(observer);
-    if let (Some(path), Some(best)) = (&arguments.output, best_design(&outcome.designed)) {
+    if let (Some(target), Some(best)) = (&output, best_design(&outcome.designed)) {
         let extent = setup.surface().extent();
-        let (rig, written) =
-            changed_rig(path, &text, "layout", |rig| place_sensors(rig, &best.layout, &design.kept, extent))?;
+        let (rig, written) = changed_rig(target.path(), &text, "layout", |rig| {
+            place_sensors(rig, &best.layout, &design.kept, extent)
+        })?;
         if rig.setup.layout().len() != best.layout.len() {
             return Err(Complaint::new("the rig does not take the layout").into());
         }
-        output::write_file(path, written.as_bytes())?;
+        target.write(written.as_bytes())?;
     }
-    if let Some(out) = &arguments.out {
+    if let Some(out) = &out {
         write_report(&outcome, &setup, out)?;
     }
     if arguments.json {
@@ -188,7 +190,7 @@ fn to_verify(designed: &[Designed]) -> impl Iterator<Item = &Designed> {
     designed.iter().filter(move |designed| !designed.method.is_search() || Some(designed.method) == best)
 }
 
-fn write_report(outcome: &Outcome, setup: &Setup, out: &Path) -> Result<(), Failure> {
+fn write_report(outcome: &Outcome, setup: &Setup, out: &TargetFolder) -> Result<(), Failure> {
     let report = SensorDesignReport {
         title: &format!("Sensors for {}", outcome.rig.display()),
         setup,
@@ -198,7 +200,7 @@ fn write_report(outcome: &Outcome, setup: &Setup, out: &Path) -> Result<(), Fail
         counts: &outcome.counts,
         seed: outcome.seed,
     };
-    output::write_report(out, sensor_design_report(&report))
+    out.write_report(sensor_design_report(&report))
 }
 
 fn complaint(error: &DesignError, rig: &Path) -> Failure {

@@ -1,10 +1,11 @@
 //! Studies that are built in beside the paper's: run whole, reported, and told as a table.
 
-use super::Arguments;
-use crate::failure::Failure;
+use super::{Arguments, EarlierRun};
+use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::output::{self, Table};
 use crate::progress::Observer;
+use crate::target::{RESULTS_JSON, TargetFolder};
 use palpate_estimators::evaluation::Quantiles;
 use palpate_numerics::watch::Watch;
 use palpate_report::{ReportFile, dead_areas_report, elliott_report};
@@ -36,9 +37,10 @@ pub fn dead_areas(arguments: &Arguments) -> Result<(), Failure> {
         without: Vec::new(),
         seed: 0,
     };
+    let out = folder(arguments, "dead-areas")?;
     let results = |findings| results("dead-areas", study.calibrations, study.seed, findings);
     let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
-    write(arguments, &results, dead_areas_report(&study, &results.findings), tell_dead_areas)
+    write((arguments, &out), &results, dead_areas_report(&study, &results.findings), tell_dead_areas)
 }
 
 /// `palpate study elliott`: components of a plate's readings and a network, beside the influence locator and its tracker.
@@ -51,9 +53,22 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
         tolerance_m: 5e-3,
         seed: 0,
     };
+    let out = folder(arguments, "elliott")?;
     let results = |findings| results("elliott", study.calibrations, study.seed, findings);
     let results = results(fit(study.most_rounds(), |watch| study.run(watch))?);
-    write(arguments, &results, elliott_report(&study, &results.findings), tell_elliott)
+    write((arguments, &out), &results, elliott_report(&study, &results.findings), tell_elliott)
+}
+
+/// The folder of a study that fits in minutes, and keeps nothing that another run could go on from.
+fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
+    if arguments.earlier_run() == EarlierRun::GoOn {
+        let complaint =
+            Complaint::new(format!("--resume: the study `{study}` keeps no networks to go on from"));
+        return Err(complaint
+            .help("--overwrite throws an earlier run away, --out names another folder")
+            .into());
+    }
+    arguments.folder(study)
 }
 
 fn results<F>(study: &'static str, calibrations: u64, seed: u64, findings: F) -> Results<F> {
@@ -70,19 +85,18 @@ where
 
 /// Writes a study's report and results, and prints them.
 fn write<F: serde::Serialize>(
-    arguments: &Arguments,
+    (arguments, out): (&Arguments, &TargetFolder),
     results: &Results<F>,
     report: Vec<ReportFile>,
     tell: fn(&F) -> String,
 ) -> Result<(), Failure> {
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new("palpate-out").join(results.study));
-    output::write_report(&out, report)?;
-    output::write_file(&out.join("results.json"), (output::to_json(results)? + "\n").as_bytes())?;
+    out.write_report(report)?;
+    out.write(RESULTS_JSON, (output::to_json(results)? + "\n").as_bytes())?;
     if arguments.json {
         return output::say_json(results);
     }
     output::say(tell(&results.findings))?;
-    output::say_report("\n", Some(&out))
+    output::say_report("\n", Some(out.path()))
 }
 
 fn tell_dead_areas(findings: &DeadAreaResults) -> String {

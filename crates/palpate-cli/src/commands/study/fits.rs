@@ -3,19 +3,18 @@
 //! The file grows as fits are finished, survives Ctrl-C, and is sorted at the end.
 
 use crate::failure::{Complaint, Failure};
-use crate::{input, output, progress};
+use crate::target::{NETWORKS_CSV, RESULTS_JSON, TargetFolder};
+use crate::{input, progress, target};
 use indicatif::ProgressBar;
+use palpate_mechanics::units::format_count;
 use palpate_studies::{
-    ArmOutcome, CheckpointError, NetworksCsv, PreparedStudy, RunOptions, Trained, TrainedSeed,
+    ArmOutcome, Checkpoint, CheckpointError, FitRow, NetworksCsv, PreparedStudy, RunOptions, Trained,
+    TrainedSeed,
 };
 use std::fs::File;
 use std::io::Write;
-use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-
-/// Name of the file that has a row for every fit, and keeps the networks.
-pub const NETWORKS_CSV: &str = "networks.csv";
 
 /// The file, open for more rows.
 pub struct CheckpointFile {
@@ -23,37 +22,30 @@ pub struct CheckpointFile {
 }
 
 impl CheckpointFile {
-    /// Opens the file of a run, and reads what an earlier run left in it when `resume` asks for that.
-    ///
-    /// A finished run's file is replaced. An unfinished one's is replaced only when `overwrite` says so.
-    pub fn open(
-        out: &Path,
+    /// Begins the file of a run with the rows that it keeps of an earlier one. From here until its end the run counts as unfinished.
+    pub fn begin(
+        out: &TargetFolder,
         table: &NetworksCsv,
-        resume: bool,
-        overwrite: bool,
-    ) -> Result<(Self, Vec<Trained>), Failure> {
-        let path = out.join(NETWORKS_CSV);
-        let unfinished = path.exists() && !out.join("results.json").exists();
-        if unfinished && !resume && !overwrite {
-            let complaint = Complaint::new(format!("{} is of a run that was not finished", path.display()));
-            return Err(complaint
-                .help("--resume goes on from it, --overwrite throws it away, --out names another folder")
-                .into());
-        }
-        let done = if resume { read(&path, table)? } else { Vec::new() };
-        // From here until the end the run counts as unfinished.
-        match std::fs::remove_file(out.join("results.json")) {
+        done: &[Trained],
+        surplus: &[&FitRow],
+    ) -> Result<Self, Failure> {
+        let results = out.path().join(RESULTS_JSON);
+        match std::fs::remove_file(&results) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(output::cannot("remove", &out.join("results.json"), &error));
+                return Err(target::cannot("remove", &results, &error));
             }
             _ => {}
         }
+        let is_surplus =
+            |row: &Trained| surplus.iter().any(|kept| (kept.arm, kept.seed) == (row.arm, row.fit.seed));
         let mut rows = table.heading();
-        done.iter().for_each(|trained| rows.push_str(&table.row(trained)));
-        output::write_file(&path, rows.as_bytes())?;
+        done.iter().filter(|row| !is_surplus(row)).for_each(|trained| rows.push_str(&table.row(trained)));
+        surplus.iter().for_each(|row| rows.push_str(&row.text));
+        out.write(NETWORKS_CSV, rows.as_bytes())?;
+        let path = out.path().join(NETWORKS_CSV);
         let file = File::options().append(true).open(&path);
-        let file = file.map_err(|error| output::cannot("write", &path, &error))?;
-        Ok((Self { file }, done))
+        let file = file.map_err(|error| target::cannot("write", &path, &error))?;
+        Ok(Self { file })
     }
 
     /// Adds a row, in one write, so that no other row comes between.
@@ -62,7 +54,12 @@ impl CheckpointFile {
     }
 }
 
-fn read(path: &Path, table: &NetworksCsv) -> Result<Vec<Trained>, Failure> {
+/// The fits that an earlier run left in a folder.
+pub fn read(out: &TargetFolder, table: &NetworksCsv) -> Result<Checkpoint, Failure> {
+    let path = &out.path().join(NETWORKS_CSV);
+    if !path.exists() {
+        return Ok(Checkpoint::default());
+    }
     let text = input::read_text(path)?;
     let checkpoint = table.resume(&text).map_err(|error| {
         let name = path.display().to_string();
@@ -80,18 +77,37 @@ fn read(path: &Path, table: &NetworksCsv) -> Result<Vec<Trained>, Failure> {
     if checkpoint.cut_off {
         eprintln!("warning: the last line of {} is cut off; its network is trained again", path.display());
     }
-    Ok(checkpoint.done)
+    Ok(checkpoint)
+}
+
+/// Rows of an earlier run with more seeds: they stay in the file, and the results are without them.
+pub fn surplus(earlier: &[FitRow], options: RunOptions) -> Vec<&FitRow> {
+    let surplus: Vec<&FitRow> = earlier.iter().filter(|row| row.seed >= options.seeds).collect();
+    if !surplus.is_empty() {
+        eprintln!(
+            "palpate: {} fits of further seeds stay in {NETWORKS_CSV}; the results are of the first {} seeds",
+            format_count(surplus.len() as u64),
+            options.seeds
+        );
+    }
+    surplus
 }
 
 /// Replaces the file by one whose rows are in the order of the arms and seeds, whatever the threads did.
-pub fn write_sorted(out: &Path, table: &NetworksCsv, outcomes: &[ArmOutcome]) -> Result<(), Failure> {
+pub fn write_sorted(
+    out: &TargetFolder,
+    table: &NetworksCsv,
+    outcomes: &[ArmOutcome],
+    surplus: &[&FitRow],
+) -> Result<(), Failure> {
     let mut rows = table.heading();
     for (arm, outcome) in outcomes.iter().enumerate() {
         for fit in &outcome.fits {
             rows.push_str(&table.row(&Trained { arm, fit: fit.clone() }));
         }
+        surplus.iter().filter(|row| row.arm == arm).for_each(|row| rows.push_str(&row.text));
     }
-    output::write_file(&out.join(NETWORKS_CSV), rows.as_bytes())
+    out.write(NETWORKS_CSV, rows.as_bytes())
 }
 
 /// Patterns that were presented to a network.

@@ -1,0 +1,273 @@
+//! Files and folders that a command may write: what must not be lost is refused with a reason, and what is written appears whole.
+
+use crate::failure::{Complaint, Failure};
+use palpate_report::ReportFile;
+use std::fs::{self, Metadata};
+use std::io::{Error, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// Results of a study, which is finished once they are there.
+pub const RESULTS_JSON: &str = "results.json";
+/// Fits of a study, which keep its networks.
+pub const NETWORKS_CSV: &str = "networks.csv";
+
+/// The files that a command reads and those that its own words go to, none of which it may write over.
+#[derive(Clone, Debug)]
+pub struct Inputs(Vec<(&'static str, Identity)>);
+
+impl Inputs {
+    /// The files of these names; `-` is stdin. A name without a file is left to whoever reads it.
+    pub fn new<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
+        let read = paths.into_iter().filter_map(Identity::of).map(|file| ("this command reads it", file));
+        let streams = [
+            ("/dev/stdin", "this command reads it, as stdin"),
+            ("/dev/stdout", "this command's stdout goes there"),
+            ("/dev/stderr", "this command's stderr goes there"),
+        ];
+        let streams = streams.into_iter().filter_map(|(path, why)| Some((why, Identity::of(path.as_ref())?)));
+        Self(read.chain(streams).collect())
+    }
+
+    fn reason_to_keep(&self, path: &Path) -> Option<&'static str> {
+        let file = Identity::of(path)?;
+        self.0.iter().find(|(_, kept)| kept.is_same(&file)).map(|(why, _)| *why)
+    }
+}
+
+/// What makes two names those of one file: the path without links, and the inode, which hard links share.
+#[derive(Clone, Debug)]
+struct Identity {
+    path: PathBuf,
+    inode: Option<(u64, u64)>,
+}
+
+impl Identity {
+    /// That of a regular file; `None` of anything else.
+    fn of(path: &Path) -> Option<Self> {
+        let there = fs::metadata(path).ok().filter(Metadata::is_file)?;
+        Some(Self { path: fs::canonicalize(path).ok()?, inode: inode(&there) })
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        self.path == other.path || (self.inode.is_some() && self.inode == other.inode)
+    }
+}
+
+#[cfg(unix)]
+fn inode(there: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((there.dev(), there.ino()))
+}
+
+#[cfg(not(unix))]
+fn inode(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+/// A file that may be written.
+#[derive(Clone, Debug)]
+pub struct Target {
+    path: PathBuf,
+    inputs: Inputs,
+}
+
+impl Target {
+    /// Complains at once, before any work, where the file must not be written or could not be.
+    pub fn new(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
+        let target = Self { path: path.to_owned(), inputs: inputs.clone() };
+        let place = target.place()?;
+        check_takes_files(folder_of(&place)).map_err(|error| cannot("write", path, &error))?;
+        Ok(target)
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes the file under a temporary name and renames it, so that nobody ever sees half of it. A link stays, and what it
+    /// leads to is written; a file that is replaced keeps its mode.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
+        let place = self.place()?;
+        let write = || -> std::io::Result<()> {
+            let mut file = temporary_file(folder_of(&place))?;
+            file.write_all(bytes)?;
+            if let Ok(replaced) = fs::metadata(&place) {
+                file.as_file().set_permissions(replaced.permissions())?;
+            }
+            file.persist(&place)?;
+            Ok(())
+        };
+        write().map_err(|error| cannot("write", &self.path, &error))
+    }
+
+    /// The file with all links followed, which may be written.
+    fn place(&self) -> Result<PathBuf, Failure> {
+        let refused = |why: &str| Complaint::new(format!("cannot write {}: {why}", self.path.display()));
+        if self.path == Path::new("-") {
+            let complaint = refused("stdout is for what the command says");
+            return Err(complaint.help("name a file; one that is called so is `./-`").into());
+        }
+        if self.path.file_name().is_none() && !self.path.is_dir() {
+            return Err(refused("it names no file").into());
+        }
+        let place = match fs::metadata(&self.path) {
+            Ok(there) => {
+                if let Some(why) = reason_against(&there) {
+                    return Err(refused(why).help("name another file").into());
+                }
+                if let Some(why) = self.inputs.reason_to_keep(&self.path) {
+                    return Err(refused(why).help("name another file").into());
+                }
+                fs::canonicalize(&self.path)
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => follow_links(&self.path),
+            Err(error) => Err(error),
+        };
+        let place = place.map_err(|error| cannot("write", &self.path, &error))?;
+        let folder = folder_of(&place);
+        match folder.is_dir() {
+            true => Ok(place),
+            false => Err(refused(&format!("there is no folder {}", folder.display())).into()),
+        }
+    }
+}
+
+/// Why what is there must not be replaced by a file, whatever the command.
+fn reason_against(there: &Metadata) -> Option<&'static str> {
+    match there.file_type() {
+        kind if kind.is_dir() => Some("it is a folder"),
+        kind if !kind.is_file() => Some(what_it_is(there)),
+        _ if there.permissions().readonly() => Some("it is write-protected"),
+        _ => None,
+    }
+}
+
+#[cfg(unix)]
+fn what_it_is(there: &Metadata) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    match there.file_type() {
+        kind if kind.is_fifo() => "it is a pipe (FIFO), and no file",
+        kind if kind.is_socket() => "it is a socket, and no file",
+        _ => "it is a device, and no file",
+    }
+}
+
+#[cfg(not(unix))]
+fn what_it_is(_: &Metadata) -> &'static str {
+    "it is no regular file"
+}
+
+/// What a name that leads to nothing stands for: itself, or the end of its links.
+fn follow_links(path: &Path) -> std::io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const MOST: usize = 40;
+    let mut place = path.to_owned();
+    for _ in 0..MOST {
+        match fs::read_link(&place) {
+            Ok(to) => place = folder_of(&place).join(to),
+            Err(_) => return Ok(place),
+        }
+    }
+    Err(Error::other("its links lead in a circle"))
+}
+
+/// A folder that takes a report, with all files that belong to it.
+#[derive(Clone, Debug)]
+pub struct TargetFolder {
+    path: PathBuf,
+    inputs: Inputs,
+}
+
+impl TargetFolder {
+    /// A folder for the report of a command; one that holds the results of a study is left alone.
+    pub fn for_report(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
+        let folder = Self::for_study(path, inputs)?;
+        match [RESULTS_JSON, NETWORKS_CSV].into_iter().find(|name| path.join(name).exists()) {
+            None => Ok(folder),
+            Some(name) => {
+                let found = path.join(name);
+                let complaint =
+                    format!("cannot write a report into {}: a study's {name} is there", path.display());
+                let help = format!("name another folder, or take {} away", found.display());
+                Err(Complaint::new(complaint).help(help).into())
+            }
+        }
+    }
+
+    /// A folder for a study, which has its own rules for earlier results.
+    pub fn for_study(path: &Path, inputs: &Inputs) -> Result<Self, Failure> {
+        let folder = Self { path: path.to_owned(), inputs: inputs.clone() };
+        let refused = |error: &Error| cannot("write into the folder", path, error);
+        let nearest =
+            path.ancestors().find(|above| above.exists()).filter(|above| !above.as_os_str().is_empty());
+        let nearest = nearest.unwrap_or(Path::new("."));
+        if !nearest.is_dir() {
+            return Err(refused(&Error::other(format!("{} is no folder", nearest.display()))));
+        }
+        check_takes_files(nearest).map_err(|error| refused(&error))?;
+        if path.is_dir() {
+            let entries = fs::read_dir(path).map_err(|error| refused(&error))?;
+            let names = entries.flatten().map(|entry| entry.file_name());
+            for name in names.filter(|name| name.to_str().is_some_and(is_of_a_report)) {
+                folder.target(name.as_ref()).place()?;
+            }
+        }
+        Ok(folder)
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Makes the folder, with those above it, where it is not there yet.
+    pub fn make(&self) -> Result<(), Failure> {
+        fs::create_dir_all(&self.path).map_err(|error| cannot("make the folder", &self.path, &error))
+    }
+
+    /// Writes one file of the report.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+        self.make()?;
+        self.target(name.as_ref()).write(bytes)
+    }
+
+    /// Writes the files of a report; with the feature `png`, also a copy of every figure as PNG.
+    pub fn write_report(&self, files: Vec<ReportFile>) -> Result<(), Failure> {
+        #[cfg(feature = "png")]
+        let files = palpate_report::with_png_copies(files).map_err(Complaint::new)?;
+        files.iter().try_for_each(|file| self.write(&file.name, &file.bytes))
+    }
+
+    fn target(&self, name: &Path) -> Target {
+        Target { path: self.path.join(name), inputs: self.inputs.clone() }
+    }
+}
+
+/// Whether a file of this name may belong to a report.
+fn is_of_a_report(name: &str) -> bool {
+    let tables = ["errors.csv", "trials.csv", "limit.csv", NETWORKS_CSV];
+    let is_figure = name.starts_with("figure-") && [".svg", ".png"].iter().any(|end| name.ends_with(end));
+    is_figure || name == "report.html" || name == RESULTS_JSON || tables.contains(&name)
+}
+
+/// An error where a folder does not take a file: it is better known before an hour of work than after it.
+fn check_takes_files(folder: &Path) -> std::io::Result<()> {
+    temporary_file(folder).map(drop)
+}
+
+fn temporary_file(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".palpate-");
+    // Results are for whoever may read files that are made here, as the umask says.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The complaint that a path cannot be used.
+pub fn cannot(what: &str, path: &Path, error: &Error) -> Failure {
+    Complaint::new(format!("cannot {what} {}: {error}", path.display())).into()
+}
