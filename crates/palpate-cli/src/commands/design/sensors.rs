@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let (Some(target), Some(best)) = (&output, best_design(&outcome.designed)) {
         let extent = setup.surface().extent();
         let (rig, written) = changed_rig(target.path(), &text, "layout", |rig| {
-            place_sensors(rig, &best.layout, &design.kept, extent)
+            place_sensors(rig, &best.layout, &design.kept, extent);
         })?;
         if rig.setup.layout().len() != best.layout.len() {
             return Err(Complaint::new("the rig does not take the layout").into());
