@@ -2,6 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
+use crate::output::remark;
 use crate::progress::duration;
 use palpate_estimators::estimator::{Estimator, FitCost, contenders};
 use palpate_estimators::recording::Recording;
@@ -29,7 +30,7 @@ impl MemoryLimit {
             return Err(Complaint::new(why).help(self.remedy(estimator, setup, recording)).into());
         }
         if cost.memory_bytes > NOTICEABLE.memory_bytes || cost.seconds > NOTICEABLE.seconds {
-            eprintln!("{}: {}", estimator.kind(), in_words(cost));
+            remark!("{}: {}", estimator.kind(), in_words(cost));
         }
         Ok(())
     }

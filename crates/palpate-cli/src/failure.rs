@@ -1,5 +1,7 @@
 //! Failure of a command: a message with its place, and an exit code.
 
+use crate::output::remark;
+use crate::progress;
 use miette::{
     Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };
@@ -19,14 +21,14 @@ pub enum Failure {
     BadInput(Box<Complaint>),
     /// Exit code 3: it finished, but data was lost; the places were reported as they came.
     DataLost(String),
-    /// Exit code 130: somebody pressed Ctrl-C.
+    /// Exit code 130 after Ctrl-C, 143 after SIGTERM.
     Interrupted(String),
     /// Whoever read our output stopped reading, which is their right.
     NobodyReads,
 }
 
 impl Failure {
-    /// Ctrl-C before anything was written.
+    /// A signal before anything was written.
     pub fn stopped() -> Self {
         Self::Interrupted("stopped; nothing was written".to_owned())
     }
@@ -40,15 +42,15 @@ impl Failure {
     pub fn report(self) -> ExitCode {
         let (message, code) = match self {
             Self::BadInput(complaint) => {
-                eprintln!("{:?}", miette::Report::new(*complaint));
+                remark!("{:?}", miette::Report::new(*complaint));
                 return ExitCode::from(2);
             }
             Self::NobodyReads => return ExitCode::SUCCESS,
             Self::GoalMissed(message) => (message, 1),
             Self::DataLost(message) => (message, 3),
-            Self::Interrupted(message) => (message, 130),
+            Self::Interrupted(message) => (message, progress::interrupted_code()),
         };
-        eprintln!("palpate: {message}");
+        remark!("palpate: {message}");
         ExitCode::from(code)
     }
 }
@@ -171,6 +173,6 @@ pub fn install_handler() {
         Box::new(miette::MietteHandlerOpts::new().color(colour).terminal_links(false).width(100).build())
     }));
     if installed.is_err() {
-        eprintln!("palpate: messages will look plainer than usual");
+        remark!("palpate: messages will look plainer than usual");
     }
 }

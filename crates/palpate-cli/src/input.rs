@@ -1,6 +1,8 @@
 //! Input of a command: palpate's files, with complaints that point at the place, and quantities.
 
+use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
+use crate::output::remark;
 use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::{CsvError, Recording};
 use palpate_estimators::setup::Setup;
@@ -21,15 +23,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
 
 /// The bytes of a file.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| {
-        let complaint = Complaint::new(format!("cannot read {}: {error}", path.display()));
-        match error.kind() {
-            std::io::ErrorKind::NotFound => {
-                complaint.help("check the name; it is taken from the current folder").into()
-            }
-            _ => complaint.into(),
-        }
-    })
+    Chunks::of_file(path)?.read_to_end()
 }
 
 /// A rig, from its file.
@@ -123,13 +117,13 @@ pub fn read_recording(setup: &Setup, path: &Path) -> Result<Recording, Failure> 
 fn with_warnings(recording: Result<Recording, CsvError>, name: &str) -> Result<Recording, Failure> {
     let recording = recording.map_err(|error| csv_complaint(&error))?;
     say_dialects(&recording);
-    recording.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
+    recording.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     Ok(recording)
 }
 
 /// Says on stderr how the files of a recording write their tables, where that is not plainly.
 pub fn say_dialects(recording: &Recording) {
-    recording.provenance.dialects.iter().for_each(|dialect| eprintln!("{}: {dialect}", dialect.source));
+    recording.provenance.dialects.iter().for_each(|dialect| remark!("{}: {dialect}", dialect.source));
 }
 
 /// A length in metres, from a command line argument.

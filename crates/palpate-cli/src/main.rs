@@ -6,7 +6,10 @@
 //! $ palpate evaluate locator.json --data presses.csv --out report
 //! ```
 #![forbid(unsafe_code)]
+// These macros panic where nobody listens; `output` has others.
+#![warn(clippy::print_stderr, clippy::print_stdout)]
 
+mod chunks;
 mod commands;
 mod cost;
 mod failure;
@@ -20,11 +23,12 @@ mod tare;
 mod target;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Turns an elastic surface with a few sensors into a calibrated contact locator.
 ///
-/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted.
+/// Exit codes: 0 done; 1 ran, but a stated goal was missed; 2 bad input; 3 finished with data lost; 130 interrupted by Ctrl-C; 143 ended by SIGTERM.
 #[derive(Parser)]
 #[command(name = "palpate", version, max_term_width = 100)]
 struct Arguments {
@@ -50,8 +54,12 @@ enum Command {
 
 fn main() -> ExitCode {
     failure::install_handler();
-    progress::install_interrupt_handler();
-    let result = match Arguments::parse().command {
+    progress::install_signal_handler();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return answer(&error),
+    };
+    let result = match arguments.command {
         Command::Study(arguments) => commands::study::run(&arguments),
         Command::Init(arguments) => commands::init::run(&arguments),
         Command::Simulate(arguments) => commands::simulate::run(&arguments),
@@ -68,5 +76,15 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
+    }
+}
+
+/// Prints help, version, or a complaint about the arguments.
+fn answer(error: &clap::Error) -> ExitCode {
+    let printed = error.print().and_then(|()| std::io::stdout().flush());
+    match (error.use_stderr(), printed) {
+        (true, _) => ExitCode::from(2),
+        (false, Ok(())) => ExitCode::SUCCESS,
+        (false, Err(error)) => output::unprinted(&error).report(),
     }
 }

@@ -15,6 +15,17 @@ pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     }
 }
 
+/// Prints a line on stderr. Where nobody can be told there is nobody to tell: work does not end for a remark.
+macro_rules! remark {
+    ($($words:tt)*) => { $crate::output::print_remark(format_args!($($words)*)) };
+}
+pub(crate) use remark;
+
+/// What [`remark`] does.
+pub fn print_remark(words: std::fmt::Arguments) {
+    let _ = std::io::stderr().lock().write_all(format!("{words}\n").as_bytes());
+}
+
 /// Prints a line on stdout.
 pub fn say(line: impl Display) -> Result<(), Failure> {
     print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())
@@ -25,6 +36,11 @@ pub fn say_json(value: &impl serde::Serialize) -> Result<(), Failure> {
     say(to_json(value)?)
 }
 
+/// Prints a value as a line of JSON on stdout.
+pub fn say_json_line(value: &impl serde::Serialize) -> Result<(), Failure> {
+    say(serde_json::to_string(value).map_err(Complaint::new)?)
+}
+
 /// A value as JSON text.
 pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(value).map_err(|error| Complaint::new(error).into())
@@ -32,10 +48,20 @@ pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
 
 /// Writes to stdout or whatever stands for it; a reader that has gone is no error of ours.
 pub fn print(out: &mut impl Write, bytes: &[u8]) -> Result<(), Failure> {
-    out.write_all(bytes).map_err(|error| match error.kind() {
+    out.write_all(bytes).map_err(|error| unprinted(&error))
+}
+
+/// Hands on what was printed: a reader at the other end of a pipe wants each answer now.
+pub fn flush(out: &mut impl Write) -> Result<(), Failure> {
+    out.flush().map_err(|error| unprinted(&error))
+}
+
+/// What it means that stdout takes no more: its reader has gone, which is no error of ours, or it is full.
+pub fn unprinted(error: &std::io::Error) -> Failure {
+    match error.kind() {
         ErrorKind::BrokenPipe => Failure::NobodyReads,
-        _ => Complaint::new(format!("cannot write to the output: {error}")).into(),
-    })
+        _ => Complaint::new(format!("cannot write to stdout: {error}")).into(),
+    }
 }
 
 /// A table for people, made column by column; the columns after the first are aligned to the right.

@@ -1,41 +1,67 @@
 //! Long work as people see it: on a terminal a bar with rate and time left, in a pipe nothing; and Ctrl-C, which stops it.
 
+use crate::output::remark;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_numerics::watch::{Progress, Watch};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::error::Error;
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-/// True once some work has seen that it is to stop.
-static SEEN: AtomicBool = AtomicBool::new(false);
-/// Work that does not see it for so long cannot be asked, and is ended with the process.
-const PATIENCE: Duration = Duration::from_millis(900);
+/// Number of the signal that came; 0 for none.
+static SIGNAL: AtomicU8 = AtomicU8::new(0);
+/// Work that has not ended by itself so long after a signal is ended with the process.
+const PATIENCE: Duration = Duration::from_millis(800);
+/// SIGINT, which Ctrl-C sends.
+const INTERRUPT: u8 = 2;
 
-/// Makes Ctrl-C (and a polite kill) ask long work to stop, and end the process the second time, or where nothing listens.
-pub fn install_interrupt_handler() {
-    let installed = ctrlc::set_handler(|| {
-        let again = INTERRUPTED.swap(true, Ordering::Relaxed);
-        if !again {
-            std::thread::sleep(PATIENCE);
-        }
-        if again || !SEEN.load(Ordering::Relaxed) {
-            eprintln!("stopped");
-            std::process::exit(130);
-        }
-    });
-    if let Err(error) = installed {
-        eprintln!("Ctrl-C will end palpate at once: {error}");
+/// Makes Ctrl-C (and a polite kill) ask long work to stop. What has not ended soon is ended with the process: everything that
+/// palpate writes is whole at any time.
+///
+/// To be called before there is any other thread: those begun later leave the signals to the one that waits for them.
+pub fn install_signal_handler() {
+    if let Err(error) = begin_to_listen() {
+        remark!("Ctrl-C will end palpate at once: {error}");
     }
 }
 
-/// True once Ctrl-C was pressed.
+#[cfg(unix)]
+fn begin_to_listen() -> Result<(), Box<dyn Error>> {
+    use nix::sys::signal::{SigSet, Signal};
+    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
+    signals.thread_block()?;
+    std::thread::Builder::new().spawn(move || {
+        while let Ok(signal) = signals.wait() {
+            stop(signal as u8);
+        }
+    })?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn begin_to_listen() -> Result<(), Box<dyn Error>> {
+    Ok(ctrlc::set_handler(|| stop(INTERRUPT))?)
+}
+
+/// Asks the work to stop, and ends the process where it does not.
+fn stop(signal: u8) {
+    SIGNAL.store(signal, Ordering::Relaxed);
+    std::thread::sleep(PATIENCE);
+    remark!("palpate: stopped");
+    std::process::exit(interrupted_code().into());
+}
+
+/// True once Ctrl-C was pressed, or the process was asked to end.
 pub fn interrupted() -> bool {
-    let interrupted = INTERRUPTED.load(Ordering::Relaxed);
-    if interrupted {
-        SEEN.store(true, Ordering::Relaxed);
+    SIGNAL.load(Ordering::Relaxed) != 0
+}
+
+/// Exit code of a command that was interrupted: 128 and the signal, as shells have it.
+pub fn interrupted_code() -> u8 {
+    match SIGNAL.load(Ordering::Relaxed) {
+        0 => 128 + INTERRUPT,
+        signal => 128 + signal,
     }
-    interrupted
 }
 
 /// A bar of `length` steps on stderr.

@@ -2,7 +2,8 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
-use crate::lines::Readings;
+use crate::lines::{Lines, Readings, Records};
+use crate::output::remark;
 use crate::progress::Observer;
 use palpate_estimators::estimator::{Locator, Status, Tare, TareError, take_off_drift};
 use palpate_estimators::evaluation::Split;
@@ -131,11 +132,11 @@ impl<'a> Taring<'a> {
     }
 
     fn read(&mut self, path: &Path, no_header: bool) -> Result<(), Failure> {
-        let mut readings = Readings::open(path, &self.locator.setup, no_header)?;
+        let mut readings = Readings::new(Lines::open(path, Records::None)?, &self.locator.setup, no_header);
         while let Some(reading) = readings.next()? {
             self.add(&reading).map_err(|error| Complaint::about(path, error))?;
         }
-        if !readings.is_whole() {
+        if !readings.lines.is_whole() {
             let complaint =
                 Complaint::about(path, "not every line is a reading, and so the tare would be another one");
             return Err(complaint.help("mend the lines above, or take them out").into());
@@ -191,7 +192,7 @@ impl<'a> Taring<'a> {
             touched += usize::from(estimate.is_none_or(|estimate| estimate.status != Status::NoContact));
         }
         if touched as f64 > MOST_TOUCHED * kept.len() as f64 {
-            eprintln!(
+            remark!(
                 "palpate: warning: {touched} of {} readings of the tare are not within the noise of their mean: was the surface touched, or did it drift?",
                 kept.len()
             );
@@ -209,7 +210,7 @@ impl<'a> Taring<'a> {
             Source::First(_) | Source::File(_) => format!("the mean of {} readings", self.count),
         };
         let moved = Quantity { value, dimension: sensor.kind.dimension() };
-        eprintln!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
+        remark!("palpate: tare from {from}; {} has moved most, by {moved}", sensor.name);
     }
 
     /// The end of the readings of `source`.
@@ -257,7 +258,7 @@ pub fn tare_splits(
                 })
                 .map_err(|error| Failure::from_error(&error))?;
             if let Some(course) = course {
-                eprintln!(
+                remark!(
                     "warning: {}: {}, and so do the readings that are held out; `--tare auto` takes it off",
                     recording.provenance.source,
                     moved_most(setup, &course.spans())
@@ -271,14 +272,14 @@ pub fn tare_splits(
         .map_err(|error| Failure::from_error(&error))?;
     match spans {
         Some(spans) => say_drift(setup, &spans),
-        None => eprintln!("palpate: the presses tell no drift; readings are judged as they are"),
+        None => remark!("palpate: the presses tell no drift; readings are judged as they are"),
     }
     Ok(())
 }
 
 /// Says how far the channels drift where readings are judged without it.
 pub fn say_drift(setup: &Setup, spans: &[f64]) {
-    eprintln!("palpate: {}; it is taken off held-out readings", moved_most(setup, spans));
+    remark!("palpate: {}; it is taken off held-out readings", moved_most(setup, spans));
 }
 
 /// Rows from which on nobody waits for a warning.

@@ -5,6 +5,7 @@ use crate::failure::{Complaint, Failure};
 use crate::input::{RecordingFiles, RigOrLocator};
 use crate::json::object;
 use crate::output::Table;
+use crate::output::remark;
 use crate::progress::Observer;
 use crate::tables::{CsvTable, ERROR_COLUMNS, ERRORS_CSV};
 use crate::tare::{TareOption, tare_splits, tared_recording};
@@ -199,7 +200,7 @@ fn simulated(locator: &Locator, seed: u64) -> Result<Recording, Failure> {
 
 fn warn_of_training_data(locator: &Locator, recording: &Recording) {
     if locator.provenance.recording.digests == recording.provenance.digests {
-        eprintln!(
+        remark!(
             "warning: the locator was fitted to this very recording; at positions that it has not seen it is worse: `palpate evaluate RIG --data …` cross-validates"
         );
     }

@@ -5,6 +5,7 @@ use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
+use crate::output::remark;
 use crate::progress::{self, Observer};
 use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
@@ -106,18 +107,18 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     if let Some(spans) = &choice.drift {
         say_drift(&rig.setup, spans);
     }
-    eprintln!(
+    remark!(
         "auto: {}, with the least mean error × interval score at positions held out ({CHOICE_FOLDS} folds)",
         choice.best.kind()
     );
-    eprintln!("{:<20} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
+    remark!("{:<20} {:>12} {:>20} {:>14}", "", "mean error", "score of 95 %", "95 % covers");
     for Tried { kind, mean_error_m, interval_score_m, coverage_percent } in &choice.tried {
         let covers = coverage_percent.map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"));
         let [error, score] = [mean_error_m, interval_score_m].map(|length_m| format_length_mm(*length_m));
-        eprintln!("{kind:<20} {error:>12} {score:>20} {covers:>14}");
+        remark!("{kind:<20} {error:>12} {score:>20} {covers:>14}");
     }
     for (kind, reason) in &choice.left_out {
-        eprintln!("{kind:<20} left out: {reason}");
+        remark!("{kind:<20} left out: {reason}");
     }
     rig.estimator = choice.best;
     Ok(rig)

@@ -1,6 +1,7 @@
 //! `palpate init`: a first rig for somebody's own recording.
 
 use crate::failure::{Complaint, Failure};
+use crate::output::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::recording::{Decimal, Separator};
@@ -65,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let recording = rig.setup.read_recording(&name, bytes.as_slice());
     let recording = recording.map_err(|error| input::csv_complaint(&error))?;
     input::say_dialects(&recording);
-    first.warnings().iter().for_each(|warning| eprintln!("warning: {name}: {warning}"));
+    first.warnings().iter().for_each(|warning| remark!("warning: {name}: {warning}"));
     let Some(out) = out else {
         return output::print(&mut std::io::stdout().lock(), text.as_bytes());
     };

@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
-use crate::lines::Readings;
+use crate::lines::{Lines, Readings, Records};
 use crate::tare::{Taken, TareOption, Taring};
 use crate::{input, output};
 use palpate_estimators::digit::{DigitShape, ShapePoint};
@@ -11,7 +11,6 @@ use palpate_estimators::recording::csv_row;
 use palpate_mechanics::surface::Extent;
 use serde::Serialize;
 use std::error::Error;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Locate readings: CSV in (a file, or stdin), estimates out as they come.
@@ -50,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let path = arguments.readings.as_deref().unwrap_or(Path::new("-"));
     let mut taring = Taring::new(&arguments.tare, &locator, arguments.no_header)?;
-    let mut readings = Readings::open(path, &locator.setup, arguments.no_header)?;
+    let records = if arguments.json { Records::Json } else { Records::None };
+    let mut readings = Readings::new(Lines::open(path, records)?, &locator.setup, arguments.no_header);
     let extent = locator.setup.surface().extent();
     let mut out = std::io::stdout().lock();
     if !arguments.json {
@@ -60,33 +60,33 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let estimate = match locate(&locator, taring.as_mut(), &mut reading) {
             Ok(estimate) => estimate,
             Err(error) => {
-                readings.lose(&error);
+                readings.lines.lose(&*error)?;
                 continue;
             }
         };
         let line = readings.lines.count;
         let text = match &estimate {
             None if arguments.json => untouched_json(line)?,
-            None => untouched_csv(extent),
+            None => untouched_csv(line, extent),
             Some(estimate) if arguments.json => {
                 let shape =
                     arguments.shape.and_then(|points| locator.shape(estimate, usize::from(points) - 1));
                 json(estimate, line, extent, shape.as_ref())?
             }
-            Some(estimate) => csv(estimate, extent),
+            Some(estimate) => csv(estimate, line, extent),
         };
         output::print(&mut out, text.as_bytes())?;
         // A reader at the other end of a pipe wants each estimate now.
-        out.flush().map_err(|_| Failure::NobodyReads)?;
+        output::flush(&mut out)?;
     }
     if readings.awaits_columns() {
-        let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name));
+        let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name()));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }
     if let Some(taring) = &taring {
-        taring.finish(&readings.lines.name)?;
+        taring.finish(readings.lines.name())?;
     }
-    readings.finish("estimate")
+    readings.lines.finish("estimate")
 }
 
 /// The estimate of a reading; `None` of one that is taken for an untouched one.
@@ -106,9 +106,9 @@ fn locate(
 /// The status of a reading that is taken for an untouched one, and is not located.
 const TARE: &str = "tare";
 
-fn untouched_csv(extent: Extent) -> String {
-    let empty = heading(extent).matches(',').count();
-    csv_row(std::iter::repeat_n(String::new(), empty).chain([TARE.to_owned()]))
+fn untouched_csv(line: u64, extent: Extent) -> String {
+    let empty = std::iter::repeat_n(String::new(), heading(extent).matches(',').count() - 1);
+    csv_row(std::iter::once(line.to_string()).chain(empty).chain([TARE.to_owned()]))
 }
 
 fn untouched_json(line: u64) -> Result<String, Failure> {
@@ -118,16 +118,17 @@ fn untouched_json(line: u64) -> Result<String, Failure> {
 /// The columns of [`csv`].
 fn heading(extent: Extent) -> &'static str {
     match extent {
-        Extent::Line { .. } => "position_mm,force_n,low_mm,high_mm,status\n",
-        Extent::Plane { .. } => "x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n",
+        Extent::Line { .. } => "line,position_mm,force_n,low_mm,high_mm,status\n",
+        Extent::Plane { .. } => "line,x_mm,y_mm,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,status\n",
     }
 }
 
-/// An estimate as a line of CSV: position, force, the ends of the 95 % interval, status. What a locator does not estimate stays empty.
-fn csv(estimate: &Estimate, extent: Extent) -> String {
+/// An estimate as a line of CSV: the line of its reading, position, force, the ends of the 95 % interval, status. What a locator does not estimate stays empty.
+fn csv(estimate: &Estimate, line: u64, extent: Extent) -> String {
     let contact = &estimate.contact;
     let mm = |at_m: f64| format!("{:.4}", at_m * 1e3);
-    let mut cells: Vec<String> = extent.coordinates_m(contact.position).map(mm).collect();
+    let mut cells = vec![line.to_string()];
+    cells.extend(extent.coordinates_m(contact.position).map(mm));
     cells.push(contact.force_n.map_or_else(String::new, |force_n| format!("{force_n:.4}")));
     cells.extend(match contact.uncertainty {
         None => vec![String::new(); 2 * extent.dimensions()],

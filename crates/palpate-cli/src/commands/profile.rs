@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::input::RigOrLocator;
-use crate::lines::Readings;
+use crate::lines::{Lines, Readings, Records};
 use crate::output::{self, Table};
 use crate::target::{Inputs, Target};
 use palpate_estimators::estimator::{
@@ -101,14 +101,17 @@ impl Printer<'_> {
     }
 
     fn stream(&mut self, path: &Path) -> Result<(), Failure> {
-        let mut readings = Readings::open(path, self.subject.setup(), self.arguments.no_header)?;
+        let mut readings = {
+            let records = if self.arguments.json { Records::Json } else { Records::None };
+            Readings::new(Lines::open(path, records)?, self.subject.setup(), self.arguments.no_header)
+        };
         while let Some(reading) = readings.next()? {
             self.tell(&reading, Some(readings.lines.count))?;
         }
-        if self.told == 0 && readings.is_whole() {
-            return Err(Complaint::new(format!("{} holds no reading", readings.lines.name)).into());
+        if self.told == 0 && readings.lines.is_whole() {
+            return Err(Complaint::new(format!("{} holds no reading", readings.lines.name())).into());
         }
-        readings.finish("profile")
+        readings.lines.finish("profile")
     }
 
     /// Prints the profile of a reading, and writes the page about the first.

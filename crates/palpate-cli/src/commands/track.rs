@@ -2,8 +2,9 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
-use crate::lines::{DialectNote, Lines};
+use crate::lines::{DialectNote, Lines, Records, check_first_length, check_first_line};
 use crate::output::Table;
+use crate::output::remark;
 use crate::tare::{Taken, TareOption, Taring};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output};
@@ -80,20 +81,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Follower::Filter(Tracker::new(tracking.likelihood(), config))
     };
     let taring = Taring::new(&arguments.tare, &locator, false)?;
+    let records = if arguments.json { Records::Json } else { Records::None };
     let mut stream = Stream {
         arguments,
         taring,
         follower,
         extent,
         columns,
-        lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")))?,
-        lost: 0,
+        lines: Lines::open(arguments.readings.as_deref().unwrap_or(Path::new("-")), records)?,
         times: 0,
         numbers: Vec::new(),
         truths: Vec::new(),
         filtered: Vec::new(),
     };
-    stream.run(&locator)?;
+    // Readings that came before a signal are finished.
+    let stopped = match stream.run(&locator) {
+        Err(Failure::Interrupted(message)) if !stream.numbers.is_empty() => Some(message),
+        ran => ran.map(|()| None)?,
+    };
     let (filtered, smoothed) = stream.finish()?;
     stream.say_errors(&filtered, &smoothed);
     if let Some(folder) = &report {
@@ -106,9 +111,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         };
         stream.report(folder, (&filtered, &smoothed), &sweep)?;
     }
-    match stream.lost {
-        0 => Ok(()),
-        lost => Err(Failure::DataLost(format!("{lost} of {} lines gave no estimate", stream.lines.count))),
+    match stopped {
+        Some(message) => Err(Failure::Interrupted(message)),
+        None => stream.lines.finish("estimate"),
     }
 }
 
@@ -136,8 +141,6 @@ struct Stream<'a> {
     /// Columns of the CSV.
     columns: Columns,
     lines: Lines,
-    /// Rows that gave no estimate.
-    lost: u64,
     /// Readings so far, skipped ones too: --rate counts them.
     times: u64,
     /// The line of each track.
@@ -151,37 +154,45 @@ struct Stream<'a> {
 impl Stream<'_> {
     fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
         let columns = locator.setup.recording_columns();
-        let mut parser = TimedParser::new(&self.lines.name, locator.setup.schema(&columns));
+        let mut parser = TimedParser::new(self.lines.name(), locator.setup.schema(&columns));
         let mut note = DialectNote::default();
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
             output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;
         }
         while let Some(line) = self.lines.next()? {
-            match parser.parse_line(line) {
-                Ok(None) => {}
-                Ok(Some(reading)) => {
+            match line.map(|line| parser.parse_line(line)) {
+                Ok(Ok(None)) => {}
+                Ok(Ok(Some(reading))) => {
                     note.say(parser.dialect());
                     self.follow(reading, &mut out)?;
                 }
-                Err(error) if parser.awaits_columns() => return Err(input::csv_complaint(&error).into()),
+                Ok(Err(error)) => {
+                    if parser.awaits_columns() {
+                        check_first_line(&self.lines, columns.header, &error)?;
+                    }
+                    self.lines.lose(&error)?;
+                }
                 Err(error) => {
-                    self.lost += 1;
-                    eprintln!("palpate: skipped: {error}");
+                    if parser.awaits_columns() {
+                        check_first_length(&self.lines, columns.header, &error)?;
+                    }
+                    parser.skip_line();
+                    self.lines.lose(&error)?;
                 }
             }
             if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
-                let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name));
+                let complaint = Complaint::new(format!("{} has no column {column}", self.lines.name()));
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }
         if parser.awaits_columns() {
-            let complaint = Complaint::new(format!("{} holds no reading", self.lines.name));
+            let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }
-        self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(&self.lines.name))
+        self.taring.as_ref().map_or(Ok(()), |taring| taring.finish(self.lines.name()))
     }
 
     fn follow(&mut self, mut reading: TimedReading, out: &mut impl Write) -> Result<(), Failure> {
@@ -191,10 +202,7 @@ impl Stream<'_> {
         match self.taring.as_mut().map_or(Ok(Taken::Tared), |taring| taring.take(&mut reading.reading)) {
             Ok(Taken::Tared) => {}
             Ok(Taken::Baseline) => return Ok(()),
-            Err(error) => {
-                self.lose(&error);
-                return Ok(());
-            }
+            Err(error) => return self.lines.lose(&error),
         }
         let track = match &mut self.follower {
             Follower::Filter(tracker) => tracker.follow(time_s, &reading.reading).map(Some),
@@ -202,10 +210,7 @@ impl Stream<'_> {
         };
         let track = match track {
             Ok(track) => track,
-            Err(error) => {
-                self.lose(&error);
-                return Ok(());
-            }
+            Err(error) => return self.lines.lose(&error),
         };
         self.truths.extend(reading.truth.clone());
         let Some(track) = track else {
@@ -217,12 +222,7 @@ impl Stream<'_> {
             self.filtered.push(track);
         }
         // A reader at the other end of a pipe wants each estimate now.
-        out.flush().map_err(|_| Failure::NobodyReads)
-    }
-
-    fn lose(&mut self, error: &dyn std::fmt::Display) {
-        self.lost += 1;
-        eprintln!("palpate: skipped line {}: {error}", self.lines.count);
+        output::flush(out)
     }
 
     /// The filter's tracks and the smoother's, and prints those that were kept back.
@@ -244,7 +244,7 @@ impl Stream<'_> {
         let line = if self.arguments.json {
             json(track, line, self.extent)? + "\n"
         } else {
-            self.columns.csv(track)
+            self.columns.csv(track, line)
         };
         output::print(out, line.as_bytes())
     }
@@ -276,7 +276,7 @@ impl Stream<'_> {
             .column("covered, %", |(_, errors)| percent(errors.track_covered))
             .column("single, %", |(_, errors)| percent(errors.single_covered))
             .column("number right, %", |(_, errors)| percent(errors.track_number_right));
-        eprintln!("{table}");
+        remark!("{table}");
     }
 
     fn report(
@@ -288,8 +288,8 @@ impl Stream<'_> {
         let (tracks, how) = if smoothed.is_empty() { (filtered, "filter") } else { (smoothed, "smoother") };
         let known = self.truths.len() == tracks.len();
         let report = TrackReport {
-            title: &format!("A contact followed through {}", self.lines.name),
-            source: &self.lines.name,
+            title: &format!("A contact followed through {}", self.lines.name()),
+            source: self.lines.name(),
             extent: self.extent,
             tracks,
             how,
@@ -314,19 +314,19 @@ enum Columns {
 
 impl Columns {
     fn heading(self) -> String {
-        let one = "time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching";
+        let one = "line,time_s,position_mm,speed_m_per_s,force_n,low_mm,high_mm,touching";
         let second = "position_2_mm,speed_2_m_per_s,force_2_n,low_2_mm,high_2_mm,two_touching";
         match self {
             Self::One => one.to_owned(),
             Self::Two => format!("{one},{second}"),
-            Self::Plane => "time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
+            Self::Plane => "line,time_s,x_mm,y_mm,speed_x_m_per_s,speed_y_m_per_s,force_n,x_low_mm,x_high_mm,y_low_mm,y_high_mm,touching".to_owned(),
         }
     }
 
     /// A line of CSV.
-    fn csv(self, track: &Track) -> String {
+    fn csv(self, track: &Track, line: u64) -> String {
         let (first, second) = (track.contacts.first(), track.contacts.get(1));
-        let mut cells = vec![track.time_s.to_string()];
+        let mut cells = vec![line.to_string(), track.time_s.to_string()];
         cells.extend(match self {
             Self::One | Self::Two => cells_on_line(first),
             Self::Plane => cells_on_plane(first),

@@ -16,6 +16,8 @@ mod positions;
 mod profile;
 mod recordings;
 mod report_page;
+mod signals;
+mod streams;
 mod study;
 mod support;
 mod supported_beams;

@@ -36,9 +36,9 @@ fn judged(folder: &Path, touches: &[Touch], options: &[&str]) -> (f64, f64) {
     let (mut errors, mut untouched) = (Vec::new(), Vec::new());
     for (row, touch) in rows.iter().zip(touches).skip(FIRST) {
         if touch.force_n > 0.0 {
-            errors.push((row[0].parse::<f64>().unwrap() - touch.position_mm).abs());
+            errors.push((row[1].parse::<f64>().unwrap() - touch.position_mm).abs());
         } else {
-            untouched.push(f64::from(row[4] == "no_contact"));
+            untouched.push(f64::from(row[5] == "no_contact"));
         }
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -74,7 +74,7 @@ fn what_a_tare_takes_is_said_and_its_rows_stay_in_their_places() {
     fs::write(folder.path().join("few.csv"), board.recording(&[Touch::NONE, Touch::NONE, touch])).unwrap();
     let output = run(folder.path(), &["locate", "board.json", "few.csv", "--tare", "2"]);
     let lines: Vec<String> = said(&output).lines().map(str::to_owned).collect();
-    assert_eq!(lines[..3], ["position_mm,force_n,low_mm,high_mm,status", ",,,,tare", ",,,,tare"]);
+    assert_eq!(lines[..3], ["line,position_mm,force_n,low_mm,high_mm,status", "2,,,,,tare", "3,,,,,tare"]);
     assert!(lines[3].ends_with(",located"), "{lines:?}");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("tare from the mean of 2 readings; g"), "{told}");
@@ -210,7 +210,7 @@ fn a_track_is_tared_too() {
     let plain = said(&run(folder.path(), &["track", "locator.json", "moving.csv"]));
     let tared = said(&run(folder.path(), &["track", "locator.json", "moved.csv", "--tare", "untouched.csv"]));
     let positions = |text: &str| -> Vec<f64> {
-        text.lines().skip(1).filter_map(|line| line.split(',').nth(1)?.parse().ok()).collect()
+        text.lines().skip(1).filter_map(|line| line.split(',').nth(2)?.parse().ok()).collect()
     };
     let (plain, tared) = (positions(&plain), positions(&tared));
     assert_eq!(plain.len(), tared.len());

@@ -43,7 +43,7 @@ fn a_simulated_recording_is_read_back_and_located() {
     assert!(csv.starts_with("# palpate ") && csv.lines().count() == 81, "{}", csv.lines().count());
     let located = said(&run(folder.path(), &["locate", "locator.json", "presses.csv"]));
     let mid = located.lines().nth(40).unwrap();
-    let x_mm: f64 = mid.split(',').next().unwrap().parse().unwrap();
+    let x_mm: f64 = mid.split(',').nth(1).unwrap().parse().unwrap();
     assert!((x_mm - 200.0).abs() < 2.0, "{mid}");
     let evaluated = run(folder.path(), &["evaluate", "locator.json", "--data", "presses.csv", "--json"]);
     let found: Value = serde_json::from_str(&said(&evaluated)).unwrap();
@@ -65,7 +65,7 @@ fn readings_are_located_as_they_come() {
         .unwrap();
     let mut readings = child.stdin.take().unwrap();
     let mut estimates = BufReader::new(child.stdout.take().unwrap()).lines();
-    assert_eq!(estimates.next().unwrap().unwrap(), "position_mm,force_n,low_mm,high_mm,status");
+    assert_eq!(estimates.next().unwrap().unwrap(), "line,position_mm,force_n,low_mm,high_mm,status");
     for _ in 0..3 {
         // The answer comes before the next reading goes in.
         writeln!(readings, "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();

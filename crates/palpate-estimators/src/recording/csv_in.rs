@@ -466,6 +466,11 @@ impl ReadingParser {
         next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
     }
 
+    /// Counts a line that nobody reads, so that the lines after it have their numbers.
+    pub fn skip_line(&mut self) {
+        self.lines.count += 1;
+    }
+
     /// Dialect of the lines, as far as they have told.
     pub fn dialect(&self) -> &Dialect {
         &self.lines.dialect
@@ -557,6 +562,11 @@ impl<'a> TimedParser<'a> {
     /// Whether no line yet has told which columns there are: an error now means that no line can be read.
     pub fn awaits_columns(&self) -> bool {
         self.lines.fields.is_none()
+    }
+
+    /// Counts a line that nobody reads, so that the lines after it have their numbers.
+    pub fn skip_line(&mut self) {
+        self.lines.count += 1;
     }
 
     /// Dialect of the lines, as far as they have told.

@@ -5,6 +5,7 @@ use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::{Object, fields, object};
+use crate::output::remark;
 use crate::output::{self, Table, figure};
 use crate::progress::Observer;
 use crate::target::{Inputs, Target, TargetFolder};
@@ -143,7 +144,7 @@ fn what_to_design(arguments: &Arguments, rig: &Rig) -> Result<(Setup, SensorDesi
         design = adding.map_err(|error| complaint(&error, &arguments.rig))?;
         let dead = rig.setup.layout().len() - design.kept.len();
         if dead > 0 {
-            eprintln!("palpate: {dead} of today's sensors are dead, and are not kept");
+            remark!("palpate: {dead} of today's sensors are dead, and are not kept");
         }
     }
     Ok((setup, design))

@@ -3,6 +3,7 @@
 //! The file grows as fits are finished, survives Ctrl-C, and is sorted at the end.
 
 use crate::failure::{Complaint, Failure};
+use crate::output::remark;
 use crate::target::{NETWORKS_CSV, RESULTS_JSON, TargetFolder};
 use crate::{input, progress, target};
 use indicatif::ProgressBar;
@@ -75,7 +76,7 @@ pub fn read(out: &TargetFolder, table: &NetworksCsv) -> Result<Checkpoint, Failu
         }
     })?;
     if checkpoint.cut_off {
-        eprintln!("warning: the last line of {} is cut off; its network is trained again", path.display());
+        remark!("warning: the last line of {} is cut off; its network is trained again", path.display());
     }
     Ok(checkpoint)
 }
@@ -84,7 +85,7 @@ pub fn read(out: &TargetFolder, table: &NetworksCsv) -> Result<Checkpoint, Failu
 pub fn surplus(earlier: &[FitRow], options: RunOptions) -> Vec<&FitRow> {
     let surplus: Vec<&FitRow> = earlier.iter().filter(|row| row.seed >= options.seeds).collect();
     if !surplus.is_empty() {
-        eprintln!(
+        remark!(
             "palpate: {} fits of further seeds stay in {NETWORKS_CSV}; the results are of the first {} seeds",
             format_count(surplus.len() as u64),
             options.seeds

@@ -1,0 +1,112 @@
+//! Bytes of a file or of stdin as they come. A signal ends the wait for them.
+
+use crate::failure::{Complaint, Failure};
+use crate::{output::remark, progress};
+use std::fs::File;
+use std::io::{self, IsTerminal, Read};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
+
+/// Bytes of a source, read by a thread of its own, as a read that waits cannot be called off.
+pub struct Chunks {
+    /// Name of the source: the file, or "stdin".
+    pub name: String,
+    /// What was opened, which holds nothing; then chunks, until the source ends.
+    chunks: Receiver<io::Result<Vec<u8>>>,
+}
+
+/// Most bytes of a chunk.
+const CHUNK: usize = 1 << 16;
+/// Chunks that are read ahead.
+const AHEAD: usize = 4;
+/// Time between two looks whether a signal came.
+const LOOK: Duration = Duration::from_millis(50);
+
+impl Chunks {
+    /// Those of a file; `-` is stdin.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        if path != Path::new("-") {
+            return Self::of_file(path);
+        }
+        if io::stdin().is_terminal() {
+            remark!("palpate: reading from the keyboard; Ctrl-D ends it");
+        }
+        Self::read(None, "stdin".to_owned())
+    }
+
+    /// Those of a file, whatever its name.
+    pub fn of_file(path: &Path) -> Result<Self, Failure> {
+        Self::read(Some(path.to_owned()), path.display().to_string())
+    }
+
+    fn read(path: Option<PathBuf>, name: String) -> Result<Self, Failure> {
+        let (sender, chunks) = sync_channel(AHEAD);
+        let reader = std::thread::Builder::new().spawn(move || send_all(path, &sender));
+        reader.map_err(|error| Complaint::new(format!("cannot read {name}: {error}")))?;
+        let mut opened = Self { name, chunks };
+        opened.next()?;
+        Ok(opened)
+    }
+
+    /// The next bytes, at least one; `None` after the last.
+    ///
+    /// # Errors
+    /// A complaint where the source cannot be read, and [`Failure::Interrupted`] once a signal came.
+    pub fn next(&mut self) -> Result<Option<Vec<u8>>, Failure> {
+        loop {
+            if progress::interrupted() {
+                return Err(Failure::stopped());
+            }
+            match self.chunks.recv_timeout(LOOK) {
+                Ok(Ok(chunk)) => return Ok(Some(chunk)),
+                Ok(Err(error)) => return Err(unreadable(&self.name, &error)),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
+            }
+        }
+    }
+
+    /// All bytes up to the end.
+    pub fn read_to_end(mut self) -> Result<Vec<u8>, Failure> {
+        let mut bytes = Vec::new();
+        while let Some(chunk) = self.next()? {
+            bytes.extend(chunk);
+        }
+        Ok(bytes)
+    }
+}
+
+/// Sends an empty chunk once the source is open, and then all that it holds; of stdin where there is no path.
+fn send_all(path: Option<PathBuf>, to: &SyncSender<io::Result<Vec<u8>>>) {
+    let source: io::Result<Box<dyn Read>> = match path {
+        None => Ok(Box::new(io::stdin().lock())),
+        Some(path) => File::open(path).map(|file| Box::new(file) as Box<dyn Read>),
+    };
+    let mut source = match source {
+        Ok(source) => source,
+        Err(error) => return drop(to.send(Err(error))),
+    };
+    // Whoever listened may have left, which ends the reading.
+    let mut listens = to.send(Ok(Vec::new())).is_ok();
+    let mut buffer = vec![0; CHUNK];
+    while listens {
+        match source.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(count) => listens = to.send(Ok(buffer[..count].to_vec())).is_ok(),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return drop(to.send(Err(error))),
+        }
+    }
+}
+
+/// The complaint that a source cannot be read.
+fn unreadable(name: &str, error: &io::Error) -> Failure {
+    let complaint = Complaint::new(format!("cannot read {name}: {error}"));
+    match error.kind() {
+        io::ErrorKind::NotFound => {
+            complaint.help("check the name; it is taken from the current folder").into()
+        }
+        _ => complaint.into(),
+    }
+}

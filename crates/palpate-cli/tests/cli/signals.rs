@@ -1,0 +1,143 @@
+//! Ctrl-C and SIGTERM: every verb ends soon, says so by its exit code, and keeps what is finished.
+#![cfg(unix)]
+
+use crate::support::command::{folder, palpate, run, said};
+use crate::support::examples::{LOAD_PROFILE, MOVING_LOAD, NOISY_BEAM, PLATE};
+use crate::support::toml::Toml;
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Longest time in which whoever waits for input ends; 200 ms are asked for, on a machine that does nothing else.
+const WAITING: Duration = Duration::from_millis(600);
+/// Longest time in which whoever computes ends.
+const COMPUTING: Duration = Duration::from_millis(1500);
+
+fn begin(folder: &Path, arguments: &[&str]) -> Child {
+    let mut command = palpate(folder);
+    command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Sends a signal, and waits for the end.
+fn end(child: Child, signal: &str, within: Duration) -> Output {
+    let start = Instant::now();
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    // Its stdin stays open until it has ended.
+    let mut child = child;
+    let stdin = child.stdin.take();
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    let elapsed = start.elapsed();
+    let code = output.status.code();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let wanted = if signal == "-INT" { 130 } else { 143 };
+    assert_eq!(code, Some(wanted), "{stderr}");
+    assert!(elapsed < within, "{elapsed:?}: {stderr}");
+    assert!(stderr.contains("stopped"), "{stderr}");
+    output
+}
+
+/// A folder with a moving load's rig, a locator of it, and its readings in time.
+fn moving_bench() -> TempDir {
+    let folder = folder(Toml::parse(MOVING_LOAD));
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(folder.path(), &["simulate", "rig.toml", "--moving", "-o", "moving.csv"]));
+    folder
+}
+
+#[test]
+fn a_wait_for_input_ends_at_once() {
+    let bench = moving_bench();
+    let folder = bench.path();
+    fs::write(folder.join("load.toml"), LOAD_PROFILE).unwrap();
+    Command::new("mkfifo").arg(folder.join("silent.csv")).status().unwrap();
+    let waiting: [&[&str]; 8] = [
+        &["locate", "locator.json"],
+        &["locate", "locator.json", "--no-header"],
+        &["locate", "locator.json", "silent.csv"],
+        &["track", "locator.json", "--rate", "100 Hz"],
+        &["track", "locator.json", "--rate", "100 Hz", "--smooth"],
+        &["profile", "load.toml", "-"],
+        &["fit", "rig.toml", "--data", "silent.csv", "-o", "never.json"],
+        &["locate", "locator.json", "moving.csv", "--tare", "silent.csv"],
+    ];
+    for arguments in waiting {
+        for signal in ["-INT", "-TERM"] {
+            let child = begin(folder, arguments);
+            std::thread::sleep(Duration::from_millis(400));
+            end(child, signal, WAITING);
+        }
+    }
+    assert!(!folder.join("never.json").exists());
+}
+
+#[test]
+fn a_stream_that_is_stopped_keeps_what_it_has_told() {
+    let bench = moving_bench();
+    let folder = bench.path();
+    let csv = fs::read_to_string(folder.join("moving.csv")).unwrap();
+    let lines: Vec<&str> = csv.lines().take(42).collect();
+    for (arguments, signal) in [
+        (&["locate", "locator.json"][..], "-INT"),
+        (&["locate", "locator.json", "--json"], "-TERM"),
+        (&["track", "locator.json"], "-INT"),
+        (&["track", "locator.json"], "-TERM"),
+        (&["track", "locator.json", "--json"], "-INT"),
+    ] {
+        let mut child = begin(folder, arguments);
+        let mut stdin = child.stdin.take().unwrap();
+        writeln!(stdin, "{}", lines.join("\n")).unwrap();
+        child.stdin = Some(stdin);
+        let mut told = BufReader::new(child.stdout.take().unwrap()).lines();
+        let heading = usize::from(!arguments.contains(&"--json"));
+        // A comment and a header are no readings.
+        for _ in 0..heading + 40 {
+            assert!(!told.next().unwrap().unwrap().is_empty());
+        }
+        let stopped = end(child, signal, WAITING);
+        assert!(String::from_utf8_lossy(&stopped.stderr).contains("stopped after line 42"), "{stopped:?}");
+        assert!(told.next().is_none());
+    }
+}
+
+#[test]
+fn what_came_before_a_signal_is_smoothed_and_reported() {
+    let bench = moving_bench();
+    let folder = bench.path();
+    let csv = fs::read_to_string(folder.join("moving.csv")).unwrap();
+    let mut child = begin(folder, &["track", "locator.json", "--smooth", "--report", "report"]);
+    let mut stdin = child.stdin.take().unwrap();
+    writeln!(stdin, "{}", csv.lines().take(42).collect::<Vec<_>>().join("\n")).unwrap();
+    child.stdin = Some(stdin);
+    std::thread::sleep(Duration::from_millis(1500));
+    let stopped = end(child, "-INT", COMPUTING);
+    let told = String::from_utf8(stopped.stdout).unwrap();
+    assert_eq!(told.lines().count(), 41, "{told}");
+    assert!(folder.join("report/report.html").exists());
+}
+
+#[test]
+fn work_ends_within_a_second() {
+    let bench = folder(Toml::parse(NOISY_BEAM).set("sensors.count", 40));
+    let folder = bench.path();
+    fs::write(folder.join("plate.toml"), PLATE).unwrap();
+    let long: [&[&str]; 5] = [
+        &["design", "sensors", "rig.toml", "--counts", "2..40", "--verify", "50"],
+        &["design", "positions", "rig.toml", "--trials", "100000", "--verify", "1000"],
+        &["compare", "rig.toml", "--calibrations", "5000"],
+        &["evaluate", "rig.toml", "--folds", "5"],
+        &["limit", "plate.toml", "--every", "1 mm"],
+    ];
+    for (arguments, signal) in long.into_iter().zip(["-INT", "-TERM"].into_iter().cycle()) {
+        let mut child = begin(folder, arguments);
+        std::thread::sleep(Duration::from_millis(700));
+        // Where it was done before, there is nothing to be seen.
+        if child.try_wait().unwrap().is_none() {
+            end(child, signal, COMPUTING);
+        }
+    }
+}
