@@ -1,7 +1,8 @@
 //! Bytes of a file or of stdin as they come. A signal ends the wait for them.
 
 use crate::failure::{Complaint, Failure};
-use crate::{output::remark, progress};
+use crate::progress;
+use crate::remark::remark;
 use std::fs::File;
 use std::io::{self, IsTerminal, Read};
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::input;
-use crate::output::remark;
 use crate::progress::duration;
+use crate::remark::remark;
 use palpate_estimators::estimator::{Estimator, FitCost, contenders};
 use palpate_estimators::recording::Recording;
 use palpate_estimators::setup::Setup;
@@ -70,7 +70,7 @@ impl MemoryLimit {
         if most_s > NOTICEABLE_WORK_S || bytes > NOTICEABLE.memory_bytes {
             let [least, most] = [least_s, most_s].map(duration);
             let time = if least == most { most } else { format!("{least} to {most}") };
-            eprintln!("{what} will take some {time} and {} of memory", size(bytes));
+            remark!("{what} will take some {time} and {} of memory", size(bytes));
         }
         Ok(())
     }

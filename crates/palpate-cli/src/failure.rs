@@ -1,7 +1,7 @@
 //! Failure of a command: a message with its place, and an exit code.
 
-use crate::output::remark;
 use crate::progress;
+use crate::remark::remark;
 use miette::{
     Diagnostic, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents,
 };

@@ -2,7 +2,7 @@
 
 use crate::chunks::Chunks;
 use crate::failure::{Complaint, Failure};
-use crate::output::remark;
+use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, LocatorFileError};
 use palpate_estimators::recording::{CsvError, Recording};
 use palpate_estimators::setup::Setup;

@@ -6,7 +6,7 @@
 //! $ palpate evaluate locator.json --data presses.csv --out report
 //! ```
 #![forbid(unsafe_code)]
-// These macros panic where nobody listens; `output` has others.
+// These macros panic where nobody listens; `remark` and `output` have others.
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod chunks;
@@ -18,6 +18,7 @@ mod json;
 mod lines;
 mod output;
 mod progress;
+mod remark;
 mod tables;
 mod tare;
 mod target;

@@ -15,17 +15,6 @@ pub fn say_report(before: &str, folder: Option<&Path>) -> Result<(), Failure> {
     }
 }
 
-/// Prints a line on stderr. Where nobody can be told there is nobody to tell: work does not end for a remark.
-macro_rules! remark {
-    ($($words:tt)*) => { $crate::output::print_remark(format_args!($($words)*)) };
-}
-pub(crate) use remark;
-
-/// What [`remark`] does.
-pub fn print_remark(words: std::fmt::Arguments) {
-    let _ = std::io::stderr().lock().write_all(format!("{words}\n").as_bytes());
-}
-
 /// Prints a line on stdout.
 pub fn say(line: impl Display) -> Result<(), Failure> {
     print(&mut std::io::stdout().lock(), format!("{line}\n").as_bytes())

@@ -1,6 +1,6 @@
 //! Long work as people see it: on a terminal a bar with rate and time left, in a pipe nothing; and Ctrl-C, which stops it.
 
-use crate::output::remark;
+use crate::remark::remark;
 use indicatif::{ProgressBar, ProgressStyle};
 use palpate_numerics::watch::{Progress, Watch};
 use std::error::Error;

@@ -3,8 +3,8 @@
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::lines::{Lines, Readings, Records};
-use crate::output::remark;
 use crate::progress::Observer;
+use crate::remark::remark;
 use palpate_estimators::estimator::{Locator, Status, Tare, TareError, take_off_drift};
 use palpate_estimators::evaluation::Split;
 use palpate_estimators::fit::{FitTask, Locate};

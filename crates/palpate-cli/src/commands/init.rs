@@ -1,7 +1,7 @@
 //! `palpate init`: a first rig for somebody's own recording.
 
 use crate::failure::{Complaint, Failure};
-use crate::output::remark;
+use crate::remark::remark;
 use crate::target::{Inputs, Target};
 use crate::{input, output};
 use palpate_estimators::recording::{Decimal, Separator};

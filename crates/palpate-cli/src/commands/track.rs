@@ -4,7 +4,7 @@ use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
 use crate::lines::{DialectNote, Lines, Records, check_first_length, check_first_line};
 use crate::output::Table;
-use crate::output::remark;
+use crate::remark::remark;
 use crate::tare::{Taken, TareOption, Taring};
 use crate::target::{Inputs, TargetFolder};
 use crate::{input, output};

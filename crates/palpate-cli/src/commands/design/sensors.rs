@@ -5,9 +5,9 @@ use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input;
 use crate::json::{Object, fields, object};
-use crate::output::remark;
 use crate::output::{self, Table, figure};
 use crate::progress::Observer;
+use crate::remark::remark;
 use crate::target::{Inputs, Target, TargetFolder};
 use palpate_design::sensors::{
     Assessment, CountPoint, DesignCriterion, DesignError, Designed, Method, SensorDesign, SensorProblem,

@@ -3,7 +3,7 @@
 //! The file grows as fits are finished, survives Ctrl-C, and is sorted at the end.
 
 use crate::failure::{Complaint, Failure};
-use crate::output::remark;
+use crate::remark::remark;
 use crate::target::{NETWORKS_CSV, RESULTS_JSON, TargetFolder};
 use crate::{input, progress, target};
 use indicatif::ProgressBar;

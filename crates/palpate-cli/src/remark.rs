@@ -1,0 +1,14 @@
+//! Remarks on stderr.
+
+use std::io::Write;
+
+/// Prints a line on stderr. Where nobody can be told there is nobody to tell: work does not end for a remark.
+macro_rules! remark {
+    ($($words:tt)*) => { $crate::remark::print_remark(format_args!($($words)*)) };
+}
+pub(crate) use remark;
+
+/// What [`remark`] does.
+pub fn print_remark(words: std::fmt::Arguments) {
+    let _ = std::io::stderr().lock().write_all(format!("{words}\n").as_bytes());
+}
