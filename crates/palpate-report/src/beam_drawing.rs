@@ -44,19 +44,19 @@ const NUMBER_SIZE: f64 = 11.0;
 const DIMENSION_LINE: f64 = 30.0;
 const REMARK_LINE: f64 = 26.0;
 
-/// The beam bent by `force_n` newtons, its supports and sensors, as SVG; and where the force is drawn.
-pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (String, Position) {
+/// The beam bent by `force_n` newtons, its supports and sensors; and where the force is drawn.
+pub(super) fn beam_drawing(beam: &Beam, layout: &Layout, force_n: f64) -> (BeamDrawing, Position) {
     let supports = [0.0, beam.length_m()].map(|at_m| (at_m * 1e3, BeamSupportKind::Simple)).to_vec();
     let load = Position::along(DRAWN_LOAD * beam.length_m());
-    (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }.svg(), load)
+    (BeamDrawing { supports, ..BeamDrawing::new(beam, layout, load, force_n) }, load)
 }
 
-/// The beam on any supports, bent by `force_n` newtons, as SVG; and where the force is drawn.
+/// The beam on any supports, bent by `force_n` newtons; and where the force is drawn.
 pub(super) fn supported_beam_drawing(
     beam: &SupportedBeam,
     layout: &Layout,
     force_n: f64,
-) -> (String, Position) {
+) -> (BeamDrawing, Position) {
     let spec = beam.spec();
     let loads = DRAWN_LOADS.map(|share| Position::along(share * spec.length_m));
     let own = |at: &Position| beam.influence(SensorKind::Deflection, *at, *at).abs();
@@ -67,7 +67,7 @@ pub(super) fn supported_beam_drawing(
         steps: spec.sections.iter().map(thickness).collect(),
         ..BeamDrawing::new(beam, layout, load, force_n)
     };
-    (drawing.svg(), load)
+    (drawing, load)
 }
 
 /// Drawing of a loaded beam. Positions are from the left end of the beam; one that a rounding error puts beyond an end is drawn at

@@ -17,7 +17,7 @@ pub(super) fn bench_figure(
     layout: &Layout,
     force_n: f64,
 ) -> Option<Figure> {
-    let ((svg, load), held, solution) = match surface {
+    let ((drawing, load), held, solution) = match surface {
         SurfaceSpec::Beam(beam) => {
             (beam_drawing(beam, layout, force_n), " on two wedges".to_owned(), "in closed form")
         }
@@ -32,7 +32,7 @@ pub(super) fn bench_figure(
         (what) ": a beam" (held) " and " (counted(layout.len(), "sensor", "sensors")) ", with " (stated(force_n)) " N at "
         (mm(load.x_m)) " mm. Blue: the bent beam, " (solution) "."
     };
-    Some(Figure::new(format!("{what}: beam, supports, sensors and load"), svg, caption))
+    Some(Figure::beam(format!("{what}: beam, supports, sensors and load"), &drawing, caption))
 }
 
 /// Chart of the sensors of some layouts: a named row each, the first uppermost; a marker for each kind of sensor.

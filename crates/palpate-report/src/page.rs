@@ -2,6 +2,8 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::beam_drawing::BeamDrawing;
+use super::drawing::svg::{Colour, IN_THE_DARK};
 use super::numbers::number;
 use super::{Chart, HeatMap, chart_to_svg, heat_map_to_svg};
 
@@ -34,7 +36,7 @@ pub(crate) struct Section {
 
 enum Block {
     Text(Markup),
-    Figure(Option<Figure>),
+    Figure(Figure),
     Table(Table),
 }
 
@@ -47,18 +49,21 @@ impl Section {
         self.block(Block::Text(text))
     }
 
-    /// Adds a figure; one that cannot be drawn leaves its number free, so that the others keep theirs.
+    /// Adds a figure, if there is one.
     pub fn figure(self, figure: impl Into<Option<Figure>>) -> Self {
-        self.block(Block::Figure(figure.into()))
+        match figure.into() {
+            Some(figure) => self.block(Block::Figure(figure)),
+            None => self,
+        }
     }
 
     pub fn figures(self, figures: impl IntoIterator<Item = Figure>) -> Self {
         figures.into_iter().fold(self, Self::figure)
     }
 
-    /// Adds a table; one without rows is not shown and leaves its number free.
+    /// Adds a table, unless it has no rows.
     pub fn table(self, table: Table) -> Self {
-        self.block(Block::Table(table))
+        if table.rows.is_empty() { self } else { self.block(Block::Table(table)) }
     }
 
     fn block(mut self, block: Block) -> Self {
@@ -72,30 +77,48 @@ pub(crate) struct Figure {
     /// Alternative text: what it shows, in a few words, for readers who cannot see it.
     alternative: String,
     svg: String,
+    /// The same for a screen as narrow as a phone's.
+    narrow_svg: String,
     caption: Markup,
 }
 
+/// Width of a drawing on a phone, in pixels.
+const NARROW_PX: u32 = 360;
+/// Greatest height of a chart there.
+const NARROW_HEIGHT_PX: u32 = 420;
+
 impl Figure {
-    pub fn new(alternative: impl Into<String>, svg: String, caption: Markup) -> Self {
-        Self { alternative: alternative.into(), svg, caption }
+    fn new(alternative: impl Into<String>, [svg, narrow_svg]: [String; 2], caption: Markup) -> Self {
+        Self { alternative: alternative.into(), svg, narrow_svg, caption }
     }
 
     pub fn chart(chart: &Chart, caption: Markup) -> Self {
-        Self::new(&chart.title, chart_to_svg(chart), caption)
+        let height_px = chart.height_px.min(NARROW_HEIGHT_PX);
+        let narrow = Chart { width_px: NARROW_PX, height_px, ..chart.clone() };
+        Self::new(&chart.title, [chart, &narrow].map(chart_to_svg), caption)
     }
 
     pub fn map(map: &HeatMap, caption: Markup) -> Self {
-        Self::new(&map.title, heat_map_to_svg(map), caption)
+        let narrow = HeatMap { width_px: NARROW_PX, ..map.clone() };
+        Self::new(&map.title, [map, &narrow].map(heat_map_to_svg), caption)
     }
 
-    /// The drawing stands in the page as it is: it holds no ids that could meet those of another.
+    pub fn beam(alternative: impl Into<String>, drawing: &BeamDrawing, caption: Markup) -> Self {
+        let narrow = BeamDrawing { width_px: NARROW_PX, ..drawing.clone() };
+        Self::new(alternative, [drawing, &narrow].map(BeamDrawing::svg), caption)
+    }
+
+    /// The drawings stand in the page as they are: they hold no ids that could meet those of another.
     fn markup(&self, number: usize) -> Markup {
-        let root = html! { svg role="img" aria-label=(self.alternative) {} }.into_string();
-        let root = root.trim_end_matches("></svg>");
-        let svg = self.svg.replacen("<svg", root, 1);
+        let [wide, narrow] =
+            [("wide-drawing", &self.svg), ("narrow", &self.narrow_svg)].map(|(class, svg)| {
+                let root =
+                    html! { svg class=(class) role="img" aria-label=(self.alternative) {} }.into_string();
+                PreEscaped(svg.replacen("<svg", root.trim_end_matches("></svg>"), 1))
+            });
         html! {
             figure id={ "figure-" (number) } {
-                (PreEscaped(svg))
+                (wide) (narrow)
                 figcaption { b { "Figure " (number) ". " } (self.caption) }
             }
         }
@@ -119,12 +142,12 @@ impl Table {
 
     fn markup(&self, number: usize) -> Markup {
         html! {
-            div.table id={ "table-" (number) } role="region" tabindex="0" aria-label={ "Table " (number) } {
-                table {
-                    caption { b { "Table " (number) ". " } (self.caption) }
+            figure.of-table id={ "table-" (number) } {
+                figcaption id={ "caption-" (number) } { b { "Table " (number) ". " } (self.caption) }
+                div.table role="region" tabindex="0" aria-label={ "Table " (number) } { table aria-describedby={ "caption-" (number) } {
                     thead { tr { @for column in &self.columns { th.(column.class) scope="col" { (column.heading) } } } }
                     tbody { @for row in &self.rows { (self.row(row)) } }
-                }
+                } }
             }
         }
     }
@@ -216,6 +239,17 @@ pub(crate) fn verdict(good: bool, yes: &str, no: &str) -> Markup {
     }
 }
 
+/// Style of drawings in the dark: each of their colours is replaced.
+fn dark_drawings() -> String {
+    let rule = |(light, dark): &(Colour, Colour)| {
+        format!(
+            "figure svg [fill=\"{light}\"] {{ fill: {dark}; }} figure svg [stroke=\"{light}\"] {{ stroke: {dark}; }}\n"
+        )
+    };
+    let rules: String = IN_THE_DARK.iter().map(rule).collect();
+    format!("@media screen and (prefers-color-scheme: dark) {{\n{rules}}}\n")
+}
+
 impl Page {
     /// A page with its title, the items of its summary, and its sections.
     pub fn new(title: impl Into<String>, summary: Markup, sections: Vec<Section>) -> Self {
@@ -240,17 +274,18 @@ impl Page {
         for section in &self.sections {
             let mut body = Vec::new();
             for block in &section.blocks {
-                figures += usize::from(matches!(block, Block::Figure(_)));
-                tables += usize::from(matches!(block, Block::Table(_)));
                 match block {
                     Block::Text(text) => body.push(text.clone()),
-                    Block::Figure(Some(figure)) => {
+                    Block::Figure(figure) => {
+                        figures += 1;
                         body.push(figure.markup(figures));
                         let bytes = figure.svg.clone().into_bytes();
                         drawings.push(ReportFile { name: format!("figure-{figures}.svg"), bytes });
                     }
-                    Block::Table(table) if !table.rows.is_empty() => body.push(table.markup(tables)),
-                    Block::Figure(None) | Block::Table(_) => {}
+                    Block::Table(table) => {
+                        tables += 1;
+                        body.push(table.markup(tables));
+                    }
                 }
             }
             bodies.push(html! {
@@ -270,7 +305,7 @@ impl Page {
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     link rel="icon" href="data:,";
                     title { (self.title) }
-                    style { (PreEscaped(STYLE)) }
+                    style { (PreEscaped(STYLE)) (PreEscaped(dark_drawings())) }
                 }
                 body {
                     header { h1 { (self.title) } (self.lead) @if !self.summary.0.is_empty() { div.summary { ul { (self.summary) } } } }

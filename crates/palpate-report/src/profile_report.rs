@@ -85,7 +85,7 @@ impl<'a> ProfileReport<'a> {
                     }
                     "."
                 }
-                li { a href="#table-1" { (counted(profile.patches.len(), "patch", "patches")) } "." }
+                li { a href="#profile" { (counted(profile.patches.len(), "patch", "patches")) } "." }
             }
         }
     }

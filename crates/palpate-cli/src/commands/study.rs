@@ -220,8 +220,11 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
     output::say("Medians over the seeds (5th to 95th percentile)\n")?;
     output::say(arms_table(&file.results.arms))?;
     if let Some(figures) = &file.published {
-        let Agreement { agreeing, compared } = Agreement::new(figures);
-        output::say(format!("\nPublished against replicated: {agreeing} of {compared} agree\n"))?;
+        let Agreement { agreeing, within_seeds, compared } = Agreement::new(figures);
+        output::say(format!(
+            "\nPublished against replicated: {agreeing} of {compared} agree with our medians, as far as was fixed beforehand; \
+             {within_seeds} lie within 5–95 % of our seeds\n"
+        ))?;
         let show = |figure: &PublishedFigure, value: f64| {
             if figure.found.median >= 1000.0 { whole(value) } else { format!("{value:.2}") }
         };
@@ -230,7 +233,11 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
                 .column("figure", |figure| format!("{}: {}", figure.arm, figure.what))
                 .column("published", |figure| show(figure, figure.published))
                 .column("ours", |figure| in_words(figure.found, |value| show(figure, value)))
-                .column("agrees", |figure| if figure.agrees { "yes" } else { "NO" }.to_owned()),
+                .column("agrees if within", |figure| {
+                    figure.yardstick.in_words(&show(figure, figure.published))
+                })
+                .column("agrees", |figure| yes_or_no(figure.agrees))
+                .column("in 5–95 %", |figure| yes_or_no(figure.within_seeds)),
         )?;
     }
     if let Some(claims) = &file.claims {
@@ -251,6 +258,10 @@ fn print_tables(file: &ResultsFile, out: &Path) -> Result<(), Failure> {
         format!("\n{seconds} on {} threads", run.threads)
     })?;
     output::say_report("", Some(out))
+}
+
+fn yes_or_no(holds: bool) -> String {
+    if holds { "yes" } else { "NO" }.to_owned()
 }
 
 /// Table of the arms; a column only where some arm fills it.

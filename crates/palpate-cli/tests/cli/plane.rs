@@ -21,7 +21,7 @@ fn the_limit_of_the_plate_is_a_table_and_a_map() {
     insta::assert_snapshot!(words);
     let mut written = files(&folder.path().join("report"));
     written.retain(|name| !name.ends_with(".png"));
-    assert_eq!(written, ["figure-2.svg", "limit.csv", "report.html"]);
+    assert_eq!(written, ["figure-1.svg", "limit.csv", "report.html"]);
     let found = json(folder.path(), &["limit", "rig.toml", "--every", "50 mm"]);
     assert_eq!(found["positions"].as_array().unwrap().len(), 25);
 }

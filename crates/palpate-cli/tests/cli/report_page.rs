@@ -52,7 +52,7 @@ fn a_browser_finds_no_fault_with_the_pages() {
         let page = folder.path().join("report.html");
         let report = files.iter().find(|file| file.name == "report.html").unwrap();
         fs::write(&page, &report.bytes).unwrap();
-        for width in [400, 1200] {
+        for width in [390, 800, 1400] {
             let Some(seen) = measure(&page, width) else { return };
             assert_eq!(seen.width, width);
             assert!(seen.content_width <= width, "{} px at {width} px", seen.content_width);

@@ -22,6 +22,8 @@ const GAP: f64 = 18.0;
 const BAR_WIDTH: f64 = 16.0;
 /// Room for the labels of the colour bar.
 const BAR_LABELS: f64 = 54.0;
+/// Least width of one map beside another.
+const LEAST_WIDTH: f64 = 120.0;
 /// Greatest height of one map.
 const MOST_HEIGHT: f64 = 420.0;
 /// Cells overlap by this much, or a line of background would show between them.
@@ -123,6 +125,7 @@ impl Layout {
             _ => 3,
         };
         let room = width - 2.0 * MARGIN - BAR_LABELS - BAR_WIDTH - GAP;
+        let columns = columns.min((room / (LEAST_WIDTH + GUTTER + GAP)) as usize).max(1);
         let each = room / columns as f64 - GUTTER - GAP;
         let [length_mm, width_mm] = sides_mm(map);
         let aspect = width_mm / length_mm;

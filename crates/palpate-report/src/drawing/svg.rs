@@ -33,6 +33,23 @@ const PALETTE: [Colour; 7] = [
     BLACK,
 ];
 
+/// Every colour of a drawing, and the one that takes its place on a dark page. Colours of a map's values are the same on both.
+pub(crate) const IN_THE_DARK: [(Colour, Colour); 13] = [
+    (INK, Colour::opaque(227, 230, 232)),
+    (QUIET_INK, Colour::opaque(176, 182, 187)),
+    (REFERENCE, Colour::opaque(150, 158, 164)),
+    (GRID, Colour::opaque(52, 58, 64)),
+    (MINOR_GRID, Colour::opaque(34, 39, 43)),
+    (WHITE, Colour::opaque(22, 25, 28)),
+    (BLACK, Colour::opaque(242, 242, 242)),
+    (PALETTE[0], Colour::opaque(64, 144, 216)),
+    (PALETTE[1], Colour::opaque(255, 134, 61)),
+    (PALETTE[2], Colour::opaque(47, 199, 154)),
+    (PALETTE[3], Colour::opaque(227, 154, 196)),
+    (PALETTE[4], Colour::opaque(158, 218, 255)),
+    (PALETTE[5], Colour::opaque(255, 200, 87)),
+];
+
 /// The colour with that index; the palette starts over at its end.
 pub(crate) fn palette(index: usize) -> Colour {
     PALETTE[index % PALETTE.len()]
@@ -198,4 +215,38 @@ fn escaped(text: &str) -> String {
         }
     }
     escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast of two colours (WCAG 2.2, section 1.4.3).
+    fn contrast(a: Colour, b: Colour) -> f64 {
+        let linear = |value: u8| {
+            let value = f64::from(value) / 255.0;
+            if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+        };
+        let luminance = |colour: Colour| {
+            let [r, g, b] = colour.rgb.map(linear);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+        if a > b { a / b } else { b / a }
+    }
+
+    #[test]
+    fn drawings_are_read_in_the_dark() {
+        let dark =
+            |colour: Colour| IN_THE_DARK.iter().find(|(light, _)| *light == colour).expect("it has one").1;
+        for text in [INK, QUIET_INK, REFERENCE] {
+            assert!(contrast(dark(text), dark(WHITE)) > 4.5, "{text}");
+        }
+        for colour in PALETTE {
+            assert!(contrast(dark(colour), dark(WHITE)) > 4.5, "{colour}");
+        }
+        for grid in [GRID, MINOR_GRID] {
+            assert!(contrast(dark(grid), dark(WHITE)) < 2.0, "{grid}");
+        }
+    }
 }

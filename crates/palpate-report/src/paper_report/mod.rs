@@ -102,17 +102,19 @@ impl Paper<'_> {
     }
 
     fn agreement(&self) -> Markup {
-        let Agreement { agreeing, compared } = Agreement::new(&self.published);
+        let Agreement { agreeing, within_seeds, compared } = Agreement::new(&self.published);
         html! {
             @if compared == 0 {
                 "No arm with a published figure was run, so nothing is compared."
             } @else if agreeing == compared {
                 "All of the " a href="#published" { (counted(compared, "published figure", "published figures")) }
-                " with an arm here agree with the medians found here."
+                " with an arm here agree with the medians found here, as far as was fixed beforehand; " (within_seeds)
+                " lie within 5–95 % of the seeds."
             } @else {
                 b { (agreeing) " of " (counted(compared, "published figure", "published figures")) } " "
-                a href="#published" { "agree with the medians found here" } "; "
-                a href="#not-replicated" { "those that do not are listed" } "."
+                a href="#published" { "agree with the medians found here" } ", as far as was fixed beforehand; " b { (within_seeds) }
+                " lie within 5–95 % of the seeds. "
+                a href="#not-replicated" { "Those that do not agree are listed" } "."
             }
         }
     }

@@ -25,6 +25,15 @@ impl Yardstick {
             Self::Below => median < published,
         }
     }
+
+    /// The yardstick in words, of a published figure that is written so: "±0.6 points".
+    pub fn in_words(self, published: &str) -> String {
+        match self {
+            Self::Within(difference) => format!("±{difference} points"),
+            Self::Factor(factor) => format!("a factor of {factor}"),
+            Self::Below => format!("below {published}"),
+        }
+    }
 }
 
 /// Quantity that a published figure measures.
@@ -110,15 +119,19 @@ pub struct PublishedFigure {
     pub found: Quantiles,
     /// Yardstick of agreement.
     pub yardstick: Yardstick,
-    /// Whether our median agrees.
+    /// Whether our median agrees by the yardstick.
     pub agrees: bool,
+    /// Whether the published figure lies between the 5th and 95th percentile of our seeds; of a bound, whether the 5th keeps it.
+    pub within_seeds: bool,
 }
 
-/// Number of published figures that agree, and of all.
+/// Number of published figures that agree by either yardstick, and of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Agreement {
-    /// Number that agrees.
+    /// Number of those near which our medians are.
     pub agreeing: usize,
+    /// Number of those within the 5–95 % of our seeds.
+    pub within_seeds: usize,
     /// Number of all.
     pub compared: usize,
 }
@@ -126,7 +139,13 @@ pub struct Agreement {
 impl Agreement {
     /// Counts.
     pub fn new(figures: &[PublishedFigure]) -> Self {
-        Self { agreeing: figures.iter().filter(|figure| figure.agrees).count(), compared: figures.len() }
+        let count =
+            |holds: fn(&PublishedFigure) -> bool| figures.iter().filter(|figure| holds(figure)).count();
+        Self {
+            agreeing: count(|figure| figure.agrees),
+            within_seeds: count(|figure| figure.within_seeds),
+            compared: figures.len(),
+        }
     }
 }
 
@@ -137,8 +156,10 @@ pub fn published_figures(results: &StudyResults) -> Vec<PublishedFigure> {
         let (key, what) = figure.name();
         let yardstick = figure.yardstick(published);
         let agrees = yardstick.accepts(published, found.median);
+        let within_seeds =
+            found.p05 <= published && (yardstick == Yardstick::Below || published <= found.p95);
         let id = format!("{arm}.{key}");
-        Some(PublishedFigure { id, arm, what, published, found, yardstick, agrees })
+        Some(PublishedFigure { id, arm, what, published, found, yardstick, agrees, within_seeds })
     };
     PUBLISHED.iter().filter_map(beside).collect()
 }

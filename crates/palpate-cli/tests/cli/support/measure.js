@@ -10,6 +10,7 @@
 
   const outside = /^\s*(https?:)?\/\//i;
   const head = (element) => element.outerHTML.slice(0, 120);
+  const isShown = (element) => getComputedStyle(element).display !== "none";
   const every = (selector) => Array.from(document.querySelectorAll(selector));
   const reference = (element, name) => element.getAttribute(name) ?? element.getAttributeNS("http://www.w3.org/1999/xlink", name) ?? "";
 
@@ -31,7 +32,10 @@
     errors,
     width: document.documentElement.clientWidth,
     content_width: document.documentElement.scrollWidth,
-    empty_pictures: every("img, svg").filter((it) => !it.parentElement.closest("svg") && isEmpty(it)).map(head),
+    // A figure may hold its picture for a phone too; it shows one of the two.
+    empty_pictures: every("img, svg").filter((it) => !it.parentElement.closest("svg") && isShown(it) && isEmpty(it))
+      .concat(every("figure:has(svg)").filter((it) => Array.from(it.querySelectorAll(":scope > svg")).filter(isShown).length !== 1))
+      .map(head),
     outside_loads: [
       ...every("*").filter(loadsFromOutside).map(head),
       ...every("style").filter((it) => styleLoadsFromOutside(it.textContent)).map(head),
