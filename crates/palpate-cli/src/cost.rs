@@ -17,7 +17,7 @@ pub struct MemoryLimit {
 }
 
 /// A fit that takes longer, or more memory, is announced.
-const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 20.0 };
+const NOTICEABLE: FitCost = FitCost { memory_bytes: 500e6, seconds: 5.0 };
 
 /// The same of other work, in seconds, which is short as a rule.
 const NOTICEABLE_WORK_S: f64 = 3.0;

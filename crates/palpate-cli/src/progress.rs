@@ -64,16 +64,23 @@ pub fn interrupted_code() -> u8 {
     }
 }
 
-/// A bar of `length` steps on stderr.
+/// A bar on stderr, and the time so far where nobody knows how long work will be.
+const OF_LENGTH: &str = "{msg} {wide_bar} {pos}/{len}  {prefix}";
+const OF_ANY_LENGTH: &str = "{msg} {spinner} {prefix} {elapsed} so far";
+
+/// A bar of `length` steps on stderr, of which 0 says that nobody knows.
 pub fn bar(length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
-    let template = "{msg} {wide_bar} {pos}/{len}  {prefix}";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
+    set_template(&bar, if length == 0 { OF_ANY_LENGTH } else { OF_LENGTH });
     bar.set_message(what.to_owned());
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
+}
+
+fn set_template(bar: &ProgressBar, template: &str) {
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
 }
 
 /// Observer of long work: shows a bar on a terminal, and stops the work at Ctrl-C.
@@ -92,7 +99,7 @@ struct State {
 const STAGE_STEPS: f64 = 1000.0;
 
 impl Observer {
-    /// Observer of an iteration of at most so many rounds.
+    /// Observer of an iteration of at most so many rounds, of which 0 says that nobody knows.
     pub fn of_rounds(most: u64) -> Self {
         Self::new(bar(most, "fitting"))
     }
@@ -127,11 +134,17 @@ impl Observer {
         const EVERY: u64 = 64;
         state.rounds += 1;
         // Rounds within a stage do not move its bar.
-        if state.stage.is_empty() && state.rounds.is_multiple_of(EVERY) {
-            self.bar.set_position(state.rounds);
-            let rate = state.rounds as f64 / state.start.elapsed().as_secs_f64();
-            let most = duration(self.bar.length().unwrap_or(0).saturating_sub(state.rounds) as f64 / rate);
-            self.bar.set_prefix(format!("{rate:.0} epochs/s, at most {most} left"));
+        if !state.stage.is_empty() || !state.rounds.is_multiple_of(EVERY) {
+            return;
+        }
+        match self.bar.length() {
+            None | Some(0) => self.bar.set_prefix(format!("{} steps,", state.rounds)),
+            Some(length) => {
+                self.bar.set_position(state.rounds);
+                let rate = state.rounds as f64 / state.start.elapsed().as_secs_f64();
+                let most = duration(length.saturating_sub(state.rounds) as f64 / rate);
+                self.bar.set_prefix(format!("{rate:.0} epochs/s, at most {most} left"));
+            }
         }
     }
 
@@ -162,6 +175,7 @@ impl Observer {
             self.bar.set_position(0);
             self.bar.set_prefix("");
             self.bar.set_length(length);
+            set_template(&self.bar, OF_LENGTH);
             self.bar.set_message(name);
         }
     }

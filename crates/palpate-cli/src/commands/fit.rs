@@ -5,7 +5,7 @@ use crate::cost::MemoryLimit;
 use crate::failure::{Complaint, Failure};
 use crate::input::RecordingFiles;
 use crate::json::object;
-use crate::progress::{self, Observer};
+use crate::progress::Observer;
 use crate::remark::remark;
 use crate::tare::say_drift;
 use crate::target::{Inputs, Target};
@@ -15,7 +15,6 @@ use palpate_estimators::fit::{Fit, FitTask};
 use palpate_estimators::network::{TrainingOutcome, TrainingStatus};
 use palpate_estimators::recording::Recording;
 use palpate_mechanics::units::{format_count, format_length_mm};
-use palpate_numerics::watch::Watch;
 use palpate_rig::Rig;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -101,9 +100,10 @@ fn decided(mut rig: Rig, recording: &Recording, arguments: &Arguments) -> Result
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
     let limit = TimeLimit { clock: &clock, seconds: f64::from(arguments.auto_seconds) };
-    let go_on = |_| !progress::interrupted();
-    let task = FitTask::new(&rig.setup, recording).seed(arguments.seed).watch(Watch::new(&go_on));
-    let choice = choose(task, Some(limit)).map_err(|error| Failure::from_error(&error))?;
+    let task = FitTask::new(&rig.setup, recording).seed(arguments.seed);
+    let choice = Observer::of_stages()
+        .watch(|watch| choose(task.watch(watch), Some(limit)))
+        .map_err(|error| Failure::from_error(&error))?;
     if let Some(spans) = &choice.drift {
         say_drift(&rig.setup, spans);
     }

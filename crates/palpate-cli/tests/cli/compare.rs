@@ -90,7 +90,9 @@ fn auto_takes_the_best_and_says_why() {
     let folder = folder(Toml::parse(NOISY_BEAM).set("training.repeats", 2));
     with_estimator(folder.path(), "auto");
     let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json"]);
-    let why = String::from_utf8(fitted.stderr.clone()).unwrap();
+    let told = String::from_utf8(fitted.stderr.clone()).unwrap();
+    let (cost, why) = told.split_once('\n').unwrap();
+    assert!(cost.starts_with("auto: the fit will take at most some "), "{told}");
     let rows: Vec<Vec<&str>> = why.lines().skip(2).map(|line| line.split_whitespace().collect()).collect();
     let number = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
     let scores: Vec<f64> = rows.iter().map(|row| number(row, 1) * number(row, 3)).collect();
@@ -107,7 +109,7 @@ fn auto_leaves_out_what_is_not_done_in_time() {
     with_estimator(folder.path(), "auto");
     let fitted = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "0"]);
     let why = String::from_utf8(fitted.stderr.clone()).unwrap();
-    assert!(why.starts_with("auto: influence,"), "{why}");
+    assert!(why.contains("\nauto: influence,"), "{why}");
     assert!(why.contains("network              left out: it was not done in time"), "{why}");
     let refused = run(folder.path(), &["fit", "other.toml", "-o", "locator.json", "--auto-seconds", "-1"]);
     assert_eq!(refused.status.code(), Some(2));

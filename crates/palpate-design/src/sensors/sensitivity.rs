@@ -197,8 +197,9 @@ impl Sensitivity<'_> {
             candidates,
             memory_bytes: table + readings + solution.map_or(0.0, |cost| cost.memory_bytes),
             seconds: sums * SECONDS_EACH
-                + solution
-                    .map_or(0.0, |cost| (solutions as f64 + REFINING * count as f64) * cost.seconds_each),
+                + solution.map_or(0.0, |cost| {
+                    cost.seconds_once + (solutions as f64 + REFINING * count as f64) * cost.seconds_each
+                }),
         }
     }
 

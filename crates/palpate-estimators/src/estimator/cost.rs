@@ -1,15 +1,18 @@
 //! The cost of a fit, before it is begun: memory and time by the sizes of what each method factors and tabulates.
 //!
-//! Times are for one core of some 3 GHz, to within a factor of a few; memory to within a half.
+//! Times are for one core of some 3 GHz. Where a fit takes a second or more, both are to be within a factor of two; `cargo bench -p palpate
+//! --bench cost` measures them, and docs/measured.md has what it found.
 
 use super::{CHOICE_FOLDS, Estimator};
+use crate::features::FeatureKind;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
-use crate::influence::{Influence, Structure, force_linear, learning};
+use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
+use crate::network::LevenbergMarquardt;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::{neighbours, network};
-use palpate_mechanics::surface::Extent;
-use palpate_numerics::regression::{INDUCING, MOST_EVALUATIONS, MOST_EXACT};
+use palpate_mechanics::surface::{Extent, SolutionCost, Solving, Surface};
+use palpate_numerics::regression::{INDUCING, MOST_EXACT};
 use std::collections::HashSet;
 
 /// Memory and time that a fit will take.
@@ -29,8 +32,12 @@ impl FitCost {
 
 /// Size of an f64.
 const NUMBER: f64 = 8.0;
-/// Multiply-adds of a matrix product in a second.
-const PRODUCTS: f64 = 5e9;
+/// Multiply-adds of a product of large matrices in a second.
+const PRODUCTS: f64 = 12e9;
+/// Those of narrow ones.
+const NARROW: f64 = 5e9;
+/// Those of a triangular solution for one vector.
+const SOLVED: f64 = 2e9;
 /// Those of loops over what does not fit into the cache.
 const LOOPS: f64 = 1e9;
 
@@ -50,7 +57,11 @@ impl Estimator {
         let sizes = Sizes::new(setup, recording);
         let own = match self {
             Self::GaussianProcess(process) => {
-                sizes.process(sizes.rows, sizes.channels + 1.0, 2.0, process.search_points)
+                let cost = sizes.process(sizes.rows, sizes.channels + 1.0, 2.0, process.search_points);
+                // Of readings and of their logarithms, where they have them.
+                let twice =
+                    process.features.is_none() && FeatureKind::logarithms_for(setup, recording).is_some();
+                FitCost { seconds: if twice { 2.0 } else { 1.0 } * cost.seconds, ..cost }
             }
             Self::Influence(influence) => sizes.influence(influence, setup, recording),
             Self::Neighbours(_) => FitCost {
@@ -59,25 +70,19 @@ impl Estimator {
                     / LOOPS,
             },
             Self::Network(network) => {
+                /// Seconds of a node's activation, and of a weight's use and change, in a presentation.
+                const NODE_SECONDS: f64 = 24e-9;
+                const WEIGHT_SECONDS: f64 = 0.7e-9;
                 let nodes = network.hidden.iter().sum::<usize>() as f64;
                 let weights = nodes * (sizes.channels + 3.0);
+                let presentations =
+                    f64::from(network.training.most_epochs(recording.rows.len())) * sizes.rows;
                 FitCost {
                     memory_bytes: 3.0 * NUMBER * sizes.rows * (sizes.channels + 2.0),
-                    seconds: f64::from(network.training.most_epochs(recording.rows.len()))
-                        * sizes.rows
-                        * weights
-                        / LOOPS,
+                    seconds: presentations * (nodes * NODE_SECONDS + weights * WEIGHT_SECONDS),
                 }
             }
-            Self::NetworkLm(levenberg) => {
-                let weights = levenberg.hidden.iter().sum::<usize>() as f64 * (sizes.channels + 3.0);
-                let steps = 2.0 * levenberg.ensemble as f64 * f64::from(levenberg.max_iterations);
-                let rows = sizes.rows.min(network::MOST_PRESSES as f64);
-                FitCost {
-                    memory_bytes: 3.0 * NUMBER * (sizes.rows * sizes.channels + 2.0 * rows * weights),
-                    seconds: steps * 2.0 * rows * weights * weights / PRODUCTS,
-                }
-            }
+            Self::NetworkLm(levenberg) => sizes.network_lm(levenberg, setup, recording),
             Self::ClosedForm(_) | Self::Digit(_) | Self::Centroid(_) => {
                 FitCost { memory_bytes: 0.0, seconds: sizes.rows * sizes.channels * 1e-6 }
             }
@@ -91,7 +96,7 @@ impl Estimator {
                 })
             }
         };
-        own.and(FitCost { memory_bytes: 3.0 * sizes.rows * (NUMBER * sizes.channels + 120.0), seconds: 0.0 })
+        own.and(FitCost { memory_bytes: sizes.rows * (NUMBER * sizes.channels + 120.0), seconds: 0.0 })
     }
 }
 
@@ -114,22 +119,42 @@ impl Sizes {
         }
     }
 
+    /// Networks by Levenberg–Marquardt: steps over Jacobians of every output, and curvatures that are factored and inverted.
+    fn network_lm(&self, levenberg: &LevenbergMarquardt, setup: &Setup, recording: &Recording) -> FitCost {
+        let [inputs, outputs] = network::network_size(setup, recording).unwrap_or([0, 0]);
+        let widths: Vec<usize> =
+            std::iter::once(inputs).chain(levenberg.hidden.iter().copied()).chain([outputs]).collect();
+        let weights = widths.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum::<usize>() as f64;
+        let steps = 2.0 * levenberg.ensemble as f64 * f64::from(levenberg.max_iterations);
+        let rows = self.rows.min(network::MOST_PRESSES as f64);
+        // The first output's Jacobian, others that join it in the cache, and the curvature.
+        let products = 0.5 * (1.0 + outputs as f64) * rows * weights * weights + 1.5 * weights.powi(3);
+        FitCost {
+            memory_bytes: 3.0 * NUMBER * (self.rows * self.channels + outputs as f64 * rows * weights),
+            seconds: steps * products / NARROW,
+        }
+    }
+
     /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
     fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
+        /// Evaluations of the evidence, each a factor and an inverse, that a search takes as a rule; and seconds that a coordinate of two points takes in all of them.
+        const EVALUATIONS: f64 = 20.0;
+        const PAIR_SECONDS: f64 = 1e-7;
         let searched = points.min(search_points as f64);
-        // Each a factor and an inverse.
-        let search = MOST_EVALUATIONS as f64 * 2.0 * searched.powi(3) / PRODUCTS;
+        let search =
+            EVALUATIONS * searched.powi(3) / NARROW + PAIR_SECONDS * searched * searched * coordinates;
         let rows = 4.0 * NUMBER * points * (coordinates + outputs);
+        let of_search = 4.0 * searched * searched;
         if points <= MOST_EXACT as f64 {
             return FitCost {
-                memory_bytes: rows + NUMBER * (3.0 * points * points + 4.0 * searched * searched),
+                memory_bytes: rows + NUMBER * of_search.max(1.1 * points * points),
                 seconds: search + points.powi(3) / 3.0 / PRODUCTS + points * points * 4e-9,
             };
         }
         let kept = INDUCING as f64;
         FitCost {
-            memory_bytes: rows + NUMBER * (10.0 * kept * kept + 4096.0 * kept),
-            seconds: search + points * (1.5 * kept * kept / PRODUCTS + kept * 4e-9) + kept * kept * 4e-6,
+            memory_bytes: rows + NUMBER * of_search.max(2.0 * kept * kept + 512.0 * kept),
+            seconds: search + points * (kept * kept / PRODUCTS + kept * 4e-9) + kept * kept * 2e-6,
         }
     }
 
@@ -137,9 +162,10 @@ impl Sizes {
         let extent = setup.surface().extent();
         let is_free = influence.structure == Structure::Free
             || self.nuisances > 0
-            || recording.rows.iter().any(|row| row.force_n.is_none());
-        if setup.surface().model().is_some() {
-            return self.over_a_model(extent);
+            || recording.rows.iter().any(|row| row.force_n.is_none())
+            || recording.rows.windows(2).all(|rows| rows[0].force_n == rows[1].force_n);
+        if let Some(surface) = setup.surface().model() {
+            return self.over_a_model(surface);
         }
         if !is_free {
             return self.force_linear(extent);
@@ -164,28 +190,41 @@ impl Sizes {
         process.and(FitCost { memory_bytes: 0.0, ..process }).and(table)
     }
 
-    /// Influence functions that are learnt over those of a model.
-    fn over_a_model(&self, extent: Extent) -> FitCost {
+    /// Influence functions that are learnt over those of a model: every node of a table is one triangular solution.
+    fn over_a_model(&self, surface: &dyn Surface) -> FitCost {
         let presses = self.presses.min(learning::MOST_LEARNT as f64);
-        let nodes = most_nodes(extent) as f64;
-        FitCost {
-            memory_bytes: NUMBER * (6.0 * presses * presses + nodes * (presses + 4.0 * self.channels)),
-            seconds: self.channels * presses * presses * (presses / 3.0 + nodes / 2.0) / PRODUCTS,
-        }
+        let [nodes, mixed] = sizes_over_a_model(surface.extent());
+        let (nodes, functions) = (nodes as f64, mixed + self.channels as usize);
+        let solution = surface.solution_cost(functions, Solving::BySensor);
+        let learnt = FitCost {
+            memory_bytes: NUMBER * (4.0 * presses * presses + nodes * (presses + mixed as f64)),
+            seconds: self.channels
+                * (presses.powi(3) / 3.0 / NARROW + nodes * presses * presses / 2.0 / SOLVED),
+        };
+        solution.map_or(learnt, |SolutionCost { memory_bytes, seconds_once, seconds_each }| {
+            learnt.and(FitCost { memory_bytes, seconds: seconds_once + functions as f64 * seconds_each })
+        })
     }
 
-    /// Influence functions of presses with forces: two priors are judged, each by as many factors as there are folds, and each channel
-    /// has one of its own; residuals of every press are another.
+    /// Influence functions of presses with forces: hyperparameters are searched, two priors are judged, each by as many factors as there are
+    /// folds, and each channel has one of its own; residuals of every press are another. Few presses are learnt from again without those that
+    /// nothing explains, and with noise by place.
     fn force_linear(&self, extent: Extent) -> FitCost {
+        /// Evaluations of the evidence in a search, and how often few presses are learnt from, as a rule.
+        const EVALUATIONS: f64 = 700.0;
+        const LEARNT: f64 = 2.2;
         let presses = self.presses.min(force_linear::MOST_PRESSES as f64);
+        let learnt = if presses < self.presses { 1.0 } else { LEARNT };
+        let searched = presses.min(force_linear::MOST_SEARCHED as f64);
         let nodes = force_linear::most_nodes(extent) as f64;
         let kept = presses * (1.0 - 1.0 / force_linear::FOLDS as f64);
         let factors = 2.0 * force_linear::FOLDS as f64 * kept.powi(3) / 3.0 + presses.powi(3);
+        let learning = EVALUATIONS * searched.powi(3) / 3.0 / NARROW + factors / PRODUCTS;
         FitCost {
-            memory_bytes: NUMBER * (10.0 * presses * presses + 4.0 * nodes * self.channels)
+            memory_bytes: NUMBER * (7.0 * presses * presses + 4.0 * nodes * self.channels)
                 + 2.0 * NUMBER * self.presses * (2.0 * self.channels + 10.0),
-            seconds: self.channels * (factors + nodes * presses * presses / 2.0) / PRODUCTS
-                + self.presses * presses * 2e-8,
+            seconds: self.channels * (learnt * learning + nodes * presses * presses / 2.0 / PRODUCTS)
+                + self.presses * presses * 5e-8,
         }
     }
 }

@@ -208,11 +208,11 @@ impl Estimator {
         }
     }
 
-    /// The most often that one fit asks whether to go on.
+    /// The most rounds that one fit has; 0 where that is not known before.
     pub fn most_rounds(&self) -> u64 {
         match self {
             Self::Network(config) => u64::from(config.training.max_epochs),
-            _ => 1,
+            _ => 0,
         }
     }
 }
@@ -534,8 +534,11 @@ pub fn choose(task: FitTask, limit: Option<TimeLimit>) -> Result<Choice, FitErro
     let start_s = limit.map_or(0.0, |limit| (limit.clock)());
     let is_over = || limit.is_some_and(|limit| (limit.clock)() - start_s > limit.seconds);
     let (mut tried, mut left_out, mut last) = (Vec::new(), Vec::new(), None);
-    for estimator in contenders(setup, &Estimator::Auto, recording.rows.len()) {
+    let contenders = contenders(setup, &Estimator::Auto, recording.rows.len());
+    let count = contenders.len();
+    for (done, estimator) in contenders.into_iter().enumerate() {
         let kind = estimator.kind();
+        watch.counted("trying estimators", "estimators", done, count)?;
         if !tried.is_empty() && is_over() {
             left_out.push((kind, NOT_IN_TIME.to_owned()));
             continue;

@@ -131,7 +131,7 @@ impl<'a> Learning<'a> {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
         for (done, (prior, &s)) in priors.iter().zip(living).enumerate() {
-            watch.stage("learning what sensors read", done as f64 / living.len() as f64)?;
+            watch.counted("learning what sensors read", "sensors", done, living.len())?;
             let sensor = with((prior, &s), &all);
             let posterior = sensor
                 .posterior(hyper)

@@ -35,6 +35,16 @@ use palpate_mechanics::limit::CramerRaoBound;
 use palpate_mechanics::surface::Extent;
 use serde::{Deserialize, Serialize};
 
+/// Sizes by which learning over a model costs: nodes of the table, and sensors that are mixed into what the model leaves.
+pub(crate) fn sizes_over_a_model(extent: Extent) -> [usize; 2] {
+    let (columns, rows) = prior::mixed_sensors(extent);
+    let nodes = match extent {
+        Extent::Line { .. } => InfluenceTable::NODES,
+        Extent::Plane { .. } => PlaneTable::nodes_over(extent),
+    };
+    [nodes, columns * rows]
+}
+
 /// Influence functions, inverted: of a surface with a model, or of one that is known by its recording alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

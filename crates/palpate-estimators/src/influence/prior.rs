@@ -166,11 +166,7 @@ impl<'a> Mixture<'a> {
         let supports = if reacts { surface.force_supports() } else { Vec::new() };
         let mixed = if reacts { SensorKind::Deflection } else { kind };
         let extent = surface.extent();
-        let side = |ratio: f64| (MIXED_ON_A_PLANE * ratio).sqrt().round().clamp(4.0, MIXED as f64) as usize;
-        let (columns, rows) = match extent.width_m() {
-            None => (MIXED, 1),
-            Some(width_m) => (side(extent.length_m() / width_m), side(width_m / extent.length_m())),
-        };
+        let (columns, rows) = mixed_sensors(extent);
         Self {
             functions: surface.influence_functions(mixed, &cells(extent, columns, rows)),
             scale: surface.full_scale(mixed),
@@ -188,6 +184,15 @@ impl<'a> Mixture<'a> {
                 None => self.functions[column].at(at) / self.scale,
             }
         })
+    }
+}
+
+/// Columns and rows of the sensors that are mixed.
+pub(super) fn mixed_sensors(extent: Extent) -> (usize, usize) {
+    let side = |ratio: f64| (MIXED_ON_A_PLANE * ratio).sqrt().round().clamp(4.0, MIXED as f64) as usize;
+    match extent.width_m() {
+        None => (MIXED, 1),
+        Some(width_m) => (side(extent.length_m() / width_m), side(width_m / extent.length_m())),
     }
 }
 

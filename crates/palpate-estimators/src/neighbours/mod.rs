@@ -92,7 +92,7 @@ fn held_out_errors(rows: &[Neighbour], most: usize, watch: Watch) -> Result<Vec<
     let mut errors: Vec<Vec<[f64; 2]>> = Vec::new();
     let every = rows.len().div_ceil(MOST_HELD_OUT).max(1);
     for (i, row) in rows.iter().step_by(every).enumerate() {
-        watch.stage("holding presses out", (i * every) as f64 / rows.len() as f64)?;
+        watch.counted("holding presses out", "presses", i * every, rows.len())?;
         let others = rows.iter().filter(|other| other.position != row.position);
         let means = means(&nearest(others, &row.features, most));
         if i == 0 {

@@ -13,11 +13,11 @@ mod logistic;
 mod prepared;
 mod train;
 
-pub(crate) use levenberg_marquardt::MOST_PRESSES;
 pub use levenberg_marquardt::{
     LevenbergMarquardt, LevenbergMarquardtFitError, LevenbergMarquardtLocator, Member, NetworkInputs,
     OutputScale,
 };
+pub(crate) use levenberg_marquardt::{MOST_PRESSES, network_size};
 pub use palpate_core::Activation;
 pub use prepared::PreparedNetwork;
 pub use train::{Precision, TrainingTask, train_many, train_one};

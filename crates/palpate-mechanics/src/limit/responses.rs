@@ -124,7 +124,7 @@ impl<'a> Responses<'a> {
         };
         LimitCost {
             memory_bytes: cost.memory_bytes + kept + compared,
-            seconds: [solutions, most].map(|solutions| solutions * cost.seconds_each),
+            seconds: [solutions, most].map(|solutions| cost.seconds_once + solutions * cost.seconds_each),
         }
     }
 

@@ -37,7 +37,6 @@ pub use groups::Samples;
 pub use kernel::{Hyperparameters, Kernel, Trend};
 pub use posterior::{GaussianProcess, MOST_EXACT, PosteriorFault, PredictionScratch};
 pub use reduced::INDUCING;
-pub use search::MOST_EVALUATIONS;
 pub use search::Regression;
 
 use crate::NotPositiveDefinite;

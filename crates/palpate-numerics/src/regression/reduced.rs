@@ -170,7 +170,7 @@ pub(super) fn learn(
     let mut of_variance = Sums::new(first, terms, 0);
     let (mut log_noise, mut square) = (0.0, vec![0.0; outputs]);
     for start in (0..n).step_by(ROWS) {
-        watch.stage("learning from all presses", start as f64 / n as f64)?;
+        watch.counted("learning from all presses", "presses", start, n)?;
         let these = start..(start + ROWS).min(n);
         let correlations =
             cross_correlations(kernel, &points.view(), &rows.scaled.slice(s![.., these.clone()]));

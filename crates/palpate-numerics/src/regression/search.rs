@@ -36,8 +36,6 @@ const TRIAL_POINTS: usize = 160;
 /// Stopping rules of the trial of a start, and of the search that continues from the best.
 const TRIAL: Stop = Stop { evaluations: 30, decrease: 0.05 };
 const FINAL: Stop = Stop { evaluations: 60, decrease: 0.01 };
-/// Evaluations of the evidence over all points of the search, at most; those of the trials are over fewer.
-pub const MOST_EVALUATIONS: usize = FINAL.evaluations;
 /// Starts: length scales over the coordinates' spread, and the noise ratio.
 const STARTS: [(f64, f64); 3] = [(1.0, 1e-2), (0.3, 1e-3), (3.0, 1e-5)];
 

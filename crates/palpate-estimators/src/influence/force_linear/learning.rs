@@ -23,7 +23,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{bisect, mean};
 
 /// Presses that the search for kernel and length scales looks at.
-const MOST_SEARCHED: usize = 150;
+pub(crate) const MOST_SEARCHED: usize = 150;
 /// Presses that are learnt from, as the time grows with their cube; more are condensed to so many.
 pub(crate) const MOST_PRESSES: usize = 1000;
 /// Distinct positions from which on every fifth can be held out.

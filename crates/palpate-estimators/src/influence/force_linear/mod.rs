@@ -18,7 +18,7 @@ mod residuals;
 mod scan;
 
 pub use drift::DriftCourse;
-pub(crate) use learning::{FOLDS, MOST_PRESSES};
+pub(crate) use learning::{FOLDS, MOST_PRESSES, MOST_SEARCHED};
 pub use locator::{ForceLinearLocator, Scatter};
 pub use prior::Source;
 

@@ -57,6 +57,11 @@ impl PlaneTable {
         (columns - 1) / 2 * ((rows - 1) / 2)
     }
 
+    /// Nodes of a table over a surface of this extent.
+    pub(crate) fn nodes_over(extent: Extent) -> usize {
+        Self::empty(0, extent).nodes()
+    }
+
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.columns * self.rows

@@ -161,6 +161,12 @@ impl LevenbergMarquardt {
 }
 
 /// The outputs of all rows: x, y where the surface has one, and the force where it is an output.
+/// Inputs and outputs of the networks for a recording; `None` where it has nothing to tell positions by.
+pub(crate) fn network_size(setup: &Setup, recording: &Recording) -> Option<[usize; 2]> {
+    let inputs = NetworkInputs::fit(setup.layout(), recording).ok()?;
+    Some([inputs.axes.len(), outputs(setup, recording).len()])
+}
+
 fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
     let mut outputs = vec![column(|row| row.position.x_m)];
