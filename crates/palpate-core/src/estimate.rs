@@ -27,6 +27,21 @@ pub struct ContactEstimate {
     pub uncertainty: Option<Uncertainty>,
 }
 
+impl ContactEstimate {
+    fn is_in_numbers(&self) -> bool {
+        let Position { x_m, y_m } = self.position;
+        let is_certain = |uncertainty: Uncertainty| {
+            let ((x_low, x_high), (y_low, y_high)) = (uncertainty.x_95_m, uncertainty.y_95_m);
+            [x_low, x_high, y_low, y_high].iter().all(|end| end.is_finite())
+                && uncertainty.covariance.iter().all(|entry| !entry.is_nan())
+        };
+        x_m.is_finite()
+            && y_m.is_finite()
+            && self.force_n.is_none_or(f64::is_finite)
+            && self.uncertainty.is_none_or(is_certain)
+    }
+}
+
 /// The uncertainty of one estimated contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Uncertainty {
@@ -79,6 +94,15 @@ impl Estimate {
     /// An estimate of one contact.
     pub const fn of_contact(contact: ContactEstimate, status: Status) -> Self {
         Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
+    }
+
+    /// Whether all positions, forces, intervals and probabilities are finite, and no covariance is NaN; a covariance may be infinite, of what
+    /// is not known at all.
+    pub fn is_in_numbers(&self) -> bool {
+        let of_mode = |mode: &Mode| mode.contact.is_in_numbers() && mode.probability.is_finite();
+        self.contact.is_in_numbers()
+            && self.modes.as_slice().iter().all(of_mode)
+            && self.further.as_slice().iter().all(ContactEstimate::is_in_numbers)
     }
 }
 

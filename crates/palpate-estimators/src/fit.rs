@@ -3,8 +3,9 @@
 use std::borrow::Borrow;
 use std::collections::VecDeque;
 
-use palpate_core::Estimate;
+use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::sensing::Layout;
+use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
 use crate::recording::{Provenance, Recording};
@@ -271,7 +272,7 @@ impl<M: Locate> Fitted<M> {
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
         ReadingError::check(reading, self.setup.layout().len())?;
-        Ok(self.method.locate(reading))
+        Ok(in_numbers(self.method.locate(reading), self.setup.surface().extent()))
     }
 
     /// Checks what a file may have got wrong.
@@ -285,6 +286,24 @@ impl<M: Locate> Fitted<M> {
         }
         self.method.check(&self.setup)
     }
+}
+
+/// An estimate as it is, or where something of it is not a number, as of readings far beyond all that a sensor reads: one that says that
+/// no contact explains the reading, and that leaves the whole surface.
+fn in_numbers(estimate: Estimate, extent: Extent) -> Estimate {
+    if estimate.is_in_numbers() {
+        return estimate;
+    }
+    let (length_m, width_m) = (extent.length_m(), extent.width_m().unwrap_or(0.0));
+    let uniform = |side_m: f64| side_m * side_m / 12.0;
+    let uncertainty = Uncertainty {
+        covariance: [uniform(length_m), 0.0, 0.0, uniform(width_m), 0.0, 0.0],
+        x_95_m: (0.0, length_m),
+        y_95_m: (0.0, width_m),
+    };
+    let position = Position { x_m: 0.5 * length_m, y_m: 0.5 * width_m };
+    let contact = ContactEstimate { position, force_n: None, uncertainty: Some(uncertainty) };
+    Estimate::of_contact(contact, Status::OutsideModel)
 }
 
 /// A reading that nothing can be told from.
@@ -326,7 +345,7 @@ impl ReadingError {
 }
 
 /// A locator whose numbers do not fit together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LocatorFault {
     /// A list has the wrong length.
     #[error("the locator has {found} {what}; it must have {needed}")]
@@ -339,18 +358,44 @@ pub enum LocatorFault {
         found: usize,
     },
     /// A number that is infinite, not a number, or beyond its bound.
-    #[error("the locator's {what} number {number} is not {bound}")]
+    #[error("the locator's {what} number {number} is {value:?}; it must be {bound}")]
     BadNumber {
         /// Name of the list's elements.
         what: &'static str,
         /// Which one, from 1.
         number: usize,
+        /// The number.
+        value: f64,
         /// Bound of the number, in words.
         bound: &'static str,
+    },
+    /// A number by which others are divided, and which is hardly more than 0.
+    #[error(
+        "the locator's {what} number {number} is {value:?}; it must be at least {:e}",
+        LocatorFault::LEAST
+    )]
+    TooSmall {
+        /// Name of the list's elements.
+        what: &'static str,
+        /// Which one, from 1.
+        number: usize,
+        /// The number.
+        value: f64,
     },
 }
 
 impl LocatorFault {
+    /// Least size of a number that must not be 0: its inverse and the square of that are numbers.
+    pub const LEAST: f64 = 1e-60;
+
+    /// The number that is at fault, or the count that was found.
+    pub fn value(&self) -> f64 {
+        match self {
+            Self::Count { found, .. } => *found as f64,
+            Self::BadNumber { value, .. } | Self::TooSmall { value, .. } => *value,
+        }
+    }
+
     /// Checks the length of a list.
     ///
     /// # Errors
@@ -362,17 +407,24 @@ impl LocatorFault {
     /// Checks the numbers of a list.
     ///
     /// # Errors
-    /// [`LocatorFault::BadNumber`] for the first that is not finite or not `good`.
+    /// [`LocatorFault::BadNumber`] for the first that is not finite or not `good`, and [`LocatorFault::TooSmall`] where 0 is not good and
+    /// it is hardly more.
     pub fn check_numbers(
         what: &'static str,
         numbers: impl IntoIterator<Item = impl Borrow<f64>>,
         good: impl Fn(f64) -> bool,
         bound: &'static str,
     ) -> Result<(), Self> {
-        let bad = |number: f64| !(number.is_finite() && good(number));
-        match numbers.into_iter().position(|number| bad(*number.borrow())) {
-            Some(i) => Err(Self::BadNumber { what, number: i + 1, bound }),
-            None => Ok(()),
+        let least = if good(0.0) { 0.0 } else { Self::LEAST };
+        for (i, value) in numbers.into_iter().enumerate() {
+            let (number, value) = (i + 1, *value.borrow());
+            if !(value.is_finite() && good(value)) {
+                return Err(Self::BadNumber { what, number, value, bound });
+            }
+            if value.abs() < least {
+                return Err(Self::TooSmall { what, number, value });
+            }
         }
+        Ok(())
     }
 }

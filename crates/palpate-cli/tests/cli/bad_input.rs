@@ -1,7 +1,7 @@
 //! Bad input: a message with the place and the bound, exit code 2, nothing written, no panic.
 
 use crate::support::command::{complained, run, said};
-use crate::support::examples::{FSI_WATER, PAPER, PAPER_STUDY, PLATE, SENSOR_KINDS_STUDY};
+use crate::support::examples::{FSI_WATER, NOISY_BEAM, PAPER, PAPER_STUDY, PLATE, SENSOR_KINDS_STUDY};
 use crate::support::toml::{Toml, replaced};
 use std::fs;
 use std::path::Path;
@@ -101,6 +101,37 @@ fn locators_of_another_kind_are_refused() {
     ];
     let messages: Vec<String> =
         cases.iter().map(|(what, text)| format!("{what}:\n{}", inspect(text))).collect();
+    insta::assert_snapshot!(messages.join("\n"));
+}
+
+#[test]
+fn numbers_of_locators_are_refused_at_the_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = Toml::parse(NOISY_BEAM).estimator("neighbours").to_string();
+    fs::write(folder.path().join("rig.toml"), rig).unwrap();
+    said(&run(folder.path(), &["fit", "rig.toml", "-o", "locator.json"]));
+    let good = fs::read_to_string(folder.path().join("locator.json")).unwrap();
+    let put = |key: &str, number: &str| {
+        let start = good.find(&format!("\"{key}\": ")).unwrap() + key.len() + 4;
+        let end = start + good[start..].find([',', '\n']).unwrap();
+        let text = format!("{}{number}{}", &good[..start], &good[end..]);
+        let locate = ["locate", "locator.json", "--no-header"];
+        let complaint = complaint(&[("locator.json", text.as_bytes())], &locate);
+        assert!(complaint.contains("locator.json:"), "{key} = {number}: no place: {complaint}");
+        complaint
+    };
+    let cases = [
+        ("divisor", "1e-320"),
+        ("divisor", "1e308"),
+        ("divisor", "1e999"),
+        ("divisor", "NaN"),
+        ("divisor", "Infinity"),
+        ("spread", "-1"),
+        ("count", "1000000000000000000"),
+        ("count", "99999999999999999999"),
+    ];
+    let messages: Vec<String> =
+        cases.iter().map(|(key, number)| format!("{key} = {number}:\n{}", put(key, number))).collect();
     insta::assert_snapshot!(messages.join("\n"));
 }
 

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod bad_input;
+mod broken_streams;
 mod browser;
 mod compare;
 mod design;

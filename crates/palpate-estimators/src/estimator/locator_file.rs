@@ -30,15 +30,33 @@ pub enum LocatorFileError {
         found: u32,
     },
     /// Numbers that do not fit together.
-    #[error(transparent)]
-    Fault(#[from] LocatorFault),
+    #[error("{fault}")]
+    Fault {
+        /// What is wrong.
+        fault: LocatorFault,
+        /// Line and column, from 1, where they are known.
+        place: Option<(usize, usize)>,
+    },
+    /// A number beyond all that a surface, a sensor or a sum of their squares can be.
+    #[error("{value:e} is beyond ±{LARGEST:e}, within which every number of a locator lies")]
+    TooLarge {
+        /// The number.
+        value: f64,
+        /// Line and column, from 1.
+        place: (usize, usize),
+    },
 }
+
+/// Largest size of a number; its third power and products of that are numbers.
+const LARGEST: f64 = 1e60;
 
 impl LocatorFileError {
     /// Line and column, from 1, where the JSON is at fault.
     pub fn place(&self) -> Option<(usize, usize)> {
         match self {
             Self::Json(error) if error.line() > 0 => Some((error.line(), error.column().max(1))),
+            Self::Fault { place, .. } => *place,
+            Self::TooLarge { place, .. } => Some(*place),
             _ => None,
         }
     }
@@ -93,8 +111,61 @@ impl Locator {
         if heading.format_version != FORMAT_VERSION {
             return Err(LocatorFileError::Version { found: heading.format_version });
         }
+        if let Some((at, value)) = numbers(text).find(|(_, value)| value.abs() > LARGEST) {
+            return Err(LocatorFileError::TooLarge { value, place: line_and_column(text, at) });
+        }
         let File::<Self> { locator, .. } = serde_json::from_str(text)?;
-        locator.check()?;
+        locator.check().map_err(|fault| LocatorFileError::Fault { fault, place: place_of(&fault, text) })?;
         Ok(locator)
     }
+}
+
+/// The numbers of a JSON text, each with the byte at which it begins.
+fn numbers(text: &str) -> impl Iterator<Item = (usize, f64)> {
+    let bytes = text.as_bytes();
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        loop {
+            let start = at;
+            match *bytes.get(at)? {
+                b'"' => at = end_of_string(bytes, at + 1),
+                b'-' | b'0'..=b'9' => {
+                    let is_part = |byte: &u8| matches!(byte, b'0'..=b'9' | b'-' | b'+' | b'.' | b'e' | b'E');
+                    at += bytes[at..].iter().take_while(|byte| is_part(byte)).count();
+                    if let Ok(value) = text[start..at].parse() {
+                        return Some((start, value));
+                    }
+                }
+                _ => at += 1,
+            }
+        }
+    })
+}
+
+/// The byte behind a string, of which `at` is the first character.
+fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'"' => return at + 1,
+            // Whatever is escaped ends no string.
+            b'\\' => at += 2,
+            _ => at += 1,
+        }
+    }
+    at
+}
+
+/// Line and column, from 1, of the number that is at fault: the only one of this value, or the first that is too small, which is none that a
+/// fit would write.
+fn place_of(fault: &LocatorFault, text: &str) -> Option<(usize, usize)> {
+    let mut places = numbers(text).filter(|(_, number)| number.to_bits() == fault.value().to_bits());
+    let (at, _) = places.next()?;
+    let is_found = matches!(fault, LocatorFault::TooSmall { .. }) || places.next().is_none();
+    is_found.then(|| line_and_column(text, at))
+}
+
+fn line_and_column(text: &str, at: usize) -> (usize, usize) {
+    let before = &text.as_bytes()[..at];
+    let line_start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    (before.iter().filter(|byte| **byte == b'\n').count() + 1, at - line_start + 1)
 }

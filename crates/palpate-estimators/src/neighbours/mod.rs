@@ -145,8 +145,11 @@ impl Locate for NeighboursLocator {
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         self.features.check(setup.layout().len())?;
-        LocatorFault::check_numbers("count of neighbours", [self.count as f64], |k| k >= 1.0, "at least 1")?;
-        LocatorFault::check_numbers("count of rows", [self.rows.len() as f64], |n| n >= 1.0, "at least 1")?;
+        let rows = self.rows.len() as f64;
+        LocatorFault::check_numbers("count of rows", [rows], |n| n >= 1.0, "at least 1")?;
+        let is_of_rows = |k: f64| (1.0..=rows).contains(&k);
+        let bound = "at least 1 and at most the number of rows";
+        LocatorFault::check_numbers("count of neighbours", [self.count as f64], is_of_rows, bound)?;
         for row in &self.rows {
             let (needed, found) = (self.features.len(), row.features.len());
             LocatorFault::check_count("features of a row", needed, found)?;

@@ -143,7 +143,10 @@ impl Locate for BeamLocator {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
-        LocatorFault::check_count("channels", setup.layout().len(), self.stored.table.sensors)
+        LocatorFault::check_count("channels", setup.layout().len(), self.stored.table.sensors)?;
+        let length_m = setup.surface().extent().length_m();
+        let is_whole = |x: f64| (x - length_m).abs() <= 1e-9 * length_m;
+        LocatorFault::check_numbers("length", [self.stored.table.length_m], is_whole, "that of the surface")
     }
 }
 

@@ -183,7 +183,11 @@ impl Stored {
         let live = self.live.len();
         let is_channel = |c: &&usize| **c >= self.channels;
         if let Some(c) = self.live.iter().find(is_channel) {
-            return Err(LocatorFault::Count { what: "channels", needed: *c + 1, found: self.channels });
+            return Err(LocatorFault::Count {
+                what: "channels",
+                needed: c.saturating_add(1),
+                found: self.channels,
+            });
         }
         LocatorFault::check_count("offsets", live, offsets.len())?;
         LocatorFault::check_count("noises", live, noise_sd.len())?;

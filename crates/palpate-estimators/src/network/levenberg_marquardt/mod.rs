@@ -407,9 +407,9 @@ impl Locate for LevenbergMarquardtLocator {
 
 impl LevenbergMarquardtLocator {
     fn check_member(&self, member: &Member) -> Result<(), LocatorFault> {
-        let weights = self.topology.weight_count();
+        let weights = self.topology.checked_weight_count().unwrap_or(usize::MAX);
         LocatorFault::check_count("weights", weights, member.weights.len())?;
-        let (needed, found) = (weights * (weights + 1) / 2, member.curvature_factor.len());
+        let (needed, found) = (weights.saturating_mul(weights + 1) / 2, member.curvature_factor.len());
         LocatorFault::check_count("curvature numbers", needed, found)?;
         LocatorFault::check_count("noise variances", self.scales.len(), member.noise.len())?;
         let finite = member.weights.iter().chain(&member.curvature_factor);

@@ -1,0 +1,96 @@
+//! Stdout and stderr that are full, closed or left: nothing panics, whatever the verb.
+#![cfg(target_os = "linux")]
+
+use crate::support::command::{folder, palpate, run, said};
+use crate::support::examples::{LOAD_PROFILE, NOISY_BEAM};
+use crate::support::toml::Toml;
+use std::fs::{self, OpenOptions};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+/// Every verb with something to say on stdout, and whether it ends well.
+const VERBS: [&[&str]; 14] = [
+    &["--help"],
+    &["--version"],
+    &["simulate", "rig.toml", "-o", "more.csv"],
+    &["fit", "rig.toml", "-o", "more.json"],
+    &["evaluate", "locator.json"],
+    &["locate", "locator.json", "presses.csv"],
+    &["locate", "locator.json", "presses.csv", "--json"],
+    &["track", "influence.json", "presses.csv", "--rate", "100 Hz"],
+    &["compare", "rig.toml", "--only", "neighbours", "--calibrations", "1"],
+    &["limit", "rig.toml"],
+    &["design", "sensors", "rig.toml", "--count", "2"],
+    &["inspect", "locator.json"],
+    &["profile", "load.toml"],
+    &["init", "table.csv"],
+];
+
+/// Commands that complain, or have remarks.
+const COMPLAINTS: [&[&str]; 7] = [
+    &["fit", "nowhere.toml", "-o", "x.json"],
+    &["fit", "rig.toml"],
+    &["nonsense"],
+    &["limit", "table.csv"],
+    &["locate", "locator.json", "torn.csv", "--no-header"],
+    &["track", "influence.json", "torn.csv", "--rate", "1 Hz"],
+    &["init", "torn.csv"],
+];
+
+fn bench() -> TempDir {
+    let bench = folder(Toml::parse(NOISY_BEAM).estimator("neighbours"));
+    let path = bench.path();
+    fs::write(path.join("influence.toml"), NOISY_BEAM).unwrap();
+    fs::write(path.join("load.toml"), LOAD_PROFILE).unwrap();
+    fs::write(path.join("table.csv"), "x,force,a\n0,1,1\n10,1,2\n20,1,3\n").unwrap();
+    fs::write(path.join("torn.csv"), "1,2\n1,2,3\n4\n").unwrap();
+    said(&run(path, &["simulate", "rig.toml", "-o", "presses.csv"]));
+    said(&run(path, &["fit", "rig.toml", "-o", "locator.json"]));
+    said(&run(path, &["fit", "influence.toml", "-o", "influence.json"]));
+    bench
+}
+
+fn full() -> Stdio {
+    OpenOptions::new().write(true).open("/dev/full").unwrap().into()
+}
+
+fn code(command: &mut Command) -> Option<i32> {
+    command.status().unwrap().code()
+}
+
+/// Runs it by a shell, which can close what it hands on.
+fn by_shell(folder: &Path, arguments: &[&str], redirection: &str) -> Option<i32> {
+    let script = format!("\"$0\" \"$@\" {redirection}");
+    let program = env!("CARGO_BIN_EXE_palpate");
+    let mut command = Command::new("sh");
+    command.current_dir(folder).args(["-c", &script, program]).args(arguments);
+    code(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()))
+}
+
+#[test]
+fn a_full_stdout_is_an_error() {
+    let bench = bench();
+    for arguments in VERBS {
+        let output = palpate(bench.path()).args(arguments).stdout(full()).output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert!(stderr.contains("cannot write to stdout"), "{arguments:?}: {stderr}");
+    }
+}
+
+#[test]
+fn a_full_or_closed_stderr_changes_nothing() {
+    let bench = bench();
+    for arguments in VERBS.into_iter().chain(COMPLAINTS) {
+        let wanted = code(palpate(bench.path()).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()));
+        assert_eq!(wanted == Some(0), VERBS.contains(&arguments), "{arguments:?}: {wanted:?}");
+        let told = code(palpate(bench.path()).args(arguments).stdout(Stdio::null()).stderr(full()));
+        assert_eq!(told, wanted, "{arguments:?}");
+        for redirection in ["2>&-", ">&-", ">&- 2>&-", "2>/dev/full >&-"] {
+            assert_eq!(by_shell(bench.path(), arguments, redirection), wanted, "{arguments:?} {redirection}");
+        }
+        let both = code(palpate(bench.path()).args(arguments).stdout(full()).stderr(full()));
+        assert!(both == Some(2) || both == wanted, "{arguments:?}: {both:?}");
+    }
+}
