@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Number of the signal that came; 0 for none.
 static SIGNAL: AtomicU8 = AtomicU8::new(0);
 /// Work that has not ended by itself so long after a signal is ended with the process.
-const PATIENCE: Duration = Duration::from_millis(800);
+const PATIENCE: Duration = Duration::from_millis(700);
 /// SIGINT, which Ctrl-C sends.
 const INTERRUPT: u8 = 2;
 
@@ -28,7 +28,8 @@ pub fn install_signal_handler() {
 #[cfg(unix)]
 fn begin_to_listen() -> Result<(), Box<dyn Error>> {
     use nix::sys::signal::{SigSet, Signal};
-    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
+    // SIGHUP stays as it is: `nohup` has it ignored, and whatever is written is whole.
+    let signals = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM]);
     signals.thread_block()?;
     std::thread::Builder::new().spawn(move || {
         while let Ok(signal) = signals.wait() {

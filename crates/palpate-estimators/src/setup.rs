@@ -13,6 +13,7 @@ use palpate_mechanics::sensing::{
 };
 use palpate_mechanics::surface::{Extent, InsensitiveSensor, SurfaceSpec};
 use palpate_numerics::OutOfRange;
+use palpate_numerics::watch::Watch;
 
 /// A surface with its sensors, all on it, and the contact force where it is known. A rig describes it, and a locator keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -300,7 +301,16 @@ impl Setup {
     /// # Errors
     /// [`LimitError`] for a measured surface, for a live sensor without noise, and when none is alive.
     pub fn cramer_rao_bound(&self) -> Result<CramerRaoBound<'_>, LimitError> {
-        CramerRaoBound::new(self.surface.model().ok_or(LimitError::NoModel)?, &self.layout)
+        self.cramer_rao_bound_watched(Watch::NONE)
+    }
+
+    /// The same, watched while sensors are solved for.
+    ///
+    /// # Errors
+    /// Those of [`Setup::cramer_rao_bound`], and [`LimitError::Cancelled`].
+    pub fn cramer_rao_bound_watched(&self, watch: Watch) -> Result<CramerRaoBound<'_>, LimitError> {
+        let model = self.surface.model().ok_or(LimitError::NoModel)?;
+        CramerRaoBound::new_watched(model, &self.layout, watch)
     }
 
     /// Roles of a recording's columns: those that were named, or those that palpate itself writes.

@@ -91,7 +91,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             touch = linear.lightest_touch();
         }
         None => {
-            limit = setup.cramer_rao_bound().map_err(complain)?;
+            let observer = Observer::of_stages();
+            limit = observer.watch(|watch| setup.cramer_rao_bound_watched(watch)).map_err(complain)?;
             touch = Influence { false_alarm_rate: false_alarm_rate(&bench), ..Influence::default() }
                 .lightest_touch(&limit);
         }

@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         // A reader at the other end of a pipe wants each estimate now.
         output::flush(&mut out)?;
     }
-    if readings.awaits_columns() {
+    if readings.awaits_columns() && readings.lines.is_whole() {
         let complaint = Complaint::new(format!("{} holds no reading", readings.lines.name()));
         return Err(complaint.help("it must begin with a header; --no-header reads values alone").into());
     }

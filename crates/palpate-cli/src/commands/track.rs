@@ -188,7 +188,7 @@ impl Stream<'_> {
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }
-        if parser.awaits_columns() {
+        if parser.awaits_columns() && self.lines.is_whole() {
             let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }

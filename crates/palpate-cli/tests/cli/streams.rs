@@ -85,6 +85,7 @@ fn lines_without_an_end_are_not_kept() {
     assert_eq!(lines(&fed(bench.path(), &locate, format!("{long}\n{READING}").as_bytes())).len(), 2);
     let output = fed(bench.path(), &["locate", "locator.json"], long.as_bytes());
     assert!(complained(&output, 2).contains("stdin:1: the line is longer than 1 MiB"), "{output:?}");
+    complained(&fed(bench.path(), &locate, long.as_bytes()), 3);
     // Exactly a mebibyte is a line like others.
     let most = format!("{READING}#{}\n", "x".repeat((1 << 20) - 2));
     said(&fed(bench.path(), &locate, most.as_bytes()));

@@ -13,7 +13,7 @@ use ndarray::{Array1, Array2, ArrayView1};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, SensorKind};
 use palpate_mechanics::surface::Surface;
-use palpate_numerics::watch::Watch;
+use palpate_numerics::watch::{Cancelled, Watch};
 use palpate_numerics::{Cholesky, NotPositiveDefinite, mean};
 
 /// One sensor's influence function as the presses tell it, at the places that were asked for.
@@ -114,9 +114,12 @@ impl<'a> Learning<'a> {
         let Self { from, surface, layout, presses, places } = *self;
         let mean = if from == InfluenceSource::Recording { Mean::Zero } else { Mean::Model };
         let pressed: Vec<Position> = presses.presses.iter().map(|press| press.position).collect();
-        let remainders = Remainders::new(surface, kind, &pressed, places);
-        let priors: Vec<Prior<'a>> =
-            living.iter().map(|s| Prior::new(surface, &layout.sensors()[*s], mean)).collect();
+        let remainders = Remainders::new(surface, kind, &pressed, places, watch)?;
+        let prior = |s: &usize| -> Result<Prior<'a>, Cancelled> {
+            watch.round()?;
+            Ok(Prior::new(surface, &layout.sensors()[*s], mean))
+        };
+        let priors: Vec<Prior<'a>> = living.iter().map(prior).collect::<Result<_, _>>()?;
         let with = |(prior, &s): (&Prior<'a>, &usize), kept: &[usize]| {
             let noise = presses.noise_variance(layout, s);
             SensorPresses::new(prior.clone(), presses, s, noise, kept, &remainders.presses)

@@ -8,6 +8,7 @@ use ndarray::{Array1, Array2};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, InfluenceFunction, Surface};
+use palpate_numerics::watch::{Cancelled, Watch};
 use std::sync::Arc;
 
 /// Standard deviations of what an influence function may deviate by, shared by sensors of one kind.
@@ -130,23 +131,34 @@ pub(super) struct Remainders {
 const MIXED: usize = 40;
 /// The same on a plane, about; more of them along its longer side.
 const MIXED_ON_A_PLANE: f64 = 144.0;
+/// Sensors that are solved for between two looks whether to go on, as many as plates have sooner together.
+const SOLVED_TOGETHER: usize = 24;
 /// Stretches between the places at which the largest remainder is looked for: along a line, and along each side of a plane.
 const STRETCHES: usize = 64;
 const STRETCHES_OF_A_SIDE: usize = 12;
 
 impl Remainders {
     /// Covariances of sensors of `kind`, for presses and places on the surface.
-    pub fn new(surface: &dyn Surface, kind: SensorKind, presses: &[Position], places: &[Position]) -> Self {
-        let mixture = Mixture::new(surface, kind);
+    ///
+    /// # Errors
+    /// [`Cancelled`] where `watch` stops the solutions of the sensors that are mixed.
+    pub fn new(
+        surface: &dyn Surface,
+        kind: SensorKind,
+        presses: &[Position],
+        places: &[Position],
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
+        let mixture = Mixture::new(surface, kind, watch)?;
         let sizes = mixture.rows(&everywhere(surface.extent()));
         let norm = sizes.outer_iter().map(|row| row.dot(&row)).fold(0.0, f64::max).sqrt();
         let presses = mixture.rows(presses) / norm;
         let places = mixture.rows(places) / norm;
-        Self {
+        Ok(Self {
             own: places.outer_iter().map(|row| row.dot(&row)).collect(),
             places: places.dot(&presses.t()),
             presses: presses.dot(&presses.t()),
-        }
+        })
     }
 }
 
@@ -159,7 +171,7 @@ struct Mixture<'a> {
 }
 
 impl<'a> Mixture<'a> {
-    fn new(surface: &'a dyn Surface, kind: SensorKind) -> Self {
+    fn new(surface: &'a dyn Surface, kind: SensorKind, watch: Watch) -> Result<Self, Cancelled> {
         // Supports carry no row of sensors to mix: a reaction is a mixture of what all supports take up, and what bends of it,
         // as deflections do.
         let reacts = kind == SensorKind::Reaction;
@@ -167,11 +179,16 @@ impl<'a> Mixture<'a> {
         let mixed = if reacts { SensorKind::Deflection } else { kind };
         let extent = surface.extent();
         let (columns, rows) = mixed_sensors(extent);
-        Self {
-            functions: surface.influence_functions(mixed, &cells(extent, columns, rows)),
+        let mut functions = Vec::new();
+        for places in cells(extent, columns, rows).chunks(SOLVED_TOGETHER) {
+            watch.round()?;
+            functions.extend(surface.influence_functions(mixed, places));
+        }
+        Ok(Self {
+            functions,
             scale: surface.full_scale(mixed),
             taken: supports.iter().map(|at| surface.influence_function(kind, *at)).collect(),
-        }
+        })
     }
 
     /// A row a position: what each of the mixed sensors would read there.

@@ -81,11 +81,19 @@ impl<'a> CramerRaoBound<'a> {
     /// # Errors
     /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
+        Self::new_watched(surface, layout, Watch::NONE)
+    }
+
+    /// The same, watched while sensors are solved for.
+    ///
+    /// # Errors
+    /// Those of [`CramerRaoBound::new`], and [`LimitError::Cancelled`].
+    pub fn new_watched(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, LimitError> {
         let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
             Some(Channel { kind: sensor.kind, sd: sd?, range: sensor.channel.range })
         };
         let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
-        let responses = Responses::new(surface, layout);
+        let responses = Responses::new(surface, layout, watch)?;
         Ok(Self { extent: surface.extent(), model: Some(surface), channels, responses })
     }
 

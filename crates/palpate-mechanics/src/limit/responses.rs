@@ -53,31 +53,43 @@ pub(super) struct ByContact<'a> {
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
 }
 
+/// Sensors that are solved for between two looks whether to go on, as many as plates have sooner together.
+const SOLVED_TOGETHER: usize = 24;
+
 impl<'a> Responses<'a> {
     /// Responses of the sensors of a layout that are alive.
-    pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Self {
-        Self::with_most_functions(surface, layout, MOST_FUNCTIONS)
+    pub fn new(surface: &'a dyn Surface, layout: &Layout, watch: Watch) -> Result<Self, Cancelled> {
+        Self::with_most_functions(surface, layout, MOST_FUNCTIONS, watch)
     }
 
-    pub(super) fn with_most_functions(surface: &'a dyn Surface, layout: &Layout, most: usize) -> Self {
+    pub(super) fn with_most_functions(
+        surface: &'a dyn Surface,
+        layout: &Layout,
+        most: usize,
+        watch: Watch,
+    ) -> Result<Self, Cancelled> {
         let alive = layout.sensors().iter().filter(|sensor| !sensor.channel.dead);
         let sensors: Vec<(SensorKind, Position)> =
             alive.map(|sensor| (sensor.kind, sensor.position)).collect();
         if sensors.len() > most
             && let Some(readings) = surface.readings_by_contact(&sensors)
         {
-            return Self::ByContact(ByContact {
+            return Ok(Self::ByContact(ByContact {
                 readings,
                 sensors: sensors.len(),
                 kept: Arc::default(),
                 degrees: Arc::default(),
-            });
+            }));
         }
-        let of_a_kind = sensors.chunk_by(|a, b| a.0 == b.0).flat_map(|sensors| {
-            let positions: Vec<Position> = sensors.iter().map(|(_, position)| *position).collect();
-            surface.response_functions(sensors[0].0, &positions)
-        });
-        Self::BySensor(of_a_kind.collect())
+        let mut functions = Vec::with_capacity(sensors.len());
+        let of_a_kind = sensors.chunk_by(|a, b| a.0 == b.0);
+        for together in of_a_kind.flat_map(|sensors| sensors.chunks(SOLVED_TOGETHER)) {
+            watch
+                .stage("influence functions of the sensors", functions.len() as f64 / sensors.len() as f64)?;
+            let positions: Vec<Position> = together.iter().map(|(_, position)| *position).collect();
+            functions.extend(surface.response_functions(together[0].0, &positions));
+        }
+        Ok(Self::BySensor(functions))
     }
 
     /// Reading of each sensor under a force at each of some positions.

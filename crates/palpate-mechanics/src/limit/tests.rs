@@ -382,7 +382,7 @@ fn many_sensors_solved_for_by_contact_have_the_limit_of_their_functions() {
     };
     layout.edit(spread).unwrap();
     let functions = CramerRaoBound::new(&plate, &layout).unwrap();
-    let responses = Responses::with_most_functions(&plate, &layout, 3);
+    let responses = Responses::with_most_functions(&plate, &layout, 3, Watch::NONE).unwrap();
     let by_contact = CramerRaoBound { responses, ..functions.clone() };
     let off_grid = Position { x_m: 0.123, y_m: 0.045 };
     by_contact.prepare(&[off_grid], Watch::NONE).unwrap();
