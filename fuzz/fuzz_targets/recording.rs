@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use palpate_estimators::recording::ReadingParser;
+use palpate_estimators::recording::{LineParser, ReadingParser};
 use palpate_rig::Rig;
 use std::sync::LazyLock;
 

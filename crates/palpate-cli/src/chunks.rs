@@ -13,7 +13,7 @@ use std::time::Duration;
 pub struct Chunks {
     /// Name of the source: the file, or "stdin".
     pub name: String,
-    /// What was opened, which holds nothing; then chunks, until the source ends.
+    /// Messages of the thread that reads: an empty one once the source is open, then chunks until it ends.
     chunks: Receiver<io::Result<Vec<u8>>>,
 }
 

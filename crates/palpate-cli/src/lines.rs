@@ -6,7 +6,7 @@ use crate::input;
 use crate::json::object;
 use crate::output;
 use crate::remark::remark;
-use palpate_estimators::recording::{Column, Columns, CsvError, Dialect, Header, ReadingParser};
+use palpate_estimators::recording::{Column, Columns, CsvError, Dialect, Header, LineParser, ReadingParser};
 use palpate_estimators::setup::Setup;
 use palpate_mechanics::units::format_count;
 use std::error::Error;
@@ -92,20 +92,20 @@ impl Lines {
     /// Counts the line as one that gave nothing, and says why.
     pub fn lose(&mut self, error: &(dyn Error + 'static)) -> Result<(), Failure> {
         self.lost += 1;
-        match error.downcast_ref::<CsvError>() {
-            // It names source and line itself.
-            Some(error) => remark!("palpate: skipped: {error}"),
-            None => remark!("palpate: skipped: {}:{}: {error}", self.name(), self.count),
-        }
+        let (column, reason) = match error.downcast_ref::<CsvError>() {
+            Some(CsvError { place, problem, .. }) => {
+                // It names source and line itself.
+                remark!("palpate: skipped: {error}");
+                (place.as_ref().and_then(|place| place.column), problem.to_string())
+            }
+            None => {
+                remark!("palpate: skipped: {}:{}: {error}", self.name(), self.count);
+                (None, error.to_string())
+            }
+        };
         if self.records == Records::None {
             return Ok(());
         }
-        let (column, reason) = match error.downcast_ref::<CsvError>() {
-            Some(CsvError { place, problem, .. }) => {
-                (place.as_ref().and_then(|place| place.column), problem.to_string())
-            }
-            None => (None, error.to_string()),
-        };
         output::say_json_line(&object! { "line": self.count, "column"?: column, "skipped": reason })
     }
 
@@ -123,7 +123,7 @@ impl Lines {
     }
 }
 
-/// What was interrupted, with the last line that was read before.
+/// The same failure; of an interruption, one that names the last line that was read.
 fn stopped_after(failure: Failure, line: u64) -> Failure {
     match failure {
         Failure::Interrupted(_) => Failure::Interrupted(format!("stopped after line {line}")),
@@ -131,32 +131,13 @@ fn stopped_after(failure: Failure, line: u64) -> Failure {
     }
 }
 
-/// What to do with a line that cannot be read while it is not known yet which columns there are.
-///
-/// # Errors
-/// A complaint, unless the stream has no header and this is its first line: it may have begun in the middle of it.
-pub fn check_first_line(lines: &Lines, header: Header, error: &CsvError) -> Result<(), Failure> {
-    match header {
-        Header::Absent if lines.is_whole() => Ok(()),
-        _ => Err(input::csv_complaint(error).into()),
-    }
-}
-
-/// The same for a line that is too long: there is no header behind it.
-pub fn check_first_length(lines: &Lines, header: Header, error: &TooLong) -> Result<(), Failure> {
-    match header {
-        Header::Absent => Ok(()),
-        _ => Err(Complaint::new(format!("{}:{}: {error}", lines.name(), lines.count)).into()),
-    }
-}
-
-/// Remarks that were made about a stream's dialect.
+/// The dialect of a stream as it was last said on stderr.
 #[derive(Default)]
-pub struct DialectNote(String);
+struct DialectNote(String);
 
 impl DialectNote {
     /// Says on stderr what is new of the dialect.
-    pub fn say(&mut self, dialect: &Dialect) {
+    fn say(&mut self, dialect: &Dialect) {
         let words = dialect.to_string();
         if words != self.0 {
             remark!("{}: {words}", dialect.source);
@@ -165,12 +146,54 @@ impl DialectNote {
     }
 }
 
-/// The readings of a file, one a line; lines that hold none are said and counted.
-pub struct Readings {
-    pub lines: Lines,
-    parser: ReadingParser,
+/// Values of lines, by a parser; lines that hold none are said and counted.
+pub struct Parsing<P> {
+    pub parser: P,
     header: Header,
     note: DialectNote,
+}
+
+impl<P: LineParser> Parsing<P> {
+    /// Values by a parser, of lines with or without a header.
+    pub fn new(parser: P, header: Header) -> Self {
+        Self { parser, header, note: DialectNote::default() }
+    }
+
+    /// The values of the next line, `Some(None)` of one that gives nothing; `None` after the last line.
+    pub fn next(&mut self, lines: &mut Lines) -> Result<Option<Option<P::Parsed>>, Failure> {
+        let Some(line) = lines.next()? else { return Ok(None) };
+        match line.map(|line| self.parser.parse_line(line)) {
+            Ok(Ok(parsed)) => {
+                if parsed.is_some() {
+                    self.note.say(self.parser.dialect());
+                }
+                return Ok(Some(parsed));
+            }
+            Ok(Err(error)) => {
+                // A stream without a header may have been joined in the middle of its first line.
+                let may_be_torn = self.header == Header::Absent && lines.is_whole();
+                if self.parser.awaits_columns() && !may_be_torn {
+                    return Err(input::csv_complaint(&error).into());
+                }
+                lines.lose(&error)?;
+            }
+            Err(error) => {
+                if self.parser.awaits_columns() && self.header != Header::Absent {
+                    let place = format!("{}:{}", lines.name(), lines.count);
+                    return Err(Complaint::new(format!("{place}: {error}")).into());
+                }
+                self.parser.skip_line();
+                lines.lose(&error)?;
+            }
+        }
+        Ok(Some(None))
+    }
+}
+
+/// The readings of a file, one a line.
+pub struct Readings {
+    pub lines: Lines,
+    parsing: Parsing<ReadingParser>,
 }
 
 impl Readings {
@@ -183,36 +206,15 @@ impl Readings {
                 channel.column = Column::Number(i + 1);
             }
         }
-        Self {
-            parser: ReadingParser::new(lines.name(), &columns),
-            header: columns.header,
-            note: DialectNote::default(),
-            lines,
-        }
+        let parser = ReadingParser::new(lines.name(), &columns);
+        Self { lines, parsing: Parsing::new(parser, columns.header) }
     }
 
     /// The next reading.
     pub fn next(&mut self) -> Result<Option<Vec<f64>>, Failure> {
-        while let Some(line) = self.lines.next()? {
-            match line.map(|line| self.parser.parse_line(line)) {
-                Ok(Ok(None)) => {}
-                Ok(Ok(Some(reading))) => {
-                    self.note.say(self.parser.dialect());
-                    return Ok(Some(reading));
-                }
-                Ok(Err(error)) => {
-                    if self.parser.awaits_columns() {
-                        check_first_line(&self.lines, self.header, &error)?;
-                    }
-                    self.lines.lose(&error)?;
-                }
-                Err(error) => {
-                    if self.parser.awaits_columns() {
-                        check_first_length(&self.lines, self.header, &error)?;
-                    }
-                    self.parser.skip_line();
-                    self.lines.lose(&error)?;
-                }
+        while let Some(parsed) = self.parsing.next(&mut self.lines)? {
+            if parsed.is_some() {
+                return Ok(parsed);
             }
         }
         Ok(None)
@@ -220,6 +222,6 @@ impl Readings {
 
     /// True until the columns are known, by a header or by `--no-header`.
     pub fn awaits_columns(&self) -> bool {
-        self.parser.awaits_columns()
+        self.parsing.parser.awaits_columns()
     }
 }

@@ -45,7 +45,7 @@ pub fn flush(out: &mut impl Write) -> Result<(), Failure> {
     out.flush().map_err(|error| unprinted(&error))
 }
 
-/// What it means that stdout takes no more: its reader has gone, which is no error of ours, or it is full.
+/// The failure of a write to stdout: its reader has gone, which is no error of ours, or it is full.
 pub fn unprinted(error: &std::io::Error) -> Failure {
     match error.kind() {
         ErrorKind::BrokenPipe => Failure::NobodyReads,

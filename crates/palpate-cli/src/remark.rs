@@ -8,7 +8,7 @@ macro_rules! remark {
 }
 pub(crate) use remark;
 
-/// What [`remark`] does.
+/// Writes a line to stderr for [`remark`]; a stderr that takes nothing is no failure.
 pub fn print_remark(words: std::fmt::Arguments) {
     let _ = std::io::stderr().lock().write_all(format!("{words}\n").as_bytes());
 }

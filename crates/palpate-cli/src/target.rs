@@ -18,23 +18,25 @@ pub struct Inputs(Vec<(&'static str, Identity)>);
 impl Inputs {
     /// The files of these names; `-` is stdin. A name without a file is left to whoever reads it.
     pub fn new<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Self {
-        let read = paths.into_iter().filter_map(Identity::of).map(|file| ("this command reads it", file));
+        let read =
+            paths.into_iter().filter_map(Identity::look_up).map(|file| ("this command reads it", file));
         let streams = [
             ("/dev/stdin", "this command reads it, as stdin"),
             ("/dev/stdout", "this command's stdout goes there"),
             ("/dev/stderr", "this command's stderr goes there"),
         ];
-        let streams = streams.into_iter().filter_map(|(path, why)| Some((why, Identity::of(path.as_ref())?)));
+        let streams =
+            streams.into_iter().filter_map(|(path, why)| Some((why, Identity::look_up(path.as_ref())?)));
         Self(read.chain(streams).collect())
     }
 
     fn reason_to_keep(&self, path: &Path) -> Option<&'static str> {
-        let file = Identity::of(path)?;
+        let file = Identity::look_up(path)?;
         self.0.iter().find(|(_, kept)| kept.is_same(&file)).map(|(why, _)| *why)
     }
 }
 
-/// What makes two names those of one file: the path without links, and the inode, which hard links share.
+/// Identity of a file, by whatever name: the path without links, and the inode, which hard links share.
 #[derive(Clone, Debug)]
 struct Identity {
     path: PathBuf,
@@ -43,7 +45,7 @@ struct Identity {
 
 impl Identity {
     /// That of a regular file; `None` of anything else.
-    fn of(path: &Path) -> Option<Self> {
+    fn look_up(path: &Path) -> Option<Self> {
         let there = fs::metadata(path).ok().filter(Metadata::is_file)?;
         Some(Self { path: fs::canonicalize(path).ok()?, inode: inode(&there) })
     }
@@ -132,7 +134,7 @@ impl Target {
     }
 }
 
-/// Why what is there must not be replaced by a file, whatever the command.
+/// The reason why an entry of a folder must not be replaced by a file, whatever the command; `None` for a regular file.
 fn reason_against(there: &Metadata) -> Option<&'static str> {
     match there.file_type() {
         kind if kind.is_dir() => Some("it is a folder"),
@@ -157,7 +159,7 @@ fn what_it_is(_: &Metadata) -> &'static str {
     "it is no regular file"
 }
 
-/// What a name that leads to nothing stands for: itself, or the end of its links.
+/// The path at the end of a name's links, or the name itself, where nothing is there yet.
 fn follow_links(path: &Path) -> std::io::Result<PathBuf> {
     /// As many as Linux follows.
     const MOST: usize = 40;
@@ -242,7 +244,7 @@ impl TargetFolder {
     }
 }
 
-/// Whether a file of this name may belong to a report.
+/// True for names that files of a report have.
 fn is_of_a_report(name: &str) -> bool {
     let tables = ["errors.csv", "trials.csv", "limit.csv", NETWORKS_CSV];
     let is_figure = name.starts_with("figure-") && [".svg", ".png"].iter().any(|end| name.ends_with(end));

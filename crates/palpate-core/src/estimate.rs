@@ -96,8 +96,8 @@ impl Estimate {
         Self { contact, status, modes: BoundedList::none(NO_MODE), further: BoundedList::none(NO_CONTACT) }
     }
 
-    /// Whether all positions, forces, intervals and probabilities are finite, and no covariance is NaN; a covariance may be infinite, of what
-    /// is not known at all.
+    /// True when all positions, forces, intervals and probabilities are finite and no covariance is NaN. An infinite covariance is allowed: it
+    /// stands for no knowledge at all.
     pub fn is_in_numbers(&self) -> bool {
         let of_mode = |mode: &Mode| mode.contact.is_in_numbers() && mode.probability.is_finite();
         self.contact.is_in_numbers()

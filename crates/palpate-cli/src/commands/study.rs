@@ -48,19 +48,19 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What is done about an earlier run in the same folder.
+/// The way an earlier run in the same folder is treated.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum EarlierRun {
     Leave,
-    GoOn,
-    ThrowAway,
+    Resume,
+    Overwrite,
 }
 
 impl Arguments {
     fn earlier_run(&self) -> EarlierRun {
         match (self.resume, self.overwrite) {
-            (true, _) => EarlierRun::GoOn,
-            (false, true) => EarlierRun::ThrowAway,
+            (true, _) => EarlierRun::Resume,
+            (false, true) => EarlierRun::Overwrite,
             (false, false) => EarlierRun::Leave,
         }
     }
@@ -162,8 +162,8 @@ fn train(
     let table = NetworksCsv::new(prepared);
     out.make()?;
     let earlier = match arguments.earlier_run() {
-        EarlierRun::GoOn => fits::read(out, &table)?,
-        EarlierRun::Leave | EarlierRun::ThrowAway => Checkpoint::default(),
+        EarlierRun::Resume => fits::read(out, &table)?,
+        EarlierRun::Leave | EarlierRun::Overwrite => Checkpoint::default(),
     };
     let surplus = fits::surplus(&earlier.rows, options);
     let keeps = (0..prepared.study.arms.len()).any(|arm| prepared.is_kept(arm));

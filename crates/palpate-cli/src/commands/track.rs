@@ -2,7 +2,7 @@
 
 use crate::failure::{Complaint, Failure};
 use crate::json::{Fields, Object, fields, object};
-use crate::lines::{DialectNote, Lines, Records, check_first_length, check_first_line};
+use crate::lines::{Lines, Parsing, Records};
 use crate::output::Table;
 use crate::remark::remark;
 use crate::tare::{Taken, TareOption, Taring};
@@ -11,7 +11,7 @@ use crate::{input, output};
 use palpate_estimators::estimator::{
     Across, Locator, SmoothTracker, Swing, Track, Tracked, Tracker, TrackerConfig,
 };
-use palpate_estimators::recording::{TimedParser, TimedReading, csv_row};
+use palpate_estimators::recording::{LineParser, TimedParser, TimedReading, csv_row};
 use palpate_estimators::track_errors::{SpeedErrors, TrackErrors, sweep_speeds};
 use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::surface::Extent;
@@ -154,33 +154,17 @@ struct Stream<'a> {
 impl Stream<'_> {
     fn run(&mut self, locator: &Locator) -> Result<(), Failure> {
         let columns = locator.setup.recording_columns();
-        let mut parser = TimedParser::new(self.lines.name(), locator.setup.schema(&columns));
-        let mut note = DialectNote::default();
+        let parser = TimedParser::new(self.lines.name(), locator.setup.schema(&columns));
+        let mut parsing = Parsing::new(parser, columns.header);
         let mut out = std::io::stdout().lock();
         if !self.arguments.json {
             output::print(&mut out, (self.columns.heading() + "\n").as_bytes())?;
         }
-        while let Some(line) = self.lines.next()? {
-            match line.map(|line| parser.parse_line(line)) {
-                Ok(Ok(None)) => {}
-                Ok(Ok(Some(reading))) => {
-                    note.say(parser.dialect());
-                    self.follow(reading, &mut out)?;
-                }
-                Ok(Err(error)) => {
-                    if parser.awaits_columns() {
-                        check_first_line(&self.lines, columns.header, &error)?;
-                    }
-                    self.lines.lose(&error)?;
-                }
-                Err(error) => {
-                    if parser.awaits_columns() {
-                        check_first_length(&self.lines, columns.header, &error)?;
-                    }
-                    parser.skip_line();
-                    self.lines.lose(&error)?;
-                }
+        while let Some(reading) = parsing.next(&mut self.lines)? {
+            if let Some(reading) = reading {
+                self.follow(reading, &mut out)?;
             }
+            let parser = &parsing.parser;
             if !parser.awaits_columns() && !parser.has_time() && self.arguments.rate.is_none() {
                 let column =
                     columns.time.as_ref().map_or("`time_s`".to_owned(), |time| time.column.to_string());
@@ -188,7 +172,7 @@ impl Stream<'_> {
                 return Err(complaint.help("--rate says how many readings there are a second").into());
             }
         }
-        if parser.awaits_columns() && self.lines.is_whole() {
+        if parsing.parser.awaits_columns() && self.lines.is_whole() {
             let complaint = Complaint::new(format!("{} holds no reading", self.lines.name()));
             return Err(complaint.help("it must begin with a header").into());
         }

@@ -1,4 +1,4 @@
-//! What must not be written over: inputs, devices, pipes, folders, finished results; and links, which are followed.
+//! Targets that are refused (inputs, devices, pipes, folders, finished results), and links, which are followed.
 
 use crate::support::command::{complained, folder, palpate, run, said};
 use crate::support::examples::{

@@ -137,8 +137,9 @@ impl Sizes {
 
     /// A Gaussian process of so many points, their coordinates and outputs, and points of the search for its hyperparameters.
     fn process(&self, points: f64, coordinates: f64, outputs: f64, search_points: usize) -> FitCost {
-        /// Evaluations of the evidence, each a factor and an inverse, that a search takes as a rule; and seconds that a coordinate of two points takes in all of them.
+        /// Evaluations of the evidence that a search takes as a rule, each a factor and an inverse.
         const EVALUATIONS: f64 = 20.0;
+        /// Seconds that one coordinate of two points takes in all of them.
         const PAIR_SECONDS: f64 = 1e-7;
         let searched = points.min(search_points as f64);
         let search =

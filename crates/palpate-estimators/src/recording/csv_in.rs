@@ -435,6 +435,29 @@ fn first_line<F>(
     }
 }
 
+/// A parser of the lines of a stream, one by one, which finds its columns by the first of them.
+pub trait LineParser {
+    /// The values of a line.
+    type Parsed;
+
+    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on with the next line.
+    ///
+    /// # Errors
+    /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
+    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8; of readings in time also a time or a
+    /// contact that is no number, and a contact off the surface.
+    fn parse_line(&mut self, line: &[u8]) -> Result<Option<Self::Parsed>, CsvError>;
+
+    /// Counts a line that nobody reads, so that the lines after it have their numbers.
+    fn skip_line(&mut self);
+
+    /// True while no line yet has told which columns there are: an error now means that no line can be read.
+    fn awaits_columns(&self) -> bool;
+
+    /// Dialect of the lines, as far as they have told.
+    fn dialect(&self) -> &Dialect;
+}
+
 /// Turns lines of CSV into readings; only the channel columns need to be there.
 #[derive(Clone, Debug)]
 pub struct ReadingParser {
@@ -447,32 +470,27 @@ impl ReadingParser {
     pub fn new(source: &str, columns: &Columns) -> Self {
         Self { lines: Lines::new(source, columns.separator, columns.decimal), columns: columns.clone() }
     }
+}
 
-    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
-    pub fn awaits_columns(&self) -> bool {
-        self.lines.fields.is_none()
-    }
+impl LineParser for ReadingParser {
+    /// One value per channel, in SI units.
+    type Parsed = Vec<f64>;
 
-    /// Reads the next line: one value per channel, in SI units; `None` for the header, a blank line or a comment (`#`).
-    ///
-    /// After an error the parser goes on with the next line.
-    ///
-    /// # Errors
-    /// [`CsvError`] with line and column: a header that lacks a channel or names one twice, another number of fields
-    /// than the header or the first row, a field that is not a finite number, text that is not UTF-8.
-    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
+    fn parse_line(&mut self, line: &[u8]) -> Result<Option<Vec<f64>>, CsvError> {
         let Self { lines, columns } = self;
         let next = lines.next(line, columns.header, |head| ChannelFields::find(head, columns))?;
         next.map(|(mut cells, channels)| channels.reading(&mut cells)).transpose()
     }
 
-    /// Counts a line that nobody reads, so that the lines after it have their numbers.
-    pub fn skip_line(&mut self) {
+    fn skip_line(&mut self) {
         self.lines.count += 1;
     }
 
-    /// Dialect of the lines, as far as they have told.
-    pub fn dialect(&self) -> &Dialect {
+    fn awaits_columns(&self) -> bool {
+        self.lines.fields.is_none()
+    }
+
+    fn dialect(&self) -> &Dialect {
         &self.lines.dialect
     }
 }
@@ -559,33 +577,16 @@ impl<'a> TimedParser<'a> {
         Self { lines: Lines::new(source, *separator, *decimal), clock: Clock::default(), schema }
     }
 
-    /// Whether no line yet has told which columns there are: an error now means that no line can be read.
-    pub fn awaits_columns(&self) -> bool {
-        self.lines.fields.is_none()
-    }
-
-    /// Counts a line that nobody reads, so that the lines after it have their numbers.
-    pub fn skip_line(&mut self) {
-        self.lines.count += 1;
-    }
-
-    /// Dialect of the lines, as far as they have told.
-    pub fn dialect(&self) -> &Dialect {
-        &self.lines.dialect
-    }
-
     /// Whether a column tells the time.
     pub fn has_time(&self) -> bool {
         self.lines.fields.as_ref().is_some_and(|(fields, _)| fields.time.0.is_some())
     }
+}
 
-    /// Reads the next line; `None` for the header, a blank line or a comment (`#`). After an error the parser goes on
-    /// with the next line.
-    ///
-    /// # Errors
-    /// [`CsvError`] with line and column, as [`ReadingParser::parse_line`] has them, and for a time or a contact that is no number, or
-    /// a contact off the surface.
-    pub fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
+impl LineParser for TimedParser<'_> {
+    type Parsed = TimedReading;
+
+    fn parse_line(&mut self, line: &[u8]) -> Result<Option<TimedReading>, CsvError> {
         let Self { lines, clock, schema } = self;
         let next = lines.next(line, schema.columns.header, |head| TimedFields::find(head, schema))?;
         let Some((mut cells, fields)) = next else { return Ok(None) };
@@ -604,6 +605,18 @@ impl<'a> TimedParser<'a> {
         let second = fields.second.map(&mut second).transpose()?;
         let truth = truth.map(|first| std::iter::once(first).chain(second).collect());
         Ok(Some(TimedReading { time_s, truth, reading: fields.channels.reading(&mut cells)? }))
+    }
+
+    fn skip_line(&mut self) {
+        self.lines.count += 1;
+    }
+
+    fn awaits_columns(&self) -> bool {
+        self.lines.fields.is_none()
+    }
+
+    fn dialect(&self) -> &Dialect {
+        &self.lines.dialect
     }
 }
 

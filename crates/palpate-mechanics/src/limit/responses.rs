@@ -19,6 +19,8 @@ use palpate_numerics::watch::{Cancelled, Watch};
 const MOST_FUNCTIONS: usize = 1500;
 /// Bytes of what is kept of contacts, at most.
 const MOST_KEPT: usize = 256 << 20;
+/// Sensors that are solved for between two questions whether to go on: as many as a plate solves for in one sweep.
+const SOLVED_TOGETHER: usize = 24;
 /// Bytes of readings under loads on degrees of freedom, at most.
 const MOST_OF_DEGREES: usize = 192 << 20;
 
@@ -52,9 +54,6 @@ pub(super) struct ByContact<'a> {
     /// Readings of all sensors under loads on degrees of freedom, for contacts that are asked for one by one near each other.
     degrees: Arc<Mutex<HashMap<usize, Vec<f64>>>>,
 }
-
-/// Sensors that are solved for between two looks whether to go on, as many as plates have sooner together.
-const SOLVED_TOGETHER: usize = 24;
 
 impl<'a> Responses<'a> {
     /// Responses of the sensors of a layout that are alive.

@@ -61,7 +61,7 @@ pub fn elliott(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The folder of a study that fits in minutes, and keeps nothing that another run could go on from.
 fn folder(arguments: &Arguments, study: &str) -> Result<TargetFolder, Failure> {
-    if arguments.earlier_run() == EarlierRun::GoOn {
+    if arguments.earlier_run() == EarlierRun::Resume {
         let complaint =
             Complaint::new(format!("--resume: the study `{study}` keeps no networks to go on from"));
         return Err(complaint
