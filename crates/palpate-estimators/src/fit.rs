@@ -8,6 +8,7 @@ use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
+use crate::reading_check::ReadingCheck;
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 
@@ -160,12 +161,20 @@ pub trait Fit {
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it.
     fn fit_task(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
+        self.fit_alone(task)
+    }
+
+    /// Fits with a seed, watched, without a [`ReadingCheck`]: what studies of a method need.
+    ///
+    /// # Errors
+    /// When the recording does not suit the setup or the method, or the watch stopped it.
+    fn fit_alone(&self, task: FitTask) -> Result<Fitted<Self::Method>, Self::Error> {
         task.check_channels()?;
         Ok(Fitted::new(task, self.fit_method(task)?))
     }
 
     /// Fits once for every seed of a queue, to the task's recording; the task's own seed is not used. A seed gives the same
-    /// locator as [`Fit::fit_task`] does; methods that can, fit many seeds at once.
+    /// locator as [`Fit::fit_alone`] does; methods that can, fit many seeds at once.
     ///
     /// ```
     /// use palpate_estimators::fit::{Fit, FitTask, SeedList};
@@ -191,7 +200,7 @@ pub trait Fit {
         queue: &mut dyn SeedQueue<Fitted<Self::Method>>,
     ) -> Result<(), Self::Error> {
         while let Some(seed) = queue.next_seed() {
-            queue.fitted(seed, self.fit_task(task.seed(seed))?);
+            queue.fitted(seed, self.fit_alone(task.seed(seed))?);
         }
         Ok(())
     }
@@ -227,6 +236,9 @@ pub struct Fitted<M> {
     /// Mean reading of the recording's rows without contact, where it has some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Vec<f64>>,
+    /// The check of its estimates, where it was learnt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub check: Option<Box<ReadingCheck>>,
 }
 
 /// Provenance of a locator.
@@ -250,13 +262,13 @@ impl<M> Fitted<M> {
             recording: task.recording.provenance.clone(),
         };
         let untouched = task.recording.untouched_mean();
-        Self { setup: task.setup.clone(), provenance, method, untouched }
+        Self { setup: task.setup.clone(), provenance, method, untouched, check: None }
     }
 
     /// The same locator with its method as another type.
     pub fn map<N>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
-        let Self { setup, provenance, method, untouched } = self;
-        Fitted { setup, provenance, method: convert(method), untouched }
+        let Self { setup, provenance, method, untouched, check } = self;
+        Fitted { setup, provenance, method: convert(method), untouched, check }
     }
 
     /// The sensors, a channel of a reading each.
@@ -272,7 +284,13 @@ impl<M: Locate> Fitted<M> {
     /// [`ReadingError`] for another number of channels or a value that is not finite.
     pub fn locate(&self, reading: &[f64]) -> Result<Estimate, ReadingError> {
         ReadingError::check(reading, self.setup.layout().len())?;
-        Ok(in_numbers(self.method.locate(reading), self.setup.surface().extent()))
+        let extent = self.setup.surface().extent();
+        let estimate = self.method.locate(reading);
+        let estimate = match &self.check {
+            Some(check) => check.checked(reading, estimate, extent),
+            None => estimate,
+        };
+        Ok(in_numbers(estimate, extent))
     }
 
     /// Checks what a file may have got wrong.
@@ -283,6 +301,9 @@ impl<M: Locate> Fitted<M> {
         if let Some(untouched) = &self.untouched {
             LocatorFault::check_count("untouched channels", self.setup.layout().len(), untouched.len())?;
             LocatorFault::check_numbers("untouched reading", untouched, |_| true, "a finite number")?;
+        }
+        if let Some(check) = &self.check {
+            check.check(&self.setup)?;
         }
         self.method.check(&self.setup)
     }

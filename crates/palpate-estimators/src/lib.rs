@@ -41,6 +41,7 @@ pub mod load_profile;
 pub mod neighbours;
 pub mod network;
 pub mod offset_course;
+pub mod reading_check;
 pub mod recording;
 pub mod setup;
 pub mod simulate;

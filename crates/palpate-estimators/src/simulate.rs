@@ -97,13 +97,30 @@ pub fn simulate_at(
     repeats: usize,
     seed: u64,
 ) -> Result<Recording, SimulateError> {
-    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    setup.surface().model().ok_or(SimulateError::NoModel)?;
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
-    OffSurface::check("position", positions, surface.extent())?;
+    let contacts: Vec<Contact> =
+        positions.iter().map(|position| Contact { position: *position, force_n }).collect();
+    simulate_contacts(setup, &contacts, repeats, seed)
+}
+
+/// The same with a force of each contact's own.
+///
+/// # Errors
+/// [`SimulateError`] when the bench lacks a model, or a contact lies off the surface.
+pub fn simulate_contacts(
+    setup: &Setup,
+    contacts: &[Contact],
+    repeats: usize,
+    seed: u64,
+) -> Result<Recording, SimulateError> {
+    let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
+    OffSurface::check("position", &positions, surface.extent())?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     let sensors = CleanSensors::new(surface, &placed);
     let mut rows = Vec::new();
-    for position in positions.iter().copied() {
+    for Contact { position, force_n } in contacts.iter().copied() {
         let clean = sensors.reading(Contact { position, force_n });
         for _ in 0..repeats {
             let reading = measure(setup.layout(), &clean, &errors, &mut rng);

@@ -103,12 +103,13 @@ impl Rig {
     }
 
     /// Simulated calibrations with `count` seeds from the first on, each judged by one contact at each position of
-    /// [`all_over`](palpate_estimators::arrangement::all_over).
+    /// [`all_over`](palpate_estimators::arrangement::all_over), by several forces where the rig does not know it: see
+    /// [`Calibration::at_forces_of_use`].
     ///
     /// # Errors
     /// [`RigSimulationError`] as for [`Rig::simulate`].
     pub fn trials(&self, count: u64, seed: u64) -> Result<Vec<Split>, RigSimulationError> {
-        let calibration = self.calibration()?;
+        let calibration = self.calibration()?.at_forces_of_use();
         (0..count).map(|k| Ok(calibration.simulate(seed + k)?)).collect()
     }
 

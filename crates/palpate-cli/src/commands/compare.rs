@@ -168,7 +168,11 @@ fn trials(arguments: &Arguments, rig: &Rig) -> Result<Trials, Failure> {
         })?;
         let calibrations = arguments.calibrations;
         let judged = trials.first().map_or(0, |trial| trial.judged.rows.len());
-        let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each");
+        let forces = match rig.setup.force_n() {
+            Some(_) => "",
+            None => " by the force of the presses, half and twice that in turn",
+        };
+        let how = format!("{calibrations} simulated calibrations, judged at {judged} positions each{forces}");
         return Ok(Trials { data: "simulation".to_owned(), source: how.clone(), how, trials });
     };
     let recording = recording.in_order();

@@ -181,6 +181,9 @@ fn locator(locator: &Locator) -> Vec<String> {
     )];
     lines.extend(setup(&locator.setup));
     lines.extend(method(locator));
+    if let Some(check) = &locator.check {
+        lines.push(format!("status and interval of an estimate: by {}", check.in_words()));
+    }
     lines.push(match locator.false_alarm_rate() {
         Some(rate) => format!("untouched readings taken for a contact: {rate}, by the noise of the channels"),
         None => "untouched readings are not told from contacts: it does not know what the board reads then"

@@ -100,10 +100,12 @@ fn bad_tares_are_refused() {
     file("header.csv", "g1,g2,g3,g4,g5,g6\n");
     let neighbours = RIG.replace("\"influence\"", "\"neighbours\"");
     file("neighbours.toml", &neighbours);
+    // Without forces nothing tells what the board reads untouched.
+    file("forceless.toml", &neighbours.replace("force = \"Force\"\n", ""));
     let pressed = fs::read_to_string(folder.path().join("presses.csv")).unwrap();
     let touched: Vec<&str> = pressed.lines().filter(|line| !line.contains(",0.0000,")).collect();
     file("touched.csv", &touched.join("\n"));
-    said(&run(folder.path(), &["fit", "neighbours.toml", "--data", "touched.csv", "-o", "touched.json"]));
+    said(&run(folder.path(), &["fit", "forceless.toml", "--data", "touched.csv", "-o", "forceless.json"]));
     said(&run(folder.path(), &["fit", "neighbours.toml", "--data", "presses.csv", "-o", "neighbours.json"]));
     let refused = |locator: &str, tare: &str| {
         let option = format!("--tare={tare}");
@@ -115,7 +117,7 @@ fn bad_tares_are_refused() {
     for tare in tares {
         shown.push(refused("board.json", tare));
     }
-    shown.extend([refused("touched.json", "2"), refused("neighbours.json", "auto")]);
+    shown.extend([refused("forceless.json", "2"), refused("forceless.json", "auto")]);
     insta::assert_snapshot!(shown.join("\n"));
     // With rows of force 0, the mean of those is the baseline.
     said(&run(folder.path(), &["locate", "neighbours.json", "few.csv", "--tare", "2"]));

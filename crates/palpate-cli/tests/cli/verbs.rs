@@ -67,14 +67,14 @@ fn readings_are_located_as_they_come() {
     let mut estimates = BufReader::new(child.stdout.take().unwrap()).lines();
     assert_eq!(estimates.next().unwrap().unwrap(), "line,position_mm,force_n,low_mm,high_mm,status");
     for _ in 0..3 {
-        // The answer comes before the next reading goes in.
+        // The answer comes before the next reading goes in. No contact of 3 N reads so.
         writeln!(readings, "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();
-        assert!(estimates.next().unwrap().unwrap().ends_with("located"));
+        assert!(estimates.next().unwrap().unwrap().ends_with("outside_model"));
     }
     writeln!(readings, "-1.2,-2.2,-3.0").unwrap();
     writeln!(readings, "nan,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();
     writeln!(readings, "-1.2,-2.2,-3.0,-3.4,-3.4,-3.0,-2.2,-1.2").unwrap();
-    assert!(estimates.next().unwrap().unwrap().ends_with("located"));
+    assert!(estimates.next().unwrap().unwrap().ends_with("outside_model"));
     drop(readings);
     let complaint = complained(&child.wait_with_output().unwrap(), 3);
     insta::assert_snapshot!(complaint);

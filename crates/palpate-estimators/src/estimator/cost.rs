@@ -3,15 +3,16 @@
 //! Times are for one core of some 3 GHz. Where a fit takes a second or more, both are to be within a factor of two; `cargo bench -p palpate
 //! --bench cost` measures them, and docs/measured.md has what it found.
 
-use super::{CHOICE_FOLDS, Estimator};
+use super::{CHOICE_FOLDS, Estimator, is_learnt};
 use crate::features::FeatureKind;
 use crate::influence::measured::{MeasuredInfluence, most_nodes, most_nuisance_nodes};
 use crate::influence::{Influence, Structure, force_linear, learning, sizes_over_a_model};
 use crate::network::LevenbergMarquardt;
+use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::{neighbours, network};
-use palpate_mechanics::surface::{Extent, SolutionCost, Solving, Surface};
+use palpate_mechanics::surface::{Extent, SolutionCost, Solving, Surface, SurfaceSpec};
 use palpate_numerics::regression::{INDUCING, MOST_EXACT};
 use std::collections::HashSet;
 
@@ -96,7 +97,17 @@ impl Estimator {
                 })
             }
         };
+        let own = if is_learnt(self.kind()) { own.and(check_cost(setup, recording)) } else { own };
         own.and(FitCost { memory_bytes: sizes.rows * (NUMBER * sizes.channels + 120.0), seconds: 0.0 })
+    }
+}
+
+/// Memory and time of the check beside a learnt method.
+fn check_cost(setup: &Setup, recording: &Recording) -> FitCost {
+    let recording = ReadingCheck::thinned(recording);
+    match setup.surface() {
+        SurfaceSpec::Digit(_) => FitCost { memory_bytes: 0.0, seconds: 0.0 },
+        _ => Sizes::new(setup, &recording).influence(&Influence::default(), setup, &recording),
     }
 }
 

@@ -33,6 +33,7 @@ use crate::network::{
     NetworkLocator, TrainingOutcome,
 };
 use crate::offset_course::OffsetCourse;
+use crate::reading_check::ReadingCheck;
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::FalseAlarmRate;
@@ -102,6 +103,14 @@ macro_rules! estimators {
                 }
             }
 
+            /// Fits with a seed, watched. A method that is learnt has a [`ReadingCheck`] beside it.
+            fn fit_task(&self, task: FitTask) -> Result<Locator, FitError> {
+                task.check_channels()?;
+                let method = self.fit_method(task)?;
+                let check = if is_learnt(method.kind()) { ReadingCheck::fit(task)?.map(Box::new) } else { None };
+                Ok(Fitted { check, ..Fitted::new(task, method) })
+            }
+
             fn fit_many(&self, task: FitTask, queue: &mut dyn SeedQueue<Locator>) -> Result<(), FitError> {
                 let learnt_from = self.learnt_from(task.recording);
                 let task = FitTask { recording: &learnt_from, ..task };
@@ -155,6 +164,11 @@ estimators! {
     "neighbours" Neighbours(Neighbours) NeighboursLocator, NeighboursFitError;
     /// The calibrated centroid of array sensors
     "centroid" Centroid(Centroid) CentroidLocator, CentroidFitError;
+}
+
+/// True of kinds that go from a reading to a position and do not know what a contact reads: these have a [`ReadingCheck`].
+pub(crate) fn is_learnt(kind: &str) -> bool {
+    matches!(kind, "network" | "network-lm" | "gaussian-process" | "neighbours" | "centroid")
 }
 
 impl Estimator {
@@ -338,7 +352,8 @@ impl Locator {
             _ => None,
         };
         let of_model = || self.setup.surface().model().map(|_| vec![0.0; self.setup.layout().len()]);
-        let known = offsets.or_else(|| self.untouched.clone()).or_else(of_model);
+        let of_check = || self.check.as_ref().and_then(|check| check.offsets());
+        let known = offsets.or_else(|| self.untouched.clone()).or_else(of_check).or_else(of_model);
         known.ok_or(NoBaseline { kind: self.kind() })
     }
 
@@ -378,7 +393,7 @@ impl Locator {
                 closed_form.knows_noise().then_some(closed_form.false_alarm_rate)
             }
             Method::Digit(digit) => Some(digit.false_alarm_rate),
-            _ => None,
+            _ => self.check.as_ref()?.false_alarm_rate(),
         }
     }
 

@@ -4,8 +4,8 @@ use super::{Evaluation, EvaluationError, Split};
 use crate::arrangement::{Training, all_over};
 use crate::fit::{Fit, FitTask, Fitted, Locate, SeedList};
 use crate::setup::Setup;
-use crate::simulate::{SimulateError, simulate_at};
-use palpate_mechanics::contact::Position;
+use crate::simulate::{SimulateError, simulate_at, simulate_contacts};
+use palpate_mechanics::contact::{Contact, Position};
 use palpate_mechanics::sensing::ChannelModel;
 use palpate_numerics::OutOfRange;
 use palpate_numerics::watch::Watch;
@@ -35,8 +35,10 @@ use palpate_numerics::watch::Watch;
 pub struct Calibration {
     /// The setup with the force of the presses.
     pressed: Setup,
-    /// The setup with the force of the contacts that are located afterwards.
+    /// The setup with the force of the contacts that are located afterwards, or its middle.
     touched: Setup,
+    /// Forces of these contacts in turn, as multiples of that one.
+    force_shares: &'static [f64],
     /// The setup as the locator knows it.
     known: Setup,
     /// Positions of the presses, each as often as it is pressed.
@@ -57,6 +59,9 @@ pub struct Calibrated<M> {
 }
 
 impl Calibration {
+    /// Forces of contacts in turn, as multiples of that of the presses, by which locators are compared that are not told the force.
+    pub const UNKNOWN_FORCES: [f64; 3] = [1.0, 0.5, 2.0];
+
     /// A calibration by presses of `press_force_n`, or else of the setup's force, nowhere yet. Contacts have the setup's force, or
     /// that of the presses where the setup does not know it; there is one at each position of [`all_over`].
     ///
@@ -68,6 +73,7 @@ impl Calibration {
         Ok(Self {
             pressed: with(press_force_n)?,
             touched: with(setup.force_n().or(press_force_n))?,
+            force_shares: &[1.0],
             known: setup.clone(),
             presses: Vec::new(),
             contacts: all_over(setup.surface().extent()),
@@ -95,6 +101,14 @@ impl Calibration {
         Self { contacts: repeated(contacts, readings), ..self }
     }
 
+    /// The same judged by contacts with [`Calibration::UNKNOWN_FORCES`] in turn, where the setup does not know the force.
+    #[must_use]
+    pub fn at_forces_of_use(self) -> Self {
+        let force_shares =
+            if self.known.force_n().is_some() { self.force_shares } else { &Self::UNKNOWN_FORCES };
+        Self { force_shares, ..self }
+    }
+
     /// The same for a locator that is not told the force of its contacts.
     #[must_use]
     pub fn unknown_force(self) -> Self {
@@ -112,10 +126,16 @@ impl Calibration {
     /// # Errors
     /// [`SimulateError`] when the setup has no model or no force, or a position lies off the surface.
     pub fn simulate(&self, seed: u64) -> Result<Split, SimulateError> {
-        let all = [self.presses.as_slice(), &self.contacts].concat();
+        let force_n = self.touched.force_n().ok_or(SimulateError::NoForce)?;
+        let presses = self.presses.iter().map(|position| Contact { position: *position, force_n });
+        let shares = self.force_shares.iter().cycle();
+        let contacts = self.contacts.iter().zip(shares);
+        let contacts =
+            contacts.map(|(position, share)| Contact { position: *position, force_n: share * force_n });
+        let all: Vec<Contact> = presses.chain(contacts).collect();
         let rows: Vec<usize> = (0..all.len()).collect();
         let (pressed, touched) = rows.split_at(self.presses.len());
-        let recording = simulate_at(&self.touched, &all, 1, seed)?;
+        let recording = simulate_contacts(&self.touched, &all, 1, seed)?;
         let training = if self.pressed.force_n() == self.touched.force_n() {
             recording.subset(pressed)
         } else {
@@ -124,7 +144,7 @@ impl Calibration {
         Ok(Split { training, judged: recording.subset(touched), offsets: None })
     }
 
-    /// Simulates, fits and judges.
+    /// Simulates, fits and judges the method alone.
     ///
     /// # Errors
     /// [`EvaluationError`] when the setup cannot be simulated or the estimator not be fitted, or the watch stopped it.
@@ -134,7 +154,7 @@ impl Calibration {
         seed: u64,
         watch: Watch,
     ) -> Result<Calibrated<E::Method>, EvaluationError<E::Error>> {
-        self.run_with(seed, watch, |task| estimator.fit_task(task))
+        self.run_with(seed, watch, |task| estimator.fit_alone(task))
     }
 
     /// Simulates, gets a locator by `fit`, and judges it.

@@ -14,15 +14,25 @@ pub enum FeatureKind {
     /// r/‖r‖ and ln ‖r‖. Where readings are proportional to the force, r/‖r‖ does not change with it, and ln ‖r‖ says
     /// how much there is of it.
     LoadInvariant,
+    /// r/‖r‖ alone, for presses of one force: ln ‖r‖ would tell where contacts of that force are, and lead those of others astray.
+    Direction,
     /// ln r of every channel, where all readings are greater than 0: channels that grow as different powers of the force or the depth, such
     /// as times beside pressures, then differ by sums.
     Logarithms,
 }
 
 impl FeatureKind {
-    /// The readings where the force is known, and what the load does not change where it is not.
-    pub fn for_setup(setup: &Setup) -> Self {
-        if setup.force_n().is_some() { Self::Readings } else { Self::LoadInvariant }
+    /// The readings where the force is known; where it is not, what the load does not change.
+    pub fn for_presses(setup: &Setup, recording: &Recording) -> Self {
+        if setup.force_n().is_some() { Self::Readings } else { Self::load_invariant(setup, recording) }
+    }
+
+    /// What the load does not change: with the size of a reading, unless all presses have one force and contacts may have others.
+    pub fn load_invariant(setup: &Setup, recording: &Recording) -> Self {
+        let mut forces = recording.rows.iter().map(|row| row.force_n);
+        let first = forces.next().flatten();
+        let has_one_force = first.is_some() && forces.all(|force_n| force_n == first);
+        if setup.force_n().is_none() && has_one_force { Self::Direction } else { Self::LoadInvariant }
     }
 
     /// Logarithms, where the force is not known and all readings of a recording have one.
@@ -170,7 +180,7 @@ impl Features {
         let scaled = value(reading, channel) / divisor;
         match self.kind {
             FeatureKind::Readings => scaled,
-            FeatureKind::LoadInvariant => scaled / norm,
+            FeatureKind::LoadInvariant | FeatureKind::Direction => scaled / norm,
             FeatureKind::Logarithms => scaled.max(self.least_norm).ln(),
         }
     }

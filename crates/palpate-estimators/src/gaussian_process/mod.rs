@@ -33,7 +33,7 @@ use palpate_numerics::watch::{Cancelled, Watch};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaussianProcessEstimator {
-    /// Features of a reading; `None` for [`FeatureKind::for_setup`], or [`FeatureKind::logarithms_for`] where the positions
+    /// Features of a reading; `None` for [`FeatureKind::for_presses`], or [`FeatureKind::logarithms_for`] where the positions
     /// are more probable under them.
     pub features: Option<FeatureKind>,
     /// Kernel: the smoothness of the position as a function of the features.
@@ -82,7 +82,9 @@ impl Fit for GaussianProcessEstimator {
         recording.check_distinct_positions(LEAST_POSITIONS)?;
         let (usual, logarithms) = match self.features {
             Some(kind) => (kind, None),
-            None => (FeatureKind::for_setup(setup), FeatureKind::logarithms_for(setup, recording)),
+            None => {
+                (FeatureKind::for_presses(setup, recording), FeatureKind::logarithms_for(setup, recording))
+            }
         };
         let mut best = self.with_features(usual, setup, recording, seed, watch)?;
         if let Some(kind) = logarithms {

@@ -64,7 +64,7 @@ impl Fit for Neighbours {
     fn fit_method(&self, task: FitTask) -> Result<NeighboursLocator, NeighboursFitError> {
         let recording = task.recording;
         recording.check_distinct_positions(2)?;
-        let features = Features::fit(FeatureKind::for_setup(task.setup), recording)?;
+        let features = Features::fit(FeatureKind::for_presses(task.setup, recording), recording)?;
         let neighbour =
             |row: &Row| Neighbour { features: features.apply(&row.reading), position: row.position };
         let rows: Vec<Neighbour> = recording.rows.iter().map(neighbour).collect();

@@ -321,7 +321,7 @@ struct TrialSetup<'a> {
 
 impl TrialSetup<'_> {
     fn fit(&self, of: &Setup, estimator: &Estimator, watch: Watch) -> Result<Locator, FitError> {
-        estimator.fit_task(FitTask { setup: of, recording: &self.trial.training, seed: self.seed, watch })
+        estimator.fit_alone(FitTask { setup: of, recording: &self.trial.training, seed: self.seed, watch })
     }
 }
 

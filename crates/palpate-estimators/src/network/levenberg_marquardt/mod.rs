@@ -107,7 +107,7 @@ impl Fit for LevenbergMarquardt {
             return zero("networks in its ensemble");
         }
         recording.check_distinct_positions(2)?;
-        let inputs = NetworkInputs::fit(setup.layout(), recording)?;
+        let inputs = NetworkInputs::fit(setup, recording)?;
         if inputs.axes.is_empty() {
             return Err(LevenbergMarquardtFitError::Alike);
         }
@@ -160,20 +160,21 @@ impl LevenbergMarquardt {
     }
 }
 
-/// The outputs of all rows: x, y where the surface has one, and the force where it is an output.
 /// Inputs and outputs of the networks for a recording; `None` where it has nothing to tell positions by.
 pub(crate) fn network_size(setup: &Setup, recording: &Recording) -> Option<[usize; 2]> {
-    let inputs = NetworkInputs::fit(setup.layout(), recording).ok()?;
+    let inputs = NetworkInputs::fit(setup, recording).ok()?;
     Some([inputs.axes.len(), outputs(setup, recording).len()])
 }
 
+/// The outputs of all rows: x, y where the surface has one, and the force where it is not known and the presses have several.
 fn outputs(setup: &Setup, recording: &Recording) -> Vec<Vec<f64>> {
     let column = |of: fn(&Row) -> f64| recording.rows.iter().map(of).collect();
     let mut outputs = vec![column(|row| row.position.x_m)];
     if let Extent::Plane { .. } = setup.surface().extent() {
         outputs.push(column(|row| row.position.y_m));
     }
-    if setup.force_n().is_none() && recording.rows.iter().all(|row| row.force_n.is_some()) {
+    let has_several = recording.rows.windows(2).any(|pair| pair[0].force_n != pair[1].force_n);
+    if setup.force_n().is_none() && has_several && recording.rows.iter().all(|row| row.force_n.is_some()) {
         outputs.push(column(|row| row.force_n.unwrap_or_default()));
     }
     outputs
@@ -198,10 +199,10 @@ pub struct NetworkInputs {
 
 impl NetworkInputs {
     /// The inputs for a recording; none where its readings differ by no more than noise.
-    fn fit(layout: &Layout, recording: &Recording) -> Result<Self, NoFeatures> {
-        let features = Features::fit(FeatureKind::LoadInvariant, recording)?;
+    fn fit(setup: &Setup, recording: &Recording) -> Result<Self, NoFeatures> {
+        let features = Features::fit(FeatureKind::load_invariant(setup, recording), recording)?;
         let mut inputs = Self { features, axes: Vec::new() };
-        let noise = inputs.feature_noise(layout, recording);
+        let noise = inputs.feature_noise(setup.layout(), recording);
         // In units of the noise, where that is known, all that is not signal has variance 1 along every axis.
         let unit = noise.clone().unwrap_or_else(|| Array1::ones(inputs.features.len()));
         let mut covariance = Array2::zeros((unit.len(), unit.len()));
