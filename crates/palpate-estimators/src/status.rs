@@ -2,10 +2,10 @@
 //! its channels.
 //!
 //! - `no_contact`: |d|², the squared length of the whitened reading d (less offsets, over the noise), is one that noise alone
-//!   exceeds more often than the [`FalseAlarmRate`], and the best contact takes no more of it off than a contact costs. Noise alone
-//!   fails the first at that rate. The cost of a contact is that of the extended Bayesian information criterion at 0.1 %; at
+//!   exceeds more often than half the [`FalseAlarmRate`], and the best contact takes no more of it off than a contact costs. Noise alone
+//!   fails the first at half the rate. The cost of a contact is that of the extended Bayesian information criterion at 0.2 %; at
 //!   another rate Φ(−√cost), the chance that noise exceeds it along one contact's reading, changes as the rate does. A cost is no quantile:
-//!   noise fails the second at a rate that the numbers of channels and places give, up to twice the one that is set on the benches of
+//!   noise fails the second at a rate that the numbers of channels and places give, 0.3 to 1 times the one that is set on the benches of
 //!   docs/at-the-limit.md. Force-linear surfaces without a model have `NoiseBounds` in its place, which noise fails at the rate itself.
 //! - `outside_model`: the misfit χ² of the best contact is one that a contact of the model exceeds less often than
 //!   [`OUTSIDE_MODEL_RATE`].
@@ -108,23 +108,23 @@ pub(crate) fn misfit_bound(freedom: usize) -> f64 {
     KNOWN.get(freedom).map_or_else(bound, |known| *known.get_or_init(bound))
 }
 
-/// |d|² that noise of so many channels exceeds at a rate.
+/// |d|² that noise of so many channels exceeds at half a rate.
 fn noise_bound(channels: usize, rate: FalseAlarmRate) -> f64 {
-    // The two rates have the same default, whose bounds are kept.
-    if rate.0 == OUTSIDE_MODEL_RATE {
-        return misfit_bound(channels);
+    /// Bounds at the default rate that were asked for: some estimators ask for each reading.
+    static KNOWN: [OnceLock<f64>; 65] = [const { OnceLock::new() }; 65];
+    let channels = channels.max(1);
+    let bound = || chi_squared_critical_value(0.5 * rate.0, channels);
+    match KNOWN.get(channels) {
+        Some(known) if rate == FalseAlarmRate::DEFAULT => *known.get_or_init(bound),
+        _ => bound(),
     }
-    chi_squared_critical_value(rate.0, channels.max(1))
 }
 
-/// The cost of a contact at a rate, from that at the default one: noise exceeds it along the reading of a contact as much more often as the
-/// rate is greater.
+/// The cost of a contact at half a rate, from that at 0.1 %: noise exceeds it along the reading of a contact as much more often as the rate
+/// is greater.
 fn detection_cost(contact_cost: f64, rate: FalseAlarmRate) -> f64 {
-    if rate == FalseAlarmRate::DEFAULT {
-        return contact_cost;
-    }
-    let tail = normal_cdf(-contact_cost.sqrt()) * rate.0 / FalseAlarmRate::DEFAULT.0;
-    bisect((0.0, 20.0), 50, |u| normal_cdf(-u) > tail).powi(2)
+    let tail = normal_cdf(-contact_cost.sqrt()) * 0.5 * rate.0 / FalseAlarmRate::DEFAULT.0;
+    bisect((0.0, 20.0), 40, |u| normal_cdf(-u) > tail).powi(2)
 }
 
 /// The misfit from which on no contact explains a reading, of a surface that is known by its recording alone: [`misfit_bound`] for

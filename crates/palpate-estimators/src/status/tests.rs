@@ -71,7 +71,8 @@ fn false_alarms(case: &Case, setup: &Setup) -> FalseAlarms {
     let locator = case.estimator.fit(setup, &case.bench.simulate(0)).unwrap();
     let clean = CleanSensors::new(setup.surface().model().unwrap(), setup.layout());
     let (errors, extent) = (ChannelErrors::none(setup.layout()), setup.surface().extent());
-    let (silence, bound) = (vec![0.0; setup.layout().len()], misfit_bound(setup.layout().len()));
+    let bound = noise_bound(setup.layout().len(), FalseAlarmRate::DEFAULT);
+    let silence = vec![0.0; setup.layout().len()];
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
     let force_n = case.bench.pressed_setup().force_n().unwrap();
     let mut alarms = FalseAlarms::default();
@@ -166,7 +167,7 @@ fn check(case: &Case, force_n: Option<f64>) -> String {
     let coordinates = 1 + usize::from(setup.surface().extent().width_m().is_some());
     // A plane has more places, and a contact on it costs more.
     let cost = contact_cost(unknowns(coordinates, force_n), setup.layout().len(), LINE_PLACES);
-    let chance = chance_of_contact(&setup, cost);
+    let chance = chance_of_contact(&setup, detection_cost(cost, FalseAlarmRate::DEFAULT));
     let FalseAlarms { beyond_noise, like_contact, outside_model } = false_alarms(case, &setup);
     let per_thousand = |count: usize| 1e3 * count as f64 / case.readings as f64;
     let row = format!(
@@ -180,12 +181,16 @@ fn check(case: &Case, force_n: Option<f64>) -> String {
         per_thousand(beyond_noise + like_contact),
         per_thousand(outside_model),
     );
-    let (least, most) = binomial_bounds(case.readings, OUTSIDE_MODEL_RATE);
-    for alarms in [beyond_noise, outside_model] {
+    for (alarms, rate) in
+        [(beyond_noise, 0.5 * FalseAlarmRate::DEFAULT.share()), (outside_model, OUTSIDE_MODEL_RATE)]
+    {
+        let (least, most) = binomial_bounds(case.readings, rate);
         assert!((least..=most).contains(&alarms), "{row}: {alarms} not in {least}..={most}");
     }
     let (_, most) = binomial_bounds(case.readings, chance);
     assert!(like_contact <= most, "{row}: {like_contact}, at most {most}");
+    let (_, most) = binomial_bounds(case.readings, 2e-3);
+    assert!(beyond_noise + like_contact <= most, "{row}: noise is `no_contact` in 99.8 %");
     row
 }
 
@@ -275,8 +280,8 @@ fn surfaces_with_a_model_exceed_another_rate_no_more_than_the_default_one() {
         };
         let alarms = (0..READINGS).filter(is_alarm).count();
         println!("{} at {rate}, force {force_n:?}: {alarms} of {READINGS}", locator.kind());
-        // Three times the rate, as at 0.1 % in docs/at-the-limit.md.
-        assert!((READINGS / 100..=3 * READINGS / 100).contains(&alarms), "{}: {alarms}", locator.kind());
+        // Up to one and a half times the rate, as at 0.1 % in docs/at-the-limit.md.
+        assert!((READINGS / 200..=3 * READINGS / 200).contains(&alarms), "{}: {alarms}", locator.kind());
     }
 }
 
