@@ -6,7 +6,7 @@ use super::maps::sensors_mm;
 use super::numbers::{NOTHING, counted, decimals, mm, number, place, stated};
 use super::page::{Columns, Figure, Page, ReportFile, Section, Table};
 use super::{Axis, BandPoint, Chart, HeatMap, HeatPanel, Mark, Marker, Series};
-use palpate_estimators::estimator::{LoadProfile, Patch, PatchLimit, Resolution, Status};
+use palpate_estimators::estimator::{ForceBounds, LoadProfile, Patch, PatchLimit, Resolution, Status};
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
 use palpate_mechanics::surface::{Extent, UniformLoad};
 
@@ -71,14 +71,22 @@ impl<'a> ProfileReport<'a> {
 
     fn summary(&self) -> Markup {
         let profile = self.profile;
-        let (low, high) = profile.total_95_n();
+        let ForceBounds { total_95_n, margin_m, seen_95_n } = profile.bounds;
+        let interval = |(low_n, high_n): (f64, f64)| match high_n.is_finite() {
+            true => format!("{}–{} N", number(low_n), number(high_n)),
+            false => format!("at least {} N", number(low_n)),
+        };
         html! {
             li { (status_in_words(profile)) }
             @if let Some(centre) = &profile.centre {
-                li { "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (number(low)) "–" (number(high)) " N." }
+                li {
+                    "Total force " b { (number(profile.total_n)) " N" } ", 95 % interval " (interval(total_95_n))
+                    " whatever the shape of the load; " (interval(seen_95_n)) " where nothing lies within " (mm(margin_m))
+                    " mm of an edge."
+                }
                 li {
                     "Centre of pressure at " b { (number(centre.position.x_m * 1e3)) " mm" } ", 95 % interval "
-                    (interval_mm(centre.x_95_m())) " mm"
+                    (interval_mm(profile.centre_95_m().unwrap_or(centre.x_95_m()))) " mm"
                     @if let Extent::Plane { .. } = self.extent() {
                         "; across at " b { (number(centre.position.y_m * 1e3)) " mm" } ", 95 % interval "
                         (interval_mm(centre.y_95_m())) " mm"
@@ -259,11 +267,12 @@ impl<'a> ProfileReport<'a> {
         type Row<'r> = (&'r Patch, Option<&'r PatchLimit>, usize);
         // Stretch, centre, its interval and its limit: along the surface, and on a plane across it.
         let stretch = |from_m: f64, to_m: f64| format!("{}–{}", mm(from_m), mm(to_m));
+        let extent = self.extent();
         let along = |table: Columns<Row<'a>>, [to, centre]: [&str; 2]| {
             table
                 .numeric(to, |(patch, ..)| stretch(patch.from.x_m, patch.to.x_m))
                 .numeric(centre, |(patch, ..)| tenths_mm(patch.centre.position.x_m))
-                .numeric("95 %, mm", |(patch, ..)| interval_mm(patch.centre.x_95_m()))
+                .numeric("95 %, mm", move |(patch, ..)| interval_mm(patch.centre_95_m(extent)))
                 .mm("limit, mm", |(_, limit, _)| limit.map(|limit| limit.sd_x_m))
         };
         let across = |table: Columns<Row<'a>>| {
@@ -283,7 +292,8 @@ impl<'a> ProfileReport<'a> {
         let interval = |(low_n, high_n): (f64, f64)| format!("{}–{}", number(low_n), number(high_n));
         let caption = html! {
             "The patches: connected parts where the load is above a tenth of its highest density, and their limits, the least \
-             standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have."
+             standard deviations that an unbiased estimator of evenly loaded patches of this number and these sizes can have. Beside an edge \
+             force and place trade off: the intervals of a patch there are of all that lies between it and the edge."
         };
         table
             .number("force, N", |(patch, ..)| patch.force_n)

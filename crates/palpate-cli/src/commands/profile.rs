@@ -177,9 +177,18 @@ fn print(told: &JsonProfile) -> Result<(), Failure> {
         None => format!("simulated: {}", told.status),
     };
     output::say(heading)?;
-    output::say(format!("misfit {:.1}; noise seldom makes more than {:.1}", told.misfit, told.worst_misfit))?;
+    let misfit =
+        if told.misfit < 1e6 { format!("{:.1}", told.misfit) } else { format!("{:.1e}", told.misfit) };
+    output::say(format!("misfit {misfit}; noise seldom makes more than {:.1}", told.worst_misfit))?;
     let Some(centre) = &told.centre_x_mm else { return Ok(()) };
-    output::say(format!("total force         {}", interval(&told.total_n, "N")))?;
+    output::say(format!(
+        "total force         {}, whatever the shape of the load",
+        interval(&told.total_n, "N")
+    ))?;
+    let Seen { margin_mm, low_n, high_n } = told.seen;
+    output::say(format!(
+        "                    {low_n:.3} to {high_n:.3} N where nothing lies within {margin_mm:.0} mm of an edge"
+    ))?;
     output::say(format!("centre of pressure  {}", interval(centre, "mm")))?;
     if let Some(across) = &told.centre_y_mm {
         output::say(format!("            across  {}", interval(across, "mm")))?;
@@ -207,6 +216,7 @@ struct JsonProfile {
     misfit: f64,
     worst_misfit: f64,
     total_n: Interval,
+    seen: Seen,
     centre_x_mm: Option<Interval>,
     #[serde(skip_serializing_if = "Option::is_none")]
     centre_y_mm: Option<Interval>,
@@ -222,7 +232,15 @@ struct JsonProfile {
     extent: Extent,
 }
 
-/// A value, its standard deviation and the ends of its 95 % interval.
+/// The ends of the total force's 95 % interval where nothing lies within a distance of an edge.
+#[derive(Clone, Copy, serde::Serialize)]
+struct Seen {
+    margin_mm: f64,
+    low_n: f64,
+    high_n: f64,
+}
+
+/// A value, its standard deviation and the ends of its 95 % interval; null where the reading does not bound it.
 #[derive(serde::Serialize)]
 struct Interval {
     value: f64,
@@ -289,8 +307,13 @@ impl JsonProfile {
             status: profile.status.name(),
             misfit: profile.misfit,
             worst_misfit: profile.worst_misfit,
-            total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.total_95_n(), 1.0),
-            centre_x_mm: profile.centre.map(|centre| x_mm(&centre)),
+            total_n: Interval::new(profile.total_n, profile.total_sd_n, profile.bounds.total_95_n, 1.0),
+            seen: Seen {
+                margin_mm: profile.bounds.margin_m * 1e3,
+                low_n: profile.bounds.seen_95_n.0,
+                high_n: profile.bounds.seen_95_n.1,
+            },
+            centre_x_mm: profile.centre.zip(profile.centre_95_m()).map(|(centre, held)| x_mm(&centre, held)),
             centre_y_mm: profile.centre.and_then(|centre| extent.if_plane(y_mm(&centre))),
             resolution_mm: profiler.resolution(profile).map(|resolution| resolution.median_width_m() * 1e3),
             patches: patches.map(|(i, patch)| JsonPatch::of_patch(patch, limit(limits, i), extent)).collect(),
@@ -308,7 +331,8 @@ impl JsonPatch<Interval> {
     fn of_patch(patch: &Patch, limit: Option<PatchLimit>, extent: Extent) -> Self {
         let Patch { from, to, centre, .. } = patch;
         let force_n = Interval::new(patch.force_n, patch.force_sd_n, patch.force_95_n(), 1.0);
-        Self::new([*from, *to], (x_mm(centre), y_mm(centre)), force_n, limit, extent)
+        let centre_x_mm = x_mm(centre, patch.centre_95_m(extent));
+        Self::new([*from, *to], (centre_x_mm, y_mm(centre)), force_n, limit, extent)
     }
 }
 
@@ -393,8 +417,8 @@ impl JsonCell {
     }
 }
 
-fn x_mm(centre: &CentreOfPressure) -> Interval {
-    Interval::new(centre.position.x_m, centre.sd_x_m, centre.x_95_m(), 1e3)
+fn x_mm(centre: &CentreOfPressure, held_95_m: (f64, f64)) -> Interval {
+    Interval::new(centre.position.x_m, centre.sd_x_m, held_95_m, 1e3)
 }
 
 fn y_mm(centre: &CentreOfPressure) -> Interval {

@@ -6,8 +6,8 @@ mod settings;
 
 pub use crate::fit::{LocatorProvenance, ReadingError};
 pub use crate::load_profile::{
-    Cells, CentreOfPressure, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit, Profiler,
-    Resolution, patch_limits,
+    Cells, CentreOfPressure, ForceBounds, LoadProfile, LoadSensors, LoadSensorsError, Patch, PatchLimit,
+    Profiler, Resolution, patch_limits,
 };
 pub use crate::tracking::{Across, SmoothTracker, Swing, Track, TrackError, Tracked, Tracker, TrackerConfig};
 pub use cost::FitCost;

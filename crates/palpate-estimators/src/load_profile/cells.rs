@@ -104,6 +104,14 @@ impl Cells {
         Position { x_m: from.x_m.midpoint(to.x_m), y_m: from.y_m.midpoint(to.y_m) }
     }
 
+    /// The distance of a cell's far end from the nearest edge, in metres: on a line from the nearest end.
+    pub(super) fn edge_distance_m(&self, cell: usize) -> f64 {
+        let (from, to) = self.corners(cell);
+        let near = |from_m: f64, to_m: f64, side_m: f64| to_m.min(side_m - from_m);
+        let along = near(from.x_m, to.x_m, self.extent.length_m());
+        self.extent.width_m().map_or(along, |width_m| along.min(near(from.y_m, to.y_m, width_m)))
+    }
+
     /// The lower left and the upper right corner of a cell.
     pub fn corners(&self, cell: usize) -> (Position, Position) {
         let (column, row) = (cell % self.columns, cell / self.columns);

@@ -15,18 +15,20 @@
 //! The method is penalised non-negative least squares in Bayesian dress: MacKay, *Bayesian Interpolation*, Neural
 //! Computation 4 (1992), for the evidence; Jaynes, *Prior Probabilities*, IEEE Trans. SSC 4 (1968), for the exponential prior.
 
+mod bounds;
 mod cells;
 mod smoothness;
 
 pub use cells::Cells;
 
-use ndarray::{Array1, Array2};
+use ndarray::{Array1, Array2, Axis};
 use serde::Serialize;
 use std::sync::Arc;
 
 use crate::fit::ReadingError;
 use crate::setup::Setup;
 use crate::status::{OUTSIDE_MODEL_RATE, misfit_bound};
+use bounds::Bounds;
 use palpate_core::Status;
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, NoiseError, Sensor};
@@ -133,8 +135,10 @@ pub struct LoadProfile {
     pub covariance_n2: Array2<f64>,
     /// Their sum, in newtons.
     pub total_n: f64,
-    /// Standard deviation of the sum.
+    /// Standard deviation of the sum, by the mixture.
     pub total_sd_n: f64,
+    /// Bounds of the sum.
+    pub bounds: ForceBounds,
     /// Centre of the whole force; `None` without load.
     pub centre: Option<CentreOfPressure>,
     /// The patches that carry load, along x.
@@ -149,6 +153,17 @@ pub struct LoadProfile {
     pub worst_misfit: f64,
     /// λ of the most probable smoothness, in 1/N²; `None` without load.
     pub smoothness: Option<f64>,
+}
+
+/// 95 % intervals of a load's whole force, over loads of any shape; an upper end is infinite where the reading does not bound it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ForceBounds {
+    /// Of the whole force, in newtons.
+    pub total_95_n: (f64, f64),
+    /// Distance from the edges, in metres, within which a load of this force is not told from a harder one at the edge.
+    pub margin_m: f64,
+    /// Of the whole force, where nothing lies within that distance.
+    pub seen_95_n: (f64, f64),
 }
 
 /// Centre of pressure: the mean position of the load.
@@ -203,7 +218,8 @@ impl<'a> Profiler<'a> {
         let channels = self.sensors.channels.iter().zip(reading);
         let whitened = channels.filter_map(|(channel, value)| {
             let channel = channel.as_ref()?;
-            Some((value - channel.offset) / channel.noise_sd)
+            // Of values beyond all bounds the squares are still numbers.
+            Some(((value - channel.offset) / channel.noise_sd).clamp(-LOUDEST, LOUDEST))
         });
         let y: Array1<f64> = whitened.collect();
         let silent = y.dot(&y) <= self.worst_misfit;
@@ -222,6 +238,8 @@ impl<'a> Profiler<'a> {
             least_misfit: y.dot(&y),
         });
         let forces_n = forces.to_vec();
+        let mut patches = find_patches(&self.cells, &forces_n, &covariance);
+        let bounds = self.bounds(&y, forces.sum(), &mut patches);
         let everything: Vec<usize> = (0..cells).collect();
         let (fitted, residuals) = self.fitted(&y, &forces);
         Ok(LoadProfile {
@@ -229,8 +247,9 @@ impl<'a> Profiler<'a> {
             cells: self.cells,
             total_n: forces.sum(),
             total_sd_n: covariance.sum().sqrt(),
+            bounds,
             centre: centre_of(&self.cells, &everything, &forces_n, &covariance),
-            patches: find_patches(&self.cells, &forces_n, &covariance),
+            patches: patches.into_iter().map(|(_, patch)| patch).collect(),
             forces_n,
             covariance_n2: covariance,
             fitted,
@@ -239,6 +258,68 @@ impl<'a> Profiler<'a> {
             worst_misfit: self.worst_misfit,
             smoothness,
         })
+    }
+
+    /// Bounds of the force by a whitened reading, over loads of any shape; patches beside an edge are given theirs.
+    fn bounds(&self, y: &Array1<f64>, total_n: f64, patches: &mut [(Part, Patch)]) -> ForceBounds {
+        let influence = &self.problem.influence;
+        let bounds = Bounds::new(influence, y);
+        let cells = self.cells.len();
+        let hull = |(low, high): (f64, f64), held: f64| (low.min(held), high.max(held));
+        let total_95_n = hull(bounds.of_sum(&Array1::ones(cells)), total_n);
+        if total_n <= 0.0 {
+            return ForceBounds { total_95_n, margin_m: 0.0, seen_95_n: total_95_n };
+        }
+        let blind = self.blind_cells(total_n);
+        let seen: Vec<usize> = (0..cells).filter(|cell| !blind.contains(cell)).collect();
+        let of_seen = Bounds::new(&influence.select(Axis(1), &seen), y).of_sum(&Array1::ones(seen.len()));
+        for i in 0..patches.len() {
+            let others = patches.iter().enumerate().filter(|(other, _)| *other != i);
+            let others: Vec<usize> = others.flat_map(|(_, (part, _))| part.all.iter().copied()).collect();
+            let (part, patch) = &mut patches[i];
+            // Its force could as well act at one place beside an edge, or does.
+            let could_be = |cell: &usize| bounds.is_open(&[&others[..], &[*cell]].concat());
+            if part.core.iter().any(|cell| blind.contains(cell)) || blind.iter().any(could_be) {
+                let mut c = Array1::zeros(cells);
+                part.all.iter().chain(&blind).for_each(|cell| c[*cell] = 1.0);
+                patch.beside_edge = Some(hull(bounds.of_sum(&c), patch.force_n));
+            }
+        }
+        let margin_m = blind.iter().map(|cell| self.cells.edge_distance_m(*cell)).fold(0.0, f64::max);
+        ForceBounds { total_95_n, margin_m, seen_95_n: hull(of_seen, total_n) }
+    }
+
+    /// Cells beside an edge in which a load of this force is not told from one at the edge: its distance from there is within 1.96 standard
+    /// deviations of its limit.
+    fn blind_cells(&self, force_n: f64) -> Vec<usize> {
+        let extent = self.cells.extent;
+        let is_blind = |cell: &usize| -> bool {
+            let (from, to) = self.cells.corners(*cell);
+            let limits = patch_limits(&self.sensors, &[UniformLoad::new(from, to, force_n)]);
+            let Some(limit) = limits.as_deref().and_then(<[_]>::first) else { return true };
+            let within =
+                |at_m: f64, side_m: f64, sd_m: f64| at_m.min(side_m - at_m) < normal_interval_95(0.0, sd_m).1;
+            let Position { x_m, y_m } = self.cells.centre(*cell);
+            within(x_m, extent.length_m(), limit.sd_x_m)
+                || extent.width_m().is_some_and(|width_m| within(y_m, width_m, limit.sd_y_m))
+        };
+        // From the edges inwards, as long as there are any.
+        let Cells { columns, rows, .. } = self.cells;
+        let from_edge = |cell: &usize| {
+            let (column, row) = (cell % columns, cell / columns);
+            let along = column.min(columns - 1 - column);
+            if rows == 1 { along } else { along.min(row).min(rows - 1 - row) }
+        };
+        let mut blind = Vec::new();
+        for ring in 0..columns {
+            let cells = (0..self.cells.len()).filter(|cell| from_edge(cell) == ring);
+            let found: Vec<usize> = cells.filter(|cell| is_blind(cell)).collect();
+            if found.is_empty() {
+                break;
+            }
+            blind.extend(found);
+        }
+        blind
     }
 
     /// Resolution of this layout at the smoothness of a profile; `None` for a profile without load.
@@ -275,15 +356,21 @@ impl LoadProfile {
         (force / measure, (low.max(0.0) / measure, high / measure))
     }
 
+    /// The ends of the 95 % interval of the centre of pressure along x, in metres: from an edge on where a patch beside it may be harder and nearer.
+    pub fn centre_95_m(&self) -> Option<(f64, f64)> {
+        let (mut low, mut high) = self.centre?.x_95_m();
+        for patch in &self.patches {
+            let (first, last) = patch.centre_95_m(self.cells.extent);
+            if patch.beside_edge.is_some() {
+                (low, high) = (low.min(first), high.max(last));
+            }
+        }
+        Some((low, high))
+    }
+
     /// Standard deviation of the density in a cell: N/m on a line, N/m² on a plane.
     pub fn density_sd(&self, cell: usize) -> f64 {
         self.covariance_n2[[cell, cell]].sqrt() / self.cells.measure()
-    }
-
-    /// The ends of the total force's 95 % interval, in newtons.
-    pub fn total_95_n(&self) -> (f64, f64) {
-        let (low, high) = normal_interval_95(self.total_n, self.total_sd_n);
-        (low.max(0.0), high)
     }
 }
 
@@ -328,6 +415,9 @@ fn sd_of_sum(listed: &[usize], slopes: &[f64], covariance: &Array2<f64>) -> f64 
     listed.iter().zip(slopes).map(row).sum::<f64>().max(0.0).sqrt()
 }
 
+/// Reading over its noise beyond which it makes no difference how far.
+const LOUDEST: f64 = 1e60;
+
 /// A patch is where the load is above this share of its highest density.
 pub const PATCH_SHARE: f64 = 0.1;
 /// Cells between a patch and another that it may be part of.
@@ -346,13 +436,25 @@ pub struct Patch {
     pub force_n: f64,
     /// Standard deviation of the force.
     pub force_sd_n: f64,
+    /// Bounds of the force, in newtons, of a patch beside an edge, where force and place trade off: with all that lies between the two.
+    pub beside_edge: Option<(f64, f64)>,
 }
 
 impl Patch {
     /// The ends of the force's 95 % interval, in newtons.
     pub fn force_95_n(&self) -> (f64, f64) {
         let (low, high) = normal_interval_95(self.force_n, self.force_sd_n);
-        (low.max(0.0), high)
+        self.beside_edge.unwrap_or((low.max(0.0), high))
+    }
+
+    /// The ends of the centre's 95 % interval along x, in metres: of a patch beside an edge, from that edge on.
+    pub fn centre_95_m(&self, extent: Extent) -> (f64, f64) {
+        let (low, high) = self.centre.x_95_m();
+        match self.beside_edge {
+            Some(_) if self.centre.position.x_m < 0.5 * extent.length_m() => (0.0, high),
+            Some(_) => (low, extent.length_m()),
+            None => (low, high),
+        }
     }
 
     /// An even load of its force and sizes around its centre, as far as the surface reaches: what its limit is of.
@@ -380,7 +482,7 @@ struct Part {
 /// Connected cells above the share of the highest are patches; each takes the cells downhill from it as its flanks, up to the
 /// valley to the next. A patch whose force does not stand out of its own uncertainty becomes a part of the one beside it, or,
 /// where there is none, is none.
-fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<Patch> {
+fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Vec<(Part, Patch)> {
     let mut parts = grow(cells, forces_n, cores(cells, forces_n));
     let least_ratio = normal_quantile(1.0 - OUTSIDE_MODEL_RATE);
     let stands_out = |part: &Part| {
@@ -398,9 +500,9 @@ fn find_patches(cells: &Cells, forces_n: &[f64], covariance: &Array2<f64>) -> Ve
             beside.all.extend(part.all);
         }
     }
-    let mut patches: Vec<Patch> =
-        parts.iter().filter_map(|part| patch(cells, part, forces_n, covariance)).collect();
-    patches.sort_by(|a, b| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
+    let of_part = |part: Part| patch(cells, &part, forces_n, covariance).map(|patch| (part, patch));
+    let mut patches: Vec<(Part, Patch)> = parts.into_iter().filter_map(of_part).collect();
+    patches.sort_by(|(_, a), (_, b)| a.centre.position.x_m.total_cmp(&b.centre.position.x_m));
     patches
 }
 
@@ -470,7 +572,7 @@ fn patch(cells: &Cells, part: &Part, forces_n: &[f64], covariance: &Array2<f64>)
         let least = Position { x_m: from.x_m.min(low.x_m), y_m: from.y_m.min(low.y_m) };
         (least, Position { x_m: to.x_m.max(high.x_m), y_m: to.y_m.max(high.y_m) })
     })?;
-    Some(Patch { from, to, centre, force_n, force_sd_n })
+    Some(Patch { from, to, centre, force_n, force_sd_n, beside_edge: None })
 }
 
 /// Least standard deviations for one of several patches.
