@@ -32,7 +32,8 @@ impl ContactEstimate {
         let Position { x_m, y_m } = self.position;
         let is_certain = |uncertainty: Uncertainty| {
             let ((x_low, x_high), (y_low, y_high)) = (uncertainty.x_95_m, uncertainty.y_95_m);
-            [x_low, x_high, y_low, y_high].iter().all(|end| end.is_finite())
+            let (force_low, force_high) = uncertainty.force_95_n.unwrap_or_default();
+            [x_low, x_high, y_low, y_high, force_low, force_high].iter().all(|end| end.is_finite())
                 && uncertainty.covariance.iter().all(|entry| !entry.is_nan())
         };
         x_m.is_finite()
@@ -52,12 +53,16 @@ pub struct Uncertainty {
     pub x_95_m: (f64, f64),
     /// Lower and upper end of the 95 % interval across, in metres; both 0 on a one-dimensional surface.
     pub y_95_m: (f64, f64),
+    /// Lower and upper end of the 95 % interval of the force, in newtons, where force and place trade off: beside an end a harder contact
+    /// nearer to it reads like a softer one farther away, and the force's standard deviation does not describe what is known of it. `None`
+    /// elsewhere.
+    pub force_95_n: Option<(f64, f64)>,
 }
 
 impl Uncertainty {
     /// Uncertainty of a contact on a line, from the covariance of position and force: xx, xf, ff.
     pub const fn on_line([xx, xf, ff]: [f64; 3], x_95_m: (f64, f64)) -> Self {
-        Self { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0) }
+        Self { covariance: [xx, 0.0, xf, 0.0, 0.0, ff], x_95_m, y_95_m: (0.0, 0.0), force_95_n: None }
     }
 }
 

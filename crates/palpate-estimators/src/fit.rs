@@ -321,6 +321,7 @@ fn in_numbers(estimate: Estimate, extent: Extent) -> Estimate {
         covariance: [uniform(length_m), 0.0, 0.0, uniform(width_m), 0.0, 0.0],
         x_95_m: (0.0, length_m),
         y_95_m: (0.0, width_m),
+        force_95_n: None,
     };
     let position = Position { x_m: 0.5 * length_m, y_m: 0.5 * width_m };
     let contact = ContactEstimate { position, force_n: None, uncertainty: Some(uncertainty) };

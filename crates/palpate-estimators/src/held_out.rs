@@ -46,6 +46,7 @@ impl HeldOutErrors {
             covariance: [self.rms_m[0].powi(2), 0.0, 0.0, self.rms_m[1].powi(2), 0.0, 0.0],
             x_95_m: (position.x_m - half_x, position.x_m + half_x),
             y_95_m: (position.y_m - half_y, position.y_m + half_y),
+            force_95_n: None,
         }
     }
 

@@ -48,3 +48,4 @@ pub mod simulate;
 pub mod status;
 pub mod track_errors;
 pub mod tracking;
+mod trade_off;

@@ -178,6 +178,9 @@ fn shape_point(point: &ShapePoint) -> impl Serialize {
     }
 }
 
+/// What is said of an estimate near an end whose force is not known.
+const TRADE_OFF: &str = "force and position";
+
 fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + use<> {
     let uncertainty = contact.uncertainty.as_ref();
     let mm = |(low, high): (f64, f64)| [low * 1e3, high * 1e3];
@@ -190,6 +193,8 @@ fn contact_fields(contact: &ContactEstimate, extent: Extent) -> impl Fields + us
         "x_95_mm"?: uncertainty.map(|uncertainty| mm(uncertainty.x_95_m)),
         "y_95_mm"?: uncertainty.and_then(|uncertainty| extent.if_plane(mm(uncertainty.y_95_m))),
         "sd_mm"?: uncertainty.and_then(|u| sd(u.covariance[0] + u.covariance[3])).map(|sd_m| sd_m * 1e3),
+        "force_95_n"?: uncertainty.and_then(|u| u.force_95_n).map(|(low_n, high_n)| [low_n, high_n]),
+        "trade_off"?: uncertainty.and_then(|u| u.force_95_n).map(|_| TRADE_OFF),
         "sd_force_n"?: uncertainty.and_then(|u| sd(u.covariance[5])),
     }
 }

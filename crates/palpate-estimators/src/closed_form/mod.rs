@@ -9,10 +9,12 @@ mod polynomial;
 use serde::{Deserialize, Serialize};
 
 use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{
     FalseAlarmRate, LINE_PLACES, NO_CONTACT, OTHER_PLACE, StatusRule, misfit_bound, unknowns,
 };
+use crate::trade_off::{Contacts, Force, PRIOR_FORCES, interval_on_line_95, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_mechanics::sensing::{Layout, Sensor, SensorKind};
@@ -88,7 +90,10 @@ impl Fit for ClosedForm {
     type Method = ClosedFormLocator;
     type Error = ClosedFormFitError;
 
-    fn fit_method(&self, FitTask { setup, .. }: FitTask) -> Result<ClosedFormLocator, ClosedFormFitError> {
+    fn fit_method(
+        &self,
+        FitTask { setup, recording, .. }: FitTask,
+    ) -> Result<ClosedFormLocator, ClosedFormFitError> {
         if setup.surface().model().is_none() {
             return Err(ClosedFormFitError::NoModel);
         }
@@ -100,6 +105,7 @@ impl Fit for ClosedForm {
             beam: *beam,
             layout: setup.layout().clone(),
             force_n: setup.force_n(),
+            greatest_force_n: if setup.force_n().is_none() { greatest_force_n(recording) } else { None },
             false_alarm_rate: self.false_alarm_rate,
         };
         let (needed, found) = (unknowns(1, setup.force_n()), locator.seeing().len());
@@ -117,6 +123,9 @@ pub struct ClosedFormLocator {
     pub layout: Layout,
     /// The contact's force in newtons, where it is known.
     pub force_n: Option<f64>,
+    /// Greatest force of a contact of unknown force, in newtons, where the calibration tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub greatest_force_n: Option<f64>,
     /// Share of untouched readings that may be taken for a contact.
     #[serde(default)]
     pub false_alarm_rate: FalseAlarmRate,
@@ -215,8 +224,12 @@ impl ClosedFormLocator {
         } else {
             (Status::OutsideSurface, position_m)
         };
-        let uncertainty = (noise == Noise::Known)
-            .then_some(Uncertainty::on_line(covariance, normal_interval_95(position_m, sd_m)));
+        let interval = |x_m: f64, sd_m: f64| match status {
+            Status::Located => interval_on_line_95(x_m, sd_m, length_m),
+            _ => normal_interval_95(x_m, sd_m),
+        };
+        let uncertainty =
+            (noise == Noise::Known).then(|| Uncertainty::on_line(covariance, interval(position_m, sd_m)));
         let position = Position::along(held_m);
         Estimate::of_contact(ContactEstimate { position, force_n: Some(force_n), uncertainty }, status)
     }
@@ -250,7 +263,13 @@ impl Locate for ClosedFormLocator {
             return NO_CONTACT;
         }
         let segments = self.segments(&channels, &weights);
-        let posterior = Posterior { segments: &segments, reading: &whitened, force_n: self.force_n, noise };
+        let posterior = Posterior {
+            segments: &segments,
+            reading: &whitened,
+            force_n: self.force_n,
+            greatest_force_n: self.greatest_force_n,
+            noise,
+        };
         let found = posterior.explanations();
         let least = found.iter().fold(f64::INFINITY, |least, explanation| least.min(explanation.chi_squared));
         if rule.is_no_contact(size, least) {
@@ -268,12 +287,27 @@ impl Locate for ClosedFormLocator {
         let on_beam = |x: f64| self.beam.contains(Position::along(x));
         LocatorFault::check_numbers("sensor position", places, on_beam, "on the beam")?;
         LocatorFault::check_numbers("force", self.force_n, |x| x > 0.0, "a number greater than 0")?;
+        LocatorFault::check_numbers(
+            "greatest force",
+            self.greatest_force_n,
+            |x| x > 0.0,
+            "a number greater than 0",
+        )?;
         let (needed, found) = (unknowns(1, self.force_n), self.seeing().len());
         if found < needed {
             return Err(LocatorFault::Count { what: "sensors that see a contact", needed, found });
         }
         Ok(())
     }
+}
+
+/// Explanations whose χ² is so much above the least have a share of e⁻¹² of the probability.
+const NEGLIGIBLE: f64 = 24.0;
+
+/// So many times the hardest press of a recording, which is a bound for forces; `None` of a recording without forces.
+fn greatest_force_n(recording: &Recording) -> Option<f64> {
+    let hardest = recording.rows.iter().filter_map(|row| row.force_n).fold(0.0, f64::max);
+    (hardest > 0.0).then_some(PRIOR_FORCES * hardest)
 }
 
 /// Squared residuals that differ by less than this share of the reading are the same in double precision.
@@ -284,6 +318,8 @@ struct Posterior<'a> {
     segments: &'a [Segment],
     reading: &'a [f64],
     force_n: Option<f64>,
+    /// Bound of a force that is not known, in newtons.
+    greatest_force_n: Option<f64>,
     noise: Noise,
 }
 
@@ -305,6 +341,9 @@ impl Posterior<'_> {
         let Some(best) = found.first() else {
             return Estimate::of_position(Position::default(), Status::OutsideModel);
         };
+        if let Some(estimate) = self.trade_off(&found, rule) {
+            return estimate;
+        }
         let mut estimate = Estimate::of_contact(self.contact(best), Status::Located);
         if best.force_n <= 0.0 || !rule.is_explained(best.chi_squared) {
             estimate.status = Status::OutsideModel;
@@ -322,6 +361,47 @@ impl Posterior<'_> {
             estimate.status = Status::Ambiguous;
         }
         estimate
+    }
+
+    /// The estimate where a place that competes is so near to an end, or told so little of, that force and place trade off; `None`
+    /// elsewhere, and where the noise is not known.
+    fn trade_off(&self, found: &[Explanation], rule: &StatusRule) -> Option<Estimate> {
+        if self.noise == Noise::Unknown {
+            return None;
+        }
+        let least = found.iter().fold(f64::INFINITY, |least, at| least.min(at.chi_squared));
+        let competes = |at: &&Explanation| at.chi_squared <= least + NEGLIGIBLE;
+        let is_near = |at: &Explanation| is_near_end(at.position_m, at.covariance[0].sqrt(), self.length_m());
+        let force = self.force_n.map_or_else(|| Force::at_most(self.greatest_force_n), Force::Known);
+        let is_too_hard = |at: &Explanation| matches!(force, Force::AtMost(most) if at.force_n > most);
+        if !found.iter().filter(competes).any(|at| is_near(at) || is_too_hard(at)) {
+            return None;
+        }
+        let channels = |x_m: f64, _: f64, channels: &mut Vec<[f64; 2]>| {
+            channels.clear();
+            let segment = self.segments.iter().find(|segment| x_m <= segment.to_m).or(self.segments.last());
+            let influence = segment.map(|segment| segment.influence_at(x_m)).unwrap_or_default();
+            channels.extend(self.reading.iter().zip(influence).map(|(d, (f, _))| [*d, f]));
+        };
+        let strongest = found.iter().map(|at| at.force_n).fold(0.0, f64::max);
+        let contacts = Contacts {
+            length_m: self.length_m(),
+            force,
+            widening: 1.0,
+            reference_force_n: self.greatest_force_n.unwrap_or(strongest),
+            channels: &channels,
+        };
+        let minima_m: Vec<f64> = found.iter().map(|at| at.position_m).collect();
+        let open = contacts.not_excluded(&minima_m)?;
+        let mut estimate = Estimate::of_position(Position::default(), Status::Located);
+        open.write(&mut estimate);
+        if found[0].to_m - found[0].from_m > 0.01 * self.length_m() {
+            estimate.status = Status::Ambiguous;
+        }
+        if !rule.is_explained(open.misfit) || estimate.contact.force_n.is_none_or(|force_n| force_n <= 0.0) {
+            estimate.status = Status::OutsideModel;
+        }
+        Some(estimate)
     }
 
     fn length_m(&self) -> f64 {

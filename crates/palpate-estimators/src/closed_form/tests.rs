@@ -210,3 +210,26 @@ fn what_does_not_suit_is_named() {
         "the closed form needs at least 2 sensors that see a contact (the force is unknown); the layout has 1"
     );
 }
+
+#[test]
+fn two_scales_hold_a_contact_at_the_edge_in_its_own_interval() {
+    for force_n in [None, Some(3.0)] {
+        let setup = setup(&SCALES, 0.01, force_n);
+        let locator = fit(&setup).unwrap();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
+        for x_m in [0.0, 2e-4, 1e-3, 3e-3] {
+            let (truth, mut covered) = (clean(&setup, x_m, 3.0), 0);
+            for _ in 0..2000 {
+                let reading = measure(setup.layout(), &truth, &ChannelErrors::none(setup.layout()), &mut rng);
+                let estimate = locator.locate(&reading);
+                let (low, high) = estimate.contact.uncertainty.unwrap().x_95_m;
+                covered += usize::from(low <= x_m && x_m <= high);
+                if estimate.status == Status::Located {
+                    let place = estimate.contact.position.x_m;
+                    assert!(low <= place && place <= high, "{estimate:?}");
+                }
+            }
+            assert!((1860..=1940).contains(&covered), "{force_n:?} at {x_m}: {covered} of 2000");
+        }
+    }
+}

@@ -155,6 +155,7 @@ impl Locate for GaussianProcessLocator {
             covariance: [x_m2, 0.0, 0.0, y_m2, 0.0, 0.0],
             x_95_m: normal_interval_95(x_m, x_m2.sqrt()),
             y_95_m: normal_interval_95(y_m, y_m2.sqrt()),
+            force_95_n: None,
         };
         let position = Position { x_m, y_m };
         let contact = ContactEstimate { position, force_n: self.force_n, uncertainty: Some(uncertainty) };

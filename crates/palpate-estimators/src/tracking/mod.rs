@@ -162,7 +162,7 @@ impl Tracked {
         ContactEstimate {
             position: Position { x_m: self.x_m, y_m },
             force_n: Some(self.force_n),
-            uncertainty: Some(Uncertainty { covariance, x_95_m: self.x_95_m, y_95_m }),
+            uncertainty: Some(Uncertainty { covariance, x_95_m: self.x_95_m, y_95_m, force_95_n: None }),
         }
     }
 

@@ -85,6 +85,21 @@ impl GaussNewton {
         self.grown(force_n) * self.reference_force_n * self.reference_force_n
     }
 
+    /// Mean force of the calibration, in newtons.
+    pub fn reference_force_n(&self) -> f64 {
+        self.reference_force_n
+    }
+
+    /// 1/(1 + v) of each channel in a cell, for a contact of a force.
+    pub fn weights_at(&self, cell: &Cell<f64>, force_n: f64) -> impl Fn(usize) -> f64 {
+        let first = cell.node as usize * self.groups;
+        let grown = self.weights_grown(force_n);
+        move |channel| {
+            let weight = self.weights[first + channel / 8][channel % 8];
+            weight / (weight + grown * (1.0 - weight))
+        }
+    }
+
     /// The minima near `x_m`, by at most so many `steps`, and the bits of those readings that came to theirs.
     ///
     /// `whitened` holds the readings one after the other.

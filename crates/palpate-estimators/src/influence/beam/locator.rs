@@ -13,7 +13,7 @@
 use super::coarse::Profile;
 use super::gauss_newton::Minimum;
 use super::multi_contact::locate_several;
-use super::posterior::conclude;
+use super::posterior::{Read, conclude};
 use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
 use super::table::{FittedInfluence, InfluenceTable};
 use crate::fit::{Locate, LocatorFault};
@@ -220,7 +220,9 @@ fn locate_eight<V: Eight>(search: &Search, rows: Rows, scratch: &mut Scratch, es
     let mut hard = !arrived;
     for i in 0..8 {
         if floors[i] > minima[i].misfit + NEGLIGIBLE {
-            conclude(search, squares[i], &minima[i..=i], &profiles[i], &mut estimates[i]);
+            let whitened = &whitened[i * groups..][..groups];
+            let read = Read { whitened, square: squares[i] };
+            conclude(search, read, &minima[i..=i], &profiles[i], &mut estimates[i]);
         } else {
             hard |= 1 << i;
         }
@@ -252,7 +254,8 @@ fn one_by_one<V: Eight>(minima: &Minimum<V>) -> [Minimum; 8] {
 fn locate_into<V: Eight>(search: &Search, reading: &[f64], scratch: &mut Scratch, estimate: &mut Estimate) {
     let square = search.whiten::<V>(reading, scratch.whitened.room(search.groups()));
     let (minima, count) = search.minima::<V>(square, scratch);
-    conclude(search, square, &minima[..count], &scratch.profile, estimate);
+    let read = Read { whitened: scratch.whitened.groups(search.groups()), square };
+    conclude(search, read, &minima[..count], &scratch.profile, estimate);
 }
 
 impl Stored {

@@ -179,6 +179,7 @@ fn refine<const K: usize, const N: usize>(
                 table.length_m,
             ),
             y_95_m: (0.0, 0.0),
+            force_95_n: None,
         });
         ContactEstimate { position, force_n: Some(force_n), uncertainty }
     };

@@ -3,7 +3,9 @@
 use super::coarse::{COARSE, MOST_MINIMA, Profile};
 use super::gauss_newton::Minimum;
 use super::search::Search;
+use crate::influence::config::ForceBelief;
 use crate::status::OTHER_PLACE;
+use crate::trade_off::{CALIBRATED, Contacts, Force, NotExcluded, is_near_end};
 use palpate_core::{ContactEstimate, Estimate, Mode, Status, Uncertainty};
 use palpate_mechanics::contact::Position;
 use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
@@ -11,11 +13,18 @@ use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
 /// A minimum with a wider standard deviation, in spacings of the nodes, is no parabola.
 const MOST_SPACINGS: f64 = 1.5;
 
-/// Writes the estimate from the minima of a reading that was whitened to length `square`.
+/// A whitened reading, in groups of eight channels, and its squared length.
+#[derive(Clone, Copy)]
+pub(super) struct Read<'a> {
+    pub whitened: &'a [[f64; 8]],
+    pub square: f64,
+}
+
+/// Writes the estimate from the minima of a reading.
 #[inline(always)]
 pub(super) fn conclude(
     search: &Search,
-    square: f64,
+    read: Read,
     minima: &[Minimum],
     profile: &Profile,
     estimate: &mut Estimate,
@@ -23,28 +32,85 @@ pub(super) fn conclude(
     let best = &minima[0];
     estimate.modes.clear();
     estimate.further.clear();
-    if search.rule.is_no_contact(square, best.misfit) {
+    if search.rule.is_no_contact(read.square, best.misfit) {
         estimate.contact =
             ContactEstimate { position: Position::along(best.x_m), ..ContactEstimate::default() };
         estimate.status = Status::NoContact;
         return;
     }
     let sd_m = best.covariance[0].sqrt();
-    let clear = 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m;
+    let clear = match search.force {
+        ForceBelief::Unknown => !is_near_end(best.x_m, sd_m, search.table.length_m),
+        _ => 4.0 * sd_m < best.x_m && 4.0 * sd_m < search.table.length_m - best.x_m,
+    };
     let narrow = sd_m <= MOST_SPACINGS * search.gauss_newton.spacing.h_m && best.misfit.is_finite();
     if minima.len() == 1 && clear && narrow {
         estimate.contact = contact(search, best, normal_interval_95(best.x_m, sd_m));
         estimate.status = Status::Located;
+        if !search.rule.is_explained(best.misfit) {
+            estimate.status = Status::OutsideModel;
+        }
     } else {
-        write_competing(search, minima, profile.misfits(), estimate);
+        write_uncertain(search, read, minima, profile, estimate);
     }
-    if !search.rule.is_explained(best.misfit) {
+}
+
+/// Writes the estimate of a reading that one normal distribution does not describe.
+#[cold]
+fn write_uncertain(
+    search: &Search,
+    read: Read,
+    minima: &[Minimum],
+    profile: &Profile,
+    estimate: &mut Estimate,
+) {
+    let length_m = search.table.length_m;
+    let is_near = |minimum: &Minimum| is_near_end(minimum.x_m, minimum.covariance[0].sqrt(), length_m);
+    let is_roughly_known = matches!(search.force, ForceBelief::Normal { .. });
+    let trades_off = !is_roughly_known && minima.iter().any(is_near);
+    let misfit = match trades_off.then(|| not_excluded(search, read.whitened, minima)).flatten() {
+        Some(found) => {
+            found.write(estimate);
+            found.misfit
+        }
+        None => {
+            write_competing(search, minima, profile.misfits(), estimate);
+            minima[0].misfit
+        }
+    };
+    if !search.rule.is_explained(misfit) {
         estimate.status = Status::OutsideModel;
     }
 }
 
+/// The contacts that a reading does not exclude.
+fn not_excluded(search: &Search, whitened: &[[f64; 8]], minima: &[Minimum]) -> Option<NotExcluded> {
+    let (table, gauss_newton) = (&search.table, &search.gauss_newton);
+    let channels = |x_m: f64, force_n: f64, channels: &mut Vec<[f64; 2]>| {
+        let cell = table.cell(x_m);
+        let weights = gauss_newton.weights_at(&cell, force_n);
+        channels.clear();
+        table.for_each(cell, |s, f, _| {
+            let root = weights(s).sqrt();
+            channels.push([root * whitened.as_flattened()[s], root * f]);
+        });
+    };
+    let reference_force_n = search.gauss_newton.reference_force_n();
+    let contacts = Contacts {
+        length_m: table.length_m,
+        force: match search.force {
+            ForceBelief::Known(force_n) => Force::Known(force_n),
+            _ => Force::AtMost(search.greatest_force_n),
+        },
+        widening: CALIBRATED,
+        reference_force_n,
+        channels: &channels,
+    };
+    let minima_m: Vec<f64> = minima.iter().map(|minimum| minimum.x_m).collect();
+    contacts.not_excluded(&minima_m)
+}
+
 /// Writes the estimate from minima that compete, or one that is wide or near an end.
-#[cold]
 fn write_competing(search: &Search, minima: &[Minimum], misfits: &[f64; COARSE], estimate: &mut Estimate) {
     let shares = shares(minima, search.table.length_m);
     let x_95_m = interval(search, minima, &shares, misfits);

@@ -224,6 +224,7 @@ impl Probable {
             covariance,
             x_95_m: normal_interval_95(x_m, covariance[0].sqrt()),
             y_95_m: normal_interval_95(y_m, covariance[3].sqrt()),
+            force_95_n: None,
         };
         ContactEstimate { position: Position { x_m, y_m }, force_n, uncertainty: Some(uncertainty) }
     }

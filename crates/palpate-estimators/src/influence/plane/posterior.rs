@@ -63,8 +63,12 @@ fn contact(search: &Search, mode: &Mode, covariance: [f64; 6]) -> ContactEstimat
     let interval = |k: usize, variance: f64| {
         clamped_interval(normal_interval_95(mode.mean[k], variance.sqrt()), search.size_m[k])
     };
-    let uncertainty =
-        Uncertainty { covariance, x_95_m: interval(0, covariance[0]), y_95_m: interval(1, covariance[3]) };
+    let uncertainty = Uncertainty {
+        covariance,
+        x_95_m: interval(0, covariance[0]),
+        y_95_m: interval(1, covariance[3]),
+        force_95_n: None,
+    };
     ContactEstimate {
         position: position(mode.mean),
         force_n: Some(mode.mean[2]),

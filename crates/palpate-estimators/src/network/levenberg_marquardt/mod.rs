@@ -372,6 +372,7 @@ impl LevenbergMarquardtLocator {
                 covariance: pairs.map(|(a, b)| a.zip(b).map_or(0.0, |(i, j)| covariance(i, j))),
                 x_95_m: interval(0),
                 y_95_m: y.map_or((0.0, 0.0), interval),
+                force_95_n: None,
             }),
         }
     }

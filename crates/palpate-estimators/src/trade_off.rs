@@ -1,0 +1,498 @@
+//! Contacts near the ends of a line, where a force that is not known and the place trade off.
+//!
+//! Beside a support a harder contact nearer to it reads like a softer one farther away: readings there tell the product of force and
+//! place, and hardly more. Neither a normal distribution nor equal tails describe that, so here
+//!
+//! - the force is at most a bound, a multiple of what the calibration pressed with or what the bench gives;
+//! - the 95 % region holds every contact whose χ² is at most χ²_min + q. By the likelihood ratio q is 3.84 away from the ends; towards
+//!   an end, where the place has a boundary, it falls to 2.71, such that 95 % of the readings of every place are covered (Feldman and
+//!   Cousins, Physical Review D 57, 1998). The intervals of place and force are the region's projections, and hold the best contact
+//!   whatever the reading;
+//! - where a stretch of places in the region reaches an end, the estimate is their posterior median, the prior being flat in the place
+//!   and in the size of the signal, with the best force there. Of all estimates it has the least mean error over the places.
+//!
+//! Symbols: d reading and f influence per newton, both over the noise; W force, a place; μ distance between the reading of a contact and
+//! the readings at the end, in standard deviations.
+
+use std::sync::OnceLock;
+
+use palpate_core::{ContactEstimate, Estimate, Mode, Position, Status, Uncertainty};
+use palpate_numerics::{bisect, normal_cdf, normal_interval_95};
+
+use crate::status::OTHER_PLACE;
+
+/// Forces beyond so many times the hardest press of the calibration are excluded, unless the bench gives a bound of its own.
+pub(crate) const PRIOR_FORCES: f64 = 10.0;
+
+/// A contact farther than so many standard deviations from both ends is described by a normal distribution.
+const CLEAR_OF_ENDS: f64 = 12.0;
+
+/// Whether a place with this standard deviation is so near to an end of a line that [`Contacts`] have to tell its interval.
+#[inline(always)]
+pub(crate) fn is_near_end(x_m: f64, sd_m: f64, length_m: f64) -> bool {
+    !(CLEAR_OF_ENDS * sd_m < x_m && CLEAR_OF_ENDS * sd_m < length_m - x_m)
+}
+
+/// What q is multiplied by where influences and noise come from finitely many presses: their errors are common to all channels of a
+/// contact and to all forces, which variances channel by channel do not say.
+///
+/// Without it 92.2 % of 4,000 readings over 200 calibrations were covered in the worst row of `trade_off/coverage.rs`.
+pub(crate) const CALIBRATED: f64 = 1.1;
+
+/// q of places that a barrier of greater χ² parts from the best: noise decides for the wrong side so surely in at most 0.5 % of the
+/// readings, which are lost besides the 5 % of one side. (With a distance of δ standard deviations between both sides, χ² differs by
+/// 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often for δ = √q, when z does.)
+const BEYOND_A_BARRIER: f64 = 6.63;
+
+/// What is known of the force beforehand, in newtons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Force {
+    /// It is this.
+    Known(f64),
+    /// It is no more than this.
+    AtMost(f64),
+    /// Nothing.
+    Unknown,
+}
+
+impl Force {
+    /// A force that is not known, with its bound where there is one.
+    pub fn at_most(greatest_force_n: Option<f64>) -> Self {
+        greatest_force_n.map_or(Self::Unknown, Self::AtMost)
+    }
+}
+
+/// Contacts on a line, as one reading has them.
+pub(crate) struct Contacts<'a> {
+    /// Length of the line in metres.
+    pub length_m: f64,
+    pub force: Force,
+    /// What q is multiplied by: 1 where influences and noise are known, or [`CALIBRATED`].
+    pub widening: f64,
+    /// The force at which channels are weighed first, in newtons.
+    pub reference_force_n: f64,
+    /// Writes d and f of every channel at a place, over the standard deviation that the channel has for a contact of a force there.
+    pub channels: &'a dyn Fn(f64, f64, &mut Vec<[f64; 2]>),
+}
+
+/// The contacts that a reading does not exclude.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NotExcluded {
+    /// The least χ² of a contact with no more than the greatest force.
+    pub misfit: f64,
+    /// The 95 % interval of the place over all stretches, in metres.
+    pub x_95_m: (f64, f64),
+    /// The 95 % interval of the force over all stretches, in newtons; `None` where it is known.
+    pub force_95_n: Option<(f64, f64)>,
+    /// The stretches of places, most probable first; at least one.
+    pub stretches: Vec<Stretch>,
+}
+
+/// Places side by side that a reading does not exclude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stretch {
+    /// Its ends, in metres.
+    pub x_95_m: (f64, f64),
+    /// The forces at its places that the reading does not exclude, in newtons.
+    pub force_95_n: (f64, f64),
+    /// Estimated place in metres, and force there in newtons.
+    pub x_m: f64,
+    pub force_n: f64,
+    /// Mean squares of place, place and force, and force about these: m², m·N, N².
+    pub covariance: [f64; 3],
+    /// Its share of the posterior probability.
+    pub probability: f64,
+}
+
+impl NotExcluded {
+    /// Writes position, force and intervals, and where other stretches are too probable, these as modes.
+    pub fn write(&self, estimate: &mut Estimate) {
+        let Some((best, others)) = self.stretches.split_first() else { return };
+        estimate.contact = best.contact_within(self.x_95_m, self.force_95_n);
+        estimate.status = Status::Located;
+        for other in others.iter().filter(|other| other.probability >= OTHER_PLACE) {
+            let force_95_n = self.force_95_n.and(Some(other.force_95_n));
+            let contact = other.contact_within(other.x_95_m, force_95_n);
+            estimate.modes.push(Mode { contact, probability: other.probability });
+            estimate.status = Status::Ambiguous;
+        }
+    }
+}
+
+impl Stretch {
+    /// The contact with these intervals.
+    fn contact_within(&self, x_95_m: (f64, f64), force_95_n: Option<(f64, f64)>) -> ContactEstimate {
+        let uncertainty = Uncertainty { force_95_n, ..Uncertainty::on_line(self.covariance, x_95_m) };
+        ContactEstimate {
+            position: Position::along(self.x_m),
+            force_n: Some(self.force_n),
+            uncertainty: Some(uncertainty),
+        }
+    }
+}
+
+/// The best force at a place.
+#[derive(Clone, Copy, Debug)]
+struct Best {
+    x_m: f64,
+    force_n: f64,
+    /// 1/variance of the force.
+    precision: f64,
+    misfit: f64,
+    /// q.
+    bound: f64,
+    /// Whether a greater force than the greatest would explain the reading better.
+    is_held: bool,
+}
+
+impl Best {
+    /// Whether χ² is at most `least` + q, q being at least `floor`.
+    fn is_in(&self, least: f64, floor: f64) -> bool {
+        self.misfit - least <= self.bound.max(floor)
+    }
+}
+
+impl Contacts<'_> {
+    /// Cells between the places that are looked at.
+    const CELLS: usize = 64;
+    /// Places within the cells at the ends, each half as far from the end as the one before.
+    const HALVINGS: i32 = 8;
+    /// Halvings of the way to the edge of a stretch.
+    const EDGE_HALVINGS: usize = 24;
+    /// Places within a stretch over which its probability is summed up.
+    const WITHIN: usize = 24;
+
+    /// The contacts that the reading does not exclude; `minima_m` are places where another search has found its χ² to be low.
+    /// `None` where no place explains anything in numbers.
+    pub fn not_excluded(&self, minima_m: &[f64]) -> Option<NotExcluded> {
+        let mut buffer = Vec::new();
+        let ends = self.end_readings(&mut buffer);
+        let mut look = |x_m: f64| self.best(x_m, &ends, &mut buffer);
+        let looked = self.look_over(minima_m, &mut look);
+        let misfit = looked.iter().map(|at| at.misfit).fold(f64::INFINITY, f64::min);
+        if !misfit.is_finite() {
+            return None;
+        }
+        let mut stretches = Vec::new();
+        let mut from = 0;
+        let around_best = self.around_best(&looked, misfit);
+        while from < looked.len() {
+            let floor = if around_best.contains(&from) { 0.0 } else { self.widening * BEYOND_A_BARRIER };
+            let run_len = looked[from..].iter().take_while(|at| at.is_in(misfit, floor)).count();
+            if run_len > 0 {
+                let beside = [from.checked_sub(1), Some(from + run_len)];
+                let beside = beside.map(|i| i.and_then(|i| looked.get(i).copied()));
+                let run = &looked[from..from + run_len];
+                stretches.push(self.stretch(run, beside, (misfit, floor), &mut look));
+            }
+            from += run_len.max(1);
+        }
+        let all: f64 = stretches.iter().map(|stretch| stretch.probability).sum();
+        stretches.iter_mut().for_each(|stretch| stretch.probability /= all);
+        stretches.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let around = |of: fn(&Stretch) -> (f64, f64)| {
+            let hull = |hull: (f64, f64), one: (f64, f64)| (hull.0.min(one.0), hull.1.max(one.1));
+            stretches.iter().map(of).reduce(hull)
+        };
+        let is_known = matches!(self.force, Force::Known(_));
+        let x_95_m = around(|s| s.x_95_m)?;
+        let force_95_n = if is_known { None } else { around(|s| s.force_95_n) };
+        Some(NotExcluded { misfit, x_95_m, force_95_n, stretches })
+    }
+
+    /// The best forces at places all over the line, in rising order; among them where the greatest force begins to hold the best.
+    fn look_over(&self, minima_m: &[f64], look: &mut impl FnMut(f64) -> Best) -> Vec<Best> {
+        let h_m = self.length_m / Self::CELLS as f64;
+        let halved = (1..=Self::HALVINGS).map(|k| h_m * 0.5f64.powi(k));
+        let mut places: Vec<f64> = (0..=Self::CELLS).map(|i| i as f64 * h_m).collect();
+        places.extend(halved.clone());
+        places.extend(halved.map(|x_m| self.length_m - x_m));
+        places.extend(minima_m.iter().map(|x_m| x_m.clamp(0.0, self.length_m)));
+        places.sort_by(f64::total_cmp);
+        let mut looked: Vec<Best> = places.into_iter().map(&mut *look).collect();
+        let at_bound: Vec<Best> = looked
+            .windows(2)
+            .filter(|pair| pair[0].is_held != pair[1].is_held)
+            .map(|pair| {
+                edge(&pair[0], &pair[1], Self::EDGE_HALVINGS, look, |at| at.is_held == pair[0].is_held)
+            })
+            .collect();
+        looked.extend(at_bound);
+        looked.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        looked
+    }
+
+    /// Indices of the places around the best, up to barriers that are higher than what is not excluded behind them.
+    fn around_best(&self, looked: &[Best], least: f64) -> std::ops::Range<usize> {
+        let is_barrier = |at: &Best| at.misfit - least > self.widening * BEYOND_A_BARRIER;
+        let best = looked.iter().position(|at| at.misfit == least).unwrap_or(0);
+        let from = looked[..best].iter().rposition(is_barrier).map_or(0, |i| i + 1);
+        let to = looked[best..].iter().position(is_barrier).map_or(looked.len(), |i| best + i);
+        from..to
+    }
+
+    /// The stretch around a run of places in the region, between two that are not.
+    fn stretch(
+        &self,
+        run: &[Best],
+        [before, after]: [Option<Best>; 2],
+        (least, floor): (f64, f64),
+        look: &mut impl FnMut(f64) -> Best,
+    ) -> Stretch {
+        let mut end = |inside: &Best, outside: Option<Best>| match outside {
+            None => *inside,
+            Some(outside) => edge(inside, &outside, Self::EDGE_HALVINGS, look, |at| at.is_in(least, floor)),
+        };
+        let (first, last) = (end(&run[0], before), end(&run[run.len() - 1], after));
+        // Where nothing but the greatest force ends a stretch, it reaches the end as far as a place can be told.
+        let reaches = |edge: &Best, outside: Option<Best>| outside.is_none_or(|o| o.is_held) || edge.is_held;
+        let way_m = last.x_m - first.x_m;
+        let step = |i: usize| first.x_m + way_m * (i as f64 + 0.5) / Self::WITHIN as f64;
+        let mut within: Vec<Best> = (0..Self::WITHIN).map(|i| look(step(i))).collect();
+        let weighed = Weighed::new(&within, least);
+        let lowest = run.iter().copied().min_by(|a, b| a.misfit.total_cmp(&b.misfit)).unwrap_or(first);
+        let at = if weighed.weight > 0.0 && (reaches(&first, before) || reaches(&last, after)) {
+            look(first.x_m + way_m * weighed.median())
+        } else {
+            lowest
+        };
+        let covariance = weighed.covariance(&at, &within);
+        within.extend([first, last, lowest, at]);
+        Stretch {
+            x_95_m: (first.x_m, last.x_m),
+            force_95_n: self.forces(&within, (least, floor)),
+            x_m: at.x_m,
+            force_n: at.force_n,
+            covariance,
+            probability: weighed.weight * way_m.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The least and the greatest force in the region at these places.
+    fn forces(&self, within: &[Best], (least, floor): (f64, f64)) -> (f64, f64) {
+        let most = if let Force::AtMost(most) = self.force { most } else { f64::INFINITY };
+        let mut forces = (f64::INFINITY, 0.0f64);
+        for at in within {
+            let left = (at.bound.max(floor) - (at.misfit - least)).max(0.0);
+            // At the end itself no force has an effect, and any is possible.
+            let half = if at.precision > 0.0 { (left / at.precision).sqrt() } else { 0.0 };
+            forces = (forces.0.min(at.force_n - half), forces.1.max(at.force_n + half));
+        }
+        (forces.0.max(0.0), forces.1.min(most))
+    }
+
+    /// What contacts at both ends read: f there where the force is known, and just beside them, divided by |f|, where it is not.
+    fn end_readings(&self, buffer: &mut Vec<[f64; 2]>) -> [Vec<f64>; 2] {
+        const BESIDE: f64 = 1e-5;
+        let is_known = matches!(self.force, Force::Known(_));
+        let ends = if is_known { [0.0, 1.0] } else { [BESIDE, 1.0 - BESIDE] };
+        ends.map(|share| {
+            (self.channels)(share * self.length_m, self.reference_force_n, buffer);
+            let norm = buffer.iter().map(|[_, f]| f * f).sum::<f64>().sqrt();
+            let inverse = if is_known { 1.0 } else { norm.max(f64::MIN_POSITIVE).recip() };
+            buffer.iter().map(|[_, f]| f * inverse).collect()
+        })
+    }
+
+    fn best(&self, x_m: f64, ends: &[Vec<f64>; 2], buffer: &mut Vec<[f64; 2]>) -> Best {
+        let (force_n, is_held) = self.best_force(x_m, buffer);
+        // Summed, as |d|² − W·(2·d·f − W·|f|²) loses all digits of a good fit.
+        let misfit = buffer.iter().map(|[d, f]| (d - force_n * f).powi(2)).sum();
+        let ff: f64 = buffer.iter().map(|[_, f]| f * f).sum();
+        let across = ends.iter().map(|end| {
+            let pairs = || end.iter().zip(buffer.iter());
+            let square: f64 = match self.force {
+                Force::Known(_) => pairs().map(|(e, [_, f])| (f - e).powi(2)).sum(),
+                _ => ff - pairs().map(|(e, [_, f])| e * f).sum::<f64>().powi(2),
+            };
+            force_n * square.max(0.0).sqrt()
+        });
+        let bound = self.widening * likelihood_bound(across.fold(f64::INFINITY, f64::min));
+        let precision = if let Force::Known(_) = self.force { f64::INFINITY } else { ff };
+        Best { x_m, force_n, precision, misfit, bound, is_held }
+    }
+
+    /// The best force at a place, and whether a greater one than the greatest would be better; leaves d and f in the buffer.
+    fn best_force(&self, x_m: f64, buffer: &mut Vec<[f64; 2]>) -> (f64, bool) {
+        /// Times that channels are weighed anew by the force.
+        const WEIGHED: usize = 3;
+        if let Force::Known(force_n) = self.force {
+            (self.channels)(x_m, force_n, buffer);
+            return (force_n, false);
+        }
+        let (mut force_n, mut is_held) = (self.reference_force_n, false);
+        for _ in 0..WEIGHED {
+            (self.channels)(x_m, force_n, buffer);
+            let df: f64 = buffer.iter().map(|[d, f]| d * f).sum();
+            let ff: f64 = buffer.iter().map(|[_, f]| f * f).sum();
+            let best_n = if ff > 0.0 { (df / ff).max(0.0) } else { 0.0 };
+            let mut next_n = best_n;
+            if let Force::AtMost(most) = self.force {
+                (next_n, is_held) = (best_n.min(most), best_n > most || ff <= 0.0);
+            }
+            let is_settled = (next_n - force_n).abs() <= 1e-3 * force_n;
+            force_n = next_n;
+            if is_settled {
+                break;
+            }
+        }
+        (force_n, is_held)
+    }
+}
+
+/// The last place from `inside` towards `outside` of which `holds` is true, to so many halvings of the way.
+fn edge(
+    inside: &Best,
+    outside: &Best,
+    halvings: usize,
+    look: &mut impl FnMut(f64) -> Best,
+    holds: impl Fn(&Best) -> bool,
+) -> Best {
+    let (mut good, mut bad_m) = (*inside, outside.x_m);
+    for _ in 0..halvings {
+        let middle = look(0.5 * (good.x_m + bad_m));
+        if holds(&middle) {
+            good = middle;
+        } else {
+            bad_m = middle.x_m;
+        }
+    }
+    good
+}
+
+/// Posterior over places in the middles of equal parts of a stretch.
+struct Weighed {
+    densities: Vec<f64>,
+    /// Mean density.
+    weight: f64,
+    sum: f64,
+}
+
+impl Weighed {
+    fn new(within: &[Best], least: f64) -> Self {
+        let densities: Vec<f64> = within.iter().map(|at| (-0.5 * (at.misfit - least)).exp()).collect();
+        let sum: f64 = densities.iter().sum();
+        Self { weight: sum / within.len() as f64, densities, sum }
+    }
+
+    /// Share of a stretch on whose either side half of the probability is.
+    fn median(&self) -> f64 {
+        let mut before = 0.0;
+        for (i, density) in self.densities.iter().enumerate() {
+            if before + density >= 0.5 * self.sum {
+                return (i as f64 + (0.5 * self.sum - before) / density) / self.densities.len() as f64;
+            }
+            before += density;
+        }
+        0.5
+    }
+
+    /// Mean squares about a contact.
+    fn covariance(&self, about: &Best, within: &[Best]) -> [f64; 3] {
+        let variance = if about.precision > 0.0 { about.precision.recip() } else { 0.0 };
+        if self.sum <= 0.0 {
+            return [0.0, 0.0, variance];
+        }
+        let mut mean = [0.0; 3];
+        for (at, density) in within.iter().zip(&self.densities) {
+            let (x, force, share) = (at.x_m - about.x_m, at.force_n - about.force_n, density / self.sum);
+            mean = [mean[0] + share * x * x, mean[1] + share * x * force, mean[2] + share * force * force];
+        }
+        [mean[0], mean[1], mean[2] + variance]
+    }
+}
+
+/// The 95 % interval of a place on a line by a normal distribution about `x_m`, which may lie beyond the ends: it holds the best place on
+/// the line, and covers at the ends as elsewhere.
+pub(crate) fn interval_on_line_95(x_m: f64, sd_m: f64, length_m: f64) -> (f64, f64) {
+    if !is_near_end(x_m, sd_m, length_m) || sd_m.is_nan() || sd_m <= 0.0 {
+        return normal_interval_95(x_m, sd_m);
+    }
+    let held_m = x_m.clamp(0.0, length_m);
+    let misfit = |at_m: f64| ((at_m - x_m) / sd_m).powi(2);
+    let holds =
+        |at_m: f64| misfit(at_m) - misfit(held_m) <= likelihood_bound(at_m.min(length_m - at_m) / sd_m);
+    let edge = |end_m: f64| {
+        let way_m = end_m - held_m;
+        held_m + way_m * bisect((0.0, 1.0), 50, |share| holds(held_m + share * way_m))
+    };
+    let to = |end_m: f64| if holds(end_m) { end_m } else { edge(end_m) };
+    (to(0.0), to(length_m))
+}
+
+/// q: the greatest χ² − χ²_min at which a place at distance μ from the boundary is not excluded, such that 95 % of its readings do not
+/// exclude it.
+///
+/// With z ~ N(μ, 1) the reading's distance from the boundary, which the best fit holds to 0 or more, χ² − χ²_min is (z − μ)² for z ≥ 0 and
+/// μ² − 2·μ·z below. It is at most q for z − μ from −(q + μ²)/(2μ), or −√q where that is above −μ, to √q.
+fn likelihood_bound(distance: f64) -> f64 {
+    const STEP: f64 = 0.02;
+    const STEPS: usize = 100;
+    static BOUNDS: OnceLock<Vec<f64>> = OnceLock::new();
+    let bounds = BOUNDS.get_or_init(|| {
+        let covered = |mu: f64, q: f64| {
+            let below = if q.sqrt() < mu {
+                q.sqrt()
+            } else if mu > 0.0 {
+                (q + mu * mu) / (2.0 * mu)
+            } else {
+                f64::INFINITY
+            };
+            normal_cdf(q.sqrt()) - normal_cdf(-below)
+        };
+        let bound = |i: usize| bisect((1.0, 6.0), 60, |q| covered(i as f64 * STEP, q) < 0.95);
+        (0..=STEPS).map(bound).collect()
+    });
+    let place = (distance / STEP).clamp(0.0, STEPS as f64);
+    let node = (place as usize).min(STEPS - 1);
+    bounds[node] + (place - node as f64) * (bounds[node + 1] - bounds[node])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_is_that_of_feldman_and_cousins() {
+        // One-sided 95 % at the boundary, two-sided away from it.
+        assert!((likelihood_bound(0.0) - 2.7055).abs() < 1e-3);
+        assert!((likelihood_bound(5.0) - 3.8415).abs() < 1e-3);
+        assert!((likelihood_bound(f64::INFINITY) - 3.8415).abs() < 1e-3);
+    }
+
+    #[test]
+    fn intervals_beside_an_end_hold_the_place_on_the_line() {
+        for x_m in [-0.06, -0.01, 0.0, 0.01, 0.05, 0.5, 0.99, 1.02] {
+            let (low, high) = interval_on_line_95(x_m, 0.02, 1.0);
+            let held_m = f64::clamp(x_m, 0.0, 1.0);
+            assert!(0.0 <= low && low <= held_m && held_m <= high && high <= 1.0, "{x_m}: {low} to {high}");
+        }
+        let (low, high) = interval_on_line_95(0.2, 0.02, 1.0);
+        assert!((low - 0.1608).abs() < 1e-5 && (high - 0.2392).abs() < 1e-5, "{low} to {high}");
+    }
+
+    #[test]
+    fn a_reading_of_nothing_but_the_product_leaves_the_place_open() {
+        // Every sensor reads the place times the force, and no sensor anything else.
+        let channels = |x_m: f64, _: f64, out: &mut Vec<[f64; 2]>| {
+            out.clear();
+            out.extend([1.0, 2.0].map(|gain| [gain * 1e3 * 0.1 * 3.0, gain * 1e3 * x_m]));
+        };
+        let contacts = Contacts {
+            length_m: 1.0,
+            force: Force::AtMost(30.0),
+            widening: 1.0,
+            reference_force_n: 3.0,
+            channels: &channels,
+        };
+        let found = contacts.not_excluded(&[0.3]).unwrap();
+        let [stretch] = found.stretches[..] else { panic!("{found:?}") };
+        assert!((found.x_95_m.0 - 0.01).abs() < 1e-4 && found.x_95_m.1 == 1.0, "{found:?}");
+        let (least_n, most_n) = found.force_95_n.unwrap();
+        assert!((least_n - 0.3).abs() < 0.01 && most_n == 30.0, "{found:?}");
+        assert!((stretch.x_m * stretch.force_n - 0.3).abs() < 1e-9, "{found:?}");
+    }
+}
+
+#[cfg(test)]
+mod coverage;

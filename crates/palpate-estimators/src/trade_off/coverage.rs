@@ -1,0 +1,151 @@
+//! How often intervals hold the contact, by its distance from the end of the paper's beam.
+
+use super::PRIOR_FORCES;
+use crate::closed_form::ClosedForm;
+use crate::fit::{Fit, FitTask, Locate};
+use crate::fixtures::{Example, paper};
+use crate::influence::Influence;
+use crate::simulate::clean_reading;
+use palpate_core::Status;
+use palpate_mechanics::contact::{Contact, Position};
+use palpate_mechanics::sensing::{ChannelErrors, measure};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Distances from the left end, in millimetres.
+const PLACES_MM: [f64; 11] = [0.5, 1.0, 2.0, 4.0, 7.0, 10.0, 15.0, 22.0, 25.0, 40.0, 100.0];
+
+/// Readings at each place.
+const READINGS: usize = 4000;
+
+/// The paper's beam, pressed with its known force.
+fn bench(force_is_known: bool) -> Example {
+    let mut bench = paper(5e-6, 10);
+    if !force_is_known {
+        bench.training = bench.training.with_force(3.0);
+        bench.setup = bench.setup.unknown_force();
+    }
+    bench
+}
+
+/// What estimates of contacts at one place hold, in percent of the readings in which a contact was found.
+#[derive(Debug, Default)]
+struct Row {
+    found: usize,
+    /// The place is in its interval; the force is in its interval; the estimate is outside its own interval.
+    place: usize,
+    force: usize,
+    outside: usize,
+    error_mm: f64,
+    width_mm: f64,
+    greatest_n: f64,
+    not_explained: usize,
+}
+
+impl Row {
+    fn new(
+        bench: &Example,
+        locators: &[Box<dyn Locate>],
+        x_m: f64,
+        force_n: f64,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Self {
+        let mut row = Self::default();
+        let surface = bench.setup.surface().model().unwrap();
+        let contact = Contact { position: Position::along(x_m), force_n };
+        let truth = clean_reading(surface, bench.setup.layout(), contact);
+        for i in 0..READINGS {
+            let reading =
+                measure(bench.setup.layout(), &truth, &ChannelErrors::none(bench.setup.layout()), rng);
+            let estimate = locators[i % locators.len()].locate(&reading);
+            if estimate.status == Status::NoContact {
+                continue;
+            }
+            let (found, place) = (estimate.contact, estimate.contact.position.x_m);
+            let uncertainty = found.uncertainty.unwrap();
+            let (low, high) = uncertainty.x_95_m;
+            let found_n = found.force_n.unwrap();
+            let half_n = 1.959964 * uncertainty.covariance[5].sqrt();
+            let (least_n, most_n) = uncertainty.force_95_n.unwrap_or((found_n - half_n, found_n + half_n));
+            row.found += 1;
+            row.place += usize::from((low..=high).contains(&x_m));
+            row.force += usize::from((least_n..=most_n).contains(&force_n));
+            row.outside +=
+                usize::from(!(low..=high).contains(&place) || !(least_n..=most_n).contains(&found_n));
+            row.not_explained += usize::from(estimate.status == Status::OutsideModel);
+            row.error_mm += 1e3 * (place - x_m).abs();
+            row.width_mm += 1e3 * (high - low);
+            row.greatest_n = row.greatest_n.max(found_n);
+        }
+        row
+    }
+
+    fn percent(&self, count: usize) -> f64 {
+        100.0 * count as f64 / self.found as f64
+    }
+}
+
+fn print_and_check(title: &str, bench: &Example, locators: &[Box<dyn Locate>], forces_n: &[f64]) {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
+    let mut wrong = Vec::new();
+    for force_n in forces_n {
+        eprintln!(
+            "{title}, {force_n} N\n| from the end | contact found | place covered | force covered | mean width | mean error | greatest force | outside_model |\n|---|---|---|---|---|---|---|---|"
+        );
+        for place_mm in PLACES_MM {
+            let row = Row::new(bench, locators, 1e-3 * place_mm, *force_n, &mut rng);
+            let (place, force) = (row.percent(row.place), row.percent(row.force));
+            let mean = |sum: f64| sum / row.found as f64;
+            eprintln!(
+                "| {place_mm} mm | {:.1} % | {place:.1} % | {force:.1} % | {:.2} mm | {:.2} mm | {:.2} N | {:.2} % |",
+                100.0 * row.found as f64 / READINGS as f64,
+                mean(row.width_mm),
+                mean(row.error_mm),
+                row.greatest_n,
+                row.percent(row.not_explained)
+            );
+            let good = |percent: f64| (93.0..=97.0).contains(&percent) || row.found < READINGS;
+            if !good(place) || force < 93.0 || row.outside > 0 || row.greatest_n > PRIOR_FORCES * 3.0 {
+                wrong.push(format!("{force_n} N at {place_mm} mm: {row:?}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{title}: {wrong:#?}");
+}
+
+fn influence(bench: &Example) -> Vec<Box<dyn Locate>> {
+    let fit = |seed: u64| -> Box<dyn Locate> {
+        let recording = bench.simulate(seed);
+        Box::new(Influence::default().fit_beam(FitTask::new(&bench.setup, &recording)).unwrap())
+    };
+    (0..200).map(fit).collect()
+}
+
+fn closed_form(bench: &Example) -> Vec<Box<dyn Locate>> {
+    let recording = bench.simulate(0);
+    vec![Box::new(ClosedForm::default().fit_method(FitTask::new(&bench.setup, &recording)).unwrap())]
+}
+
+#[test]
+fn influence_covers_unknown_forces_at_every_distance_from_the_end() {
+    let bench = bench(false);
+    print_and_check("influence, force unknown", &bench, &influence(&bench), &[1.0, 3.0, 6.0]);
+}
+
+#[test]
+fn the_closed_form_covers_unknown_forces_at_every_distance_from_the_end() {
+    let bench = bench(false);
+    print_and_check("closed form, force unknown", &bench, &closed_form(&bench), &[1.0, 3.0, 6.0]);
+}
+
+#[test]
+fn influence_covers_a_known_force_at_every_distance_from_the_end() {
+    let bench = bench(true);
+    print_and_check("influence, force known", &bench, &influence(&bench), &[3.0]);
+}
+
+#[test]
+fn the_closed_form_covers_a_known_force_at_every_distance_from_the_end() {
+    let bench = bench(true);
+    print_and_check("closed form, force known", &bench, &closed_form(&bench), &[3.0]);
+}
