@@ -145,6 +145,7 @@ fn uncertainty_with(estimate: &ContactEstimate, explained: &ContactEstimate) -> 
         covariance: [xx + dx * dx, xy + dx * dy, xf, yy + dy * dy, yf, ff],
         x_95_m: with(other.x_95_m, at.x_m),
         y_95_m: with(other.y_95_m, at.y_m),
+        force_95_n: other.force_95_n.zip(estimate.force_n).map(|(force_95_n, at_n)| with(force_95_n, at_n)),
     })
 }
 

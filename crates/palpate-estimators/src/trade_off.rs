@@ -39,10 +39,11 @@ pub(crate) fn is_near_end(x_m: f64, sd_m: f64, length_m: f64) -> bool {
 /// Without it 92.2 % of 4,000 readings over 200 calibrations were covered in the worst row of `trade_off/coverage.rs`.
 pub(crate) const CALIBRATED: f64 = 1.1;
 
-/// q of places that a barrier of greater χ² parts from the best: noise decides for the wrong side so surely in at most 0.5 % of the
-/// readings, which are lost besides the 5 % of one side. (With a distance of δ standard deviations between both sides, χ² differs by
-/// 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often for δ = √q, when z does.)
-const BEYOND_A_BARRIER: f64 = 6.63;
+/// q of places that a barrier of greater χ² parts from the best: there the likelihood is 1 % of the best, as of other places that are told.
+/// Noise decides for the wrong side so surely in at most 0.12 % of the readings, which are lost besides the 5 % of one side. (With a
+/// distance of δ standard deviations between both sides, χ² differs by 2·δ·z − δ², z ~ N(0, 1), which exceeds q most often for δ = √q,
+/// when z does.)
+const BEYOND_A_BARRIER: f64 = 9.21;
 
 /// What is known of the force beforehand, in newtons.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +63,9 @@ impl Force {
     }
 }
 
+/// Writes d and f of every channel at a place, over the standard deviation that the channel has for a contact of a force there.
+pub(crate) type Channels<'a> = dyn Fn(f64, f64, &mut Vec<[f64; 2]>) + 'a;
+
 /// Contacts on a line, as one reading has them.
 pub(crate) struct Contacts<'a> {
     /// Length of the line in metres.
@@ -72,7 +76,7 @@ pub(crate) struct Contacts<'a> {
     /// The force at which channels are weighed first, in newtons.
     pub reference_force_n: f64,
     /// Writes d and f of every channel at a place, over the standard deviation that the channel has for a contact of a force there.
-    pub channels: &'a dyn Fn(f64, f64, &mut Vec<[f64; 2]>),
+    pub channels: &'a Channels<'a>,
 }
 
 /// The contacts that a reading does not exclude.
