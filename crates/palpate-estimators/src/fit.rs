@@ -1,14 +1,16 @@
 //! The two traits of estimators: [`Fit`] calibrates, [`Locate`] locates; and the locator that fitting gives.
 
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::borrow::Borrow;
 use std::collections::VecDeque;
+use std::fmt::Debug;
 
 use palpate_core::{ContactEstimate, Estimate, Position, Status, Uncertainty};
 use palpate_mechanics::sensing::Layout;
 use palpate_mechanics::surface::Extent;
 use palpate_numerics::watch::{Cancelled, Watch};
 
-use crate::reading_check::ReadingCheck;
 use crate::recording::{Provenance, Recording};
 use crate::setup::Setup;
 
@@ -164,7 +166,7 @@ pub trait Fit {
         self.fit_alone(task)
     }
 
-    /// Fits with a seed, watched, without a [`ReadingCheck`]: what studies of a method need.
+    /// Fits with a seed, watched, without a check of the estimates: what studies of a method need.
     ///
     /// # Errors
     /// When the recording does not suit the setup or the method, or the watch stopped it.
@@ -208,6 +210,9 @@ pub trait Fit {
 
 /// A fitted method.
 pub trait Locate {
+    /// Check of its estimates that its locators may have.
+    type Check: CheckEstimate;
+
     /// Estimates the contact from a reading: one finite value a channel, in SI units or raw.
     fn locate(&self, reading: &[f64]) -> Estimate;
 
@@ -223,10 +228,36 @@ pub trait Locate {
     fn check(&self, setup: &Setup) -> Result<(), LocatorFault>;
 }
 
+/// A check of estimates by other means than those of the method that made them.
+pub trait CheckEstimate: Clone + Debug + PartialEq + Serialize + DeserializeOwned {
+    /// An estimate of a reading on a surface as the check leaves it.
+    fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate;
+
+    /// Checks what a file may have got wrong.
+    ///
+    /// # Errors
+    /// [`LocatorFault`], naming what does not fit together.
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault>;
+}
+
+/// The check of methods that need none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum NoCheck {}
+
+impl CheckEstimate for NoCheck {
+    fn checked(&self, _: &[f64], estimate: Estimate, _: Extent) -> Estimate {
+        estimate
+    }
+
+    fn check(&self, _: &Setup) -> Result<(), LocatorFault> {
+        Ok(())
+    }
+}
+
 /// A locator: a fitted method with its setup and provenance, so that nothing it needs is outside it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fitted<M> {
+pub struct Fitted<M: Locate> {
     /// The surface that is touched, and its sensors.
     pub setup: Setup,
     /// Its provenance.
@@ -236,9 +267,9 @@ pub struct Fitted<M> {
     /// Mean reading of the recording's rows without contact, where it has some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Vec<f64>>,
-    /// The check of its estimates, where it was learnt.
+    /// The check of its estimates, where it has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub check: Option<Box<ReadingCheck>>,
+    pub check: Option<Box<M::Check>>,
 }
 
 /// Provenance of a locator.
@@ -253,7 +284,7 @@ pub struct LocatorProvenance {
     pub recording: Provenance,
 }
 
-impl<M> Fitted<M> {
+impl<M: Locate> Fitted<M> {
     /// The locator of a method that was fitted to a task.
     pub fn new(task: FitTask, method: M) -> Self {
         let provenance = LocatorProvenance {
@@ -265,10 +296,10 @@ impl<M> Fitted<M> {
         Self { setup: task.setup.clone(), provenance, method, untouched, check: None }
     }
 
-    /// The same locator with its method as another type.
-    pub fn map<N>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
-        let Self { setup, provenance, method, untouched, check } = self;
-        Fitted { setup, provenance, method: convert(method), untouched, check }
+    /// The same locator with its method as another type, without a check.
+    pub fn map<N: Locate>(self, convert: impl FnOnce(M) -> N) -> Fitted<N> {
+        let Self { setup, provenance, method, untouched, check: _ } = self;
+        Fitted { setup, provenance, method: convert(method), untouched, check: None }
     }
 
     /// The sensors, a channel of a reading each.

@@ -13,7 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::digit::{DigitEstimator, DigitLocator};
-use crate::fit::{Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{CheckEstimate, Fit, FitTask, Locate, LocatorFault};
 use crate::influence::{Influence, InfluenceLocator, InfluenceSource};
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -73,25 +73,6 @@ impl ReadingCheck {
         Cow::Owned(recording.subset(&picked))
     }
 
-    /// An estimate of a reading as the check leaves it.
-    pub fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
-        let explained = match self {
-            Self::Influence(influence) => influence.locate(reading),
-            Self::Digit(digit) => digit.locate(reading),
-        };
-        let widened = || {
-            let position = nearest_on(extent, estimate.contact.position);
-            let contact = ContactEstimate { position, ..estimate.contact };
-            ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
-        };
-        match explained.status {
-            Status::NoContact => explained,
-            Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
-            Status::Ambiguous => Estimate { contact: widened(), ..explained },
-            Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
-        }
-    }
-
     /// Share of untouched readings that may be taken for a contact; `None` of one that tells no untouched reading.
     pub fn false_alarm_rate(&self) -> Option<FalseAlarmRate> {
         match self {
@@ -115,12 +96,28 @@ impl ReadingCheck {
             Self::Digit(_) => "the equations of a bending finger",
         }
     }
+}
 
-    /// Checks what a file may have got wrong.
-    ///
-    /// # Errors
-    /// [`LocatorFault`], naming what does not fit together.
-    pub fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
+impl CheckEstimate for ReadingCheck {
+    fn checked(&self, reading: &[f64], estimate: Estimate, extent: Extent) -> Estimate {
+        let explained = match self {
+            Self::Influence(influence) => influence.locate(reading),
+            Self::Digit(digit) => digit.locate(reading),
+        };
+        let widened = || {
+            let position = nearest_on(extent, estimate.contact.position);
+            let contact = ContactEstimate { position, ..estimate.contact };
+            ContactEstimate { uncertainty: uncertainty_with(&contact, &explained.contact), ..contact }
+        };
+        match explained.status {
+            Status::NoContact => explained,
+            Status::OutsideModel => Estimate { status: Status::OutsideModel, ..estimate },
+            Status::Ambiguous => Estimate { contact: widened(), ..explained },
+            Status::Located | Status::OutsideSurface => Estimate { contact: widened(), ..explained },
+        }
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), LocatorFault> {
         match self {
             Self::Influence(influence) => influence.check(setup),
             Self::Digit(digit) => digit.check(setup),

@@ -86,14 +86,14 @@ pub struct Sensor {
 
 /// Layout: all the sensors of one surface. A reading has one value for each, in this order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Unchecked")]
+#[serde(try_from = "NoCheck")]
 pub struct Layout {
     sensors: Vec<Sensor>,
 }
 
 /// A layout as a file has it.
 #[derive(Deserialize)]
-struct Unchecked {
+struct NoCheck {
     sensors: Vec<Sensor>,
 }
 
@@ -107,10 +107,10 @@ pub struct LayoutError {
     pub fault: OutOfRange,
 }
 
-impl TryFrom<Unchecked> for Layout {
+impl TryFrom<NoCheck> for Layout {
     type Error = LayoutError;
 
-    fn try_from(unchecked: Unchecked) -> Result<Self, LayoutError> {
+    fn try_from(unchecked: NoCheck) -> Result<Self, LayoutError> {
         Self::new(unchecked.sensors)
     }
 }

@@ -125,19 +125,19 @@ fn main() {
         if let Extent::Line { .. } = bench.setup.surface().extent() {
             println!("Two contacts: any test tells at most {:.1} %\n", 100.0 * most_told(bench, 2000));
         }
-        print_table(calibrated.iter().map(|benches| &benches[i]), count);
+        print_table(&calibrated.iter().map(|benches| &benches[i]).collect::<Vec<_>>(), count);
     }
 }
 
 /// A row an estimator, over all calibrations.
-fn print_table<'a>(benches: impl Iterator<Item = &'a Bench> + Clone, count: usize) {
-    let Some(first) = benches.clone().next() else { return };
+fn print_table(benches: &[&Bench], count: usize) {
+    let first = benches[0];
     let names: Vec<&str> = cases(first, 0, 0).iter().map(|case| case.name).collect();
     println!("| estimator | {} |", names.join(" | "));
     println!("|{}", "---|".repeat(names.len() + 1));
     for estimator in contenders(&first.setup, &Estimator::default(), first.presses.rows.len()) {
         let mut sums = vec![0.0; names.len()];
-        for (seed, bench) in benches.clone().enumerate() {
+        for (seed, bench) in benches.iter().enumerate() {
             let locator = estimator.fit(&bench.setup, &bench.presses).expect("it suits the bench");
             for (sum, case) in sums.iter_mut().zip(cases(bench, count, seed as u64)) {
                 *sum += case.share(&locator) / CALIBRATIONS as f64;

@@ -3,7 +3,7 @@
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::held_out::HeldOutErrors;
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
@@ -235,6 +235,8 @@ impl CentroidLocator {
 }
 
 impl Locate for CentroidLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let Some(position) = self.position(reading) else {
             return NO_CONTACT;

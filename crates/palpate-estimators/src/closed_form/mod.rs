@@ -8,7 +8,7 @@ mod polynomial;
 
 use serde::{Deserialize, Serialize};
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::recording::Recording;
 use crate::setup::Setup;
 use crate::status::{
@@ -243,6 +243,8 @@ enum Noise {
 }
 
 impl Locate for ClosedFormLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let channels = self.seeing();
         let (weights, noise) = self.weights(&channels);

@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::likelihood::ContactFit;
 use crate::recording::Recording;
 use crate::setup::Setup;
@@ -264,6 +264,8 @@ fn contact(piece: &Piece, x_95_m: (f64, f64)) -> ContactEstimate {
 }
 
 impl Locate for DigitLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let gauges = gauges(&self.layout, reading);
         let size: f64 = gauges.iter().map(|gauge| (gauge.strain / gauge.sd).powi(2)).sum();

@@ -22,7 +22,7 @@ use crate::centroid::{Centroid, CentroidFitError, CentroidLocator};
 use crate::closed_form::{ClosedForm, ClosedFormFitError, ClosedFormLocator};
 use crate::digit::{DigitEstimator, DigitFitError, DigitLocator, DigitShape, DigitTheory};
 use crate::evaluation::{Evaluation, EvaluationError, Split, TimedEvaluation, evaluate_splits};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::gaussian_process::{GaussianProcessError, GaussianProcessEstimator, GaussianProcessLocator};
 use crate::influence::{BeamLikelihood, Influence, InfluenceFitError, InfluenceLocator, PlateLikelihood};
 use crate::likelihood::Likelihood;
@@ -132,7 +132,7 @@ macro_rules! estimators {
                 }
             }
 
-            fn as_locate(&self) -> &dyn Locate {
+            fn as_locate(&self) -> &dyn Locate<Check = NoCheck> {
                 match self {
                     $(Self::$variant(method) => method,)*
                 }
@@ -241,6 +241,8 @@ impl Default for Estimator {
 pub type Locator = Fitted<Method>;
 
 impl Locate for Method {
+    type Check = ReadingCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         self.as_locate().locate(reading)
     }
@@ -254,7 +256,7 @@ impl Locate for Method {
     }
 }
 
-impl<M> Fitted<M>
+impl<M: Locate> Fitted<M>
 where
     Method: From<M>,
 {

@@ -49,7 +49,7 @@ pub struct Calibration {
 
 /// A locator from a simulated calibration, and how it located.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Calibrated<M> {
+pub struct Calibrated<M: Locate> {
     /// The seed of the simulation and of the fit.
     pub seed: u64,
     /// The locator.

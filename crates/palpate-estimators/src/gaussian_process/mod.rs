@@ -7,7 +7,7 @@
 use ndarray::Array2;
 
 use crate::features::{FeatureKind, Features, NoFeatures};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::recording::{Recording, TooFewPositions};
 use crate::setup::Setup;
 use crate::status::on_surface;
@@ -141,6 +141,8 @@ pub struct GaussianProcessLocator {
 }
 
 impl Locate for GaussianProcessLocator {
+    type Check = NoCheck;
+
     /// The posterior mean, with the variance of the contact's position: that of the function, and the fitted error of
     /// a single row besides.
     fn locate(&self, reading: &[f64]) -> Estimate {

@@ -23,7 +23,7 @@ pub use grid::Axis;
 pub use noise::Whitening;
 pub use plane::{PlaneLocator, PlaneScratch, PlaneTable, PlateLikelihood};
 
-use crate::fit::{Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::lightest_touch::LightestTouch;
 use crate::offset_course::OffsetCourse;
 use crate::recording::Recording;
@@ -195,6 +195,8 @@ impl InfluenceLocator {
 }
 
 impl Locate for InfluenceLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self {
             Self::Beam(beam) => beam.locate(reading),

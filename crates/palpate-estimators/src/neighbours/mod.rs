@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::features::{FeatureKind, Features, NoFeatures};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::held_out::HeldOutErrors;
 use crate::recording::{Row, TooFewPositions};
 use crate::setup::Setup;
@@ -134,6 +134,8 @@ pub struct Neighbour {
 }
 
 impl Locate for NeighboursLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let found = nearest(self.rows.iter(), &self.features.apply(reading), self.count);
         let Some(position) = means(&found).pop() else {

@@ -22,7 +22,7 @@ pub use palpate_core::Activation;
 pub use prepared::PreparedNetwork;
 pub use train::{Precision, TrainingTask, train_many, train_one};
 
-use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, SeedQueue};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Fitted, Locate, LocatorFault, Mapped, NoCheck, SeedQueue};
 use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use crate::status::on_surface;
@@ -599,6 +599,8 @@ impl NetworkLocator {
 }
 
 impl Locate for NetworkLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let position = self.position(reading).unwrap_or(Position::along(f64::NAN));
         on_surface(ContactEstimate { position, ..ContactEstimate::default() }, self.parts.extent)

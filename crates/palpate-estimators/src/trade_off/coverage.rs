@@ -2,7 +2,7 @@
 
 use super::PRIOR_FORCES;
 use crate::closed_form::ClosedForm;
-use crate::fit::{Fit, FitTask, Locate};
+use crate::fit::{Fit, FitTask, Locate, NoCheck};
 use crate::fixtures::{Example, paper};
 use crate::influence::Influence;
 use crate::simulate::clean_reading;
@@ -45,7 +45,7 @@ struct Row {
 impl Row {
     fn new(
         bench: &Example,
-        locators: &[Box<dyn Locate>],
+        locators: &[Box<dyn Locate<Check = NoCheck>>],
         x_m: f64,
         force_n: f64,
         rng: &mut Xoshiro256PlusPlus,
@@ -85,7 +85,12 @@ impl Row {
     }
 }
 
-fn print_and_check(title: &str, bench: &Example, locators: &[Box<dyn Locate>], forces_n: &[f64]) {
+fn print_and_check(
+    title: &str,
+    bench: &Example,
+    locators: &[Box<dyn Locate<Check = NoCheck>>],
+    forces_n: &[f64],
+) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(15);
     let mut wrong = Vec::new();
     for force_n in forces_n {
@@ -113,15 +118,15 @@ fn print_and_check(title: &str, bench: &Example, locators: &[Box<dyn Locate>], f
     assert!(wrong.is_empty(), "{title}: {wrong:#?}");
 }
 
-fn influence(bench: &Example) -> Vec<Box<dyn Locate>> {
-    let fit = |seed: u64| -> Box<dyn Locate> {
+fn influence(bench: &Example) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
+    let fit = |seed: u64| -> Box<dyn Locate<Check = NoCheck>> {
         let recording = bench.simulate(seed);
         Box::new(Influence::default().fit_beam(FitTask::new(&bench.setup, &recording)).unwrap())
     };
     (0..200).map(fit).collect()
 }
 
-fn closed_form(bench: &Example) -> Vec<Box<dyn Locate>> {
+fn closed_form(bench: &Example) -> Vec<Box<dyn Locate<Check = NoCheck>>> {
     let recording = bench.simulate(0);
     vec![Box::new(ClosedForm::default().fit_method(FitTask::new(&bench.setup, &recording)).unwrap())]
 }

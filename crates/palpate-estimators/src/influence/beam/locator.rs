@@ -16,7 +16,7 @@ use super::multi_contact::locate_several;
 use super::posterior::{Read, conclude};
 use super::search::{ForEight, NEGLIGIBLE, Scratch, Search};
 use super::table::{FittedInfluence, InfluenceTable};
-use crate::fit::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
@@ -138,6 +138,8 @@ impl BeamLocator {
 }
 
 impl Locate for BeamLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         self.locate_with(reading, &mut Scratch::default())
     }

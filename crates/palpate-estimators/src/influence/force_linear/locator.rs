@@ -14,7 +14,7 @@ use super::drift::DriftCourse;
 use super::posterior::Functions;
 use super::prior::{Prior, Source};
 use super::scan::Scan;
-use crate::fit::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::config::Structure;
 use crate::influence::grid::{Axis, check_axes, greatest_distances};
 use crate::influence::inversion::{
@@ -790,6 +790,8 @@ impl ResponseFunction for LearntResponse<'_> {
 }
 
 impl Locate for ForceLinearLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let relative = self.relative(reading);
         let estimate = self.estimate(&relative);

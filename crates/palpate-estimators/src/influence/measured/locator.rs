@@ -5,7 +5,7 @@ use super::curve::{Curve, Window};
 use super::line::{Line, Marginal, Stretch, WhiteNoise};
 use super::scan::Scan;
 use super::table::Table;
-use crate::fit::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::grid::{Axis, check_axes, greatest_distances, middle};
 use crate::influence::inversion::{
     Cells, Explain, Explained, Inversion, Layers, Look, Slopes, Stencil, ToldForce, look_at_cells,
@@ -203,6 +203,8 @@ impl MeasuredLocator {
 }
 
 impl Locate for MeasuredLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         let Stored { table, residual_limit, .. } = &self.stored;
         match self.seen(reading) {

@@ -3,7 +3,7 @@
 use super::posterior::{Scratch, locate};
 use super::search::Search;
 use super::table::PlaneTable;
-use crate::fit::{Locate, LocatorFault};
+use crate::fit::{Locate, LocatorFault, NoCheck};
 use crate::influence::channels::Channels;
 use crate::influence::config::ForceBelief;
 use crate::setup::Setup;
@@ -78,6 +78,8 @@ impl PlaneLocator {
 }
 
 impl Locate for PlaneLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         self.locate_with(reading, &mut PlaneScratch::default())
     }

@@ -7,7 +7,7 @@ use ndarray::{Array1, Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::features::{ChannelScale, FeatureKind, FeatureSource, Features, NoFeatures};
-use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault};
+use crate::fit::{ChannelMismatch, Fit, FitTask, Locate, LocatorFault, NoCheck};
 use crate::network::{Activation, Topology};
 use crate::recording::{Recording, Row, TooFewPositions};
 use crate::setup::Setup;
@@ -379,6 +379,8 @@ impl LevenbergMarquardtLocator {
 }
 
 impl Locate for LevenbergMarquardtLocator {
+    type Check = NoCheck;
+
     fn locate(&self, reading: &[f64]) -> Estimate {
         match self.predict(&self.inputs.values(reading)) {
             Some((mean, covariance)) => on_surface(self.contact(&mean, &covariance), self.extent),
