@@ -129,7 +129,11 @@ impl<'a> Learning<'a> {
         let searched: Vec<SensorPresses> =
             priors.iter().zip(living).map(|sensor| with(sensor, &thinned)).collect();
         let noise_is_told = living.iter().all(|s| presses.noise_variance(layout, *s).is_some());
-        let mut hyper = most_probable(&searched, mean, surface.length_m(), noise_is_told);
+        // A reaction of presses of one force may be an offset as well as an influence, which no support holds at 0 everywhere.
+        let has_one_force = presses.presses.windows(2).all(|pair| pair[0].force_n == pair[1].force_n);
+        let is_reaction_alone = mean == Mean::Zero && kind == SensorKind::Reaction && has_one_force;
+        let told = Told { noise: noise_is_told, offset: is_reaction_alone };
+        let mut hyper = most_probable(&searched, mean, surface.length_m(), told);
         if from == InfluenceSource::Mechanics {
             hyper = Hyperparameters { noise: hyper.noise, ..Hyperparameters::NONE };
         }
@@ -375,14 +379,18 @@ const START: [f64; 5] = [-2.0, -3.0, -3.0, -4.0, -4.0];
 const LOWEST: [f64; 5] = [-6.0, -8.0, -7.0, -9.0, -9.0];
 const HIGHEST: [f64; 5] = [0.0, -1.0, 2.0, 0.0, 0.0];
 
+/// Hyperparameters that are not to be found.
+#[derive(Clone, Copy)]
+struct Told {
+    /// The noise is told by repeats or by the rig.
+    noise: bool,
+    /// Offsets are 0.
+    offset: bool,
+}
+
 /// The hyperparameters under which the presses of all `sensors`, which are of one kind, are the most probable: steps along one
 /// logarithm at a time, ever smaller.
-fn most_probable(
-    sensors: &[SensorPresses],
-    mean: Mean,
-    length_m: f64,
-    noise_is_told: bool,
-) -> Hyperparameters {
+fn most_probable(sensors: &[SensorPresses], mean: Mean, length_m: f64, told: Told) -> Hyperparameters {
     let hyper = |logs: &[f64; 5]| {
         let power = |i: usize| if logs[i] <= LOWEST[i] { 0.0 } else { 10f64.powf(logs[i]) };
         match mean {
@@ -403,14 +411,20 @@ fn most_probable(
         }
     };
     let evidence = |logs: &[f64; 5]| sensors.iter().map(|s| s.log_evidence(&hyper(logs))).sum::<f64>();
-    let mut free = vec![2, 3];
+    let mut free = vec![2];
+    if !told.offset {
+        free.push(3);
+    }
     if mean == Mean::Model {
         free.extend([0, 1]);
     }
-    if !noise_is_told {
+    if !told.noise {
         free.push(4);
     }
     let mut logs = START;
+    if told.offset {
+        logs[3] = LOWEST[3];
+    }
     if mean == Mean::Zero {
         logs[2] = 0.0;
     }
