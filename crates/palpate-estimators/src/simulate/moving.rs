@@ -59,6 +59,16 @@ impl MovingContacts {
         Ok(Self { first: MovingContact { motion, ..self.first }, ..self })
     }
 
+    /// Ends of the straight pieces of all contacts' paths after `from_s`, `to_s` the last; see [`Motion::breaks_s`].
+    fn pieces_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
+        let mut ends: Vec<f64> =
+            self.moving().flat_map(|contact| contact.motion.breaks_s(from_s, to_s)).collect();
+        ends.push(to_s);
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        ends
+    }
+
     fn moving(&self) -> impl Iterator<Item = MovingContact> {
         std::iter::once(self.first).chain(self.second)
     }
@@ -92,8 +102,10 @@ pub fn simulate_moving(
     let (mut rows, mut second) = (Vec::with_capacity(count), Vec::new());
     for (i, time_s) in times_s.iter().enumerate() {
         let contacts = moving.contacts_at(*time_s, force_n);
-        let since_s = if i > 0 { 1.0 / moving.rate_hz } else { 0.0 };
-        let clean = under.reading(layout, &contacts, since_s);
+        if let (Under::Swings(response), Some(before)) = (&mut under, i.checked_sub(1)) {
+            advance(response, moving, force_n, (times_s[before], *time_s));
+        }
+        let clean = under.reading(layout, &contacts);
         let reading = measure(layout, &clean, &errors, &mut rng);
         let Contact { position, force_n } = contacts[0];
         rows.push(Row { position, force_n: Some(force_n), nuisances: Vec::new(), time_s: None, reading });
@@ -110,13 +122,10 @@ enum Under<'a> {
 }
 
 impl Under<'_> {
-    /// Faultless reading of the sensors, `since_s` seconds after the reading before; 0 for the first one.
-    fn reading(&mut self, layout: &Layout, contacts: &[Contact], since_s: f64) -> Vec<f64> {
+    /// Faultless reading of the sensors under `contacts`, up to which a beam that swings has been advanced.
+    fn reading(&self, layout: &Layout, contacts: &[Contact]) -> Vec<f64> {
         match self {
             Self::Swings(response) => {
-                if since_s > 0.0 {
-                    response.advance(contacts, since_s);
-                }
                 let clean = |sensor: &Sensor| response.reading(sensor.kind, sensor.position);
                 layout.sensors().iter().map(clean).collect()
             }
@@ -126,5 +135,14 @@ impl Under<'_> {
                 readings.reduce(sum).unwrap_or_default()
             }
         }
+    }
+}
+
+/// Moves the contacts from one instant to another along their paths, however far apart readings are.
+fn advance(response: &mut ModalResponse, moving: &MovingContacts, force_n: f64, (from_s, to_s): (f64, f64)) {
+    let mut now_s = from_s;
+    for end_s in moving.pieces_s(from_s, to_s) {
+        response.advance(&moving.contacts_at(end_s, force_n), end_s - now_s);
+        now_s = end_s;
     }
 }

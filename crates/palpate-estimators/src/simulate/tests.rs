@@ -1,5 +1,6 @@
 use super::*;
 use palpate_mechanics::sensing::SensorKind;
+use palpate_mechanics::surface::Motion;
 
 use crate::fixtures::{Example, faulty_paper, paper, strip};
 use palpate_mechanics::sensing::ChannelModel;
@@ -43,6 +44,43 @@ fn a_simulation_survives_its_file_bit_for_bit() {
     crate::recording::write(&recording, rig.setup.surface().extent(), "a simulation", &mut bytes).unwrap();
     assert!(bytes.starts_with(b"# a simulation\nposition_mm,force_n,deflection_1_mm,deflection_2_mm,"));
     assert_eq!(rig.setup.read_recording("again", bytes.as_slice()).unwrap().rows, recording.rows);
+}
+
+#[test]
+fn what_a_moving_contact_reads_does_not_depend_on_how_often_it_is_asked() {
+    let setup = paper(0.0, 1).setup;
+    let along =
+        |from, to, speed, turn| Motion::new(Position::along(from), Position::along(to), speed, turn).unwrap();
+    let lifted = along(0.37, 0.05, 1.0, 0.004).with_passes(4).unwrap();
+    let first = along(0.05, 0.35, 1.0, 0.05).with_passes(3).unwrap();
+    for (touch_s, second) in [(0.02, None), (0.0, Some(lifted.with_lifts(0.033, 0.01).unwrap()))] {
+        let motion = first.with_lifts(0.15, touch_s).unwrap();
+        let contact = |motion| MovingContact { motion, force_n: None };
+        let second = second.map(contact);
+        let moving = |rate_hz| MovingContacts {
+            first: contact(motion),
+            second,
+            beam: Some(crate::fixtures::swinging_beam()),
+            rate_hz,
+        };
+        let fine = simulate_moving(&setup, &moving(10_000.0), 1).unwrap();
+        let readings = |rate_hz| simulate_moving(&setup, &moving(rate_hz), 1).unwrap().recording.rows;
+        let largest = fine
+            .recording
+            .rows
+            .iter()
+            .flat_map(|row| &row.reading)
+            .fold(0.0, |most: f64, r| most.max(r.abs()));
+        for rate_hz in [1.0, 10.0, 20.0, 1000.0] {
+            let step = (10_000.0 / rate_hz) as usize;
+            for (coarse, fine) in readings(rate_hz).iter().zip(fine.recording.rows.iter().step_by(step)) {
+                assert_eq!(coarse.force_n, fine.force_n);
+                for (a, b) in coarse.reading.iter().zip(&fine.reading) {
+                    assert!((a - b).abs() < 1e-5 * largest, "{rate_hz} Hz: {a} {b} of {largest}");
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -21,6 +21,12 @@ pub struct Motion {
     touch_s: f64,
 }
 
+/// Straight pieces of a turn: they stay within π/(8·200²) = 10⁻⁵ of its length, and the force within 1.6·10⁻⁵ of it.
+const PIECES: usize = 200;
+
+/// Time before and after the instant at which a force without a time of touching is gone or there.
+const AT_ONCE_S: f64 = 1e-9;
+
 impl Motion {
     /// One pass from a place to another one, with turns of `turn_m` metres at both ends and a constant speed between them.
     ///
@@ -101,6 +107,42 @@ impl Motion {
         }
     }
 
+    /// Instants after `from_s` and before `to_s`, ascending, at which a path of straight pieces must break to follow the motion:
+    /// each turn, and each falling or growing of the force, in [`PIECES`] of them. What is between is even already.
+    pub fn breaks_s(&self, from_s: f64, to_s: f64) -> Vec<f64> {
+        let cycle_s = self.pass_s() + self.rest_s();
+        let pass_at = |time_s: f64| ((time_s / cycle_s).max(0.0) as usize).min(self.passes - 1);
+        let mut breaks = Vec::new();
+        for pass in pass_at(from_s)..=pass_at(to_s) {
+            for [begin_s, end_s] in self.curved_s(pass).into_iter().flatten() {
+                let pieces = if end_s - begin_s > 3.0 * AT_ONCE_S { PIECES } else { 1 };
+                let share = |i: usize| i as f64 / pieces as f64;
+                let at = |i: usize| pass as f64 * cycle_s + begin_s + share(i) * (end_s - begin_s);
+                breaks.extend((0..=pieces).map(at).filter(|time_s| from_s < *time_s && *time_s < to_s));
+            }
+        }
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        breaks
+    }
+
+    /// Spans, from the start of a pass, in which its contact speeds up or slows down, and in which its force falls or builds up
+    /// after it; a force that changes all at once does so within [`AT_ONCE_S`] of that instant.
+    fn curved_s(&self, pass: usize) -> [Option<[f64; 2]>; 4] {
+        let (turn_s, pass_s, rest_s) = (self.turn_s(), self.pass_s(), self.rest_s());
+        let is_lifted = rest_s > 0.0 && pass + 1 < self.passes;
+        let around = |begin_s: f64, end_s: f64| {
+            let sudden_s = if self.touch_s > 0.0 { 0.0 } else { AT_ONCE_S };
+            is_lifted.then_some([begin_s - sudden_s, end_s + sudden_s])
+        };
+        [
+            Some([0.0, turn_s]),
+            Some([pass_s - turn_s, pass_s]),
+            around(pass_s, pass_s + self.touch_s),
+            around(pass_s + rest_s - self.touch_s, pass_s + rest_s),
+        ]
+    }
+
     fn length_m(&self) -> f64 {
         self.from.distance_m(self.to)
     }
@@ -175,6 +217,27 @@ mod tests {
             let Position { x_m, y_m } = on_plane.position;
             assert!(((0.3 - x_m) * 0.18 - (0.25 - y_m) * 0.24).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn straight_pieces_between_its_breaks_follow_it() {
+        let lifted = |touch_s| motion().with_passes(3).unwrap().with_lifts(0.2, touch_s).unwrap();
+        for moved in [motion(), lifted(0.02), lifted(0.0), motion().with_passes(2).unwrap()] {
+            let (start_s, end_s) = (0.0123, moved.duration_s());
+            let mut ends = vec![start_s];
+            ends.extend(moved.breaks_s(start_s, end_s));
+            ends.push(end_s);
+            for (a, b) in ends.windows(2).map(|pair| (pair[0], pair[1])) {
+                assert!(a < b);
+                let [from, to] = [a, b].map(|time_s| moved.contact_at(time_s, 3.0));
+                let within = moved.contact_at(0.5 * (a + b), 3.0);
+                let sag_m = (within.position.x_m - 0.5 * (from.position.x_m + to.position.x_m)).abs();
+                assert!(sag_m < 1.01e-5 * 0.05, "{a} {b}: {sag_m}");
+                let sag_n = (within.force_n - 0.5 * (from.force_n + to.force_n)).abs();
+                assert!(sag_n < 1.6e-5 * 3.0 || b - a < 1.1e-9 && moved.touch_s == 0.0, "{a} {b}: {sag_n}");
+            }
+        }
+        assert_eq!(motion().breaks_s(0.3, 0.31), Vec::<f64>::new());
     }
 
     #[test]
