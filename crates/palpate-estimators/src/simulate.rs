@@ -12,7 +12,7 @@ use crate::recording::{Recording, Row};
 use crate::setup::Setup;
 use palpate_mechanics::contact::{Contact, OffSurface, Position};
 use palpate_mechanics::sensing::{ChannelErrors, Layout, LayoutError, Sensor, measure};
-use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad};
+use palpate_mechanics::surface::{Extent, ResponseFunction, Surface, UniformLoad, Unsolvable};
 use palpate_numerics::OutOfRange;
 
 pub use moving::{MovingContact, MovingContacts, simulate_moving};
@@ -35,6 +35,9 @@ pub enum SimulateError {
     /// A force, or the speed of a moving contact, is not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// The equations of the surface have no solution that is in balance.
+    #[error("the equations of the surface could not be solved: {0}")]
+    Surface(#[from] Unsolvable),
     /// A position does not lie on the surface.
     #[error(transparent)]
     OffSurface(#[from] OffSurface),
@@ -117,6 +120,7 @@ pub fn simulate_contacts(
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
     let positions: Vec<Position> = contacts.iter().map(|contact| contact.position).collect();
     OffSurface::check("position", &positions, surface.extent())?;
+    surface.check_solution()?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     let sensors = CleanSensors::new(surface, &placed);
     let mut rows = Vec::new();
@@ -144,6 +148,7 @@ pub fn simulate_loads(
     seed: u64,
 ) -> Result<Vec<Vec<f64>>, SimulateError> {
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    surface.check_solution()?;
     let (placed, errors, mut rng) = draw_faults(setup, seed);
     // By superposition.
     let reading = |sensor: &Sensor| {

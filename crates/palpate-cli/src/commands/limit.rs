@@ -187,6 +187,7 @@ fn complaint(error: LimitError, rig: &Path) -> Failure {
         LimitError::NoForce => "--force \"3 N\" gives one, or `force = \"3 N\"` in [contact]",
         LimitError::Force { .. } => "--force takes a force such as \"3 N\"",
         LimitError::Positions { .. } => "--every takes a length between two positions, such as \"10 mm\"",
+        LimitError::Surface(_) => "take fewer `elements`, or lengths and stiffnesses that are less far apart",
         LimitError::Cancelled(_) => "start it again",
     };
     complaint.help(help).into()

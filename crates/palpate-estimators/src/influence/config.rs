@@ -125,6 +125,9 @@ impl ForceBelief {
 /// Error of fitting influence functions to a recording.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InfluenceFitError {
+    /// The equations of the surface have no solution that is in balance.
+    #[error("the equations of the surface could not be solved: {0}")]
+    Surface(#[from] palpate_mechanics::surface::Unsolvable),
     /// An error of the surface without a model.
     #[error(transparent)]
     Measured(#[from] MeasuredError),

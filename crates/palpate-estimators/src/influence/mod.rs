@@ -79,6 +79,9 @@ impl Fit for Influence {
         if self.structure != Structure::Auto {
             return Err(InfluenceFitError::OnlyOnMeasured { what: "`structure`" });
         }
+        if let Some(surface) = task.setup.surface().model() {
+            surface.check_solution()?;
+        }
         if let Extent::Plane { .. } = task.setup.surface().extent() {
             return Ok(InfluenceLocator::Plane(Box::new(self.fit_plane(task)?)));
         }

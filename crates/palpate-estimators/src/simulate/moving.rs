@@ -90,6 +90,7 @@ pub fn simulate_moving(
 ) -> Result<TimedRecording, SimulateError> {
     let force_n = setup.force_n().ok_or(SimulateError::NoForce)?;
     let surface = setup.surface().model().ok_or(SimulateError::NoModel)?;
+    surface.check_solution()?;
     let layout = setup.layout();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let errors = ChannelErrors::draw(layout, &mut rng);

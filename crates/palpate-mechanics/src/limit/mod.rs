@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 use crate::contact::{Contact, Position};
 use crate::sensing::{Layout, NoiseError, Sensor, SensorKind};
-use crate::surface::{Extent, ResponseFunction, ResponseGradient, Surface};
+use crate::surface::{Extent, ResponseFunction, ResponseGradient, Surface, Unsolvable};
 use bound::{inverse_information, norm};
 use palpate_numerics::watch::{Cancelled, Watch};
 use responses::Responses;
@@ -79,7 +79,8 @@ impl<'a> CramerRaoBound<'a> {
     /// does for those all over the surface.
     ///
     /// # Errors
-    /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive.
+    /// [`LimitError::Noise`] for a live sensor with neither noise nor resolution, or when none is alive; [`LimitError::Surface`] for a
+    /// surface whose equations have no solution in balance.
     pub fn new(surface: &'a dyn Surface, layout: &Layout) -> Result<Self, LimitError> {
         Self::new_watched(surface, layout, Watch::NONE)
     }
@@ -93,6 +94,7 @@ impl<'a> CramerRaoBound<'a> {
             Some(Channel { kind: sensor.kind, sd: sd?, range: sensor.channel.range })
         };
         let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
+        surface.check_solution()?;
         let responses = Responses::new(surface, layout, watch)?;
         Ok(Self { extent: surface.extent(), model: Some(surface), channels, responses })
     }
@@ -265,6 +267,9 @@ pub enum LimitError {
         /// The most.
         most: usize,
     },
+    /// The equations of the surface have no solution that is in balance.
+    #[error("the equations of the surface could not be solved: {0}")]
+    Surface(#[from] Unsolvable),
     /// Whoever watched the work stopped it.
     #[error("{0}")]
     Cancelled(#[from] Cancelled),

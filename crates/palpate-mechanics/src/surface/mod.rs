@@ -17,7 +17,7 @@ pub use digit::{Digit, DigitError};
 pub use elastica::{Elastica, ForceDirection};
 pub use load::{UniformLoad, midpoints};
 pub use motion::Motion;
-pub use plate::{Plate, PlateError};
+pub use plate::{Plate, PlateError, Unsolvable};
 pub use supported_beam::{
     BeamPart, BeamSection, BeamSupport, BeamSupportKind, RigidMotion, SupportedBeam, SupportedBeamError,
     SupportedBeamSpec,
@@ -93,6 +93,15 @@ pub trait Surface: Send + Sync {
     /// Reason for which a sensor of this `kind` at `sensor` reads 0 wherever the surface is touched; `None` where it reads something.
     fn insensitive_sensor(&self, _kind: SensorKind, _sensor: Position) -> Option<InsensitiveSensor> {
         None
+    }
+
+    /// Solves the surface, where that has to be done, and checks that it is in balance under forces all over it; before that is known, and
+    /// where it cannot be solved, its functions may be NaN.
+    ///
+    /// # Errors
+    /// [`Unsolvable`], with what is singular or out of balance.
+    fn check_solution(&self) -> Result<(), Unsolvable> {
+        Ok(())
     }
 
     /// The largest magnitude that `influence` has for this `kind`, over all sensor and contact positions.

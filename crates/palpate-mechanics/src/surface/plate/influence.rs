@@ -2,7 +2,7 @@
 
 use super::mesh::{Derivative, Mesh, NODE_DEGREES};
 use super::solved::{Functional, Solved, TOGETHER};
-use super::spec::{self, PlateSpec, PointSupport, PointSupportKind};
+use super::spec::{self, PlateSpec};
 use crate::contact::Position;
 use crate::sensing::SensorKind;
 use crate::surface::{ContactLoad, InfluenceFunction, ReadingsByContact};
@@ -113,16 +113,10 @@ impl Reads {
         }
     }
 
-    /// The force of the support at `at` on the plate, positive upward: of an elastic one −k·w.
+    /// The force of the support at `at` on the plate, positive upward.
     fn reaction(spec: &PlateSpec, solved: &Solved, at: Position) -> Self {
-        let Some(i) = spec::support_at(spec, at) else { return Self::Nothing };
-        let PointSupport { position, kind } = spec.supports[i];
-        match kind {
-            PointSupportKind::Simple => solved.reaction(i).map_or(Self::Nothing, Self::Contact),
-            PointSupportKind::Elastic { stiffness_n_per_m } => {
-                Self::Shape(weights(&solved.mesh, position, Derivative::None), stiffness_n_per_m)
-            }
-        }
+        let force = spec::support_at(spec, at).and_then(|support| solved.reaction(support));
+        force.map_or(Self::Nothing, Self::Contact)
     }
 }
 

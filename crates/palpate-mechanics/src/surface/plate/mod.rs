@@ -5,8 +5,10 @@
 mod dissection;
 mod influence;
 mod mesh;
+mod rigid;
 mod solved;
 mod spec;
+mod supports;
 
 pub use spec::{Edge, Edges, PlateError, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
 
@@ -187,6 +189,10 @@ impl Surface for Plate {
         let memory_bytes = self.estimated_bytes() + sensors * kept;
         let seconds_once = self.estimated_bytes() / FACTORED;
         Some(SolutionCost { memory_bytes, seconds_once, seconds_each: multiply_adds / PRODUCTS })
+    }
+
+    fn check_solution(&self) -> Result<(), Unsolvable> {
+        self.solved().map(|_| ())
     }
 
     fn is_supported_at(&self, position: Position) -> bool {

@@ -1,59 +1,70 @@
 //! A plate's equations, factored: a solution then costs two sweeps through the factor.
 //!
-//! Symbols: K stiffness matrix, with the elastic supports in it; b the deflection of a simple support as a functional, B all
-//! of them as columns; r the forces of the simple supports on the plate; f a load.
-
-use std::collections::HashMap;
+//! Symbols as in `supports.rs`: K₀ stiffness matrix without point supports, b the deflection of one as a functional, r the forces of the
+//! point supports on the plate, R rigid motions, f a load.
 
 use ndarray::{Array1, Array2};
 
 use super::dissection::nested_dissection;
 use super::mesh::{Derivative, ElementStiffness, Mesh, NODE_DEGREES, element_stiffness};
-use super::spec::{Edge, Edges, PlateSpec, PointSupport, PointSupportKind, Unsolvable};
+use super::rigid::{self, Motions, RigidMotions};
+use super::spec::{Edge, Edges, PlateSpec, PointSupportKind, Unsolvable, compliance_m_per_n};
+use super::supports::SupportForces;
+use crate::contact::Position;
 use palpate_numerics::small::add_multiple;
-use palpate_numerics::{Cholesky, SparseCholesky, SparseSymmetric};
+use palpate_numerics::{SparseCholesky, SparseSymmetric};
 
 /// The factored equations of a plate.
 ///
-/// A simple support need not be at a node: B'·u = 0 is held exactly. K alone can be singular, when points hold the plate, so
-/// that K + γ·B·B' is factored, with springs γ under the simple supports, which carry nothing once their points do not move.
-/// Then u = (K + γ·B·B')⁻¹·(f + B·r), with r such that B'·u = 0 (Benzi, Golub and Liesen, *Numerical solution of saddle point
-/// problems*, 2005, section 5 and eq. 5.3).
+/// A support need not be at a node. What is factored is K₀ held at its edges and, where these let it move without bending, at as
+/// many nodes as keep it from that; what it does at its point supports follows by the force method.
 pub(super) struct Solved {
     pub mesh: Mesh,
     unknowns: Unknowns,
     factor: SparseCholesky,
-    simple_supports: SimpleSupports,
+    element: ElementStiffness,
+    supports: Supports,
+    balance: Balance,
 }
 
 /// Loads that are solved for in one sweep through the factor: more would cost memory and save little.
 pub(super) const TOGETHER: usize = 24;
 
-/// Constraint equations of the simple supports.
-struct SimpleSupports {
-    /// Of each support of the plate, which of the simple ones it is.
-    numbers: Vec<Option<usize>>,
+/// Point supports, and what they do to the plate.
+struct Supports {
     /// The column of B of each.
     deflections: Vec<Functional>,
-    /// (K + γ·B·B')⁻¹·B, a column each.
+    /// K₀ₕ⁻¹·B, a column each.
     solutions: Vec<Vec<f64>>,
-    /// The factor of S = B'·(K + γ·B·B')⁻¹·B.
-    compliance: Cholesky,
+    forces: SupportForces,
+    motions: RigidMotions,
 }
 
+/// Equilibrium of a solution: force and moments of the load, the point supports and the edges that are held.
+struct Balance {
+    /// Force and both moments of an edge on the plate, per unit of each unknown that has a part in them.
+    by_edges: Vec<(usize, Motions)>,
+}
+
+/// Most of the load by which force and moments, over the longer side, may be out of balance.
+pub(super) const MOST_IMBALANCE: f64 = 1e-9;
+
 impl Solved {
-    /// Sets up and factors the equations of a plate that was checked.
+    /// Sets up and factors the equations of a plate that was checked, and solves them for forces all over it.
     ///
     /// # Errors
-    /// [`Unsolvable`] when they are singular to working precision, or too large for the memory that there is.
+    /// [`Unsolvable`] when they are singular to working precision, too large for the memory that there is, or a solution is not in balance.
     pub fn new(spec: &PlateSpec) -> Result<Self, Unsolvable> {
         let mesh = Mesh::new(spec.extent(), spec.elements);
-        let unknowns = Unknowns::new(&mesh, spec.edges);
-        let springs = springs(spec, &mesh);
+        let motions = RigidMotions::new(&mesh, spec.edges);
+        let unknowns = Unknowns::new(&mesh, spec.edges, motions.nodes());
         let element = element_stiffness(&mesh, spec.flexural_rigidity(), spec.poissons_ratio);
-        let factor = SparseCholesky::new(&stiffness_matrix(&mesh, &unknowns, &element, &springs))?;
-        let simple_supports = SimpleSupports::new(spec, springs, &unknowns, &factor)?;
-        Ok(Self { mesh, unknowns, factor, simple_supports })
+        let factor = SparseCholesky::new(&stiffness_matrix(&mesh, &unknowns, &element))?;
+        let supports = Supports::new(spec, &mesh, motions, &unknowns, &factor)?;
+        let balance = Balance::new(&mesh, spec.edges, &unknowns, &element);
+        let solved = Self { mesh, unknowns, factor, element, supports, balance };
+        solved.check(spec)?;
+        Ok(solved)
     }
 
     /// Number of stored entries of the factor.
@@ -61,97 +72,283 @@ impl Solved {
         self.factor.stored_numbers()
     }
 
-    /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by.
+    /// All degrees of freedom under each of `loads`, a functional and what the solution is multiplied by; NaN where a solution is not in
+    /// balance.
     pub fn solutions(&self, loads: &[(Functional, f64)]) -> Vec<Vec<f64>> {
         let each = loads.chunks(TOGETHER).flat_map(|loads| {
             let functionals: Vec<&Functional> = loads.iter().map(|(functional, _)| functional).collect();
-            let mut solved = solve(&self.unknowns, &self.factor, &functionals);
-            let expanded = |(u, (_, factor)): (&mut [f64], &(Functional, f64))| {
-                self.simple_supports.hold(&self.unknowns, u);
-                self.unknowns.expand(u, *factor)
+            let solved = self.solve(&functionals);
+            let times = |(shape, (_, factor)): (Shape, &(Functional, f64))| {
+                let factor = if shape.is_balanced() { *factor } else { f64::NAN };
+                let mut degrees = self.unknowns.expand(&shape.bent, factor);
+                self.supports.motions.add(&mut degrees, factor, &shape.moved);
+                degrees
             };
-            solved.chunks_exact_mut(self.unknowns.count().max(1)).zip(loads).map(expanded).collect::<Vec<_>>()
+            solved.into_iter().zip(loads).map(times).collect::<Vec<_>>()
         });
         each.collect()
     }
 
-    /// The force of a simple support on the plate, positive upward, under a downward unit force, as degrees of freedom of a
-    /// function of where that force acts: the row of S⁻¹·B'·(K + γ·B·B')⁻¹ that is the support's. `None` for another support.
+    /// The force of a point support on the plate, positive upward, under a downward unit force, as degrees of freedom of a
+    /// function of where that force acts: r = P·y + Q·R'·f. `None` where there is no such support.
     pub fn reaction(&self, support: usize) -> Option<Vec<f64>> {
-        let number = self.simple_supports.numbers.get(support).copied().flatten()?;
-        let held = &self.simple_supports;
-        let mut unit = Array1::zeros(held.solutions.len());
-        unit[number] = 1.0;
-        let mut sum = vec![0.0; self.unknowns.count()];
-        for (weight, solution) in held.compliance.solve(&unit).iter().zip(&held.solutions) {
-            add_multiple(&mut sum, *weight, solution);
+        let Supports { solutions, forces, motions, .. } = &self.supports;
+        (support < solutions.len()).then(|| {
+            let mut sum = vec![0.0; self.unknowns.count()];
+            for (weight, solution) in forces.by_deflection.row(support).iter().zip(solutions) {
+                add_multiple(&mut sum, *weight, solution);
+            }
+            let mut degrees = self.unknowns.expand(&sum, 1.0);
+            motions.add(&mut degrees, 1.0, &forces.by_load.row(support).to_vec());
+            degrees
+        })
+    }
+
+    /// Shapes under loads, few enough for one sweep; those out of balance are refined, by what their residuals do to the plate
+    /// (Golub and Van Loan, *Matrix Computations*, 3.5.3).
+    fn solve(&self, loads: &[&Functional]) -> Vec<Shape> {
+        let each = |load: &&Functional| self.unknowns.gathered(load.iter().copied());
+        let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>());
+        let mut shapes: Vec<Shape> = solved.into_iter().map(Shape::held).collect();
+        for (shape, load) in shapes.iter_mut().zip(loads) {
+            self.hold(shape, load, load.iter().copied());
         }
-        Some(self.unknowns.expand(&sum, 1.0))
+        for _ in 0..MOST_REFINEMENTS {
+            let is_off = |shape: &Shape| shape.imbalance.is_nan() || shape.imbalance > REFINED_IMBALANCE;
+            let (mut off, loads): (Vec<&mut Shape>, Vec<&Functional>) =
+                shapes.iter_mut().zip(loads.iter().copied()).filter(|(shape, _)| is_off(shape)).unzip();
+            if off.is_empty() {
+                break;
+            }
+            let residuals: Vec<Vec<f64>> =
+                off.iter().zip(&loads).map(|(shape, load)| self.residual(shape, load)).collect();
+            let each = |residual: &Vec<f64>| self.unknowns.gathered(residual.iter().copied().enumerate());
+            let changes = self.swept(&residuals.iter().map(each).collect::<Vec<_>>());
+            for (((shape, load), residual), change) in off.iter_mut().zip(loads).zip(&residuals).zip(changes)
+            {
+                let mut better = Shape::held(change);
+                self.hold(&mut better, load, residual.iter().copied().enumerate());
+                better.add(shape);
+                better.imbalance = self.imbalance(&better, load);
+                if better.imbalance < shape.imbalance {
+                    **shape = better;
+                }
+            }
+        }
+        shapes
+    }
+
+    /// K₀ₕ⁻¹·f for each of some loads.
+    fn swept(&self, loads: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut together = loads.concat();
+        self.factor.solve_in_place(&mut together);
+        together.chunks_exact(self.unknowns.count().max(1)).map(<[f64]>::to_vec).collect()
+    }
+
+    /// What a load leaves: f + B·r − K₀·u, by degree of freedom; 0 where an edge holds it.
+    ///
+    /// In each element K₀ is applied to the departure from the rigid motion of its first node, lest rounding of a large motion bend it.
+    fn residual(&self, shape: &Shape, load: &Functional) -> Vec<f64> {
+        let (mesh, u) = (&self.mesh, self.unknowns.expand(&shape.bent, 1.0));
+        let mut residual = vec![0.0; mesh.degrees()];
+        let mut add = |functional: &Functional, times: f64| {
+            functional.iter().for_each(|(degree, weight)| residual[*degree] += times * weight);
+        };
+        add(load, 1.0);
+        self.supports.deflections.iter().zip(&shape.forces).for_each(|(of, force)| add(of, *force));
+        for (column, row) in (0..mesh.up).flat_map(|row| (0..mesh.across).map(move |column| (column, row))) {
+            let degrees: [usize; 16] = std::array::from_fn(|i| {
+                let (x, y) = (i % 4, i / 4);
+                mesh.first_degree(column + x / 2, row + y / 2) + x % 2 + 2 * (y % 2)
+            });
+            let (level, along_x, along_y) = (u[degrees[0]], u[degrees[1]], u[degrees[4]]);
+            let bent: [f64; 16] = std::array::from_fn(|i| {
+                let rigid = match (i % 2, (i / 4) % 2) {
+                    (0, 0) => level + ((i % 4) / 2) as f64 * along_x + (i / 8) as f64 * along_y,
+                    (1, 0) => along_x,
+                    (0, 1) => along_y,
+                    _ => 0.0,
+                };
+                u[degrees[i]] - rigid
+            });
+            for (degree, couplings) in degrees.iter().zip(&self.element) {
+                residual[*degree] -= couplings.iter().zip(&bent).map(|(k, u)| k * u).sum::<f64>();
+            }
+        }
+        for (degree, residual) in residual.iter_mut().enumerate() {
+            if self.unknowns.is_on_held_edge(degree) {
+                *residual = 0.0;
+            }
+        }
+        residual
+    }
+
+    /// Adds what the point supports do to a shape that nothing but `acting` bent, and tells how far that is from balancing `load`.
+    fn hold(&self, shape: &mut Shape, load: &Functional, acting: impl Iterator<Item = (usize, f64)> + Clone) {
+        self.supports.hold(&self.unknowns, shape, &acting);
+        shape.imbalance = self.imbalance(shape, load);
+    }
+
+    fn imbalance(&self, shape: &Shape, load: &Functional) -> f64 {
+        self.balance.off(&self.mesh, &self.unknowns, &self.supports, load, shape)
+    }
+
+    /// Solves for forces on a grid, the edges included.
+    fn check(&self, spec: &PlateSpec) -> Result<(), Unsolvable> {
+        const ALONG: usize = 3;
+        let at = |i: usize, size_m: f64| i as f64 / ALONG as f64 * size_m;
+        let row =
+            |j| (0..=ALONG).map(move |i| Position { x_m: at(i, spec.length_m), y_m: at(j, spec.width_m) });
+        let places: Vec<Position> = (0..=ALONG).flat_map(row).collect();
+        let loads: Vec<Functional> = places.iter().map(|place| deflection_at(&self.mesh, *place)).collect();
+        let shapes = self.solve(&loads.iter().collect::<Vec<_>>());
+        match shapes.iter().zip(places).find(|(shape, _)| !shape.is_balanced()) {
+            Some((shape, at)) => Err(Unsolvable::OutOfBalance { share: shape.imbalance, at }),
+            None => Ok(()),
+        }
     }
 }
 
-impl SimpleSupports {
+/// Shapes are refined when they are out of balance by more than this, and at most so often.
+const REFINED_IMBALANCE: f64 = 0.3 * MOST_IMBALANCE;
+const MOST_REFINEMENTS: usize = 3;
+
+/// The shape of the plate under a load.
+struct Shape {
+    /// The unknowns, the plate held.
+    bent: Vec<f64>,
+    /// Forces of the point supports on it.
+    forces: Vec<f64>,
+    /// The rigid motions that are added to that.
+    moved: Vec<f64>,
+    /// Share of the load by which force or moment is out of balance.
+    imbalance: f64,
+}
+
+impl Shape {
+    /// Held where it just cannot move, without point supports.
+    fn held(bent: Vec<f64>) -> Self {
+        Self { bent, forces: Vec::new(), moved: Vec::new(), imbalance: f64::NAN }
+    }
+
+    /// Whether it is in balance; not where a number is none.
+    fn is_balanced(&self) -> bool {
+        self.imbalance <= MOST_IMBALANCE
+    }
+
+    fn add(&mut self, other: &Self) {
+        add_multiple(&mut self.bent, 1.0, &other.bent);
+        add_multiple(&mut self.forces, 1.0, &other.forces);
+        add_multiple(&mut self.moved, 1.0, &other.moved);
+    }
+}
+
+impl Supports {
     fn new(
         spec: &PlateSpec,
-        springs: Vec<Spring>,
+        mesh: &Mesh,
+        motions: RigidMotions,
         unknowns: &Unknowns,
         factor: &SparseCholesky,
     ) -> Result<Self, Unsolvable> {
-        let mut count = 0;
-        let numbers = spec.supports.iter().map(|support| {
-            let number = support.is_rigid().then_some(count);
-            count += usize::from(support.is_rigid());
-            number
+        let deflections: Vec<Functional> =
+            spec.supports.iter().map(|support| deflection_at(mesh, support.position)).collect();
+        let solution = |load: &Functional| {
+            let mut u = unknowns.gathered(load.iter().copied());
+            factor.solve_in_place(&mut u);
+            u
+        };
+        let solutions: Vec<Vec<f64>> = deflections.iter().map(solution).collect();
+        let own = |i: usize| match spec.supports[i].kind {
+            PointSupportKind::Simple => 0.0,
+            PointSupportKind::Elastic { stiffness_n_per_m } => 1.0 / stiffness_n_per_m,
+        };
+        let count = deflections.len();
+        let compliance = Array2::from_shape_fn((count, count), |(i, j)| {
+            let given = 0.5
+                * (reading(unknowns, &deflections[i], &solutions[j])
+                    + reading(unknowns, &deflections[j], &solutions[i]));
+            if i == j { given + own(i) } else { given }
         });
-        let numbers: Vec<_> = numbers.collect();
-        let rigid = springs.into_iter().zip(&numbers).filter(|(_, number)| number.is_some());
-        let deflections: Vec<Functional> = rigid.map(|(spring, _)| spring.deflection).collect();
-        let solutions: Vec<_> = deflections.iter().map(|load| solve(unknowns, factor, &[load])).collect();
-        let compliance =
-            Array2::from_shape_fn((count, count), |(i, j)| reading(unknowns, &deflections[i], &solutions[j]));
-        Ok(Self { numbers, deflections, compliance: Cholesky::factor(compliance)?, solutions })
+        let moved: Vec<Vec<f64>> =
+            deflections.iter().map(|deflection| motions.of(&deflection.iter().copied())).collect();
+        let moved = Array2::from_shape_fn((count, motions.count()), |(i, k)| moved[i][k]);
+        let forces = SupportForces::new(&compliance, &moved, compliance_m_per_n(spec))?;
+        Ok(Self { deflections, solutions, forces, motions })
     }
 
-    /// Adds to u what the forces of the supports do, so that their points do not move: r = −S⁻¹·B'·u.
-    fn hold(&self, unknowns: &Unknowns, u: &mut [f64]) {
-        if self.solutions.is_empty() {
-            return;
-        }
-        let moved = self.deflections.iter().map(|deflection| reading(unknowns, deflection, u));
-        let forces = self.compliance.solve(&moved.collect());
+    /// Adds to a shape under `load` without point supports what their forces do: these, and the rigid motion.
+    fn hold(
+        &self,
+        unknowns: &Unknowns,
+        shape: &mut Shape,
+        load: &(impl Iterator<Item = (usize, f64)> + Clone),
+    ) {
+        let SupportForces { by_deflection, by_load, motion_by_load } = &self.forces;
+        let moved = self.deflections.iter().map(|deflection| reading(unknowns, deflection, &shape.bent));
+        let moved: Array1<f64> = moved.collect();
+        let resultant = Array1::from(self.motions.of(load));
+        let forces = -(by_deflection.dot(&moved) + by_load.dot(&resultant));
         for (force, solution) in forces.iter().zip(&self.solutions) {
-            add_multiple(u, -force, solution);
+            add_multiple(&mut shape.bent, *force, solution);
         }
+        shape.forces = forces.to_vec();
+        shape.moved = (motion_by_load.dot(&resultant) - by_load.t().dot(&moved)).to_vec();
     }
 }
 
-/// The springs under the plate, one for each support in its order: the elastic ones, and γ under the simple ones.
-///
-/// Whatever γ is, the solution is the same; one of the plate's own size, D over its area, keeps the precision.
-fn springs(spec: &PlateSpec, mesh: &Mesh) -> Vec<Spring> {
-    let own_n_per_m = spec.flexural_rigidity() / (spec.length_m * spec.width_m);
-    let spring = |support: &PointSupport| Spring {
-        deflection: mesh.weights(mesh.locate(support.position), Derivative::None).to_vec(),
-        stiffness_n_per_m: match support.kind {
-            PointSupportKind::Simple => own_n_per_m,
-            PointSupportKind::Elastic { stiffness_n_per_m } => stiffness_n_per_m,
-        },
-    };
-    spec.supports.iter().map(spring).collect()
-}
-
-/// The unknowns under each load, one after the other.
-fn solve(unknowns: &Unknowns, factor: &SparseCholesky, loads: &[&Functional]) -> Vec<f64> {
-    let mut u = vec![0.0; unknowns.count() * loads.len()];
-    for (u, load) in u.chunks_exact_mut(unknowns.count().max(1)).zip(loads) {
-        for (degree, value) in *load {
-            if let Some(place) = unknowns.place(*degree) {
-                u[place] += value;
+impl Balance {
+    fn new(mesh: &Mesh, edges: Edges, unknowns: &Unknowns, element: &ElementStiffness) -> Self {
+        let mut sums: Vec<Motions> = vec![[0.0; 3]; mesh.degrees()];
+        let (columns, rows) = mesh.nodes();
+        for (column, row) in (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row))) {
+            let held = held_degrees(mesh, edges, column, row);
+            for degree in (0..NODE_DEGREES).filter(|degree| held[*degree]) {
+                let degree = mesh.first_degree(column, row) + degree;
+                let arms = rigid::motions_at(mesh, degree);
+                for (other, coupling) in element_column(mesh, element, degree).entries(mesh) {
+                    sums[other].iter_mut().zip(arms).for_each(|(sum, arm)| *sum += arm * coupling);
+                }
             }
         }
+        let by_edges = sums.into_iter().enumerate().filter_map(|(degree, sum)| {
+            Some((unknowns.place(degree)?, sum)).filter(|_| sum.iter().any(|sum| *sum != 0.0))
+        });
+        Self { by_edges: by_edges.collect() }
     }
-    factor.solve_in_place(&mut u);
-    u
+
+    /// Largest share of the load by which force or a moment is out of balance; NaN where a number is none.
+    fn off(
+        &self,
+        mesh: &Mesh,
+        unknowns: &Unknowns,
+        supports: &Supports,
+        load: &Functional,
+        Shape { bent, forces, .. }: &Shape,
+    ) -> f64 {
+        let mut sums = [0.0; 3];
+        let mut add = |functional: &Functional, times: f64| {
+            // What acts on a degree of freedom that an edge holds goes into that edge.
+            for (degree, weight) in functional.iter().filter(|(degree, _)| !unknowns.is_on_held_edge(*degree))
+            {
+                let arms = rigid::motions_at(mesh, *degree);
+                sums.iter_mut().zip(arms).for_each(|(sum, arm)| *sum += times * weight * arm);
+            }
+        };
+        add(load, 1.0);
+        supports.deflections.iter().zip(forces).for_each(|(deflection, force)| add(deflection, *force));
+        for (place, by_edge) in &self.by_edges {
+            sums.iter_mut().zip(by_edge).for_each(|(sum, by_edge)| *sum += by_edge * bent[*place]);
+        }
+        let loaded: f64 = load.iter().map(|(_, weight)| weight.abs()).sum();
+        sums.iter()
+            .fold(0.0, |most: f64, sum| if most.is_nan() { most } else { (sum / loaded).abs().max(most) })
+    }
+}
+
+/// The deflection of the plate at a position.
+fn deflection_at(mesh: &Mesh, position: Position) -> Functional {
+    mesh.weights(mesh.locate(position), Derivative::None).to_vec()
 }
 
 /// Value of `functional` for the unknowns `u`.
@@ -160,29 +357,46 @@ fn reading(unknowns: &Unknowns, functional: &Functional, u: &[f64]) -> f64 {
     terms.sum()
 }
 
-/// The numbers of the degrees of freedom that no edge holds at zero, in the order of elimination.
+/// The numbers of the degrees of freedom that neither an edge nor a node holds at zero, in the order of elimination.
 struct Unknowns {
     /// Of each degree of freedom, where it stands in the equations.
     places: Vec<Option<u32>>,
     /// Degree of freedom of each unknown.
     degrees: Vec<u32>,
+    /// The first degrees of freedom, the deflections, of the nodes that are held.
+    nodes: Vec<usize>,
 }
 
 impl Unknowns {
-    /// The unknowns of a mesh whose edges are held so.
-    pub fn new(mesh: &Mesh, edges: Edges) -> Self {
+    /// The unknowns of a mesh whose edges are held so, and the deflection of `nodes`.
+    pub fn new(mesh: &Mesh, edges: Edges, nodes: &[(usize, usize)]) -> Self {
         let (columns, rows) = mesh.nodes();
+        let nodes: Vec<usize> = nodes.iter().map(|(column, row)| mesh.first_degree(*column, *row)).collect();
         let mut places = vec![None; mesh.degrees()];
         let mut degrees = Vec::with_capacity(mesh.degrees());
         for (column, row) in nested_dissection(columns, rows) {
             let first = mesh.first_degree(column, row);
             let held = held_degrees(mesh, edges, column, row);
             for degree in (0..NODE_DEGREES).filter(|degree| !held[*degree]).map(|degree| first + degree) {
+                if nodes.contains(&degree) {
+                    continue;
+                }
                 places[degree] = Some(degrees.len() as u32);
                 degrees.push(degree as u32);
             }
         }
-        Self { places, degrees }
+        Self { places, degrees, nodes }
+    }
+
+    /// The values at the unknowns of what is given by degree of freedom.
+    pub fn gathered(&self, values: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
+        let mut gathered = vec![0.0; self.count()];
+        for (degree, value) in values {
+            if let Some(place) = self.place(degree) {
+                gathered[place] += value;
+            }
+        }
+        gathered
     }
 
     /// Number of unknowns.
@@ -193,6 +407,11 @@ impl Unknowns {
     /// Number of the equation of a degree of freedom; `None` when it is held at zero.
     pub fn place(&self, degree: usize) -> Option<usize> {
         self.places[degree].map(|place| place as usize)
+    }
+
+    /// Whether an edge holds a degree of freedom at zero.
+    pub fn is_on_held_edge(&self, degree: usize) -> bool {
+        self.places[degree].is_none() && !self.nodes.contains(&degree)
     }
 
     /// The degree of freedom of an unknown.
@@ -234,46 +453,15 @@ fn held_degrees(mesh: &Mesh, edges: Edges, column: usize, row: usize) -> [bool; 
 /// The sum over some degrees of freedom, each multiplied by its factor: what a point of the plate does, or a sensor reads.
 pub(super) type Functional = Vec<(usize, f64)>;
 
-/// A spring under a point of the plate.
-struct Spring {
-    /// The deflection of the point.
-    pub deflection: Functional,
-    /// Its stiffness, in N/m.
-    pub stiffness_n_per_m: f64,
-}
-
-/// The stiffness matrix of equal elements and springs, of the unknowns only.
-fn stiffness_matrix(
-    mesh: &Mesh,
-    unknowns: &Unknowns,
-    element: &ElementStiffness,
-    springs: &[Spring],
-) -> SparseSymmetric {
-    let under = springs_by_degree(springs);
+/// The stiffness matrix of equal elements, of the unknowns only.
+fn stiffness_matrix(mesh: &Mesh, unknowns: &Unknowns, element: &ElementStiffness) -> SparseSymmetric {
     let mut matrix = SparseSymmetric::with_capacity(unknowns.count() * NEIGHBOURS * NODE_DEGREES / 2);
     for unknown in 0..unknowns.count() {
-        let degree = unknowns.degree(unknown);
-        let mut column = element_column(mesh, element, degree);
-        for (spring, factor) in under.get(&degree).into_iter().flatten() {
-            for (other, other_factor) in &spring.deflection {
-                column.add(mesh, *other, spring.stiffness_n_per_m * factor * other_factor);
-            }
-        }
+        let column = element_column(mesh, element, unknowns.degree(unknown));
         let elements = column.entries(mesh);
         matrix.push_column(elements.filter_map(|(degree, value)| Some((unknowns.place(degree)?, value))));
     }
     matrix
-}
-
-/// The springs whose points move with a degree of freedom, and by how much.
-fn springs_by_degree(springs: &[Spring]) -> HashMap<usize, Vec<(&Spring, f64)>> {
-    let mut under: HashMap<usize, Vec<(&Spring, f64)>> = HashMap::new();
-    for spring in springs {
-        for (degree, factor) in &spring.deflection {
-            under.entry(*degree).or_default().push((spring, *factor));
-        }
-    }
-    under
 }
 
 /// A node couples with itself and the eight around it.
@@ -288,14 +476,6 @@ struct Column {
 }
 
 impl Column {
-    /// Adds to the coupling with `degree`, which is one of a neighbour.
-    fn add(&mut self, mesh: &Mesh, degree: usize, value: f64) {
-        let (node, degree) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
-        let (column, row) = (node % (mesh.across + 1), node / (mesh.across + 1));
-        let neighbour = 3 * (row + 1 - self.node.1) + (column + 1 - self.node.0);
-        self.couplings[neighbour][degree] += value;
-    }
-
     /// Degree of freedom and coupling of all neighbours that exist.
     fn entries(&self, mesh: &Mesh) -> impl Iterator<Item = (usize, f64)> {
         let (columns, rows) = mesh.nodes();

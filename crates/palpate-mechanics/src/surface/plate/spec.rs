@@ -247,8 +247,19 @@ pub enum Unsolvable {
     #[error(transparent)]
     Stiffness(#[from] palpate_numerics::SparseCholeskyError),
     /// The compliances of the simple supports have no factor.
-    #[error(transparent)]
+    #[error("what the supports at points do is not told: {0}")]
     Supports(#[from] palpate_numerics::NotPositiveDefinite),
+    /// Supports and edges do not balance a force.
+    #[error(
+        "under a force at {} the supports are {share:e} of it out of balance; it must be at most {:e}: take fewer elements, or numbers less far apart",
+        Point(*at), super::solved::MOST_IMBALANCE
+    )]
+    OutOfBalance {
+        /// Force, or moment over the longer side, that is not balanced, as a share of the force.
+        share: f64,
+        /// Position of the force.
+        at: Position,
+    },
 }
 
 /// A position for people.
@@ -302,7 +313,7 @@ fn check_numbers(spec: &PlateSpec) -> Result<(), PlateError> {
     if !(value > -1.0 && value <= 0.5) {
         return Err(PlateError::PoissonsRatio { value });
     }
-    let compliance_m_per_n = longer_side_m(spec).powi(2) / spec.flexural_rigidity();
+    let compliance_m_per_n = compliance_m_per_n(spec);
     if !(compliance_m_per_n > 0.0 && compliance_m_per_n.is_finite()) {
         return Err(PlateError::Compliance { compliance_m_per_n });
     }
@@ -399,7 +410,7 @@ pub(super) fn estimated_factor_size(spec: &PlateSpec) -> f64 {
 }
 
 /// Bytes that the equations of the plate need at most: the factor, which couples pairs of nodes; the stiffness matrix, where
-/// a node couples with itself and its eight neighbours; and the solutions that hold the simple supports.
+/// a node couples with itself and its eight neighbours; and the solutions of the point supports.
 pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     const NUMBER_BYTES: f64 = 8.0;
     /// Columns of nearly the same pattern are stored as one block, with zeros: the most numbers for one that couples.
@@ -411,8 +422,7 @@ pub(super) fn estimated_bytes(spec: &PlateSpec) -> f64 {
     let nodes = columns as f64 * rows as f64;
     let factor = PADDING * estimated_factor_size(spec) * NUMBER_BYTES;
     let matrix = nodes * PAIR * 5.0 * ELEMENT_BYTES;
-    let rigid = spec.supports.iter().filter(|support| support.is_rigid()).count();
-    let solutions = (rigid + 8) as f64 * nodes * NODE_DEGREES as f64 * NUMBER_BYTES;
+    let solutions = (spec.supports.len() + 8) as f64 * nodes * NODE_DEGREES as f64 * NUMBER_BYTES;
     factor + matrix + solutions
 }
 
@@ -475,6 +485,11 @@ fn edges(spec: &PlateSpec) -> [(&'static str, [Position; 2], Edge); 4] {
         ("bottom", [near, right], spec.edges.bottom),
         ("top", [top, far], spec.edges.top),
     ]
+}
+
+/// The plate's own compliance ℓ²/D, with its longer side ℓ, in m/N.
+pub(super) fn compliance_m_per_n(spec: &PlateSpec) -> f64 {
+    longer_side_m(spec).powi(2) / spec.flexural_rigidity()
 }
 
 fn longer_side_m(spec: &PlateSpec) -> f64 {

@@ -1,5 +1,6 @@
 //! Plates held against series, beams, and the properties that every plate has.
 
+mod balance;
 mod beams;
 mod mesh;
 mod properties;

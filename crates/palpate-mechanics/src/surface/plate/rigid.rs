@@ -1,0 +1,89 @@
+//! Motions of a plate without bending: up and down, and tilting about its two sides.
+
+use super::mesh::{Mesh, NODE_DEGREES};
+use super::spec::{Edge, Edges};
+use palpate_numerics::small::add_multiple;
+
+/// Values of 1, x/ℓ and y/ℓ, with the longer side ℓ, or what they are multiplied by.
+pub(super) type Motions = [f64; 3];
+
+/// The rigid motions that the edges leave to a plate: all three, tilting about the one edge that is simply supported, or none.
+pub(super) struct RigidMotions {
+    /// All degrees of freedom in each.
+    motions: Vec<Vec<f64>>,
+    /// Nodes, column and row, of which each has to be held too lest the plate move so.
+    nodes: Vec<(usize, usize)>,
+}
+
+impl RigidMotions {
+    /// Those that `edges` leave.
+    pub fn new(mesh: &Mesh, edges: Edges) -> Self {
+        let [_, far_x, far_y] = motions_at(mesh, mesh.first_degree(mesh.across, mesh.up));
+        let (middle_x, middle_y) = (mesh.across / 2, mesh.up / 2);
+        let sides = [
+            (edges.left, [0.0, 1.0, 0.0], (mesh.across, middle_y)),
+            (edges.right, [far_x, -1.0, 0.0], (0, middle_y)),
+            (edges.bottom, [0.0, 0.0, 1.0], (middle_x, mesh.up)),
+            (edges.top, [far_y, 0.0, -1.0], (middle_x, 0)),
+        ];
+        let held: Vec<_> = sides.into_iter().filter(|(edge, ..)| *edge != Edge::Free).collect();
+        let left = match held[..] {
+            [] => vec![
+                ([1.0, 0.0, 0.0], (0, 0)),
+                ([0.0, 1.0, 0.0], (mesh.across, 0)),
+                ([0.0, 0.0, 1.0], (0, mesh.up)),
+            ],
+            [(Edge::Simple, motion, node)] => vec![(motion, node)],
+            _ => Vec::new(),
+        };
+        let (factors, nodes): (Vec<Motions>, Vec<_>) = left.into_iter().unzip();
+        let at = |factors: &Motions, degree| {
+            motions_at(mesh, degree).iter().zip(factors).map(|(m, f)| m * f).sum()
+        };
+        let motion = |factors| (0..mesh.degrees()).map(|degree| at(factors, degree)).collect();
+        Self { motions: factors.iter().map(motion).collect(), nodes }
+    }
+
+    /// Number of motions.
+    pub fn count(&self) -> usize {
+        self.motions.len()
+    }
+
+    /// Nodes, column and row, that keep the plate from every one of them when they do not move.
+    pub fn nodes(&self) -> &[(usize, usize)] {
+        &self.nodes
+    }
+
+    /// R'·f: value of a load for each motion, degree by degree; 0 where its terms cancel to rounding.
+    pub fn of(&self, load: &(impl Iterator<Item = (usize, f64)> + Clone)) -> Vec<f64> {
+        const ROUNDING: f64 = 1e-14;
+        let value = |motion: &Vec<f64>| {
+            let terms = load.clone().map(|(degree, weight)| weight * motion[degree]);
+            let (sum, size) =
+                terms.fold((0.0, 0.0), |(sum, size), term: f64| (sum + term, size + term.abs()));
+            if sum.abs() > ROUNDING * size { sum } else { 0.0 }
+        };
+        self.motions.iter().map(value).collect()
+    }
+
+    /// Adds to `degrees` the motions, each as often as `shares` says, times `factor`.
+    pub fn add(&self, degrees: &mut [f64], factor: f64, shares: &[f64]) {
+        for (motion, share) in self.motions.iter().zip(shares) {
+            add_multiple(degrees, factor * share, motion);
+        }
+    }
+}
+
+/// 1, x/ℓ and y/ℓ at a degree of freedom.
+pub(super) fn motions_at(mesh: &Mesh, degree: usize) -> Motions {
+    let (node, which) = (degree / NODE_DEGREES, degree % NODE_DEGREES);
+    let (column, row) = (node % (mesh.across + 1), node / (mesh.across + 1));
+    let size_m = |count: usize, side_m: f64| count as f64 * side_m;
+    let longer_m = size_m(mesh.across, mesh.side_x_m).max(size_m(mesh.up, mesh.side_y_m));
+    match which {
+        0 => [1.0, size_m(column, mesh.side_x_m) / longer_m, size_m(row, mesh.side_y_m) / longer_m],
+        1 => [0.0, mesh.side_x_m / longer_m, 0.0],
+        2 => [0.0, 0.0, mesh.side_y_m / longer_m],
+        _ => [0.0; 3],
+    }
+}
