@@ -122,6 +122,9 @@ impl LimitReport<'_> {
                     "Median limit " b { (number(summary.median_m * 1e3)) " mm" } ", " (percent(summary.median_m))
                     " % of the length; mean " (number(summary.mean_m * 1e3)) " mm, smallest " (at(summary.best))
                     ", largest " (at(summary.worst)) "."
+                    @if let Some(words) = self.curve().not_told_in_words() {
+                        " Left out, because the readings do not tell the position there: " (words) "."
+                    }
                 }
             } @else {
                 li { "With this knowledge of the force the readings do not tell the position anywhere." }

@@ -304,6 +304,7 @@ fn json(limits: &Limits, setup: &Setup, arguments: &Arguments) -> impl Serialize
             "largest_mm": summary.worst.1 * 1e3,
             "largest_at_mm": in_mm(summary.worst.0),
             "positions_without": summary.without,
+            "share_without_percent": 100.0 * summary.without as f64 / limits.known.points.len() as f64,
         }
     };
     let at = |&position: &Position| {
@@ -376,7 +377,7 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
         line @ Extent::Line { .. } => print_line(limits, line)?,
         Extent::Plane { .. } => print_plane(limits)?,
     }
-    output::say(format!("\n{}", lightest_touch_in_words(limits)))?;
+    output::say(format!("{}\n{}", not_told_in_words(limits), lightest_touch_in_words(limits)))?;
     for warning in &limits.warnings {
         output::say(format!("\nwarning: {warning}\n  would help: {}", warning.help()))?;
     }
@@ -384,13 +385,13 @@ fn print(limits: &Limits, setup: &Setup, arguments: &Arguments) -> Result<(), Fa
 }
 
 fn print_line(limits: &Limits, extent: Extent) -> Result<(), Failure> {
-    let limit = |bound: Option<Bound>| figure(bound.map(|bound| bound.sd_position_m * 1e3));
+    let limit = |bound: Option<Bound>| limit_figure(bound.as_ref());
     let rows = limits.listed.iter().map(|&position| (position, limits.bounds_at(position)));
     let table = Table::from_rows(rows)
         .column("limit, mm", |(position, _)| extent.place_in_words(*position))
         .column("force known", |(_, [known, _])| limit(*known))
         .column("force unknown", |(_, [_, unknown])| limit(*unknown))
-        .column("force itself, N", |(_, [_, unknown])| figure(unknown.and_then(|bound| bound.sd_force_n)))
+        .column("force itself, N", |(_, [_, unknown])| told(unknown.and_then(|bound| bound.sd_force_n)))
         .column("lightest touch, N", |(position, _)| force_figure(limits.touch.forces_at(*position)[1]));
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
 }
@@ -408,7 +409,7 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
     for (force, name) in [(Force::Known, "force known"), (Force::Unknown, "force unknown")] {
         let cell = |position: Position| {
             let bound = limits.limit.bound_at(Contact { position, force_n: limits.force_n }, force);
-            figure(bound.map(|bound| bound.sd_position_m * 1e3))
+            limit_figure(bound.as_ref())
         };
         let table = Table::from_rows(rows.iter().copied()).column(format!("limit, mm, {name}"), |row| {
             row.first().map_or(String::new(), |at| format!("y {}", format_length_mm(at.y_m)))
@@ -423,6 +424,24 @@ fn print_plane(limits: &Limits) -> Result<(), Failure> {
         .into_iter()
         .fold(table, |t, name| t.column(name, |()| String::new()));
     output::say(summary_rows(limits).into_iter().fold(table, Table::row))
+}
+
+/// A limit in millimetres, or that the readings do not tell it.
+fn limit_figure(bound: Option<&Bound>) -> String {
+    told(bound.map(|bound| bound.sd_position_m * 1e3))
+}
+
+fn told(value: Option<f64>) -> String {
+    value.map_or_else(|| "not told".to_owned(), |value| figure(Some(value)))
+}
+
+/// What the limits over the surface leave out, because the readings do not tell it, in a line for each knowledge of the force.
+fn not_told_in_words(limits: &Limits) -> String {
+    let line = |(curve, name): (&LimitCurve, &str)| {
+        let words = curve.not_told_in_words()?;
+        Some(format!("\nforce {name}: not told, and left out of the limits over the surface, {words}\n"))
+    };
+    [(&limits.known, "known"), (&limits.unknown, "unknown")].into_iter().filter_map(line).collect()
 }
 
 /// A force with three digits; a dash for none.
@@ -440,6 +459,7 @@ fn lightest_touch_in_words(limits: &Limits) -> String {
     };
     let without = match surely.without {
         0 => String::new(),
+        1 => ", none at 1 position".to_owned(),
         without => format!(", none at {without} positions"),
     };
     format!(

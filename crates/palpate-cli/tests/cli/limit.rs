@@ -67,6 +67,58 @@ fn what_the_readings_do_not_tell_is_null() {
     assert!(limit(&one, &[]).contains("read the same"));
 }
 
+/// A beam of 24 m on three supports.
+const LONG_BEAM: &str = r#"
+[surface]
+kind = "beam"
+length = "24 m"
+width = "300 mm"
+thickness = "300 mm"
+youngs_modulus = "30 GPa"
+supports = [{ at = "0 m", kind = "simple" }, { at = "12 m", kind = "simple" }, { at = "24 m", kind = "simple" }]
+
+[sensors]
+measure = "deflection"
+positions = ["3 m", "6 m", "9 m", "15 m", "18 m"]
+noise = "10 um"
+
+[training]
+arrangement = "even"
+count = 20
+force = "1000 N"
+"#;
+
+#[test]
+fn over_a_support_an_unknown_force_is_not_told() {
+    let folder = folder(LONG_BEAM);
+    let table = said(&run(folder.path(), &["limit", "rig.toml", "--force", "1000 N", "--out", "report"]));
+    let row = table.lines().find(|line| line.starts_with("12000 mm")).unwrap();
+    assert_eq!(row.matches("not told").count(), 2, "{table}");
+    let words =
+        "not told, and left out of the limits over the surface, 1 of 399 positions, 0.3 %, at 12000 mm";
+    assert!(table.contains(&format!("force unknown: {words}")), "{table}");
+    let found = json(folder.path(), &["limit", "rig.toml", "--force", "1000 N"]);
+    assert_eq!(found["unknown_force"]["positions_without"], 1);
+    assert_ne!(found["unknown_force"]["least_at_mm"][0], 12000.0);
+    let middle = &found["positions"][4];
+    assert_eq!((&middle["x_mm"], &middle["unknown_force_mm"]), (&Value::from(12000.0), &Value::Null));
+    assert_eq!(middle["force_sd_n"], Value::Null);
+    let csv = fs::read_to_string(folder.path().join("report/limit.csv")).unwrap();
+    let row: Vec<&str> = csv.lines().find(|line| line.starts_with("12000,")).unwrap().split(',').collect();
+    assert!(!row[1].is_empty() && row[2].is_empty() && row[3].is_empty(), "{row:?}");
+    let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
+    assert!(page.contains("1 of 399 positions, 0.3 %, at 12000 mm"), "not in the report");
+}
+
+#[test]
+fn the_even_layout_of_a_design_keeps_off_the_support() {
+    let table = said(&run(folder(LONG_BEAM).path(), &["design", "sensors", "rig.toml", "--force", "1000 N"]));
+    let even = table.lines().find(|line| line.starts_with("even: ")).unwrap();
+    assert_eq!(even, "even: deflection 4000, 8000, 12060, 16000, 20000 mm");
+    let mean_limit = table.lines().find(|line| line.starts_with("even  ")).unwrap();
+    assert!(!mean_limit.contains('–'), "{table}");
+}
+
 #[test]
 fn a_dead_sensor_is_left_out() {
     let dead = Toml::parse(PAPER).add("sensors.dead", Array::from_iter([4]));

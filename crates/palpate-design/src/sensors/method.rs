@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::candidates::reads_something;
 use super::design::DesignCriterion;
 use super::design::{DesignError, MustHave, SensorOffer, Supply};
 use super::exchange::{Found, Search};
@@ -175,11 +176,36 @@ impl SensorProblem<'_> {
         let Some(offer) = design.offers.iter().position(is_free) else {
             return Ok(None);
         };
-        let sensors = even_positions(design.count, self.pool.extent)
+        let mut sensors: Vec<PlacedSensor> = even_positions(design.count, self.pool.extent)
             .into_iter()
             .map(|position| PlacedSensor { offer, position })
             .collect();
+        for i in 0..sensors.len() {
+            let Some(moved) = self.nearest_that_reads(&sensors, i) else { return Ok(None) };
+            sensors[i] = moved;
+        }
         self.judged(Method::Even, sensors).map(Some)
+    }
+
+    /// A sensor of a layout, moved to the nearest candidate that is no other sensor's place where it would read nothing, as on a support; of
+    /// two as near, the first. `None` where there is none.
+    fn nearest_that_reads(&self, sensors: &[PlacedSensor], which: usize) -> Option<PlacedSensor> {
+        let sensor = sensors[which];
+        let kind = self.pool.design.offers[sensor.offer].kind;
+        if reads_something(self.sensitivity.surface, kind, sensor.position) {
+            return Some(sensor);
+        }
+        let extent = self.pool.extent;
+        let is_free = |other: &&PlacedSensor| {
+            other.offer == sensor.offer && !sensors.iter().any(|taken| taken.is_same(other, extent))
+        };
+        let distance_m = |other: &PlacedSensor| other.position.distance_m(sensor.position);
+        self.pool
+            .sensors
+            .iter()
+            .filter(is_free)
+            .min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
+            .copied()
     }
 
     /// The setup's own layout.

@@ -109,6 +109,24 @@ impl LimitCurve {
         columns.map(|column| (column[0].position.x_m, mean(column))).collect()
     }
 
+    /// "1 of 399 positions, 0.3 %, at 12000 mm": those without a bound, in words; `None` where there is none.
+    pub fn not_told_in_words(&self) -> Option<String> {
+        const MOST_NAMED: usize = 3;
+        let places: Vec<String> = self
+            .points
+            .iter()
+            .filter(|point| point.bound.is_none())
+            .map(|point| self.extent.place_in_words(point.position))
+            .collect();
+        let (count, of) = (places.len(), self.points.len());
+        let share = format!("{count} of {of} positions, {:.1} %", 100.0 * count as f64 / of as f64);
+        match count {
+            0 => None,
+            1..=MOST_NAMED => Some(format!("{share}, at {}", places.join(", "))),
+            _ => Some(share),
+        }
+    }
+
     /// The curve in short; `None` where no position has a bound.
     pub fn summary(&self) -> Option<LimitSummary> {
         let mut bounds: Vec<(Position, Bound)> =

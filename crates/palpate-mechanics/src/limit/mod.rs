@@ -61,7 +61,12 @@ pub struct CramerRaoBound<'a> {
     model: Option<&'a dyn Surface>,
     channels: Vec<Channel>,
     responses: Responses<'a>,
+    /// Length of the whitened reading of a newton where all sensors read their most.
+    full_scale: f64,
 }
+
+/// Share of the full scale below which a contact, or a step of it by the length of the surface, changes readings by no more than rounding.
+const SILENT: f64 = 1e-9;
 
 /// A live sensor.
 #[derive(Clone)]
@@ -93,10 +98,19 @@ impl<'a> CramerRaoBound<'a> {
         let channel = |(sensor, sd): (&Sensor, Option<f64>)| {
             Some(Channel { kind: sensor.kind, sd: sd?, range: sensor.channel.range })
         };
-        let channels = layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
+        let channels: Vec<Channel> =
+            layout.sensors().iter().zip(layout.reading_sds()?).filter_map(channel).collect();
         surface.check_solution()?;
+        let scales: Vec<f64> =
+            channels.iter().map(|channel| surface.full_scale(channel.kind) / channel.sd).collect();
         let responses = Responses::new(surface, layout, watch)?;
-        Ok(Self { extent: surface.extent(), model: Some(surface), channels, responses })
+        Ok(Self {
+            extent: surface.extent(),
+            model: Some(surface),
+            channels,
+            responses,
+            full_scale: norm(&scales),
+        })
     }
 
     /// The limit of a surface without a model, from what each of its channels reads over the standard deviation of its noise, as a
@@ -135,7 +149,10 @@ impl<'a> CramerRaoBound<'a> {
         let responses: Vec<_> = whitened.into_iter().collect();
         let channel = Channel { kind: SensorKind::Raw, sd: 1.0, range: None };
         let channels = vec![channel; responses.len()];
-        Self { extent, model: None, channels, responses: Responses::BySensor(responses) }
+        let responses = Responses::BySensor(responses);
+        let largest = responses.readings(&Grid::over_surface(extent).positions, 1.0);
+        let full_scale = largest.iter().map(|readings| norm(readings)).fold(0.0, f64::max);
+        Self { extent, model: None, channels, responses, full_scale }
     }
 
     /// Work and memory of the limit of a surface read by `layout`, all over it and at so many other contacts.
@@ -165,9 +182,19 @@ impl<'a> CramerRaoBound<'a> {
     }
 
     /// The bound at a contact; `None` where the readings do not tell the position at all, which is where the Fisher
-    /// information is singular: no force, no sensor that notices, or a change of position that a change of force undoes.
+    /// information is singular to rounding: no force, no sensor that notices, or a change of position that a change of force undoes. Over a
+    /// support nothing is read, however hard the touch: a force that is not known, and a position with it, is not told.
     pub fn bound_at(&self, contact: Contact, force: Force) -> Option<Bound> {
         let Columns { force: by_force, along, across } = self.derivatives(contact);
+        let least = SILENT * self.full_scale;
+        let is_silent =
+            |by_place: &Vec<f64>| norm(by_place) * self.extent.length_m() <= least * contact.force_n;
+        if force == Force::Unknown && norm(&by_force) <= least
+            || is_silent(&along)
+            || across.as_ref().is_some_and(is_silent)
+        {
+            return None;
+        }
         match (force, across) {
             (Force::Known, None) => {
                 let [[xx]] = inverse_information([along])?;

@@ -9,7 +9,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
 use crate::contact::Position;
-use crate::surface::{Beam, Extent, InfluenceFunction, Plate};
+use crate::surface::{
+    Beam, BeamSection, BeamSupport, BeamSupportKind, Extent, InfluenceFunction, Plate, SupportedBeam,
+    SupportedBeamSpec,
+};
 use palpate_numerics::small::dot;
 
 /// The founding paper's beam.
@@ -35,6 +38,39 @@ fn bound(layout: &Layout) -> CramerRaoBound<'static> {
 
 fn warnings(layout: &Layout, force: Force) -> Vec<LimitWarning> {
     limit_warnings(&bound(layout), 3.0, force, Watch::NONE).unwrap()
+}
+
+#[test]
+fn over_a_support_an_unknown_force_is_not_told_and_left_out_of_the_summary() {
+    let simple = |at_m| BeamSupport { at_m, kind: BeamSupportKind::Simple };
+    let beam = SupportedBeam::new(SupportedBeamSpec {
+        length_m: 24.0,
+        youngs_modulus_pa: 30e9,
+        sections: vec![BeamSection { to_m: 24.0, width_m: 0.3, thickness_m: 0.3 }],
+        supports: vec![simple(0.0), simple(12.0), simple(24.0)],
+    })
+    .unwrap();
+    for kind in [SensorKind::Strain, SensorKind::Slope, SensorKind::Deflection] {
+        let layout = with_noise(Layout::even(kind, 6, 24.0), 1e-6);
+        let limit = CramerRaoBound::new(&beam, &layout).unwrap();
+        let at = |x_m, force| limit.bound_at(Contact { position: Position::along(x_m), force_n: 1e3 }, force);
+        assert_eq!(at(12.0, Force::Unknown), None, "{kind}");
+        assert!(at(12.0, Force::Known).is_some() && at(11.94, Force::Unknown).is_some(), "{kind}");
+        let curve = LimitCurve::over_surface(&limit, 1e3, Force::Unknown).unwrap();
+        let summary = curve.summary().unwrap();
+        assert_eq!(summary.without, 1);
+        assert_eq!(curve.not_told_in_words().unwrap(), "1 of 399 positions, 0.3 %, at 12000 mm");
+        // Beside the support the limit is the larger the nearer it is: the least is not over the support.
+        let beside = at(11.94, Force::Unknown).unwrap().sd_position_m;
+        assert!(summary.best.1 < beside && (summary.best.0.x_m - 12.0).abs() > 1.0, "{summary:?}");
+        // A zone of several positions around it is blind by its largest limit, not by the one position that has none.
+        let warnings = limit_warnings(&limit, 1e3, Force::Unknown, Watch::NONE).unwrap();
+        let told = |warning: &LimitWarning| match warning {
+            LimitWarning::Blind { zone, sd_m, .. } => zone.to.x_m - zone.from.x_m < 0.2 || sd_m.is_some(),
+            _ => true,
+        };
+        assert!(warnings.iter().all(told), "{}", words(&warnings));
+    }
 }
 
 /// The words of some warnings.

@@ -125,10 +125,14 @@ impl Survey<'_> {
     fn blind(&self) -> Vec<LimitWarning> {
         let extent = self.limit.extent;
         let bound_m = self.blind_from_m();
-        let size = |position: Position| self.sd_m(position, self.force).unwrap_or(f64::INFINITY);
+        let told = |position: Position| self.sd_m(position, self.force);
+        let size = |position: Position| told(position).unwrap_or(f64::INFINITY);
         let found = zones(extent, &self.grid, |position| size(position) > bound_m);
         let warning = |(zone, inside): (Zone, Vec<Position>)| {
-            let at = inside.into_iter().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
+            // Of a zone with few positions that are not told, as one over a support, the largest limit that is.
+            let (told, not): (Vec<_>, Vec<_>) = inside.into_iter().partition(|at| told(*at).is_some());
+            let most = if told.len() > not.len() { told } else { not };
+            let at = most.into_iter().max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
             let known = (self.force == Force::Unknown).then(|| self.sd_m(at, Force::Known)).flatten();
             Some(LimitWarning::Blind {
                 zone,
