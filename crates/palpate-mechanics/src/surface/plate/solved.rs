@@ -8,7 +8,7 @@ use ndarray::{Array1, Array2};
 use super::dissection::nested_dissection;
 use super::mesh::{Derivative, ElementStiffness, Mesh, NODE_DEGREES, element_stiffness};
 use super::rigid::{self, Motions, RigidMotions};
-use super::spec::{Edge, Edges, PlateSpec, PointSupportKind, Unsolvable, compliance_m_per_n};
+use super::spec::{Edge, Edges, MOST_IMBALANCE, PlateSpec, PointSupportKind, Unsolvable, compliance_m_per_n};
 use super::supports::SupportForces;
 use crate::contact::Position;
 use palpate_numerics::small::add_multiple;
@@ -45,9 +45,6 @@ struct Balance {
     /// Force and both moments of an edge on the plate, per unit of each unknown that has a part in them.
     by_edges: Vec<(usize, Motions)>,
 }
-
-/// Most of the load by which force and moments, over the longer side, may be out of balance.
-pub(super) const MOST_IMBALANCE: f64 = 1e-9;
 
 impl Solved {
     /// Sets up and factors the equations of a plate that was checked, and solves them for forces all over it.
@@ -111,7 +108,7 @@ impl Solved {
         let solved = self.swept(&loads.iter().map(each).collect::<Vec<_>>());
         let mut shapes: Vec<Shape> = solved.into_iter().map(Shape::held).collect();
         for (shape, load) in shapes.iter_mut().zip(loads) {
-            self.hold(shape, load, load.iter().copied());
+            self.hold(shape, load, &load.iter().copied());
         }
         for _ in 0..MOST_REFINEMENTS {
             let is_off = |shape: &Shape| shape.imbalance.is_nan() || shape.imbalance > REFINED_IMBALANCE;
@@ -127,7 +124,7 @@ impl Solved {
             for (((shape, load), residual), change) in off.iter_mut().zip(loads).zip(&residuals).zip(changes)
             {
                 let mut better = Shape::held(change);
-                self.hold(&mut better, load, residual.iter().copied().enumerate());
+                self.hold(&mut better, load, &residual.iter().copied().enumerate());
                 better.add(shape);
                 better.imbalance = self.imbalance(&better, load);
                 if better.imbalance < shape.imbalance {
@@ -184,8 +181,13 @@ impl Solved {
     }
 
     /// Adds what the point supports do to a shape that nothing but `acting` bent, and tells how far that is from balancing `load`.
-    fn hold(&self, shape: &mut Shape, load: &Functional, acting: impl Iterator<Item = (usize, f64)> + Clone) {
-        self.supports.hold(&self.unknowns, shape, &acting);
+    fn hold(
+        &self,
+        shape: &mut Shape,
+        load: &Functional,
+        acting: &(impl Iterator<Item = (usize, f64)> + Clone),
+    ) {
+        self.supports.hold(&self.unknowns, shape, acting);
         shape.imbalance = self.imbalance(shape, load);
     }
 

@@ -240,6 +240,9 @@ pub enum PlateError {
     },
 }
 
+/// Most of the load by which force and moments, over the longer side, may be out of balance.
+pub(super) const MOST_IMBALANCE: f64 = 1e-9;
+
 /// Error of a plate whose equations could not be solved.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unsolvable {
@@ -252,7 +255,7 @@ pub enum Unsolvable {
     /// Supports and edges do not balance a force.
     #[error(
         "under a force at {} the supports are {share:e} of it out of balance; it must be at most {:e}: take fewer elements, or numbers less far apart",
-        Point(*at), super::solved::MOST_IMBALANCE
+        Point(*at), MOST_IMBALANCE
     )]
     OutOfBalance {
         /// Force, or moment over the longer side, that is not balanced, as a share of the force.
